@@ -1,0 +1,209 @@
+"""The framer contract, and the mechanics that protocols share.
+
+A framer turns chunks into events. It is sans-I/O: it reads no clock; silence is told to it.
+Every framer obeys, and one shared property suite (tests/property/framer_contract.py) checks:
+
+1. Conservation: the octets of all events, in order, are exactly the octets fed.
+2. Cut invariance: the same octets and times, cut into other chunks, give the same events.
+3. Total: any octets, any times (backwards too): no exception, bounded memory, bounded delay.
+4. Resynchronisation: after any rubbish the next good frame is found.
+5. Provenance: each frame says how it was found and what was skipped.
+
+How time is read. The last octet of a chunk had ended by `chunk.time`; the octets before it stand back to back at line
+speed, so each has a *nominal* end. The true end lies in [nominal - slack, nominal], where the slack of an octet is
+at most `Timing.latency` and no more than the room before it. Silence between two octets is therefore
+
+    proved    when even the smallest reading of it reaches the limit:  gap - latency >= limit
+    possible  when the largest does:                                   gap + slack of the octet before >= limit
+
+`advance(now)` proves silence after the last octet the same way: an octet not yet delivered at `now` began no earlier
+than now - latency - one character. So what `advance` decides, the next octet would have decided too, and a saved
+capture (fed without `advance`) gives the same events as the live bus.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
+
+from dissectors.frame import Chunk, Event, LineError, Mark
+from dissectors.line import Timing
+
+
+class Framer(Protocol):
+    """Octets and times in, events out."""
+
+    protocol: str
+
+    def feed(self, chunk: Chunk) -> list[Event]:
+        """Take one read; give the events it completes, in order."""
+        ...
+
+    def advance(self, now: int) -> list[Event]:
+        """Say that no read returned up to `now` (ns); give what the silence completes."""
+        ...
+
+    def close(self) -> list[Event]:
+        """End of capture: give everything still held."""
+        ...
+
+    def deadline(self) -> int | None:
+        """When silence will mean something next (ns), or None when it never will."""
+        ...
+
+
+class Taken(NamedTuple):
+    """Octets taken out of a window; times as in `Frame`."""
+
+    octets: bytes
+    start: int
+    end: int
+    slack: int
+    marks: tuple[Mark, ...]
+
+
+@dataclass(slots=True)
+class _Run:
+    """Octets back to back: octet k of the run ends at max(floor, first_end + k * char)."""
+
+    index: int  # of its first octet in the window
+    first_end: int
+    floor: int  # no octet ends before the one before the run
+    gap: int  # nominal silence before its first octet
+    room: int  # slack of the octet before the run
+    slack: int  # of each of its octets
+
+
+class OctetWindow:
+    """Octets not yet given out, each with its nominal end, the silence before it, its slack and its line errors.
+
+    The octets of one chunk share one run, so the cost is by chunk, not by octet. Times that run backwards are read
+    as "no time passed".
+    """
+
+    __slots__ = ("_char", "_last_end", "_last_slack", "_latency", "_marks", "_runs", "octets", "timing")
+
+    def __init__(self, timing: Timing) -> None:
+        self.timing = timing
+        self.octets = bytearray()
+        self._char = timing.char
+        self._latency = timing.latency
+        self._last_end: int | None = None  # of the newest octet, also after it was taken
+        self._last_slack = timing.latency
+        self._runs: list[_Run] = []
+        self._marks: dict[int, LineError] = {}
+
+    def __len__(self) -> int:
+        return len(self.octets)
+
+    @property
+    def last_end(self) -> int | None:
+        """Nominal end of the newest octet ever appended, ns; None before the first."""
+        return self._last_end
+
+    def append(self, chunk: Chunk) -> None:
+        """Add the octets of a chunk."""
+        count = len(chunk.octets)
+        if not count:
+            return
+        index = len(self.octets)
+        first_end = chunk.time - (count - 1) * self._char
+        if self._last_end is None:  # nothing is known of the time before the first octet of a capture
+            gap, floor = _UNKNOWN, first_end - self._char
+        else:
+            floor = self._last_end
+            gap = max(0, first_end - self._char - floor)
+        slack = min(self._latency, gap + self._last_slack)
+        self._runs.append(_Run(index, first_end, floor, gap, self._last_slack, slack))
+        self.octets += chunk.octets
+        for mark in chunk.marks:
+            if 0 <= mark.offset < count:
+                self._marks[index + mark.offset] = mark.error
+        self._last_end = max(floor, first_end + (count - 1) * self._char)
+        self._last_slack = slack
+
+    def least_silence_before(self, chunk: Chunk) -> int | None:
+        """Smallest reading of the silence between the newest octet and a chunk not yet appended, ns."""
+        if self._last_end is None or not chunk.octets:
+            return None
+        return max(0, chunk.time - len(chunk.octets) * self._char - self._last_end - self._latency)
+
+    def least_silence_at(self, now: int) -> int | None:
+        """Smallest reading of the silence after the newest octet when nothing was read up to `now`, ns."""
+        if self._last_end is None:
+            return None
+        return max(0, now - self._char - self._last_end - self._latency)
+
+    def proves_silence(self, limit: int) -> int | None:
+        """The time from which `least_silence_at` reaches `limit` (ns); None before the first octet."""
+        if self._last_end is None:
+            return None
+        return self._last_end + limit + self._char + self._latency
+
+    def silence(self, index: int) -> tuple[int, int]:
+        """Smallest and largest reading of the silence before octet `index` of the window, ns.
+
+        Before the very first octet of a capture nothing is known: (0, 24 h).
+        """
+        run = self._run(index)
+        if run.index != index:
+            return 0, run.slack
+        if run.gap == _UNKNOWN:
+            return 0, _UNKNOWN
+        return max(0, run.gap - self._latency), run.gap + run.room
+
+    def start(self, index: int) -> int:
+        """Latest possible begin of octet `index`, ns."""
+        run = self._run(index)
+        before = self._end_in(run, index - 1) if index > run.index else run.floor
+        return max(self._end_in(run, index) - self._char, before)
+
+    def end(self, index: int) -> int:
+        """Nominal (latest) end of octet `index`, ns."""
+        return self._end_in(self._run(index), index)
+
+    def take(self, count: int) -> Taken:
+        """Remove and give the first `count` octets (1 … len)."""
+        start, end = self.start(0), self.end(count - 1)
+        slack = self._run(count - 1).slack
+        octets = bytes(self.octets[:count])
+        del self.octets[:count]
+        marks: tuple[Mark, ...] = ()
+        if self._marks:
+            marks = tuple(Mark(i, e) for i, e in sorted(self._marks.items()) if i < count)
+            self._marks = {i - count: e for i, e in self._marks.items() if i >= count}
+        self._drop_runs(count)
+        return Taken(octets, start, end, slack, marks)
+
+    def _drop_runs(self, count: int) -> None:
+        kept: list[_Run] = []
+        runs = self._runs
+        for position, run in enumerate(runs):
+            after = runs[position + 1].index if position + 1 < len(runs) else count + len(self.octets)
+            if after <= count:
+                continue
+            if run.index < count:  # cut inside: what is left stands directly after the octet before it
+                floor = self._end_in(run, count - 1)
+                first_end = run.first_end + (count - run.index) * self._char
+                kept.append(_Run(0, first_end, floor, 0, run.slack, run.slack))
+            else:
+                run.index -= count
+                kept.append(run)
+        self._runs = kept
+
+    def _run(self, index: int) -> _Run:
+        runs = self._runs
+        if runs[-1].index <= index:
+            return runs[-1]
+        return runs[bisect_right(runs, index, key=_index_of) - 1]
+
+    def _end_in(self, run: _Run, index: int) -> int:
+        return max(run.floor, run.first_end + (index - run.index) * self._char)
+
+
+_UNKNOWN = 86_400 * 1_000_000_000
+
+
+def _index_of(run: _Run) -> int:
+    return run.index

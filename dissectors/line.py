@@ -1,0 +1,89 @@
+"""Line settings ("19200,8E1"), character times and the gap rules that follow from them."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+NS_PER_S = 1_000_000_000
+
+_TOKEN = re.compile(r"(?P<baud>\d{2,8})(?:,(?P<data>[5-8])(?P<parity>[NEOMS])(?P<stop>1\.5|1|2))?", re.IGNORECASE)
+
+
+@dataclass(frozen=True, slots=True)
+class LineSettings:
+    """Baud rate and character format of a line.
+
+    `baud`: bit/s, 50 … 10 000 000. `data_bits` 5 … 8. `parity` one of N E O M S. `stop_bits` 1, 1.5 or 2.
+    """
+
+    baud: int = 9600
+    data_bits: int = 8
+    parity: str = "N"
+    stop_bits: float = 1
+
+    @classmethod
+    def parse(cls, token: str) -> LineSettings:
+        """Read "19200,8E1" or "19200" (then 8N1).
+
+        Raises ValueError with what was expected.
+        """
+        match = _TOKEN.fullmatch(token.strip())
+        if match is None:
+            raise ValueError(f"line settings {token!r}: expected BAUD,DPS such as 19200,8E1")
+        baud = int(match["baud"])
+        if not 50 <= baud <= 10_000_000:
+            raise ValueError(f"line settings {token!r}: baud rate {baud} is outside 50 … 10000000")
+        if match["data"] is None:
+            return cls(baud)
+        return cls(baud, int(match["data"]), match["parity"].upper(), float(match["stop"]))
+
+    def __str__(self) -> str:
+        return f"{self.baud},{self.data_bits}{self.parity}{self.stop_bits:g}"
+
+    @property
+    def bits_per_char(self) -> float:
+        """Bits on the wire for one character: start, data, parity, stop."""
+        return 1 + self.data_bits + (self.parity != "N") + self.stop_bits
+
+    @property
+    def char(self) -> int:
+        """Time of one character, ns, rounded down."""
+        return int(self.bits_per_char * NS_PER_S // self.baud)
+
+    def bits(self, count: float) -> int:
+        """Time of `count` bits, ns."""
+        return int(count * NS_PER_S // self.baud)
+
+
+@dataclass(frozen=True, slots=True)
+class Timing:
+    """A line and how far its times can be trusted.
+
+    `latency`: ns that adapter and host may hold an octet back (FTDI: latency timer + 1 ms); 0 for exact times.
+    """
+
+    line: LineSettings = LineSettings()
+    latency: int = 0
+
+    @property
+    def char(self) -> int:
+        """Time of one character, ns."""
+        return self.line.char
+
+    @property
+    def t15(self) -> int:
+        """Longest silence allowed inside an RTU frame, ns (Modbus over Serial Line V1.02, 2.5.1.1)."""
+        return self._chars(1.5, 750_000)
+
+    @property
+    def t35(self) -> int:
+        """Shortest silence between RTU frames, ns (same clause); fixed 1.75 ms above 19200 Bd.
+
+        Counted in characters as configured: a 10-bit character makes it shorter than the standard's 11-bit table,
+        which is what devices on such a line do.
+        """
+        return self._chars(3.5, 1_750_000)
+
+    def _chars(self, count: float, fixed: int) -> int:
+        return fixed if self.line.baud > 19200 else int(count * self.line.char)

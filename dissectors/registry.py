@@ -1,0 +1,79 @@
+"""The protocols: built-in ones and those that other packages bring (entry points, group `sniff485.dissectors`).
+
+A new protocol is one folder and one line in BUILT_IN. Nothing is imported before it is asked for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from importlib import import_module
+from importlib.metadata import entry_points
+from typing import Any
+
+from dissectors.frame import Frame, Header, Role
+from dissectors.framer import Framer
+from dissectors.line import Timing
+from dissectors.tracker import Tracker
+
+GROUP = "sniff485.dissectors"
+
+BUILT_IN: Mapping[str, str] = {
+    "modbus-rtu": "dissectors.modbus:RTU",
+    "modbus-ascii": "dissectors.modbus:ASCII",
+    "n2": "dissectors.n2:N2",
+    "mstp": "dissectors.bacnet:MSTP",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Dissector:
+    """Everything the application needs to know of one protocol.
+
+    `name`: as on the command line ("modbus-rtu"); `title`: for people.
+    `framer`, `tracker`: make a new one for a bus with the given timing.
+    `peek(frame)`: the quick look, total, a few µs.
+    `text(frame, header, role)`: one line for the frame list, without control characters, role as the tracker gave it.
+    `fields(frame, role)`: Wireshark field names (ours where it has none) to int, float or str, in frame order.
+    `packet(frame, role)`: the scapy packet, imported on first use; never raises, keeps what does not parse as Raw.
+    `default_line`: what such a bus normally runs ("19200,8E1").
+    """
+
+    name: str
+    title: str
+    framer: Callable[[Timing], Framer]
+    peek: Callable[[Frame], Header]
+    tracker: Callable[[Timing], Tracker]
+    text: Callable[[Frame, Header, Role], str]
+    fields: Callable[[Frame, Role], dict[str, int | float | str]]
+    packet: Callable[[Frame, Role], Any]
+    default_line: str = "9600,8N1"
+    extras: Mapping[str, Any] = field(default_factory=dict)
+
+
+class UnknownProtocol(LookupError):
+    """No such protocol; the message lists those there are."""
+
+
+def names() -> tuple[str, ...]:
+    """Names of all protocols, built-in first."""
+    plugged = sorted(point.name for point in entry_points(group=GROUP) if point.name not in BUILT_IN)
+    return (*BUILT_IN, *plugged)
+
+
+def get(name: str) -> Dissector:
+    """The protocol of that name. Raises UnknownProtocol."""
+    target = BUILT_IN.get(name)
+    if target is not None:
+        module, _, attribute = target.partition(":")
+        found = getattr(import_module(module), attribute)
+    else:
+        for point in entry_points(group=GROUP):
+            if point.name == name:
+                found = point.load()
+                break
+        else:
+            raise UnknownProtocol(f"protocol {name!r}: expected one of {', '.join(names())}")
+    if not isinstance(found, Dissector):
+        raise UnknownProtocol(f"protocol {name!r}: {found!r} is no Dissector")
+    return found
