@@ -1,1 +1,77 @@
+"""Capture files by suffix: one file a format, chosen here.
 
+`read(path)` gives a Capture (session, items in order, completeness), `create(path, session)` a CaptureWriter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from importlib import import_module
+from pathlib import Path
+from typing import Any, Protocol
+
+from sniff.session import Completeness, Item, Session
+
+
+class CaptureError(Exception):
+    """A file that cannot be read or written; the message names it, what is wrong and the way out."""
+
+
+class Capture(Protocol):
+    """A capture opened for reading."""
+
+    session: Session
+
+    def items(self) -> Iterator[Item]:
+        """Chunks and line events in order of time. A cut file ends early, without an exception."""
+        ...
+
+    def completeness(self) -> Completeness:
+        """Whether the file is whole (may need to have read it)."""
+        ...
+
+
+class CaptureWriter(Protocol):
+    """A capture opened for writing; a context manager. Every item is kept, or the writer says what it cannot keep."""
+
+    def write(self, item: Item) -> None:
+        """Add a chunk or line event, in order of time."""
+        ...
+
+    def close(self) -> None:
+        """Finish the file."""
+        ...
+
+    def __enter__(self) -> CaptureWriter: ...
+
+    def __exit__(self, *exc: object) -> None: ...
+
+
+READERS: dict[str, str] = {
+    ".cap.txt": "sniff.formats.text:read",
+    ".mcap": "sniff.recording.reader:read",
+}
+WRITERS: dict[str, str] = {
+    ".cap.txt": "sniff.formats.text:create",
+    ".mcap": "sniff.recording.writer:create",
+}
+
+
+def read(path: str | Path) -> Capture:
+    """Open a capture by its suffix. Raises CaptureError."""
+    found: Capture = _find(READERS, Path(path))(Path(path))
+    return found
+
+
+def create(path: str | Path, session: Session) -> CaptureWriter:
+    """Create a capture by its suffix. Raises CaptureError."""
+    made: CaptureWriter = _find(WRITERS, Path(path))(Path(path), session)
+    return made
+
+
+def _find(table: dict[str, str], path: Path) -> Any:
+    for suffix, target in table.items():
+        if path.name.lower().endswith(suffix):
+            module, _, attribute = target.partition(":")
+            return getattr(import_module(module), attribute)
+    raise CaptureError(f"{path}: unknown suffix; expected one of {' '.join(table)}")

@@ -1,0 +1,66 @@
+"""A mergeable histogram of durations with bounded memory and a stated precision."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from dataclasses import dataclass, field
+
+_STEPS = 32  # buckets per factor of two: a quantile is right to about 2 %
+
+
+@dataclass(slots=True)
+class Histogram:
+    """Counts of non-negative integers (ns) in logarithmic buckets; quantiles are right to ±1.1 %."""
+
+    buckets: Counter[int] = field(default_factory=Counter)
+    count: int = 0
+    total: int = 0
+    least: int | None = None
+    most: int | None = None
+
+    def add(self, value: int) -> None:
+        """Count one value; negative ones count as 0."""
+        value = max(0, value)
+        self.buckets[_bucket(value)] += 1
+        self.count += 1
+        self.total += value
+        self.least = value if self.least is None else min(self.least, value)
+        self.most = value if self.most is None else max(self.most, value)
+
+    def merge(self, other: Histogram) -> Histogram:
+        """Both together, as a new value."""
+        least = [value for value in (self.least, other.least) if value is not None]
+        most = [value for value in (self.most, other.most) if value is not None]
+        return Histogram(
+            self.buckets + other.buckets,
+            self.count + other.count,
+            self.total + other.total,
+            min(least, default=None),
+            max(most, default=None),
+        )
+
+    @property
+    def mean(self) -> float | None:
+        """Arithmetic mean, None without values."""
+        return self.total / self.count if self.count else None
+
+    def quantile(self, share: float) -> int | None:
+        """The value that `share` (0 … 1) of all values do not exceed; None without values."""
+        if not self.count or self.least is None or self.most is None:
+            return None
+        rank = max(1, math.ceil(share * self.count))
+        seen = 0
+        for bucket in sorted(self.buckets):
+            seen += self.buckets[bucket]
+            if seen >= rank:
+                return min(self.most, max(self.least, _middle(bucket)))
+        return self.most
+
+
+def _bucket(value: int) -> int:
+    return 0 if value < 1 else 1 + int(math.log2(value) * _STEPS)
+
+
+def _middle(bucket: int) -> int:
+    return 0 if bucket == 0 else int(2 ** ((bucket - 0.5) / _STEPS))

@@ -1,0 +1,74 @@
+"""How busy a bus is and how much of it is trouble, by second; mergeable."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from dissectors.frame import Frame
+from dissectors.line import NS_PER_S, LineSettings
+from sniff.engine import Row
+
+
+@dataclass(slots=True)
+class Second:
+    """One second of a bus. `busy`: ns with octets on the wire, as the octets' number gives it."""
+
+    busy: int = 0
+    octets: int = 0
+    frames: int = 0
+    damaged: int = 0
+    noise: int = 0  # octets
+
+
+@dataclass(slots=True)
+class Load:
+    """Totals, and the last seconds one by one (at most `KEPT_SECONDS` of them)."""
+
+    line: LineSettings
+    total: Second = field(default_factory=Second)
+    seconds: dict[int, Second] = field(default_factory=dict)
+    first: int | None = None  # ns
+    last: int | None = None
+
+    def add(self, row: Row) -> None:
+        """Count one row."""
+        event = row.event
+        self.first = event.start if self.first is None else min(self.first, event.start)
+        self.last = event.end if self.last is None else max(self.last, event.end)
+        second = self._second(event.end // NS_PER_S)
+        octets = len(event.octets)
+        for part in (self.total, second):
+            part.busy += octets * self.line.char
+            part.octets += octets
+            if isinstance(event, Frame):
+                part.frames += 1
+                part.damaged += not event.ok
+            else:
+                part.noise += octets
+
+    def _second(self, number: int) -> Second:
+        second = self.seconds.get(number)
+        if second is None:
+            second = self.seconds[number] = Second()
+            if len(self.seconds) > KEPT_SECONDS:
+                del self.seconds[min(self.seconds)]
+        return second
+
+    def share(self, over: int = 10) -> float:
+        """Bus load, 0 … 1, over the last `over` seconds up to the newest event."""
+        if self.last is None or self.first is None:
+            return 0.0
+        newest = self.last // NS_PER_S
+        numbers = range(max(newest - over + 1, self.first // NS_PER_S), newest + 1)
+        busy = sum(self.seconds[number].busy for number in numbers if number in self.seconds)
+        span = max(self.last - max(self.first, numbers.start * NS_PER_S), self.line.char)
+        return min(1.0, busy / span)
+
+    def overall(self) -> float:
+        """Bus load, 0 … 1, over the whole capture."""
+        if self.last is None or self.first is None or self.last <= self.first:
+            return 0.0
+        return min(1.0, self.total.busy / (self.last - self.first))
+
+
+KEPT_SECONDS = 86_400

@@ -1,0 +1,120 @@
+"""Who is on the bus and how each station fares; mergeable."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from dissectors.frame import Frame
+from dissectors.tracker import Transaction, Verdict
+from sniff.analysis.histogram import Histogram
+from sniff.engine import Row
+
+
+@dataclass(slots=True)
+class Node:
+    """One station. Times are ns; `damaged` counts frames to or from it that were not good."""
+
+    address: int
+    sent: int = 0  # frames from it
+    received: int = 0  # frames to it
+    damaged: int = 0
+    first: int | None = None
+    last: int | None = None
+    verdicts: Counter[Verdict] = field(default_factory=Counter)
+    kinds: Counter[str] = field(default_factory=Counter)
+    errors: Counter[str] = field(default_factory=Counter)
+    latency: Histogram = field(default_factory=Histogram)
+
+    @property
+    def asked(self) -> int:
+        """Transactions that expected an answer from it."""
+        return sum(self.verdicts[verdict] for verdict in EXPECTING)
+
+    @property
+    def unanswered(self) -> int:
+        """Those of them that got none in time."""
+        return self.verdicts[Verdict.NO_RESPONSE]
+
+    def merge(self, other: Node) -> Node:
+        """Both together, as a new value."""
+        times = [time for time in (self.first, other.first) if time is not None]
+        lasts = [time for time in (self.last, other.last) if time is not None]
+        return Node(
+            self.address,
+            self.sent + other.sent,
+            self.received + other.received,
+            self.damaged + other.damaged,
+            min(times, default=None),
+            max(lasts, default=None),
+            self.verdicts + other.verdicts,
+            self.kinds + other.kinds,
+            self.errors + other.errors,
+            self.latency.merge(other.latency),
+        )
+
+
+EXPECTING = (
+    Verdict.ANSWERED,
+    Verdict.RETRY,
+    Verdict.EXCEPTION,
+    Verdict.NO_RESPONSE,
+    Verdict.LATE,
+    Verdict.DAMAGED_ANSWER,
+)
+
+
+@dataclass(slots=True)
+class NodeTable:
+    """All stations of one bus by address."""
+
+    nodes: dict[int, Node] = field(default_factory=dict)
+
+    def add_row(self, row: Row) -> None:
+        """Count one frame (noise belongs to nobody)."""
+        if not isinstance(row.event, Frame) or row.header is None:
+            return
+        placement = row.placement
+        source = placement.source if placement is not None else row.header.source
+        destination = placement.destination if placement is not None else row.header.destination
+        for address, sends in ((source, True), (destination, False)):
+            if address is None:
+                continue
+            node = self._node(address)
+            node.sent += sends
+            node.received += not sends
+            node.damaged += not row.event.ok
+            node.first = row.event.start if node.first is None else node.first
+            node.last = row.event.end
+
+    def add_transaction(self, transaction: Transaction) -> None:
+        """Count one closed transaction."""
+        if transaction.station is None:
+            return
+        node = self._node(transaction.station)
+        node.verdicts[transaction.verdict] += 1
+        node.kinds[transaction.kind] += 1
+        if transaction.error:
+            node.errors[transaction.error] += 1
+        if transaction.latency is not None:
+            node.latency.add(transaction.latency.nominal)
+
+    def merge(self, other: NodeTable) -> NodeTable:
+        """Both together, as a new value."""
+        merged = dict(self.nodes)
+        for address, node in other.nodes.items():
+            merged[address] = merged[address].merge(node) if address in merged else node
+        return NodeTable(merged)
+
+    def __iter__(self) -> Iterator[Node]:
+        return iter(sorted(self.nodes.values(), key=lambda node: node.address))
+
+    def __len__(self) -> int:
+        return len(self.nodes)
+
+    def _node(self, address: int) -> Node:
+        node = self.nodes.get(address)
+        if node is None:
+            node = self.nodes[address] = Node(address)
+        return node

@@ -1,0 +1,142 @@
+"""What a capture says about itself: the session, the adapter and its limits, and what happened to the line.
+
+Frozen values without I/O; every source makes them, every format keeps as much of them as it can.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+
+from dissectors.frame import Chunk
+from dissectors.line import LineSettings, Timing
+
+
+@dataclass(frozen=True, slots=True)
+class Adapter:
+    """A serial adapter and what it allows to be known.
+
+    `latency`: ns that adapter and host may hold an octet back; `latency_from`: where that number is from, in words.
+    `reports`: line errors it can report ("parity", "framing", "break", "overrun"); None when nobody knows.
+    `detail`: what limits these reports, in words ("one flag covers a whole USB packet").
+    """
+
+    name: str = "unknown"
+    driver: str = ""
+    latency: int = 0
+    latency_from: str = "assumed"
+    reports: tuple[str, ...] | None = None
+    detail: str = ""
+    serial_number: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Session:
+    """One capture of one bus with one setting.
+
+    `port`: as the user named it. `protocol`: a registry name. `started`: ns since the Unix epoch at the anchor; all
+    chunk times are on the monotonic clock from there. `bus`: a short name for topics ("boiler-room").
+    """
+
+    port: str
+    line: LineSettings
+    protocol: str
+    started: int = 0
+    bus: str = "bus"
+    adapter: Adapter = field(default_factory=Adapter)
+    program: str = "sniff485"
+    notes: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def timing(self) -> Timing:
+        """The line with what the adapter allows."""
+        return Timing(self.line, self.adapter.latency)
+
+    def to_metadata(self) -> dict[str, str]:
+        """Flat text record of everything, for files."""
+        reports = self.adapter.reports
+        return {
+            "port": self.port,
+            "line": str(self.line),
+            "protocol": self.protocol,
+            "started_ns": str(self.started),
+            "bus": self.bus,
+            "program": self.program,
+            "adapter": self.adapter.name,
+            "adapter_driver": self.adapter.driver,
+            "adapter_latency_ns": str(self.adapter.latency),
+            "adapter_latency_from": self.adapter.latency_from,
+            "adapter_reports": "unknown" if reports is None else ",".join(reports),
+            "adapter_detail": self.adapter.detail,
+            "adapter_serial_number": self.adapter.serial_number,
+            **{f"note_{key}": value for key, value in self.notes.items()},
+        }
+
+    @classmethod
+    def from_metadata(cls, record: Mapping[str, str]) -> Session:
+        """Read what `to_metadata` wrote; total: what is missing or unreadable gets the default."""
+        reports = record.get("adapter_reports", "unknown")
+        try:
+            line = LineSettings.parse(record.get("line", ""))
+        except ValueError:
+            line = LineSettings()
+        return cls(
+            port=record.get("port", ""),
+            line=line,
+            protocol=record.get("protocol", "modbus-rtu"),
+            started=_integer(record.get("started_ns")),
+            bus=record.get("bus", "bus"),
+            adapter=Adapter(
+                name=record.get("adapter", "unknown"),
+                driver=record.get("adapter_driver", ""),
+                latency=max(0, _integer(record.get("adapter_latency_ns"))),
+                latency_from=record.get("adapter_latency_from", "assumed"),
+                reports=None if reports == "unknown" else tuple(name for name in reports.split(",") if name),
+                detail=record.get("adapter_detail", ""),
+                serial_number=record.get("adapter_serial_number", ""),
+            ),
+            program=record.get("program", ""),
+            notes={key[5:]: value for key, value in record.items() if key.startswith("note_")},
+        )
+
+
+def _integer(text: str | None) -> int:
+    try:
+        return int(text or 0)
+    except ValueError:
+        return 0
+
+
+class LineEventKind(Enum):
+    """What can happen to a line besides octets. Errors on single octets are marks of their chunk, not events."""
+
+    UNPLUGGED = "unplugged"
+    REPLUGGED = "replugged"
+    DROPPED = "dropped"  # octets that this host lost; `count` says how many, -1 unknown
+    CLOCK = "clock"  # wall clock stepped against the monotonic clock; `count` = new offset, ns
+    SETTINGS = "settings"  # line settings or protocol changed from here on; `text` = "line=19200,8E1"
+    ERRORS = "errors"  # errors that the driver counted without saying where; `count` of them, `text` = kind
+    NOTE = "note"
+
+
+@dataclass(frozen=True, slots=True)
+class LineEvent:
+    """Something that happened at a time (ns) on the capture's clock."""
+
+    time: int
+    kind: LineEventKind
+    text: str = ""
+    count: int = 0
+
+
+Item = Chunk | LineEvent
+"""What a capture is made of, in order of time."""
+
+
+@dataclass(frozen=True, slots=True)
+class Completeness:
+    """Whether a capture file is whole; `text` says in words where it ends and what is missing."""
+
+    whole: bool
+    text: str = "complete"
