@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
 
-from dissectors.frame import Frame, LineError, Role
 from dissectors.registry import Dissector
 from dissectors.tracker import Transaction, Verdict
 from sniff.analysis.load import Load
 from sniff.analysis.nodes import NodeTable
+from sniff.analysis.wording import describe, is_error
 from sniff.engine import Output, Row
 from sniff.session import LineEvent, Session
 
@@ -134,28 +134,3 @@ BAD_VERDICTS = frozenset(
         Verdict.DAMAGED_REQUEST,
     }
 )
-
-
-def is_error(row: Row) -> bool:
-    """Whether a row itself is trouble: noise, or a frame that is not good."""
-    return not isinstance(row.event, Frame) or not row.event.ok
-
-
-def describe(dissector: Dissector, row: Row) -> str:
-    """One line that says what a row is, free of control characters."""
-    event = row.event
-    if isinstance(event, Frame) and row.header is not None:
-        role = row.placement.role if row.placement is not None else Role.UNKNOWN
-        return dissector.text(event, row.header, role)
-    noise = event
-    count = len(noise.octets)
-    where = f"{noise.place.value} a frame" if noise.place.value != "between" else "between frames"  # type: ignore[union-attr]
-    return f"{count} octet{'s' if count != 1 else ''} of noise {where}: {noise.reason.value}"  # type: ignore[union-attr]
-
-
-def mark_names(error: LineError) -> str:
-    """Line errors of one octet in words: "parity", "parity or framing", "break"."""
-    names = [flag.name.lower() for flag in LineError if flag in error and flag.name]
-    if LineError.PARITY in error and LineError.FRAMING in error:
-        names = ["parity or framing", *(name for name in names if name not in {"parity", "framing"})]
-    return ", ".join(names)

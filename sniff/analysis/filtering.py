@@ -1,0 +1,301 @@
+"""The filter language of `show -Y` and of the terminal UI's `/`: Wireshark's grammar over our columns and fields.
+
+    dst == 3 && kind contains "write"          src in {1, 2, 5}        latency_ms > 50
+    !ok or verdict == no-response              modbus.func_code == 0x10   error matches "CRC|LRC"
+
+Names without a dot are columns (COLUMNS below), dotted names are fields as `show -T fields` lists them. A comparison
+with something that a frame does not have is false, also `!=`. A name alone is true when the frame has it and it is
+neither 0 nor empty. Pure.
+"""
+
+from __future__ import annotations
+
+import operator
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from dissectors.frame import Frame, Role
+from dissectors.registry import Dissector
+from dissectors.tracker import Transaction
+from sniff.analysis.wording import describe
+from sniff.engine import Row
+
+Value = int | float | str
+Predicate = Callable[[Row, Transaction | None], bool]
+Getter = Callable[[Row, Transaction | None], tuple[Value, ...]]
+
+
+class FilterError(ValueError):
+    """A filter that cannot be read: the message says what was expected, `column` (0 …) where."""
+
+    def __init__(self, message: str, column: int) -> None:
+        super().__init__(f"{message} at column {column + 1}")
+        self.column = column
+
+
+PREFIXES = ("mbrtu.", "mbascii.", "modbus.", "n2.", "mstp.", "bacnet.", "bacapp.", "profibus.")
+
+
+def _source(row: Row, _: Transaction | None) -> tuple[Value, ...]:
+    place, header = row.placement, row.header
+    found = place.source if place is not None else header.source if header is not None else None
+    return () if found is None else (found,)
+
+
+def _destination(row: Row, _: Transaction | None) -> tuple[Value, ...]:
+    place, header = row.placement, row.header
+    found = place.destination if place is not None else header.destination if header is not None else None
+    return () if found is None else (found,)
+
+
+def _of_header(name: str) -> Getter:
+    def get(row: Row, _: Transaction | None) -> tuple[Value, ...]:
+        found = getattr(row.header, name, None)
+        return () if found is None else (found,)
+
+    return get
+
+
+def _ok(row: Row, _: Transaction | None) -> tuple[Value, ...]:
+    return (int(isinstance(row.event, Frame) and row.event.ok),)
+
+
+def _role(row: Row, _: Transaction | None) -> tuple[Value, ...]:
+    if row.header is None:
+        return ()
+    return ((row.placement.role if row.placement is not None else row.header.role).value,)
+
+
+COLUMNS: dict[str, Getter] = {
+    "no": lambda row, _: (row.no,),
+    "src": _source,
+    "dst": _destination,
+    "addr": lambda row, tx: _source(row, tx) + _destination(row, tx),
+    "proto": lambda row, _: (row.header.protocol,) if row.header is not None else (),
+    "role": _role,
+    "kind": lambda row, _: (row.header.kind if row.header is not None else "noise",),
+    "func": _of_header("function"),
+    "register": _of_header("address"),
+    "count": _of_header("count"),
+    "ok": _ok,
+    "error": _of_header("error"),
+    "noise": lambda row, _: (int(not isinstance(row.event, Frame)),),
+    "found": lambda row, _: (row.event.found.value,) if isinstance(row.event, Frame) else (),
+    "damage": lambda row, _: (
+        (row.event.damage.value,) if isinstance(row.event, Frame) and row.event.damage is not None else ()
+    ),
+    "len": lambda row, _: (len(row.event.octets),),
+    "marks": lambda row, _: (len(row.event.marks),),
+    "tx": lambda row, _: (row.placement.tx,) if row.placement is not None else (),
+    "verdict": lambda _, tx: (tx.verdict.value,) if tx is not None else (),
+    "latency_ms": lambda _, tx: (tx.latency.nominal / 1e6,) if tx is not None and tx.latency is not None else (),
+    "attempt": lambda _, tx: (tx.attempt,) if tx is not None else (),
+    "hex": lambda row, _: (row.event.octets.hex(),),
+}
+ALIASES = {"frame.number": "no", "frame.len": "len", "tx.verdict": "verdict", "tx.latency_ms": "latency_ms"}
+FIELDS: tuple[str, ...] = (*COLUMNS, "text", *ALIASES)
+"""Names for completion; the dotted fields of the protocol come on top."""
+
+_COMPARE: dict[str, Callable[[Any, Any], bool]] = {
+    "==": operator.eq,
+    "!=": operator.ne,
+    ">=": operator.ge,
+    "<=": operator.le,
+    ">": operator.gt,
+    "<": operator.lt,
+}
+_WORDS = {"eq": "==", "ne": "!=", "ge": ">=", "le": "<=", "gt": ">", "lt": "<", "and": "&&", "or": "||", "not": "!"}
+_LEXER = re.compile(
+    r"\s*(?:(?P<op>==|!=|>=|<=|>|<|&&|\|\||!|\(|\)|\{|\}|,|~)"
+    r'|(?P<string>"(?:[^"\\]|\\.)*")'
+    r"|(?P<word>[A-Za-z0-9_.:+-]+))"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class _Token:
+    kind: str  # "op", "string", "word", "end"
+    text: str
+    column: int
+
+
+def compile_filter(text: str, dissector: Dissector) -> Predicate:
+    """Turn a filter into a test of a row with its transaction. An empty filter is always true. Raises FilterError."""
+    tokens = _lex(text)
+    if len(tokens) == 1:
+        return lambda row, tx: True
+    return _Parser(tokens, dissector).parse()
+
+
+def _lex(text: str) -> list[_Token]:
+    tokens: list[_Token] = []
+    position = 0
+    end = len(text.rstrip())
+    while position < end:
+        match = _LEXER.match(text, position)
+        if match is None or match.end() == position:
+            column = position + len(text[position:]) - len(text[position:].lstrip())
+            raise FilterError(f"unexpected {text[column : column + 1]!r}", column)
+        kind = match.lastgroup or "op"
+        found = match[kind]
+        if kind == "word" and found in _WORDS:
+            kind, found = "op", _WORDS[found]
+        tokens.append(_Token(kind, found, match.start(match.lastgroup or "op")))
+        position = match.end()
+    tokens.append(_Token("end", "", end))
+    return tokens
+
+
+class _Parser:
+    def __init__(self, tokens: list[_Token], dissector: Dissector) -> None:
+        self.tokens = tokens
+        self.dissector = dissector
+        self.at = 0
+        self.depth = 0
+
+    def parse(self) -> Predicate:
+        found = self._either()
+        if self._now.kind != "end":
+            raise FilterError(f"expected && or || before {self._now.text!r}", self._now.column)
+        return found
+
+    @property
+    def _now(self) -> _Token:
+        return self.tokens[self.at]
+
+    def _take(self, *texts: str) -> bool:
+        if self._now.kind == "op" and self._now.text in texts:
+            self.at += 1
+            return True
+        return False
+
+    def _either(self) -> Predicate:
+        parts = [self._both()]
+        while self._take("||"):
+            parts.append(self._both())
+        return parts[0] if len(parts) == 1 else lambda row, tx: any(part(row, tx) for part in parts)
+
+    def _both(self) -> Predicate:
+        parts = [self._not()]
+        while self._take("&&"):
+            parts.append(self._not())
+        return parts[0] if len(parts) == 1 else lambda row, tx: all(part(row, tx) for part in parts)
+
+    def _not(self) -> Predicate:
+        self.depth += 1
+        if self.depth > 200:
+            raise FilterError("too deeply nested", self._now.column)
+        try:
+            if self._take("!"):
+                inner = self._not()
+                return lambda row, tx: not inner(row, tx)
+            if self._take("("):
+                inner = self._either()
+                if not self._take(")"):
+                    raise FilterError("expected )", self._now.column)
+                return inner
+            return self._comparison()
+        finally:
+            self.depth -= 1
+
+    def _comparison(self) -> Predicate:
+        token = self._now
+        if token.kind == "string":
+            self.at += 1
+            return _contains(self._getter("text", token.column), _unquote(token.text))
+        if token.kind != "word":
+            raise FilterError("expected a name such as dst, kind or modbus.func_code", token.column)
+        get = self._getter(token.text, token.column)
+        self.at += 1
+        if self._now.kind == "op" and self._now.text in _COMPARE:
+            compare = _COMPARE[self._now.text]
+            self.at += 1
+            wanted = self._value()
+            return lambda row, tx: any(_compare(compare, found, wanted) for found in get(row, tx))
+        if (self._now.kind == "word" and self._now.text in {"contains", "matches", "in"}) or self._now.text == "~":
+            how = self._now.text
+            self.at += 1
+            if how == "in":
+                return self._among(get)
+            column = self._now.column
+            wanted_text = str(self._value())
+            return _contains(get, wanted_text) if how == "contains" else _matches(get, wanted_text, column)
+        return lambda row, tx: any(found not in (0, "") for found in get(row, tx))
+
+    def _among(self, get: Getter) -> Predicate:
+        if not self._take("{"):
+            raise FilterError("expected { after in", self._now.column)
+        values = [self._value()]
+        while not self._take("}"):
+            self._take(",")
+            values.append(self._value())
+        return lambda row, tx: any(_compare(operator.eq, found, wanted) for found in get(row, tx) for wanted in values)
+
+    def _value(self) -> Value:
+        token = self._now
+        if token.kind not in {"word", "string"}:
+            raise FilterError("expected a value", token.column)
+        self.at += 1
+        return _unquote(token.text) if token.kind == "string" else _literal(token.text)
+
+    def _getter(self, name: str, column: int) -> Getter:
+        dissector = self.dissector
+        name = ALIASES.get(name, name)
+        if name == "text":
+            return lambda row, _: (describe(dissector, row),)
+        if name in COLUMNS:
+            return COLUMNS[name]
+        if not name.startswith(PREFIXES):
+            raise FilterError(f"unknown name {name!r}; columns are {', '.join(COLUMNS)}, text", column)
+
+        def get(row: Row, _: Transaction | None) -> tuple[Value, ...]:
+            if not isinstance(row.event, Frame):
+                return ()
+            role = row.placement.role if row.placement is not None else Role.UNKNOWN
+            found = dissector.fields(row.event, role).get(name)
+            if isinstance(found, str) and "," in found:
+                return tuple(_literal(part) for part in found.split(","))
+            return () if found is None else (found,)
+
+        return get
+
+
+def _unquote(text: str) -> str:
+    return re.sub(r"\\(.)", r"\1", text[1:-1])
+
+
+def _literal(text: str) -> Value:
+    for read in (lambda: int(text, 0), lambda: int(text), lambda: float(text)):
+        try:
+            return read()
+        except ValueError:
+            continue
+    return {"true": 1, "false": 0}.get(text.lower(), text)
+
+
+def _compare(compare: Callable[[Any, Any], bool], found: Value, wanted: Value) -> bool:
+    if isinstance(found, str) and not isinstance(wanted, str):
+        number = _literal(found)
+        if isinstance(number, str):
+            return compare(found.lower(), str(wanted))
+        return compare(number, wanted)
+    if isinstance(found, str) and isinstance(wanted, str):
+        return compare(found.lower(), wanted.lower())
+    if isinstance(wanted, str):
+        return compare is operator.ne
+    return compare(found, wanted)
+
+
+def _contains(get: Getter, wanted: str) -> Predicate:
+    lowered = wanted.lower()
+    return lambda row, tx: any(lowered in str(found).lower() for found in get(row, tx))
+
+
+def _matches(get: Getter, pattern: str, column: int) -> Predicate:
+    try:
+        compiled = re.compile(pattern, re.IGNORECASE)
+    except re.error as error:
+        raise FilterError(f"regular expression: {error}", column) from None
+    return lambda row, tx: any(compiled.search(str(found)) is not None for found in get(row, tx))

@@ -1,0 +1,57 @@
+"""Rows in words, free of control characters. Pure."""
+
+from __future__ import annotations
+
+from dissectors.frame import Frame, LineError, Noise, Place, Role
+from dissectors.registry import Dissector
+from dissectors.tracker import Interval
+from sniff.engine import Row
+
+
+def describe(dissector: Dissector, row: Row) -> str:
+    """One line that says what a row is."""
+    event = row.event
+    if isinstance(event, Noise):
+        return describe_noise(event)
+    assert row.header is not None  # the engine peeks every frame
+    role = row.placement.role if row.placement is not None else row.header.role
+    return dissector.text(event, row.header, role if role is not Role.UNKNOWN else row.header.role)
+
+
+def describe_noise(noise: Noise) -> str:
+    """One line about octets that are no frame."""
+    count = len(noise.octets)
+    where = "between frames" if noise.place is Place.BETWEEN else f"{noise.place.value} a frame"
+    return f"{count} octet{'s' if count != 1 else ''} of noise {where}: {noise.reason.value}"
+
+
+def mark_names(error: LineError) -> str:
+    """Line errors of one octet: "parity", "parity or framing" (the driver did not tell), "break"."""
+    both = LineError.PARITY | LineError.FRAMING
+    names = ["parity or framing"] if both in error else []
+    names += [flag.name.lower() for flag in error if flag.name and not (both in error and flag in both)]
+    return ", ".join(names)
+
+
+def milliseconds(value: int) -> str:
+    """A duration in ns as milliseconds with the precision that is worth reading: "8.2 ms", "0.31 ms", "1250 ms"."""
+    ms = value / 1e6
+    return f"{ms:.0f} ms" if abs(ms) >= 100 else f"{ms:.1f} ms" if abs(ms) >= 1 else f"{ms:.2f} ms"
+
+
+def duration(interval: Interval) -> str:
+    """A duration with what the adapter allows: "38.0 ms (−0/+16 ms)"; "8.2 ms" when the times are exact."""
+    low, high = interval.nominal - interval.low, interval.high - interval.nominal
+    if not low and not high:
+        return milliseconds(interval.nominal)
+    return f"{milliseconds(interval.nominal)} (−{_short(low)}/+{_short(high)} ms)"
+
+
+def _short(value: int) -> str:
+    ms = value / 1e6
+    return f"{ms:.0f}" if ms >= 10 or ms == int(ms) else f"{ms:.1f}" if ms >= 0.1 else f"{ms:.2f}"
+
+
+def is_error(row: Row) -> bool:
+    """Whether a row itself is trouble: noise, or a frame that is not good."""
+    return not isinstance(row.event, Frame) or not row.event.ok
