@@ -1,1 +1,85 @@
+"""The command line: one command, one file a subcommand. Only the chosen subcommand is imported.
 
+Exit codes: 0 fine · 1 findings at or above --fail-on · 2 usage · 3 unreadable input · 4 port trouble · 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from importlib import import_module
+from types import ModuleType
+
+from sniff import __version__
+
+COMMANDS: dict[str, str] = {
+    "ports": "serial ports: adapter, driver, latency, what line errors they can report, who holds them",
+    "live": "listen to a port: terminal UI (frames as lines where there is no terminal); records",
+    "record": "listen to a port and record, without a UI",
+    "open": "terminal UI on captures",
+    "show": "frames of captures, one line each, or JSON, tree, hex, fields",
+    "info": "what is in a capture: times, counts, nodes, settings, completeness",
+    "convert": "one capture format into another, by suffix",
+    "demo": "a virtual RS-485 bus with simulated drives, through the real capture path",
+}
+"""Name → what it does, in the order of the help. Each is `sniff/cli/<name>.py`: `configure(parser)`, `run(args)`."""
+
+DESCRIPTION = """Passive RS-485 fieldbus sniffer and protocol analyzer: Modbus RTU and ASCII, Metasys N2, BACnet MS/TP.
+It listens; it never writes to a port."""
+
+EPILOG = """Start with `sniff485 demo`, then `sniff485 ports` and `sniff485 live PORT -s 19200,8E1 -p modbus-rtu`.
+Exit codes: 0 fine, 1 findings, 2 usage, 3 unreadable input, 4 port trouble, 130 interrupted."""
+
+
+class Failure(Exception):
+    """A command ends: one line for the user and an exit code."""
+
+    def __init__(self, message: str, code: int) -> None:
+        super().__init__(message)
+        self.code = code
+
+
+USAGE, UNREADABLE, PORT_TROUBLE, INTERRUPTED = 2, 3, 4, 130
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run one command; give its exit code."""
+    arguments = sys.argv[1:] if argv is None else argv
+    try:
+        return _run(arguments)
+    except Failure as failure:
+        print(f"sniff485: {failure}", file=sys.stderr)
+        return failure.code
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    except BrokenPipeError:  # the reader of our output went away (`| head`)
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+
+
+def _run(arguments: list[str]) -> int:
+    name = next((word for word in arguments if not word.startswith("-")), None)
+    parser = argparse.ArgumentParser(
+        prog="sniff485",
+        description=DESCRIPTION,
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action="version", version=f"sniff485 {__version__}")
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    chosen: ModuleType | None = None
+    for command, text in COMMANDS.items():
+        sub = commands.add_parser(
+            command,
+            help=text,
+            description=text[0].upper() + text[1:] + ".",
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+        if command == name:
+            chosen = import_module(f"sniff.cli.{command}")
+            sub.epilog = chosen.__doc__
+            chosen.configure(sub)
+    args = parser.parse_args(arguments)
+    assert chosen is not None  # argparse has refused anything else
+    return int(chosen.run(args))

@@ -1,0 +1,7 @@
+"""`python -m sniff`."""
+
+import sys
+
+from sniff.cli import main
+
+sys.exit(main())

@@ -1,0 +1,81 @@
+"""What is in a capture, counted: frames, noise, checks, verdicts, stations, load; mergeable. Pure."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+
+from dissectors.frame import Frame, LineError
+from dissectors.line import LineSettings
+from dissectors.tracker import Transaction, Verdict
+from sniff.analysis.histogram import Histogram
+from sniff.analysis.load import Load
+from sniff.analysis.nodes import NodeTable
+from sniff.analysis.wording import mark_names
+from sniff.engine import Output, Row
+from sniff.session import LineEvent, LineEventKind
+
+
+@dataclass(slots=True)
+class Summary:
+    """Counts over a whole capture or a stretch of one. Durations are ns."""
+
+    line: LineSettings
+    frames: int = 0
+    damaged: int = 0
+    noise: int = 0  # octets
+    octets: int = 0
+    kinds: Counter[str] = field(default_factory=Counter)
+    damages: Counter[str] = field(default_factory=Counter)
+    found: Counter[str] = field(default_factory=Counter)
+    marks: Counter[str] = field(default_factory=Counter)
+    verdicts: Counter[Verdict] = field(default_factory=Counter)
+    events: Counter[LineEventKind] = field(default_factory=Counter)
+    latency: Histogram = field(default_factory=Histogram)
+    nodes: NodeTable = field(default_factory=NodeTable)
+    load: Load = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.load = Load(self.line)
+
+    def add(self, output: Output) -> None:
+        """Count what the engine gave."""
+        for row in output.rows:
+            self._add_row(row)
+        for transaction in output.transactions:
+            self._add_transaction(transaction)
+
+    def add_line_event(self, event: LineEvent) -> None:
+        """Count something that happened to the line."""
+        self.events[event.kind] += 1
+
+    def _add_row(self, row: Row) -> None:
+        event = row.event
+        self.octets += len(event.octets)
+        self.load.add(row)
+        self.nodes.add_row(row)
+        for mark in event.marks:
+            self.marks[mark_names(mark.error & ~LineError.OVERRUN) or "overrun"] += 1
+        if not isinstance(event, Frame):
+            self.noise += len(event.octets)
+            return
+        self.frames += 1
+        self.found[event.found.value] += 1
+        if row.header is not None:
+            self.kinds[row.header.kind] += 1
+        if not event.ok:
+            self.damaged += 1
+            self.damages[event.damage.value if event.damage is not None else event.check.value] += 1
+
+    def _add_transaction(self, transaction: Transaction) -> None:
+        self.verdicts[transaction.verdict] += 1
+        self.nodes.add_transaction(transaction)
+        if transaction.latency is not None:
+            self.latency.add(transaction.latency.nominal)
+
+    @property
+    def seconds(self) -> float:
+        """From the first octet to the last."""
+        if self.load.first is None or self.load.last is None:
+            return 0.0
+        return (self.load.last - self.load.first) / 1e9

@@ -1,0 +1,167 @@
+"""Everything is computed from the octets in the file, with the settings in the file or those given by -s and -p."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from typing import Any
+
+from sniff.analysis.summary import Summary
+from sniff.analysis.wording import milliseconds
+from sniff.cli import arguments
+from sniff.cli.rows import iso
+from sniff.engine import Output
+from sniff.formats import Capture
+from sniff.reading import dissector_for, outputs
+from sniff.session import LineEvent, Session
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Options of `info`."""
+    arguments.add_files(parser)
+    arguments.add_line(parser)
+    parser.add_argument("--json", action="store_true", help="one JSON object a file")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Describe every capture in turn."""
+    for number, path in enumerate(args.files):
+        capture = arguments.open_capture(path)
+        session = arguments.settings_of(args, capture.session)
+        summary, events = _summarise(capture, session)
+        if args.json:
+            print(json.dumps(_as_json(path, capture, session, summary), ensure_ascii=False))
+            continue
+        if number:
+            print()
+        _print(path, capture, session, summary, events)
+    return 0
+
+
+def _summarise(capture: Capture, session: Session) -> tuple[Summary, list[LineEvent]]:
+    summary = Summary(session.line)
+    events: list[LineEvent] = []
+    for output in outputs(capture.items(), session):
+        if isinstance(output, Output):
+            summary.add(output)
+        else:
+            summary.add_line_event(output)
+            if len(events) < 1000:
+                events.append(output)
+    return summary, events
+
+
+def _as_json(path: str, capture: Capture, session: Session, summary: Summary) -> dict[str, Any]:
+    complete = capture.completeness()
+    return {
+        "file": path,
+        "complete": complete.whole,
+        "completeness": complete.text,
+        "first": iso(summary.load.first) if summary.load.first is not None else None,
+        "last": iso(summary.load.last) if summary.load.last is not None else None,
+        "seconds": summary.seconds,
+        "protocol": session.protocol,
+        "line": str(session.line),
+        "port": session.port,
+        "adapter": session.adapter.name,
+        "adapter_latency_ms": session.adapter.latency / 1e6,
+        "octets": summary.octets,
+        "frames": summary.frames,
+        "damaged": summary.damaged,
+        "noise_octets": summary.noise,
+        "load": summary.load.overall(),
+        "damages": dict(summary.damages),
+        "kinds": dict(summary.kinds),
+        "found": dict(summary.found),
+        "line_errors": dict(summary.marks),
+        "line_events": {kind.value: count for kind, count in summary.events.items()},
+        "verdicts": {verdict.value: count for verdict, count in summary.verdicts.items()},
+        "response_ms": {
+            name: None if value is None else value / 1e6
+            for name, value in (
+                ("least", summary.latency.least),
+                ("p50", summary.latency.quantile(0.5)),
+                ("p95", summary.latency.quantile(0.95)),
+                ("most", summary.latency.most),
+            )
+        },
+        "nodes": [
+            {
+                "address": node.address,
+                "sent": node.sent,
+                "received": node.received,
+                "damaged": node.damaged,
+                "asked": node.asked,
+                "verdicts": {verdict.value: count for verdict, count in node.verdicts.items()},
+                "errors": dict(node.errors),
+            }
+            for node in summary.nodes
+        ],
+    }
+
+
+def _print(path: str, capture: Capture, session: Session, summary: Summary, events: list[LineEvent]) -> None:
+    complete = capture.completeness()
+    adapter = session.adapter
+    print(f"{path}")
+    _line("file", complete.text if complete.whole else f"CUT: {complete.text}")
+    if summary.load.first is None or summary.load.last is None:
+        _line("content", "no octets")
+    else:
+        _line("from", iso(summary.load.first))
+        _line("to", f"{iso(summary.load.last)} ({_span(summary.seconds)})")
+    _line("protocol", f"{dissector_for(session).title}, {session.line}")
+    _line("port", session.port or "unknown")
+    _line(
+        "adapter", f"{adapter.name}; holds octets back up to {milliseconds(adapter.latency)} ({adapter.latency_from})"
+    )
+    reports = "unknown" if adapter.reports is None else ", ".join(adapter.reports) or "none (zero errors mean nothing)"
+    _line("reports", f"line errors: {reports}{'; ' + adapter.detail if adapter.detail else ''}")
+    _line("octets", f"{summary.octets}, {summary.noise} of them noise; bus load {summary.load.overall():.1%}")
+    _line("frames", f"{summary.frames}, {summary.damaged} damaged{_counts(summary.damages)}")
+    _line("found by", _listed(summary.found))
+    _line("kinds", _listed(summary.kinds))
+    if summary.marks:
+        _line("line errors", _listed(summary.marks))
+    verdicts = {verdict.value: count for verdict, count in summary.verdicts.items()}
+    _line("transactions", _listed(verdicts))
+    if summary.latency.count:
+        quantiles = (
+            ("p50", summary.latency.quantile(0.5)),
+            ("p95", summary.latency.quantile(0.95)),
+            ("max", summary.latency.most),
+        )
+        shown = ", ".join(f"{name} {milliseconds(value)}" for name, value in quantiles if value is not None)
+        bound = f" (each known to ±{milliseconds(adapter.latency)})" if adapter.latency else ""
+        _line("response", shown + bound)
+    for node in summary.nodes:
+        verdicts = {verdict.value: count for verdict, count in node.verdicts.items()}
+        _line(f"node {node.address}", f"{node.sent} frames from, {node.received} to; {_listed(verdicts)}")
+        if node.errors:
+            _line("", _listed(node.errors))
+    for event in events[:20]:
+        _line("event", f"{iso(event.time)} {event.kind.value} {event.text} {event.count or ''}".rstrip())
+    if len(events) > 20:
+        _line("event", f"and {sum(summary.events.values()) - 20} more")
+    sys.stdout.flush()
+
+
+def _line(name: str, text: str) -> None:
+    print(f"  {name:<13}{text}")
+
+
+def _span(seconds: float) -> str:
+    if seconds < 120:
+        return f"{seconds:.3f} s"
+    hours, rest = divmod(int(seconds), 3600)
+    return f"{hours} h {rest // 60} min {rest % 60} s"
+
+
+def _listed(counts: dict[str, int]) -> str:
+    ordered = sorted(counts.items(), key=lambda pair: -pair[1])
+    return ", ".join(f"{count} {name}" for name, count in ordered) or "none"
+
+
+def _counts(counts: dict[str, int]) -> str:
+    return f" ({_listed(counts)})" if counts else ""

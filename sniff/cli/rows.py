@@ -1,0 +1,125 @@
+"""Rows as the command line shows them: a line of text, a JSON object, chosen fields."""
+
+from __future__ import annotations
+
+import json
+from datetime import UTC, datetime
+from typing import Any
+
+from dissectors.frame import Frame, Role
+from dissectors.line import NS_PER_S
+from dissectors.registry import Dissector
+from sniff.analysis.wording import describe, duration
+from sniff.reading import Settled
+from sniff.session import Session
+
+GOOD_VERDICTS = {"answered", "broadcast", "data", "open"}
+
+
+def iso(time: int) -> str:
+    """ns since the epoch as ISO 8601 in UTC with nine decimals."""
+    seconds, rest = divmod(time, NS_PER_S)
+    try:
+        stamp = datetime.fromtimestamp(seconds, UTC)
+    except (OverflowError, ValueError, OSError):  # a hostile file's time
+        return f"{time} ns"
+    return f"{stamp:%Y-%m-%dT%H:%M:%S}.{rest:09d}Z"
+
+
+def to_json(item: Settled, dissector: Dissector, session: Session, with_fields: bool = False) -> dict[str, Any]:
+    """One object a frame; the keys and their order are a promise. Noise has null where it has no such thing."""
+    row, transaction = item.row, item.transaction
+    event, header, placement = row.event, row.header, row.placement
+    frame = event if isinstance(event, Frame) else None
+    latency = transaction.latency if transaction is not None else None
+    result: dict[str, Any] = {
+        "no": row.no,
+        "t": iso(event.start),
+        "start_ns": event.start - session.started,
+        "end_ns": event.end - session.started,
+        "proto": header.protocol if header else None,
+        "src": placement.source if placement else header.source if header else None,
+        "dst": placement.destination if placement else header.destination if header else None,
+        "role": role_of(item).value if header else None,
+        "kind": header.kind if header else "noise",
+        "ok": frame.ok if frame is not None else False,
+        "error": header.error if header else None,
+        "found": frame.found.value if frame is not None else None,
+        "noise_before": frame.skipped if frame is not None else 0,
+        "tx": placement.tx if placement else None,
+        "verdict": transaction.verdict.value if transaction is not None else None,
+        "latency_ms": round(latency.nominal / 1e6, 6) if latency is not None else None,
+        "text": describe(dissector, row),
+        "hex": event.octets.hex(),
+    }
+    if with_fields:
+        result["fields"] = fields_of(item, dissector)
+    return result
+
+
+def json_line(item: Settled, dissector: Dissector, session: Session, with_fields: bool = False) -> str:
+    """The object on one line of ASCII."""
+    return json.dumps(to_json(item, dissector, session, with_fields), separators=(", ", ": "), ensure_ascii=False)
+
+
+def role_of(item: Settled) -> Role:
+    """The role as the tracker decided it."""
+    if item.row.placement is not None:
+        return item.row.placement.role
+    return item.row.header.role if item.row.header is not None else Role.UNKNOWN
+
+
+def fields_of(item: Settled, dissector: Dissector) -> dict[str, int | float | str]:
+    """Wireshark's names (ours under frame. and tx.) to values."""
+    row, transaction = item.row, item.transaction
+    event = row.event
+    fields: dict[str, int | float | str] = {"frame.number": row.no, "frame.len": len(event.octets)}
+    if event.marks:
+        fields["line.marks"] = len(event.marks)
+    if transaction is not None:
+        fields["tx.id"] = transaction.id
+        fields["tx.verdict"] = transaction.verdict.value
+        fields["tx.attempt"] = transaction.attempt
+        if transaction.latency is not None:
+            fields["tx.latency_ms"] = transaction.latency.nominal / 1e6
+            fields["tx.latency_low_ms"] = transaction.latency.low / 1e6
+            fields["tx.latency_high_ms"] = transaction.latency.high / 1e6
+    if isinstance(event, Frame):
+        fields.update(dissector.fields(event, role_of(item)))
+    return fields
+
+
+def text_line(item: Settled, dissector: Dissector, session: Session, colour: bool = False) -> str:
+    """One line for people: number, seconds since the start, what it is, verdict and response time, doubts."""
+    row, transaction = item.row, item.transaction
+    seconds = (row.event.start - session.started) / NS_PER_S
+    notes: list[str] = []
+    bad = not isinstance(row.event, Frame) or not row.event.ok
+    if isinstance(row.event, Frame) and not row.event.ok and row.header is not None and row.header.error:
+        notes.append(f"DAMAGED ({row.header.error})")
+    if row.event.marks:
+        notes.append(f"{len(row.event.marks)} line error{'s' if len(row.event.marks) != 1 else ''}")
+    if transaction is not None and (transaction.response or transaction.request) == row.no:
+        if transaction.verdict.value not in GOOD_VERDICTS:
+            notes.append(transaction.verdict.value)
+            bad = True
+        if transaction.latency is not None:
+            notes.append(duration(transaction.latency))
+    text = describe(dissector, row)
+    if not isinstance(row.event, Frame):
+        shown = row.event.octets[:16].hex(" ").upper()
+        text = f"{text}: {shown}{' …' if len(row.event.octets) > 16 else ''}"
+    line = (
+        f"{row.no:>6} {seconds:12.6f} s  {'!' if bad else ' '} {text}{'  [' + '; '.join(notes) + ']' if notes else ''}"
+    )
+    return f"\x1b[31m{line}\x1b[0m" if colour and bad else line
+
+
+def hex_dump(octets: bytes) -> str:
+    """Sixteen octets a line: offset, hex, printable characters."""
+    lines = []
+    for offset in range(0, len(octets), 16):
+        part = octets[offset : offset + 16]
+        text = "".join(chr(octet) if 32 <= octet < 127 else "." for octet in part)
+        lines.append(f"        {offset:04x}  {part.hex(' '):<47}  {text}")
+    return "\n".join(lines)

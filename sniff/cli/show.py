@@ -1,0 +1,105 @@
+"""Filters (-Y) use columns and Wireshark's field names: `dst == 3 && kind contains "write"`, `modbus.func_code == 16`,
+`verdict in {no-response, late}`. Columns: no src dst addr role kind func register count ok error noise found damage
+len marks tx verdict latency_ms attempt text hex. Dotted names: see --fields.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import sys
+from collections.abc import Iterable
+
+from dissectors.frame import Frame
+from dissectors.registry import Dissector
+from sniff.analysis.filtering import FilterError, compile_filter
+from sniff.cli import USAGE, Failure, arguments, rows
+from sniff.reading import Settled, dissector_for, settled
+from sniff.session import Session
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Options of `show`."""
+    arguments.add_files(parser)
+    arguments.add_line(parser)
+    parser.add_argument("--json", action="store_true", help="one JSON object a frame")
+    parser.add_argument("--fields", action="store_true", help="with --json: add every field under Wireshark's names")
+    parser.add_argument("-V", dest="tree", action="store_true", help="full tree of each frame")
+    parser.add_argument("-x", dest="hex", action="store_true", help="octets of each frame")
+    parser.add_argument("-Y", dest="filter", metavar="FILTER", default="", help="only frames that match")
+    parser.add_argument("-T", dest="table", choices=["fields"], help="tab-separated fields, chosen by -e")
+    parser.add_argument("-e", dest="names", metavar="NAME", action="append", default=[], help="a field; repeatable")
+    parser.add_argument("-c", "--count", type=int, metavar="N", help="stop after N frames shown")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Show every capture in turn."""
+    if args.table and not args.names:
+        raise Failure("-T fields: say which with -e NAME (repeatable), for instance -e modbus.func_code", USAGE)
+    left = args.count
+    for path in args.files:
+        capture = arguments.open_capture(path)
+        session = arguments.settings_of(args, capture.session)
+        dissector = dissector_for(session)
+        left = _show(args, settled(capture.items(), session), session, dissector, left)
+        complete = capture.completeness()
+        if not complete.whole:
+            sys.stdout.flush()
+            print(f"sniff485: {path}: {complete.text}", file=sys.stderr)
+        if left == 0:
+            break
+    return 0
+
+
+def _show(
+    args: argparse.Namespace, items: Iterable[Settled], session: Session, dissector: Dissector, left: int | None
+) -> int | None:
+    try:
+        wanted = compile_filter(args.filter, dissector)
+    except FilterError as error:
+        raise Failure(f"filter {args.filter!r}: {error}", USAGE) from None
+    colour = arguments.colour()
+    writer = csv.writer(sys.stdout, delimiter="\t", lineterminator="\n", quoting=csv.QUOTE_MINIMAL)
+    for item in items:
+        if left == 0:
+            break
+        if not wanted(item.row, item.transaction):
+            continue
+        left = None if left is None else left - 1
+        if args.table:
+            writer.writerow(_cells(item, args.names, dissector, session))
+            continue
+        if args.json:
+            print(rows.json_line(item, dissector, session, args.fields))
+            continue
+        print(rows.text_line(item, dissector, session, colour))
+        if args.tree:
+            print(_tree(item, dissector))
+        if args.hex:
+            print(rows.hex_dump(item.row.event.octets))
+    return left
+
+
+def _cells(item: Settled, names: list[str], dissector: Dissector, session: Session) -> list[str]:
+    fields = rows.fields_of(item, dissector)
+    if any(name not in fields for name in names):
+        fields = {**rows.to_json(item, dissector, session), **fields}
+    return [_cell(fields.get(name)) for name in names]
+
+
+def _cell(value: object) -> str:
+    if value is None:
+        return ""
+    text = str(int(value)) if isinstance(value, bool) else str(value)
+    # A spreadsheet would run such a cell as a formula.
+    return "'" + text if isinstance(value, str) and text[:1] in "=+-@" else text
+
+
+def _tree(item: Settled, dissector: Dissector) -> str:
+    event = item.row.event
+    if not isinstance(event, Frame):
+        return f"        {event.place.value}: {event.reason.value}"
+    packet = dissector.packet(event, rows.role_of(item))
+    text = str(packet.show(dump=True))
+    lines = ["".join(c if c.isprintable() else "." for c in line) for line in text.splitlines()]
+    return "\n".join("        " + line for line in lines if line.strip())

@@ -1,0 +1,94 @@
+"""A saved capture through the engine: rows with their settled verdicts, in the order of the wire."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+
+from dissectors import registry
+from dissectors.frame import Chunk
+from dissectors.line import LineSettings
+from dissectors.registry import Dissector
+from dissectors.tracker import Transaction
+from sniff.engine import Engine, Output, Row
+from sniff.session import Item, LineEvent, Session
+
+HELD = 20_000
+"""Rows held back at most while waiting for the verdict of the oldest."""
+
+
+@dataclass(frozen=True, slots=True)
+class Settled:
+    """A row with the transaction it belongs to (None: noise, or never closed)."""
+
+    row: Row
+    transaction: Transaction | None
+
+
+class Settling:
+    """Holds rows until their transaction has closed, so that each can be shown with its verdict; keeps the order."""
+
+    def __init__(self) -> None:
+        self._rows: deque[Row] = deque()
+        self._closed: dict[int, Transaction] = {}
+
+    def add(self, output: Output) -> Iterator[Settled]:
+        """Take what the engine gave; give the rows that are settled by it."""
+        self._rows.extend(output.rows)
+        for transaction in output.transactions:
+            self._closed[transaction.id] = transaction
+        while self._rows and (len(self._rows) > HELD or self._is_settled(self._rows[0])):
+            yield self._pop()
+        if len(self._closed) > 4 * HELD:  # of those none older than this is asked for again
+            for key in sorted(self._closed)[: 2 * HELD]:
+                del self._closed[key]
+
+    def flush(self) -> Iterator[Settled]:
+        """Give all that is left."""
+        while self._rows:
+            yield self._pop()
+
+    def _is_settled(self, row: Row) -> bool:
+        return row.placement is None or row.placement.tx in self._closed
+
+    def _pop(self) -> Settled:
+        row = self._rows.popleft()
+        return Settled(row, None if row.placement is None else self._closed.get(row.placement.tx))
+
+
+def with_settings(session: Session, protocol: str | None = None, line: LineSettings | None = None) -> Session:
+    """The session with what the user says instead of what the file says."""
+    return replace(session, protocol=protocol or session.protocol, line=line or session.line)
+
+
+def outputs(items: Iterable[Item], session: Session) -> Iterator[Output | LineEvent]:
+    """Run items through a new engine; line events pass through at their place."""
+    engine = engine_for(session)
+    for item in items:
+        if isinstance(item, Chunk):
+            output = engine.feed(item)
+            if output:
+                yield output
+        else:
+            yield item
+    yield engine.close()
+
+
+def settled(items: Iterable[Item], session: Session) -> Iterator[Settled]:
+    """Run items through a new engine; give every row with its verdict."""
+    settling = Settling()
+    for output in outputs(items, session):
+        if isinstance(output, Output):
+            yield from settling.add(output)
+    yield from settling.flush()
+
+
+def dissector_for(session: Session) -> Dissector:
+    """The protocol of a session. Raises registry.UnknownProtocol."""
+    return registry.get(session.protocol)
+
+
+def engine_for(session: Session) -> Engine:
+    """A new engine for a session. Raises registry.UnknownProtocol."""
+    return Engine(dissector_for(session), session.timing)
