@@ -21,6 +21,7 @@ COMMANDS: dict[str, str] = {
     "show": "frames of captures, one line each, or JSON, tree, hex, fields",
     "info": "what is in a capture: times, counts, nodes, settings, completeness",
     "convert": "one capture format into another, by suffix",
+    "config": "where the configured buses and their values come from",
     "demo": "a virtual RS-485 bus with simulated drives, through the real capture path",
 }
 """Name → what it does, in the order of the help. Each is `sniff/cli/<name>.py`: `configure(parser)`, `run(args)`."""

@@ -1,0 +1,162 @@
+"""`sniff485.toml`: buses named once, so that `live boiler-room` knows port, line, protocol and devices.
+
+    [bus.boiler-room]
+    port = "/dev/ttyUSB0"
+    line = "19200,8E1"
+    protocol = "modbus-rtu"
+    record = "captures/boiler.mcap"
+
+    [bus.boiler-room.devices]
+    3 = "teco-e510"
+    "*" = "teco-e510"
+
+The first file found counts: in the working folder or one above it, then the user's configuration folder. Flags win
+over the file.
+"""
+
+from __future__ import annotations
+
+import difflib
+import os
+import re
+import sys
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from dissectors import registry
+from dissectors.line import LineSettings
+
+FILE = "sniff485.toml"
+BUS_KEYS = ("port", "line", "protocol", "record", "devices")
+TOP_KEYS = ("bus",)
+
+
+class ConfigError(Exception):
+    """A configuration that cannot be used; the message names file, line, key and the way out."""
+
+
+@dataclass(frozen=True, slots=True)
+class Bus:
+    """One bus of the configuration; None where the file is silent. `devices`: address (or "*") → profile."""
+
+    name: str
+    port: str | None = None
+    line: LineSettings | None = None
+    protocol: str | None = None
+    record: str | None = None
+    devices: Mapping[str, str] = field(default_factory=dict)
+    origin: Mapping[str, str] = field(default_factory=dict)  # key → "file:line"
+
+
+@dataclass(frozen=True, slots=True)
+class Config:
+    """All buses by name, and the file they are from (None: there is none)."""
+
+    path: Path | None
+    buses: Mapping[str, Bus]
+
+
+def candidates(start: Path) -> list[Path]:
+    """Where a configuration may be, nearest first."""
+    folders = [start, *start.parents]
+    if sys.platform == "win32":
+        user = Path(os.environ.get("APPDATA", Path.home()))
+    else:
+        user = Path(os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config")
+    return [folder / FILE for folder in folders] + [user / "sniff485" / FILE]
+
+
+def load(start: Path | None = None) -> Config:
+    """The first configuration found, or an empty one. Raises ConfigError."""
+    for path in candidates((start or Path.cwd()).resolve()):
+        if path.is_file():
+            return parse(path)
+    return Config(None, {})
+
+
+def parse(path: Path) -> Config:
+    """Read one configuration file. Raises ConfigError."""
+    try:
+        text = path.read_text(encoding="utf-8")
+        data = tomllib.loads(text)
+    except OSError as error:
+        raise ConfigError(f"{path}: {error.strerror}") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{path}: {error}") from None
+    reader = _Reader(path, text)
+    reader.check_keys(data, TOP_KEYS, "")
+    buses = reader.table(data.get("bus", {}), "bus")
+    return Config(path, {name: reader.bus(name, reader.table(entry, f"bus.{name}")) for name, entry in buses.items()})
+
+
+class _Reader:
+    def __init__(self, path: Path, text: str) -> None:
+        self.path = path
+        self.lines = text.splitlines()
+
+    def bus(self, name: str, entry: Mapping[str, Any]) -> Bus:
+        section = f"bus.{name}"
+        self.check_keys(entry, BUS_KEYS, section)
+        line, protocol = self.text(entry, "line", section), self.text(entry, "protocol", section)
+        try:
+            settings = LineSettings.parse(line) if line is not None else None
+        except ValueError as error:
+            raise self.error("line", section, str(error)) from None
+        if protocol is not None and protocol not in (*registry.names(), "auto"):
+            raise self.error("protocol", section, f"unknown protocol {protocol!r}{nearest(protocol, registry.names())}")
+        devices = self.table(entry.get("devices", {}), f"{section}.devices")
+        return Bus(
+            name,
+            self.text(entry, "port", section),
+            settings,
+            protocol,
+            self.text(entry, "record", section),
+            {str(key): str(value) for key, value in devices.items()},
+            {key: f"{self.path}:{self.line_of(key, section)}" for key in entry},
+        )
+
+    def text(self, entry: Mapping[str, Any], key: str, section: str) -> str | None:
+        value = entry.get(key)
+        if value is not None and not isinstance(value, str):
+            raise self.error(key, section, f"expected a text in quotes, not {value!r}")
+        return value
+
+    def table(self, value: Any, name: str) -> Mapping[str, Any]:
+        if not isinstance(value, dict):
+            raise self.error(name.rpartition(".")[2], name.rpartition(".")[0], f"expected a table [{name}]")
+        return value
+
+    def check_keys(self, entry: Mapping[str, Any], known: tuple[str, ...], section: str) -> None:
+        for key in entry:
+            if key not in known:
+                raise self.error(key, section, f"unknown key {key!r}{nearest(key, known)}")
+
+    def error(self, key: str, section: str, what: str) -> ConfigError:
+        return ConfigError(
+            f"{self.path}:{self.line_of(key, section)}: [{section}] {what}"
+            if section
+            else f"{self.path}:{self.line_of(key, section)}: {what}"
+        )
+
+    def line_of(self, key: str, section: str) -> int:
+        """Number of the line where a key stands (1 when it cannot be found: dotted or inline forms)."""
+        inside = not section
+        for number, line in enumerate(self.lines, 1):
+            header = re.match(r"\s*\[([^\]]+)\]", line)
+            if header is not None:
+                name = header[1].replace('"', "").replace(" ", "")
+                inside = name == section
+                if name == (f"{section}.{key}" if section else key):
+                    return number
+            elif inside and re.match(rf"\s*[\"']?{re.escape(key)}[\"']?\s*[=.]", line):
+                return number
+        return 1
+
+
+def nearest(word: str, known: tuple[str, ...]) -> str:
+    """ "; did you mean 'line'?" or the list of what there is."""
+    close = difflib.get_close_matches(word, known, 1, 0.5)
+    return f"; did you mean {close[0]!r}?" if close else f"; known: {', '.join(known)}"
