@@ -1,0 +1,35 @@
+"""Histograms: precise to 2 %, and the whole is the merge of its parts."""
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sniff.analysis.histogram import Histogram
+
+durations = st.lists(st.integers(0, 10**12), min_size=1, max_size=200)
+
+
+def filled(values: list[int]) -> Histogram:
+    histogram = Histogram()
+    for value in values:
+        histogram.add(value)
+    return histogram
+
+
+@given(durations, st.floats(0, 1))
+def test_a_quantile_is_right_to_two_percent(values: list[int], share: float) -> None:
+    import math
+
+    exact = sorted(values)[max(1, math.ceil(share * len(values))) - 1]
+    found = filled(values).quantile(share)
+    assert found is not None
+    assert abs(found - exact) <= max(2, exact * 0.022)
+
+
+@given(durations, durations)
+def test_merging_is_the_same_as_counting_all(left: list[int], right: list[int]) -> None:
+    assert filled(left).merge(filled(right)) == filled(left + right)
+
+
+def test_nothing_counted_has_no_quantile() -> None:
+    assert Histogram().quantile(0.5) is None
+    assert Histogram().mean is None

@@ -1,0 +1,51 @@
+"""sniff485.toml: buses by name, and errors that say where."""
+
+from pathlib import Path
+
+import pytest
+
+from sniff.config import ConfigError, load, parse
+
+
+def write(folder: Path, text: str) -> Path:
+    path = folder / "sniff485.toml"
+    path.write_text(text)
+    return path
+
+
+def test_a_bus_has_its_values_and_their_lines(tmp_path: Path) -> None:
+    path = write(
+        tmp_path,
+        '[bus.boiler-room]\nport = "/dev/ttyUSB0"\nline = "19200,8E1"\n\n[bus.boiler-room.devices]\n3 = "teco-e510"\n',
+    )
+    bus = parse(path).buses["boiler-room"]
+    assert (bus.port, str(bus.line), bus.protocol) == ("/dev/ttyUSB0", "19200,8E1", None)
+    assert bus.devices == {"3": "teco-e510"}
+    assert bus.origin["line"] == f"{path}:3"
+    assert bus.origin["devices"] == f"{path}:5"
+
+
+def test_the_folder_above_counts(tmp_path: Path) -> None:
+    write(tmp_path, '[bus.a]\nport = "x"\n')
+    inner = tmp_path / "one" / "two"
+    inner.mkdir(parents=True)
+    assert load(inner).buses["a"].port == "x"
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ('[bus.a]\nlnie = "9600"\n', ":2: [bus.a] unknown key 'lnie'; did you mean 'line'?"),
+        ('[bus.a]\n\nline = "fast"\n', ":3: [bus.a] line settings 'fast'"),
+        ('[bus.a]\nprotocol = "modbusrtu"\n', ":2: [bus.a] unknown protocol 'modbusrtu'; did you mean 'modbus-rtu'?"),
+        ("[bus.a]\nport = 3\n", ":2: [bus.a] expected a text in quotes, not 3"),
+        ("[buss.a]\n", "unknown key 'buss'; did you mean 'bus'?"),
+        ("bus = 1\n", "expected a table [bus]"),
+        ("[bus.a\n", "sniff485.toml: "),
+    ],
+)
+def test_a_mistake_is_named_with_its_place(tmp_path: Path, text: str, expected: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        parse(write(tmp_path, text))
+    assert expected in str(caught.value)
+    assert "\n" not in str(caught.value)
