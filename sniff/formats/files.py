@@ -1,0 +1,83 @@
+"""Opening capture files: errors in words, and new files that take their name only when they are whole."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import stat
+from pathlib import Path
+from typing import BinaryIO
+
+from sniff.formats import CaptureError
+
+WAYS_OUT = {
+    FileNotFoundError: "no such file",
+    IsADirectoryError: "a directory, not a capture; name a file in it",
+    PermissionError: "permission denied; ask its owner, or copy it",
+    FileExistsError: "exists already; choose another name or remove it",
+}
+
+
+def explain(path: str | Path, error: OSError) -> CaptureError:
+    """An error of the operating system as one line with the way out."""
+    for kind, words in WAYS_OUT.items():
+        if isinstance(error, kind):
+            return CaptureError(f"{path}: {words}")
+    return CaptureError(f"{path}: {error.strerror or error}")
+
+
+def open_capture(path: Path) -> BinaryIO:
+    """Open a file for reading. Raises CaptureError."""
+    try:
+        return open(path, "rb")
+    except OSError as error:
+        raise explain(path, error) from None
+
+
+class NewFile:
+    """A file written beside its final name and renamed on `close`, so that a half-written one never replaces a good
+    one, and a file can be converted onto itself. What is no regular file (a pipe, /dev/stdout) is written directly.
+
+    Everything raises CaptureError.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._target = Path(os.path.realpath(path))
+        self._temporary: Path | None = self._target.with_name(f".{self._target.name}.{os.getpid()}.tmp")
+        try:
+            if self._target.is_dir():
+                raise IsADirectoryError
+            if self._target.exists() and not stat.S_ISREG(self._target.stat().st_mode):
+                self._temporary = None
+            self.stream: BinaryIO = open(self._temporary or self._target, "wb")  # noqa: SIM115
+        except FileNotFoundError:
+            raise CaptureError(f"{path}: no such directory; create {self._target.parent} first") from None
+        except OSError as error:
+            raise explain(path, error) from None
+
+    def write(self, octets: bytes) -> None:
+        """Append."""
+        try:
+            self.stream.write(octets)
+        except OSError as error:
+            raise explain(self.path, error) from None
+
+    def close(self) -> None:
+        """Write out and take the final name; again is harmless."""
+        if self.stream.closed:
+            return
+        try:
+            self.stream.close()
+            if self._temporary is not None:
+                os.replace(self._temporary, self._target)
+        except OSError as error:
+            self.discard()
+            raise explain(self.path, error) from None
+
+    def discard(self) -> None:
+        """Give the file up; what had the name before stays."""
+        with contextlib.suppress(OSError):
+            self.stream.close()
+        if self._temporary is not None:
+            self._temporary.unlink(missing_ok=True)
