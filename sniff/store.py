@@ -7,9 +7,12 @@ second). Nothing here touches the capture: pausing a view never does.
 from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
+from collections import Counter
 
+from dissectors.frame import LineError
 from dissectors.registry import Dissector
 from dissectors.tracker import Transaction, Verdict
+from sniff.analysis.histogram import Histogram
 from sniff.analysis.load import Load
 from sniff.analysis.nodes import NodeTable
 from sniff.analysis.wording import describe, is_error
@@ -34,7 +37,11 @@ class Store:
         self.line_events: list[LineEvent] = []
         self.nodes = NodeTable()
         self.load = Load(session.line)
+        self.error_total = 0  # like `errors`, with those that were dropped
+        self.marks: Counter[LineError] = Counter()  # octets by the line errors reported on them
+        self.gaps = Histogram()  # silence between one row and the next, ns
         self.dropped_rows = 0
+        self.dropped_transactions = 0
         self.version = 0  # changes whenever anything changed
 
     # -- writing -----------------------------------------------------------------------------------------------
@@ -45,11 +52,16 @@ class Store:
             return
         self.version += 1
         for row in output.rows:
+            if self.rows:
+                self.gaps.add(row.event.start - self.rows[-1].event.end)
             self.rows.append(row)
             self.load.add(row)
             self.nodes.add_row(row)
+            for mark in row.event.marks:
+                self.marks[mark.error] += 1
             if is_error(row):
                 self.errors.append(row.no)
+                self.error_total += 1
         for transaction in output.transactions:
             self._close(transaction)
         if len(self.rows) > self.keep * 1.1:
@@ -69,15 +81,22 @@ class Store:
             position = bisect_left(self.errors, no or 0)
             if no is not None and self.errors[position : position + 1] != [no]:
                 self.errors.insert(position, no)
+                self.error_total += 1
 
     def _drop(self, count: int) -> None:
         del self.rows[:count]
         self.dropped_rows += count
         first = self.first_no
         del self.errors[: bisect_left(self.errors, first)]
-        alive = {row.placement.tx for row in self.rows if row.placement is not None}
-        self.transactions = {key: value for key, value in self.transactions.items() if key in alive}
-        self.closed = [key for key in self.closed if key in alive]
+        gone = 0
+        for key in self.closed:
+            transaction = self.transactions.get(key)
+            if transaction is not None and max(transaction.request or 0, transaction.response or 0) >= first:
+                break
+            self.transactions.pop(key, None)
+            gone += 1
+        del self.closed[:gone]
+        self.dropped_transactions += gone
 
     # -- reading -----------------------------------------------------------------------------------------------
 
@@ -88,6 +107,21 @@ class Store:
     def first_no(self) -> int:
         """Number of the oldest row kept (1 when there is none)."""
         return self.rows[0].no if self.rows else 1
+
+    @property
+    def last_no(self) -> int:
+        """Number of the newest row (0 when there never was one)."""
+        return self.rows[-1].no if self.rows else 0
+
+    def closed_by_no(self, no: int) -> Transaction | None:
+        """The transaction that closed as number `no` (from 1, without holes), None when dropped or not yet."""
+        index = no - 1 - self.dropped_transactions
+        return self.transactions.get(self.closed[index]) if 0 <= index < len(self.closed) else None
+
+    @property
+    def last_closed(self) -> int:
+        """How many transactions have closed, with those dropped."""
+        return self.dropped_transactions + len(self.closed)
 
     def by_no(self, no: int) -> Row | None:
         """The row of that number, None when it was dropped or never was."""
