@@ -1,1 +1,37 @@
+"""Metasys N2 (N2 Open): the field bus of Johnson Controls, `>` … CR and `A`/`N` … CR. README.md draws the frames."""
 
+from __future__ import annotations
+
+from typing import Any
+
+from dissectors.frame import Frame, Role
+from dissectors.n2.fields import fields
+from dissectors.n2.framing import N2Framer
+from dissectors.n2.header import peek
+from dissectors.n2.interpretation import Interpretation, interpret
+from dissectors.n2.text import text
+from dissectors.n2.tracker import N2Tracker
+from dissectors.registry import Dissector
+
+__all__ = ["N2", "Interpretation", "N2Framer", "N2Tracker", "fields", "interpret", "packet", "peek", "text"]
+
+
+def packet(frame: Frame, role: Role) -> Any:
+    """The scapy packet of a frame; scapy is imported on first use."""
+    from dissectors.n2.packets import dissect
+
+    return dissect(frame.octets)
+
+
+N2 = Dissector(
+    name="n2",
+    title="Metasys N2",
+    framer=N2Framer,
+    peek=peek,
+    tracker=N2Tracker,
+    text=text,
+    fields=fields,
+    packet=packet,
+    default_line="9600,8N1",
+    extras={"interpret": interpret},
+)
