@@ -16,9 +16,12 @@ at most `Timing.latency` and no more than the room before it. Silence between tw
     proved    when even the smallest reading of it reaches the limit:  gap - latency >= limit
     possible  when the largest does:                                   gap + slack of the octet before >= limit
 
-`advance(now)` proves silence after the last octet the same way: an octet not yet delivered at `now` began no earlier
-than now - latency - one character. So what `advance` decides, the next octet would have decided too, and a saved
-capture (fed without `advance`) gives the same events as the live bus.
+`advance(now)` proves silence after the last octet the same way. An octet not yet delivered at `now` ends no earlier
+than now - latency. It may come as the first of a long read, which puts its nominal end that early, and the smallest
+reading of its silence is one latency earlier still: hence twice the latency in `least_silence_at`. So what `advance`
+decides, the next octet would have decided too, and a saved capture (fed without `advance`) gives the same events as
+the live bus. Two things are asked of the caller: `Timing.latency` is a true upper bound, and `now` is a time up to
+which the *reader* vouches that it has handed over everything it read, not the clock of the process that decodes.
 """
 
 from __future__ import annotations
@@ -119,7 +122,8 @@ class OctetWindow:
         self.octets += chunk.octets
         for mark in chunk.marks:
             if 0 <= mark.offset < count:
-                self._marks[index + mark.offset] = mark.error
+                at = index + mark.offset
+                self._marks[at] = self._marks[at] | mark.error if at in self._marks else mark.error
         self._last_end = max(floor, first_end + (count - 1) * self._char)
         self._last_slack = slack
 
@@ -133,13 +137,13 @@ class OctetWindow:
         """Smallest reading of the silence after the newest octet when nothing was read up to `now`, ns."""
         if self._last_end is None:
             return None
-        return max(0, now - self._char - self._last_end - self._latency)
+        return max(0, now - self._char - self._last_end - 2 * self._latency)
 
     def proves_silence(self, limit: int) -> int | None:
         """The time from which `least_silence_at` reaches `limit` (ns); None before the first octet."""
         if self._last_end is None:
             return None
-        return self._last_end + limit + self._char + self._latency
+        return self._last_end + limit + self._char + 2 * self._latency
 
     def silence(self, index: int) -> tuple[int, int]:
         """Smallest and largest reading of the silence before octet `index` of the window, ns.
@@ -152,6 +156,11 @@ class OctetWindow:
         if run.gap == _UNKNOWN:
             return 0, _UNKNOWN
         return max(0, run.gap - self._latency), run.gap + run.room
+
+    def gap(self, index: int) -> int:
+        """Nominal silence before octet `index` of the window, ns; 24 h before the first octet of a capture."""
+        run = self._run(index)
+        return run.gap if run.index == index else 0
 
     def start(self, index: int) -> int:
         """Latest possible begin of octet `index`, ns."""
