@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from importlib import import_module
 from pathlib import Path
 from typing import Any, Protocol
@@ -50,10 +50,15 @@ class CaptureWriter(Protocol):
 READERS: dict[str, str] = {
     ".cap.txt": "sniff.formats.text:read",
     ".mcap": "sniff.recording.reader:read",
+    ".pcap": "sniff.formats.pcap:read",
+    ".cap": "sniff.formats.pcap:read",
+    ".pcapng": "sniff.formats.pcapng:read",
 }
 WRITERS: dict[str, str] = {
     ".cap.txt": "sniff.formats.text:create",
     ".mcap": "sniff.recording.writer:create",
+    ".pcap": "sniff.formats.pcap:create",
+    ".pcapng": "sniff.formats.pcapng:create",
 }
 
 
@@ -63,9 +68,13 @@ def read(path: str | Path) -> Capture:
     return found
 
 
-def create(path: str | Path, session: Session) -> CaptureWriter:
-    """Create a capture by its suffix. Raises CaptureError."""
-    made: CaptureWriter = _find(WRITERS, Path(path))(Path(path), session)
+def create(path: str | Path, session: Session, options: Mapping[str, str] | None = None) -> CaptureWriter:
+    """Create a capture by its suffix; `options` are the format's own ("link-type" of pcap). Raises CaptureError."""
+    path = Path(path)
+    make = _find(WRITERS, path)
+    if options and path.suffix not in {".pcap", ".pcapng"}:
+        raise CaptureError(f"{path}: this format has no option {', '.join(options)}")
+    made: CaptureWriter = make(path, session, options) if options else make(path, session)
     return made
 
 

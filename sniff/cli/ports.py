@@ -1,0 +1,45 @@
+"""An adapter's latency is how long it may hold octets back: every response time is uncertain by as much."""
+
+from __future__ import annotations
+
+import argparse
+import json
+
+from sniff.analysis.wording import milliseconds
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Options of `ports`."""
+    parser.add_argument("--json", action="store_true", help="one JSON object a port")
+
+
+def run(args: argparse.Namespace) -> int:
+    """List the ports of this machine."""
+    from sniff.sources.ports import list_ports
+
+    found = list_ports()
+    for port in found:
+        adapter = port.adapter
+        if args.json:
+            record = {
+                "device": port.device,
+                "adapter": adapter.name,
+                "driver": adapter.driver or None,
+                "serial_number": adapter.serial_number or None,
+                "latency_ms": adapter.latency / 1e6,
+                "latency_from": adapter.latency_from,
+                "reports": None if adapter.reports is None else list(adapter.reports),
+                "detail": adapter.detail,
+                "held_by": port.held_by,
+            }
+            print(json.dumps(record, ensure_ascii=False))
+            continue
+        reports = "unknown" if adapter.reports is None else ", ".join(adapter.reports) or "none"
+        print(f"{port.device}  {adapter.name}{f' ({adapter.driver})' if adapter.driver else ''}")
+        print(f"    holds octets back up to {milliseconds(adapter.latency)} ({adapter.latency_from})")
+        print(f"    line errors it reports: {reports}{'; ' + adapter.detail if adapter.detail else ''}")
+        if port.held_by:
+            print(f"    held by {port.held_by}")
+    if not found and not args.json:
+        print("no serial ports; try `sniff485 demo`, or a gateway: socket://HOST:PORT")
+    return 0

@@ -1,0 +1,138 @@
+"""What a pcap record holds, by link type: how a frame is written into it and read out of it. Pure.
+
+165  BACnet MS/TP: the frame from its preamble; Wireshark reads it without set-up.
+147  User 0: by convention the bare Modbus RTU frame; Wireshark needs a DLT_USER entry.
+250  RTAC Serial: a 12-octet header with an event, then the frame; line errors are events without octets.
+252  Exported PDU: tags that name the dissector and synthetic addresses, then the frame; no set-up.
+148  User 1: here, octets that are no frame (noise, damaged pieces), so that a file keeps every octet.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from dissectors.frame import Frame, LineError, Role
+
+MSTP, USER0, USER1, RTAC, EXPORTED = 165, 147, 148, 250, 252
+
+RTAC_HEADER = struct.Struct(">IIBBH")
+RTAC_TX_START, RTAC_RX_START = 1, 2
+RTAC_LOST = 5
+RTAC_ERRORS = {LineError.FRAMING: 7, LineError.PARITY: 8, LineError.BREAK: 9, LineError.OVERRUN: 10}
+RTAC_ERROR_NAMES = {7: "framing", 8: "parity", 9: "break", 10: "overrun"}
+
+TAG_END, TAG_NAME, TAG_SRC4, TAG_DST4, TAG_PORT_TYPE, TAG_SRC_PORT, TAG_DST_PORT = 0, 12, 20, 21, 24, 25, 26
+MODBUS_PORT, CLIENT_PORT, PORT_TYPE_TCP = 502, 40000, 2
+CLIENT_HOST = 254
+PDU_NAMES = {"modbus-rtu": "mbrtu", "mstp": "mstp"}
+PROTOCOL_OF_PDU = {name: protocol for protocol, name in PDU_NAMES.items()}
+
+
+@dataclass(frozen=True, slots=True)
+class Decoded:
+    """What was in a record. `protocol` is None when the record does not say; `event` is an RTAC line error's name."""
+
+    octets: bytes
+    protocol: str | None = None
+    event: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class LinkType:
+    """One link type: how to write (None where we only read) and read a record."""
+
+    number: int
+    protocol: str | None
+    read: Callable[[bytes], Decoded | None]
+    write: Callable[[Frame, Role, int | None, int], bytes]
+
+
+def _plain(octets: bytes) -> Decoded:
+    return Decoded(octets)
+
+
+def _write_plain(frame: Frame, _role: Role, _station: int | None, _time: int) -> bytes:
+    return frame.octets
+
+
+def _read_rtac(record: bytes) -> Decoded | None:
+    if len(record) < RTAC_HEADER.size:
+        return None
+    event = record[8]
+    if event in RTAC_ERROR_NAMES:
+        return Decoded(record[RTAC_HEADER.size :], "modbus-rtu", RTAC_ERROR_NAMES[event])
+    return Decoded(record[RTAC_HEADER.size :], "modbus-rtu", "dropped" if event == RTAC_LOST else "")
+
+
+def rtac_record(time: int, event: int, octets: bytes) -> bytes:
+    """An RTAC Serial record; `time` is ns since the start of the capture, kept to the microsecond."""
+    seconds, rest = divmod(max(0, time), 1_000_000_000)
+    return RTAC_HEADER.pack(seconds & 0xFFFFFFFF, rest // 1000, event, 0, 0) + octets
+
+
+def _write_rtac(frame: Frame, role: Role, _station: int | None, time: int) -> bytes:
+    return rtac_record(time, RTAC_RX_START if role is Role.RESPONSE else RTAC_TX_START, frame.octets)
+
+
+def _read_exported(record: bytes) -> Decoded | None:
+    name, at = "", 0
+    while at + 4 <= len(record):
+        tag, length = struct.unpack_from(">HH", record, at)
+        at += 4
+        if tag == TAG_END:
+            protocol = PROTOCOL_OF_PDU.get(name)
+            return Decoded(record[at:], protocol) if protocol is not None else None
+        if tag == TAG_NAME:
+            name = record[at : at + length].split(b"\0")[0].decode("ascii", "replace")
+        at += length
+    return None
+
+
+def _tag(number: int, value: bytes) -> bytes:
+    padded = value + b"\0" * (-len(value) % 4)
+    return struct.pack(">HH", number, len(padded)) + padded
+
+
+def _write_exported(frame: Frame, role: Role, station: int | None, _time: int) -> bytes:
+    """Addresses are synthetic: the client is 10.0.0.254, unit n is 10.0.0.n; the ports say the direction."""
+    name = PDU_NAMES[frame.protocol].encode() + b"\0"
+    unit, client = bytes((10, 0, 0, (station or 0) & 0xFF)), bytes((10, 0, 0, CLIENT_HOST))
+    answer = role is Role.RESPONSE
+    source, destination = (unit, client) if answer else (client, unit)
+    ports = (MODBUS_PORT, CLIENT_PORT) if answer else (CLIENT_PORT, MODBUS_PORT)
+    return b"".join(
+        (
+            _tag(TAG_NAME, name),
+            _tag(TAG_SRC4, source),
+            _tag(TAG_DST4, destination),
+            _tag(TAG_PORT_TYPE, struct.pack(">I", PORT_TYPE_TCP)),
+            _tag(TAG_SRC_PORT, struct.pack(">I", ports[0])),
+            _tag(TAG_DST_PORT, struct.pack(">I", ports[1])),
+            _tag(TAG_END, b""),
+            frame.octets,
+        )
+    )
+
+
+LINK_TYPES: dict[int, LinkType] = {
+    MSTP: LinkType(MSTP, "mstp", _plain, _write_plain),
+    USER0: LinkType(USER0, None, _plain, _write_plain),
+    USER1: LinkType(USER1, None, _plain, _write_plain),
+    RTAC: LinkType(RTAC, "modbus-rtu", _read_rtac, _write_rtac),
+    EXPORTED: LinkType(EXPORTED, None, _read_exported, _write_exported),
+}
+
+DEFAULT = {"mstp": MSTP, "modbus-rtu": EXPORTED}
+"""Link type to write by protocol; others go bare into USER0, which no Wireshark dissector reads."""
+
+ALLOWED = {"mstp": (MSTP, EXPORTED), "modbus-rtu": (EXPORTED, USER0, RTAC)}
+
+
+def link_type_for(protocol: str, wanted: int | None = None) -> int:
+    """The link type to write a protocol with. Raises ValueError, saying what is possible."""
+    allowed = ALLOWED.get(protocol, (USER0,))
+    if wanted is not None and wanted not in allowed:
+        raise ValueError(f"link type {wanted} cannot hold {protocol}; possible: {', '.join(map(str, allowed))}")
+    return wanted if wanted is not None else DEFAULT.get(protocol, USER0)

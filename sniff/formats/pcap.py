@@ -1,0 +1,139 @@
+"""Classic pcap: both byte orders, microseconds and nanoseconds. We write nanoseconds, little-endian.
+
+It keeps frames and their ends. It keeps neither line settings nor adapter, nor octets that are no whole frame.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import BinaryIO
+
+from sniff.formats import CaptureError
+from sniff.formats.files import NewFile, open_capture
+from sniff.formats.linktypes import LINK_TYPES, USER1
+from sniff.formats.records import Record, RecordMaker, foreign_session, items_of, protocol_of
+from sniff.session import Completeness, Item, Session
+
+MAGICS = {  # as read little-endian: (byte order, ns a tick)
+    0xA1B2C3D4: ("<", 1000),
+    0xA1B23C4D: ("<", 1),
+    0xD4C3B2A1: (">", 1000),
+    0x4D3CB2A1: (">", 1),
+}
+FILE_HEADER, RECORD_HEADER = 24, 16
+LONGEST = 262_144
+"""A longer record is damage: no field bus has frames of that size."""
+
+
+def read(path: Path) -> PcapCapture:
+    """Open a pcap file. Raises CaptureError."""
+    return PcapCapture(path)
+
+
+class PcapCapture:
+    """A pcap file as a capture."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        with open_capture(path) as stream:
+            header = stream.read(FILE_HEADER)
+            self._order, self._tick = self._check(header)
+            self._link_type = struct.unpack_from(self._order + "I", header, 20)[0] & 0x0FFFFFFF
+            if self._link_type not in LINK_TYPES:
+                known = ", ".join(map(str, sorted(LINK_TYPES)))
+                raise CaptureError(f"{path}: link type {self._link_type}; this program reads {known}")
+            first = next(self._records(stream), None)
+        protocol = protocol_of(first) if first is not None else LINK_TYPES[self._link_type].protocol
+        self.session: Session = foreign_session(str(path), protocol, first.time if first is not None else 0, "pcap")
+        self._complete = Completeness(True)
+
+    def _check(self, header: bytes) -> tuple[str, int]:
+        magic = int.from_bytes(header[:4], "little")
+        if magic not in MAGICS:
+            raise CaptureError(f"{self.path}: not a pcap file (it begins with {header[:4].hex(' ') or 'nothing'})")
+        if len(header) < FILE_HEADER:
+            raise CaptureError(f"{self.path}: pcap file cut inside its header, at octet {len(header)}")
+        return MAGICS[magic]
+
+    def items(self) -> Iterator[Item]:
+        """Chunks in the order of the file."""
+        with open_capture(self.path) as stream:
+            stream.seek(FILE_HEADER)
+            for record in self._records(stream):
+                yield from items_of(record, self.session.protocol)
+
+    def completeness(self) -> Completeness:
+        """Whether the last record was whole, as far as `items` has read."""
+        return self._complete
+
+    def _records(self, stream: BinaryIO) -> Iterator[Record]:
+        self._complete = Completeness(True)
+        layout = struct.Struct(self._order + "IIII")
+        while header := stream.read(RECORD_HEADER):
+            at = stream.tell() - len(header)
+            if len(header) < RECORD_HEADER:
+                self._complete = Completeness(False, f"cut inside a record header at octet {at}")
+                return
+            seconds, ticks, kept, _ = layout.unpack(header)
+            if kept > LONGEST:
+                self._complete = Completeness(False, f"damaged at octet {at}: a record of {kept} octets")
+                return
+            data = stream.read(kept)
+            if len(data) < kept:
+                self._complete = Completeness(False, f"cut inside a record at octet {at}: {len(data)} of {kept} octets")
+                return
+            yield Record(seconds * 1_000_000_000 + ticks * self._tick, self._link_type, data)
+
+
+def create(path: Path, session: Session, options: Mapping[str, str] | None = None) -> PcapWriter:
+    """Create a pcap file. Raises CaptureError."""
+    return PcapWriter(path, session, options or {})
+
+
+class PcapWriter:
+    """Writes frames; `losses` says what the format could not keep."""
+
+    def __init__(self, path: Path, session: Session, options: Mapping[str, str]) -> None:
+        self.losses: list[str] = [
+            "pcap keeps no line settings, adapter, line errors or read limits; .pcapng keeps more"
+        ]
+        self._left_out = 0
+        try:
+            self._maker = RecordMaker(session, int(options["link-type"]) if "link-type" in options else None)
+        except ValueError as error:
+            raise CaptureError(f"{path}: {error}") from None
+        self._file = NewFile(path)
+        self._file.write(struct.pack("<IHHiIII", 0xA1B23C4D, 2, 4, 0, 0, LONGEST, self._maker.link_type))
+
+    def write(self, item: Item) -> None:
+        """Add a chunk or line event."""
+        for record in self._maker.add(item):
+            self._put(record)
+
+    def close(self) -> None:
+        """Write what is held and finish the file."""
+        for record in self._maker.close():
+            self._put(record)
+        if self._left_out:
+            self.losses.append(f"{self._left_out} octets that are no whole frame were left out")
+            self._left_out = 0
+        self._file.close()
+
+    def __enter__(self) -> PcapWriter:
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        if exc and exc[0] is not None:
+            self._file.discard()
+        else:
+            self.close()
+
+    def _put(self, record: Record) -> None:
+        if record.link_type == USER1:
+            self._left_out += len(record.data)
+            return
+        seconds, rest = divmod(max(0, record.time), 1_000_000_000)
+        size = len(record.data)
+        self._file.write(struct.pack("<IIII", seconds & 0xFFFFFFFF, rest, size, size) + record.data)

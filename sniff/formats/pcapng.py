@@ -1,0 +1,260 @@
+"""pcapng: nanoseconds, comments with our verdict, the CRC-error flag; octets that are no frame on an interface of
+their own. The session travels as a comment of the section, so that our own files come back with their settings.
+
+Read: section header, interface description, enhanced and simple packet blocks, both byte orders, any resolution.
+Other blocks are skipped.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO
+
+from sniff.formats import CaptureError
+from sniff.formats.files import NewFile, open_capture
+from sniff.formats.linktypes import LINK_TYPES, USER1
+from sniff.formats.records import Record, RecordMaker, foreign_session, items_of, protocol_of
+from sniff.session import Completeness, Item, Session
+
+SECTION, INTERFACE, SIMPLE, ENHANCED = 0x0A0D0D0A, 1, 3, 6
+BYTE_ORDER = 0x1A2B3C4D
+OPT_END, OPT_COMMENT, OPT_NAME, OPT_FLAGS, OPT_TSRESOL, OPT_TSOFFSET = 0, 1, 2, 2, 9, 14
+CRC_ERROR_FLAG = 1 << 24
+LONGEST = 4 * 1024 * 1024
+"""A longer block is damage."""
+SESSION_MARK = "sniff485 session: "
+
+
+@dataclass(frozen=True, slots=True)
+class _Interface:
+    link_type: int
+    resolution: tuple[int, int] = (1000, 1)  # ns per tick as a fraction
+    offset: int = 0  # s
+
+
+def read(path: Path) -> PcapngCapture:
+    """Open a pcapng file. Raises CaptureError."""
+    return PcapngCapture(path)
+
+
+class PcapngCapture:
+    """A pcapng file as a capture: all interfaces of one protocol, merged."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._complete = Completeness(True)
+        self._metadata: dict[str, str] = {}
+        self._other = 0
+        with open_capture(path) as stream:
+            first = self._first(stream)
+        if self._metadata:
+            self.session: Session = Session.from_metadata(self._metadata)
+        else:
+            protocol = protocol_of(first) if first is not None else None
+            self.session = foreign_session(str(path), protocol, first.time if first is not None else 0, "pcapng")
+
+    def _first(self, stream: BinaryIO) -> Record | None:
+        start = stream.read(12)
+        if start[:4] != SECTION.to_bytes(4, "little"):
+            raise CaptureError(f"{self.path}: not a pcapng file (it begins with {start[:4].hex(' ') or 'nothing'})")
+        stream.seek(0)
+        fallback = None
+        for record in self._records(stream):
+            if record.link_type not in LINK_TYPES:
+                continue
+            if protocol_of(record) is not None:
+                return record
+            fallback = fallback or record
+        return fallback
+
+    def items(self) -> Iterator[Item]:
+        """Chunks in the order of the file."""
+        self._other = 0
+        with open_capture(self.path) as stream:
+            for record in self._records(stream):
+                found = False
+                for item in items_of(record, self.session.protocol):
+                    found = True
+                    yield item
+                self._other += not found
+        if self._other and self._complete.whole:
+            self._complete = Completeness(True, f"complete; {self._other} records of other kinds were passed over")
+
+    def completeness(self) -> Completeness:
+        """Whether the last block was whole, as far as `items` has read."""
+        return self._complete
+
+    def _records(self, stream: BinaryIO) -> Iterator[Record]:
+        self._complete = Completeness(True)
+        interfaces: list[_Interface] = []
+        for order, kind, body in self._blocks(stream):
+            if kind == SECTION:
+                interfaces = []
+                self._take_session(order, body)
+            elif kind == INTERFACE and len(body) >= 8:
+                interfaces.append(_interface(order, body))
+            elif kind in (ENHANCED, SIMPLE):
+                record = _packet(order, kind, body, interfaces)
+                if record is not None:
+                    yield record
+
+    def _blocks(self, stream: BinaryIO) -> Iterator[tuple[str, int, bytes]]:
+        order = "<"
+        while head := stream.read(8):
+            at = stream.tell() - len(head)
+            if len(head) < 8:
+                self._complete = Completeness(False, f"cut inside a block header at octet {at}")
+                return
+            kind, size = struct.unpack(order + "II", head)
+            if kind == SECTION:
+                magic = stream.read(4)
+                order = "<" if magic == BYTE_ORDER.to_bytes(4, "little") else ">"
+                if order == ">" and magic != BYTE_ORDER.to_bytes(4, "big"):
+                    self._complete = Completeness(False, f"damaged at octet {at}: no byte order mark")
+                    return
+                size = struct.unpack_from(order + "I", head, 4)[0]
+                stream.seek(-len(magic), 1)
+            if size < 12 or size % 4 or size > LONGEST:
+                self._complete = Completeness(False, f"damaged at octet {at}: a block of {size} octets")
+                return
+            body = stream.read(size - 8)
+            if len(body) < size - 8:
+                self._complete = Completeness(
+                    False, f"cut inside a block at octet {at}: {len(body) + 8} of {size} octets"
+                )
+                return
+            yield order, kind, body[:-4]
+
+    def _take_session(self, order: str, body: bytes) -> None:
+        for code, value in _options(order, body[16:]):
+            text = value.decode("utf-8", "replace")
+            if code == OPT_COMMENT and text.startswith(SESSION_MARK):
+                try:
+                    found = json.loads(text[len(SESSION_MARK) :])
+                except ValueError:
+                    continue
+                if isinstance(found, dict):
+                    self._metadata = {str(key): str(item) for key, item in found.items()}
+
+
+def _interface(order: str, body: bytes) -> _Interface:
+    resolution, offset = (1000, 1), 0
+    for code, value in _options(order, body[8:]):
+        if code == OPT_TSRESOL and value:
+            power = value[0] & 0x7F
+            ticks = 2**power if value[0] & 0x80 else 10 ** min(power, 30)
+            resolution = (1_000_000_000, ticks)
+        elif code == OPT_TSOFFSET and len(value) == 8:
+            offset = struct.unpack(order + "q", value)[0]
+    return _Interface(struct.unpack_from(order + "H", body)[0], resolution, offset)
+
+
+def _packet(order: str, kind: int, body: bytes, interfaces: list[_Interface]) -> Record | None:
+    if kind == SIMPLE:
+        if len(body) < 4 or not interfaces:
+            return None
+        return Record(0, interfaces[0].link_type, body[4 : 4 + struct.unpack_from(order + "I", body)[0]])
+    if len(body) < 20:
+        return None
+    number, high, low, kept, _ = struct.unpack_from(order + "IIIII", body)
+    if number >= len(interfaces) or kept > len(body) - 20:
+        return None
+    interface = interfaces[number]
+    factor, ticks = interface.resolution
+    time = ((high << 32) | low) * factor // ticks + interface.offset * 1_000_000_000
+    comment, crc_error = "", False
+    for code, value in _options(order, body[20 + kept + (-kept % 4) :]):
+        if code == OPT_COMMENT:
+            comment = value.decode("utf-8", "replace")
+        elif code == OPT_FLAGS and len(value) == 4:
+            crc_error = bool(struct.unpack(order + "I", value)[0] & CRC_ERROR_FLAG)
+    return Record(time, interface.link_type, body[20 : 20 + kept], comment, crc_error)
+
+
+def _options(order: str, data: bytes) -> Iterator[tuple[int, bytes]]:
+    at = 0
+    while at + 4 <= len(data):
+        code, size = struct.unpack_from(order + "HH", data, at)
+        if code == OPT_END or at + 4 + size > len(data):
+            return
+        yield code, data[at + 4 : at + 4 + size]
+        at += 4 + size + (-size % 4)
+
+
+def create(path: Path, session: Session, options: Mapping[str, str] | None = None) -> PcapngWriter:
+    """Create a pcapng file. Raises CaptureError."""
+    return PcapngWriter(path, session, options or {})
+
+
+class PcapngWriter:
+    """Writes frames, and what is no frame on interface 1; `losses` says what the format could not keep.
+
+    `live`: each frame at once and pushed through, for somebody who reads while we write.
+    """
+
+    def __init__(self, path: Path, session: Session, options: Mapping[str, str], live: bool = False) -> None:
+        self.losses: list[str] = ["pcapng keeps one time a frame (its end), no limits of reads, no line events"]
+        self.live = live
+        try:
+            self.maker = RecordMaker(session, int(options["link-type"]) if "link-type" in options else None, live)
+        except ValueError as error:
+            raise CaptureError(f"{path}: {error}") from None
+        self._file = NewFile(path)
+        about = SESSION_MARK + json.dumps(session.to_metadata())
+        section = struct.pack("<IHHq", BYTE_ORDER, 1, 0, -1) + _option(OPT_COMMENT, about.encode()) + _option(OPT_END)
+        self._block(SECTION, section)
+        for link_type, name in ((self.maker.link_type, session.bus), (USER1, f"{session.bus}: no frame")):
+            described = struct.pack("<HHI", link_type, 0, 0) + _option(OPT_NAME, name.encode())
+            self._block(INTERFACE, described + _option(OPT_TSRESOL, b"\x09") + _option(OPT_END))
+        self.flush()
+
+    def write(self, item: Item) -> None:
+        """Add a chunk or line event."""
+        self.put(self.maker.add(item))
+
+    def put(self, records: Iterator[Record]) -> None:
+        """Add records as they come from `maker`."""
+        for record in records:
+            self._packet(record)
+        self.flush()
+
+    def flush(self) -> None:
+        """Push through what was written, when live."""
+        if self.live:
+            self._file.stream.flush()
+
+    def close(self) -> None:
+        """Write what is held and finish the file."""
+        self.put(self.maker.close())
+        self._file.close()
+
+    def __enter__(self) -> PcapngWriter:
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        if exc and exc[0] is not None:
+            self._file.discard()
+        else:
+            self.close()
+
+    def _packet(self, record: Record) -> None:
+        time, size = max(0, record.time), len(record.data)
+        number = 1 if record.link_type == USER1 else 0
+        options = _option(OPT_FLAGS, struct.pack("<I", CRC_ERROR_FLAG)) if record.crc_error else b""
+        if record.comment:
+            options += _option(OPT_COMMENT, record.comment.encode()[:60_000])
+        head = struct.pack("<IIIII", number, time >> 32 & 0xFFFFFFFF, time & 0xFFFFFFFF, size, size)
+        data = record.data + b"\0" * (-size % 4)
+        self._block(ENHANCED, head + data + (options + _option(OPT_END) if options else b""))
+
+    def _block(self, kind: int, body: bytes) -> None:
+        size = struct.pack("<I", len(body) + 12)
+        self._file.write(struct.pack("<I", kind) + size + body + size)
+
+
+def _option(code: int, value: bytes = b"") -> bytes:
+    return struct.pack("<HH", code, len(value)) + value + b"\0" * (-len(value) % 4)
