@@ -100,8 +100,8 @@ class Frame:
 
     @property
     def ok(self) -> bool:
-        """Whether the check is good and nothing is damaged."""
-        return self.check is Check.GOOD and self.damage is None
+        """Whether nothing is damaged and the check is good, where this kind of frame has one (N2's `A` has none)."""
+        return self.damage is None and self.check is not Check.BAD
 
 
 class Place(Enum):

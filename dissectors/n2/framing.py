@@ -10,7 +10,8 @@ Rules, in the order in which they decide:
 1. `>` begins a command, always; what was being collected before it is damaged ("restarted").
 2. `A` is a hex digit too, so `A` and `N` begin an answer only where one may stand: after the CR of a line, after
    proved silence of two characters, or, while a command waits for its answer, after an octet that is no text. At the
-   begin of a capture, where a line may have been joined in its middle, an answer must prove itself by its checksum.
+   begin of a capture, where a line may have been joined in its middle, an answer must prove itself by its checksum;
+   and until a frame has, answers without one (`A` CR, `N` EE CR) are noise: any bus may carry such octets.
 3. A frame ends with CR. It ends damaged at 256 octets, or when silence of SILENCE inside it is proved; N2 sets no
    limit between characters, so that one is ours.
 4. Where a frame turns out bad and a good answer stands at its end, begun after silence or after an octet that is no
@@ -109,6 +110,7 @@ class N2Framer:
         self._before = _Before.NOTHING
         self._foreign = False  # a `:` since the last line end
         self._waits = False  # a command has no answer yet
+        self._proved = False  # a checksum was right: this bus does speak N2
         self._attached = False  # the held noise stands directly after a frame
         self._skipped = 0
         self._out: list[Event] = []
@@ -290,6 +292,7 @@ class N2Framer:
         self._skipped = 0
         self._attached = True
         self._waits = octets[0] == _COMMAND
+        self._proved |= damage is None and check is Check.GOOD
         self._before, self._foreign = _Before.TEXT, False
         if octets.endswith(b"\r"):
             self._before = _Before.LINE_END
@@ -300,7 +303,7 @@ class N2Framer:
     def _believed(self, octets: bytes, check: Check, damage: Damage | None) -> bool:
         """Whether collected octets are a frame at all (rules 2 and 5)."""
         if damage is None:
-            return self._trust is not _Trust.PROVE or check is Check.GOOD or octets[0] == 0x4E
+            return check is Check.GOOD or self._proved
         if self._trust is _Trust.PROVE:
             return False
         foreign = len(_NOT_TEXT.findall(octets.removesuffix(b"\r")))
