@@ -56,6 +56,8 @@ COMMANDS: dict[str, CommandType] = {
 NATIVE = CommandType("native-command", "JCI-native or other command", data=True)
 UNKNOWN = CommandType("unknown-command", "N2-like, unknown command (Optomux family?)", data=True)
 
+NONE = CommandType("no-command", "no command")
+
 _WITH_SUB = frozenset("0789")
 
 ERRORS: dict[str, str] = {
@@ -141,8 +143,8 @@ def parse_command(octets: bytes) -> Command:
     kind = COMMANDS.get(code)
     rest = body[2 + len(code) :]
     if kind is None:
-        letter = code[:1]
-        return Command(NATIVE if is_hex(letter) else UNKNOWN, address, code, data=rest)
+        other = NONE if not code else NATIVE if is_hex(code[:1]) else UNKNOWN
+        return Command(other, address, code, data=rest)
     if not kind.region:
         return Command(kind, address, code, data=rest)
     region = _hex(rest[: kind.region], kind.region)
