@@ -1,0 +1,357 @@
+"""Chunks to /raw and /line messages and back: the layout that `topics.RAW_LAYOUT` describes.
+
+Marks, events and continuations of a batch are written just before it, so that a reader joins them in one pass:
+
+* a mark is a /line message with the number of its entry and the offset in it;
+* an event carries the number of the entry that comes next, which keeps its place among chunks of the same time;
+* a chunk over 65535 octets is several entries of one time, the later ones marked `continued`.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from dissectors.frame import Chunk, LineError, Mark
+from sniff.recording.topics import LINE, RAW
+from sniff.session import Item, LineEvent, LineEventKind
+
+MOST_CHUNKS = 256
+MOST_TIME = 500_000_000  # ns
+MOST_OCTETS = 1 << 20
+MOST_CHUNK = 16 << 20  # octets
+LONGEST = 65535  # octets of one entry
+CONTINUED = "continued"
+
+_HEAD = struct.Struct("<Iq")
+_STEP = 4096  # entries unpacked at a time: a batch of millions from a hostile file costs no more
+_LONGEST_LINE = 1 << 16  # octets of a /line message worth reading
+_MOST_PENDING = 100_000  # /line messages kept for entries still to come
+_I64 = 1 << 63
+_U64 = 1 << 64
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """One MCAP message before it has a channel number; times in ns, 0 … 2⁶⁴-1."""
+
+    topic: str
+    log_time: int
+    publish_time: int
+    sequence: int
+    data: bytes
+
+
+def stamp(time: int) -> int:
+    """A time as MCAP can hold it."""
+    return min(max(time, 0), _U64 - 1)
+
+
+class Batcher:
+    """Collects chunks and events into messages. `first`: number of the next entry."""
+
+    def __init__(self, first: int = 0) -> None:
+        self.next = first
+        self.since: int | None = None  # when the oldest thing not yet given out happened
+        self._line_number = 0
+        self._clear()
+
+    @property
+    def first(self) -> int:
+        """Number of the first entry not yet given out."""
+        return self.next - len(self._times)
+
+    def add(self, chunk: Chunk) -> list[Message]:
+        """Take a chunk; give the messages of a batch that it closed. An empty chunk says nothing.
+
+        A chunk over `MOST_CHUNK` (no read returns that much) becomes several of the same time.
+        """
+        if len(chunk.octets) > MOST_CHUNK:
+            return [message for part in _cut(chunk) for message in self.add(part)]
+        if not chunk.octets:
+            return []
+        time = min(max(chunk.time, -_I64), _I64 - 1)
+        given = [] if self._fits(time) else self.close()
+        for start in range(0, len(chunk.octets), LONGEST):
+            if start:
+                self._line(time, {"kind": CONTINUED, "chunk": self.next})
+            self._entry(time, chunk.octets[start : start + LONGEST])
+        for mark in chunk.marks:
+            self._mark(time, mark, len(chunk.octets))
+        return given
+
+    def add_event(self, event: LineEvent) -> None:
+        """Take an event of the line; it goes out with the batch."""
+        record: dict[str, object] = {"kind": event.kind.value, "chunk": self.next}
+        if event.text:
+            record["text"] = event.text
+        if event.count:
+            record["count"] = event.count
+        if stamp(event.time) != event.time:
+            record["time_ns"] = event.time
+        if self.since is None:
+            self.since = event.time
+        self._line(event.time, record)
+
+    def close(self) -> list[Message]:
+        """The messages of what was collected, marks and events first."""
+        messages = self._lines
+        if self._times:
+            first = self._times[0]
+            count = len(self._times)
+            data = b"".join(
+                (
+                    _HEAD.pack(count, first),
+                    struct.pack(f"<{count}I", *(time - first for time in self._times)),
+                    struct.pack(f"<{count}H", *map(len, self._octets)),
+                    *self._octets,
+                )
+            )
+            sequence = (self.next - count) % (1 << 32)
+            messages.append(Message(RAW, stamp(self._times[-1]), stamp(first), sequence, data))
+        self._clear()
+        return messages
+
+    def _clear(self) -> None:
+        self._times: list[int] = []
+        self._octets: list[bytes] = []
+        self._held = 0
+        self._lines: list[Message] = []
+        self.since = None
+
+    def _fits(self, time: int) -> bool:
+        """Whether a chunk of that time may join the batch: none is earlier than the one before it."""
+        if not self._times:
+            return True
+        return (
+            len(self._times) < MOST_CHUNKS
+            and self._held < MOST_OCTETS
+            and self._times[-1] <= time <= self._times[0] + MOST_TIME
+        )
+
+    def _entry(self, time: int, octets: bytes) -> None:
+        if self.since is None:
+            self.since = time
+        self._times.append(time)
+        self._octets.append(octets)
+        self._held += len(octets)
+        self.next += 1
+
+    def _mark(self, time: int, mark: Mark, length: int) -> None:
+        pieces = (length + LONGEST - 1) // LONGEST
+        piece = min(max(mark.offset, 0) // LONGEST, pieces - 1)
+        record = {
+            "kind": mark_name(mark.error),
+            "chunk": self.next - pieces + piece,
+            "offset": mark.offset - piece * LONGEST,
+        }
+        self._line(time, record)
+
+    def _line(self, time: int, record: dict[str, object]) -> None:
+        data = json.dumps(record, separators=(",", ":")).encode()
+        self._lines.append(Message(LINE, stamp(time), stamp(time), self._line_number % (1 << 32), data))
+        self._line_number += 1
+
+
+def _cut(chunk: Chunk) -> Iterator[Chunk]:
+    for start in range(0, len(chunk.octets), MOST_CHUNK):
+        end = start + MOST_CHUNK
+        marks = tuple(Mark(mark.offset - start, mark.error) for mark in chunk.marks if start <= mark.offset < end)
+        yield Chunk(chunk.time, chunk.octets[start:end], marks)
+
+
+def mark_name(error: LineError) -> str:
+    """ "parity", "parity+framing" …"""
+    return "+".join(flag.name.lower() for flag in error if flag.name) or "none"
+
+
+_MARK_FLAGS = {flag.name.lower(): flag for flag in LineError if flag.name}
+_EVENT_KINDS = {kind.value: kind for kind in LineEventKind}
+
+
+def mark_error(name: str) -> LineError | None:
+    """What `mark_name` wrote; None for what is no mark."""
+    error = LineError(0)
+    for word in name.split("+"):
+        if word not in _MARK_FLAGS:
+            return LineError(0) if name == "none" else None
+        error |= _MARK_FLAGS[word]
+    return error
+
+
+# -- back ------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Batch:
+    """A /raw message whose sizes add up: `count` entries read from `start` (ns) on."""
+
+    count: int
+    start: int
+    data: bytes
+
+    @classmethod
+    def decode(cls, data: bytes) -> Batch | None:
+        """None when the sizes contradict each other."""
+        if len(data) < _HEAD.size:
+            return None
+        count, start = _HEAD.unpack_from(data)
+        body = len(data) - _HEAD.size - 6 * count
+        if body < 0:
+            return None
+        batch = cls(count, start, data)
+        return batch if sum(sum(lengths) for _, lengths in batch._columns()) == body else None
+
+    def entries(self) -> Iterator[tuple[int, bytes]]:
+        """Time (ns) and octets of each entry."""
+        data = self.data
+        at = _HEAD.size + 6 * self.count
+        start = self.start
+        for steps, lengths in self._columns():
+            for step, length in zip(steps, lengths, strict=True):
+                yield start + step, data[at : at + length]
+                at += length
+
+    def _columns(self) -> Iterator[tuple[tuple[int, ...], tuple[int, ...]]]:
+        steps = _HEAD.size
+        lengths = steps + 4 * self.count
+        for first in range(0, self.count, _STEP):
+            many = min(_STEP, self.count - first)
+            yield (
+                struct.unpack_from(f"<{many}I", self.data, steps + 4 * first),
+                struct.unpack_from(f"<{many}H", self.data, lengths + 2 * first),
+            )
+
+
+class Joiner:
+    """Puts /raw and /line messages together again, in the order of the file.
+
+    `next`: number of the entry that comes next, None while unknown. `missing`: entries that the numbering shows to be
+    lost. `backward`: batches numbered below the one before them. `strange`: /line messages that belong to no octet.
+    """
+
+    def __init__(self, first: int | None = None) -> None:
+        self.next = first
+        self.missing = 0
+        self.backward = 0
+        self.strange = 0
+        self._marks: dict[int, list[Mark]] = {}
+        self._continued: set[int] = set()
+        self._events: deque[tuple[int, LineEvent]] = deque()
+        self._pending = 0
+
+    def line(self, log_time: int, data: bytes) -> None:
+        """Take a /line message; total."""
+        parsed = _parse(data)
+        if parsed is None or self._pending >= _MOST_PENDING:
+            self.strange += 1
+            return
+        kind, number, record = parsed
+        self._pending += 1
+        if kind in _EVENT_KINDS:
+            time = _integer(record.get("time_ns"), log_time)
+            text = record.get("text")
+            event = LineEvent(
+                time, _EVENT_KINDS[kind], text if isinstance(text, str) else "", _integer(record.get("count"), 0)
+            )
+            self._events.append((number, event))
+        elif kind == CONTINUED:
+            self._continued.add(number)
+        else:
+            error = mark_error(kind)
+            if error is None:
+                self.strange += 1  # a later version may know more kinds
+            else:
+                self._marks.setdefault(number, []).append(Mark(_integer(record.get("offset"), 0), error))
+
+    def raw(self, sequence: int, batch: Batch) -> Iterator[Item]:
+        """Give the items of a /raw message; a hole in the numbering is a DROPPED event."""
+        number = self._number(sequence)
+        expected = number if self.next is None else self.next
+        self.next = number + batch.count
+        self.backward += number < expected
+        if number > expected:
+            self.missing += number - expected
+            yield from self._before(expected)
+            many = number - expected
+            text = f"{many} read{'s' if many != 1 else ''} missing from the recording"
+            yield LineEvent(batch.start, LineEventKind.DROPPED, text, -1)
+        if self._pending:
+            yield from self._joined(number, batch)
+        else:
+            for time, octets in batch.entries():
+                if octets:
+                    yield Chunk(time, octets)
+
+    def close(self) -> Iterator[Item]:
+        """End of the file: the events that no chunk followed."""
+        while self._events:
+            yield self._events.popleft()[1]
+
+    def _number(self, sequence: int) -> int:
+        """The full number of a sequence of 32 bits: the nearest to what is expected."""
+        if self.next is None:
+            return sequence
+        ahead = (sequence - self.next) % (1 << 32)
+        return (
+            self.next + ahead if ahead < (1 << 31) or self.next + ahead < (1 << 32) else self.next + ahead - (1 << 32)
+        )
+
+    def _joined(self, number: int, batch: Batch) -> Iterator[Item]:
+        """Entries of a batch with their marks, continuations joined, each after the events before it."""
+        pieces: list[bytes] = []
+        marks: list[Mark] = []
+        time = held = 0
+        for entry_time, octets in batch.entries():
+            if not (number in self._continued and pieces):
+                yield from self._whole(time, pieces, marks)
+                yield from self._before(number)
+                pieces, marks, time, held = [], [], entry_time, 0
+            marks.extend(Mark(mark.offset + held, mark.error) for mark in self._marks.pop(number, ()))
+            pieces.append(octets)
+            held += len(octets)
+            number += 1
+        yield from self._whole(time, pieces, marks)
+        self._forget(number)
+
+    def _whole(self, time: int, pieces: list[bytes], marks: list[Mark]) -> Iterator[Chunk]:
+        octets = b"".join(pieces)
+        good = tuple(mark for mark in marks if 0 <= mark.offset < len(octets))
+        self.strange += len(marks) - len(good)
+        if octets:
+            yield Chunk(time, octets, good)
+
+    def _before(self, number: int) -> Iterator[LineEvent]:
+        while self._events and self._events[0][0] <= number:
+            yield self._events.popleft()[1]
+
+    def _forget(self, number: int) -> None:
+        """Drop what belongs to entries that have passed."""
+        self._continued = {later for later in self._continued if later >= number}
+        late = [earlier for earlier in self._marks if earlier < number]
+        for earlier in late:
+            self.strange += len(self._marks.pop(earlier))
+        self._pending = len(self._continued) + len(self._events) + sum(map(len, self._marks.values()))
+
+
+def _parse(data: bytes) -> tuple[str, int, dict[str, object]] | None:
+    """Kind, number of the entry and the whole of a /line message; None when it is none."""
+    if len(data) > _LONGEST_LINE:
+        return None
+    try:
+        record = json.loads(data)
+    except (ValueError, RecursionError):
+        return None
+    if not isinstance(record, dict):
+        return None
+    kind, number = record.get("kind"), _integer(record.get("chunk"), -1)
+    return (kind, number, record) if isinstance(kind, str) and number >= 0 else None
+
+
+def _integer(value: object, default: int) -> int:
+    if isinstance(value, int) and not isinstance(value, bool) and abs(value) < _U64:
+        return value
+    return default

@@ -1,0 +1,115 @@
+"""One MCAP file being written: session first, messages in compressed chunks, cut off whenever it is flushed.
+
+What the file does not take (disk full) waits in memory, so that the file stays whole up to where it ends and goes on
+without a seam when there is room again.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from typing import BinaryIO
+
+from sniff import __version__
+from sniff.recording.batch import Message
+from sniff.recording.topics import FIXED_CHANNELS, PART_RECORD, PROFILE, SCHEMAS, SESSION_RECORD, VERSION
+from sniff.session import Session
+
+CHUNK_SIZE = 1 << 20
+
+
+class _Pending:
+    """The stream that the MCAP writer sees: never fails; `written` of its octets are in the file."""
+
+    def __init__(self) -> None:
+        self.octets = bytearray()
+        self.written = 0
+
+    def write(self, octets: bytes) -> int:
+        self.octets += octets
+        return len(octets)
+
+    def tell(self) -> int:
+        return self.written + len(self.octets)
+
+    def flush(self) -> None:
+        pass
+
+
+class PartFile:
+    """A part. `before`: what the parts before it held, as words → numbers, for its metadata."""
+
+    def __init__(self, stream: BinaryIO, session: Session, number: int = 1, before: Mapping[str, int] | None = None):
+        from mcap.writer import Writer
+
+        self.stream = stream
+        self._pending = _Pending()
+        self._writer = Writer(self._pending, chunk_size=CHUNK_SIZE, enable_data_crcs=True)  # type: ignore[arg-type]
+        self._channels: dict[str, int] = {}
+        self._schemas: dict[str, int] = {}
+        self._writer.start(PROFILE, f"sniff485 {__version__}")
+        self._writer.add_metadata(SESSION_RECORD, session.to_metadata())
+        counters = {"first_chunk": 0, "octets_before": 0, **(before or {})}
+        record = {"version": VERSION, "part": number, **counters}
+        self._writer.add_metadata(PART_RECORD, {key: str(value) for key, value in record.items()})
+        for topic, schema in FIXED_CHANNELS:
+            self._register(topic, schema.name, {})
+
+    @property
+    def size(self) -> int:
+        """Octets of the file, with those that wait."""
+        return self._pending.tell()
+
+    @property
+    def waiting(self) -> int:
+        """Octets that the file did not take yet."""
+        return len(self._pending.octets)
+
+    def add(self, message: Message, schema: str = "", metadata: Mapping[str, str] | None = None) -> None:
+        """Add a message; `schema` and `metadata` are for a topic that is new. Writes nothing out."""
+        channel = self._channels.get(message.topic)
+        if channel is None:
+            channel = self._register(message.topic, schema, dict(metadata or {}))
+        self._writer.add_message(
+            channel, message.log_time, message.data, message.publish_time, sequence=message.sequence
+        )
+
+    def flush(self) -> None:
+        """Write everything out. Raises OSError; what was not taken waits for the next call."""
+        self._writer.flush()  # type: ignore[no-untyped-call]
+        self._drain()
+
+    def sync(self) -> None:
+        """Have the system write the file to the disk. Raises OSError."""
+        self.stream.flush()
+        os.fsync(self.stream.fileno())
+
+    def finish(self) -> None:
+        """Write summary and footer. Raises OSError. The stream stays open."""
+        self._writer.finish()  # type: ignore[no-untyped-call]
+        self._drain()
+        self.stream.flush()
+
+    def _drain(self) -> None:
+        waiting = self._pending.octets
+        done = 0
+        try:
+            with memoryview(waiting) as view:
+                while done < len(view):
+                    done += self.stream.write(view[done:]) or 0
+        finally:
+            del waiting[:done]
+            self._pending.written += done
+
+    def _register(self, topic: str, name: str, metadata: dict[str, str]) -> int:
+        schema = SCHEMAS.get(name)
+        if schema is None:
+            channel: int = self._writer.register_channel(topic, "json", 0, metadata)
+        else:
+            number = self._schemas.get(name)
+            if number is None:
+                number = self._writer.register_schema(schema.name, schema.encoding, schema.text.encode())
+                self._schemas[name] = number
+            channel = self._writer.register_channel(topic, schema.message, number, metadata)
+        self._channels[topic] = channel
+        return channel

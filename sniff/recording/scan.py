@@ -1,0 +1,257 @@
+"""Reading the records of an MCAP file that may be cut off, damaged or made to do harm.
+
+Nothing here trusts a size: a record's length is held against the file's, a chunk's claimed size against `MOST_CHUNK`
+before it is unpacked, and every chunk against its check sum. What cannot be read is skipped and written down in a
+`Report`; nothing but an error of the operating system is raised.
+
+Layout of an MCAP file: magic · records · magic, a record being `u8 opcode, u64 length, content`, little-endian
+(mcap.dev, specification). Chunks hold messages; the summary after DATA_END is not needed to read.
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from io import BytesIO
+from typing import BinaryIO, TypeVar
+
+T = TypeVar("T")
+
+MAGIC = b"\x89MCAP0\r\n"
+HEADER, FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK = 1, 2, 3, 4, 5, 6
+METADATA, DATA_END = 0x0C, 0x0F
+LAST_OPCODE = 0x0F
+PRIVATE_OPCODES = 0x80
+
+MOST_RECORD = 80 << 20  # octets of a record that is read whole
+MOST_CHUNK = 64 << 20  # octets of a chunk unpacked; usual writers make 1 to 8 MiB
+MOST_PROBLEMS = 100
+
+_RECORD = struct.Struct("<BQ")
+_CHUNK = struct.Struct("<QQQIi")  # first and last time, size and check sum unpacked, length of the compression's name
+_ZSTD = b"\x04\x00\x00\x00zstd"
+_ZSTD_AT = _RECORD.size + 28  # of that in a chunk record
+_BLOCK = 1 << 20
+
+
+@dataclass(slots=True)
+class Report:
+    """What was found wrong in a pass. `end`: where reading ended, `size`: of the file, octets."""
+
+    size: int
+    end: int = 0
+    footer: bool = False
+    problems: list[str] = field(default_factory=list)
+    unread: int = 0  # octets skipped or beyond the end
+
+    def problem(self, text: str, octets: int = 0) -> None:
+        """Write down something that could not be read."""
+        self.unread += octets
+        if len(self.problems) < MOST_PROBLEMS:
+            self.problems.append(text)
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """A record at `offset`; `body` is None where it was not asked for."""
+
+    opcode: int
+    offset: int
+    body: bytes | None
+
+
+def records(stream: BinaryIO, report: Report, since: int | None = None) -> Iterator[Record]:
+    """The records of a file from its beginning, `stream` standing after the magic.
+
+    `since`: chunks whose messages all are earlier (ns) are passed over without being read; the check over the whole
+    file is then not made.
+    """
+    position = len(MAGIC)
+    check = zlib.crc32(MAGIC)
+    whole = since is None
+    while True:
+        head = stream.read(_RECORD.size)
+        if len(head) < _RECORD.size:
+            report.end = position
+            report.unread += report.size - position
+            return
+        opcode, length = _RECORD.unpack(head)
+        left = report.size - position - _RECORD.size
+        if not _plausible(opcode, length, left):
+            found = _next_chunk(stream, position + 1, report.size)
+            if found is None:
+                report.end = position
+                report.unread += report.size - position
+                if not (length > left and opcode <= LAST_OPCODE):
+                    report.problem(f"damaged at octet {position}")
+                return
+            report.problem(f"damaged at octet {position}, reading goes on at octet {found}", found - position)
+            whole = False
+            position = found
+            stream.seek(position)
+            continue
+        if opcode == DATA_END:
+            told = stream.read(min(length, 4))
+            if whole and told not in (bytes(4), struct.pack("<I", check)):
+                report.problem("the check over the whole file fails: some octet has changed")
+            report.end = position
+            _summary(stream, report)
+            return
+        if opcode == CHUNK and since is not None and length >= _CHUNK.size:
+            start = stream.read(16)
+            if struct.unpack("<QQ", start)[1] < since:
+                stream.seek(length - 16, 1)
+                position += _RECORD.size + length
+                continue
+            body: bytes | None = start + stream.read(length - 16)
+        elif length <= MOST_RECORD:
+            body = stream.read(length)
+        else:
+            body = None
+            whole = False
+            stream.seek(length, 1)
+        if whole and body is not None:
+            check = zlib.crc32(body, zlib.crc32(head, check))
+        yield Record(opcode, position, body)
+        position += _RECORD.size + length
+        report.end = position
+
+
+def _plausible(opcode: int, length: int, left: int) -> bool:
+    return length <= left and (0 < opcode <= LAST_OPCODE or opcode >= PRIVATE_OPCODES)
+
+
+def _next_chunk(stream: BinaryIO, position: int, size: int) -> int | None:
+    """Where the next whole chunk record begins, at or after `position`; None when there is none."""
+    stream.seek(position)
+    window = b""
+    base = position
+    while block := stream.read(_BLOCK):
+        window += block
+        at = window.find(_ZSTD)
+        while at >= 0:
+            start = base + at - _ZSTD_AT
+            if start >= position and _is_chunk(stream, start, size):
+                return start
+            at = window.find(_ZSTD, at + 1)
+        kept = len(_ZSTD) - 1
+        base += len(window) - len(window[-kept:])
+        window = window[-kept:]
+        stream.seek(base + len(window))
+    return None
+
+
+def _is_chunk(stream: BinaryIO, start: int, size: int) -> bool:
+    stream.seek(start)
+    head = stream.read(_ZSTD_AT + len(_ZSTD) + 8)
+    if len(head) < _ZSTD_AT + len(_ZSTD) + 8:
+        return False
+    opcode, length = _RECORD.unpack_from(head)
+    (packed,) = struct.unpack_from("<Q", head, len(head) - 8)
+    return bool(opcode == CHUNK and length == len(head) - _RECORD.size + packed and start + 9 + length <= size)
+
+
+def _summary(stream: BinaryIO, report: Report) -> None:
+    """Look for the footer and the magic at the end; check the summary's sum."""
+    start = stream.tell()
+    footer = 9 + 20 + len(MAGIC)
+    if report.size - start < footer:
+        return
+    stream.seek(report.size - footer)
+    tail = stream.read(footer)
+    if tail[0] != FOOTER or tail[-8:] != MAGIC:
+        return
+    report.footer = True
+    report.end = report.size
+    summary_start, _, check = struct.unpack_from("<QQI", tail, 9)
+    if check and (summary_start == start or summary_start == 0):
+        stream.seek(start)
+        found, left = 0, report.size - start - 12
+        while left > 0 and (block := stream.read(min(left, _BLOCK))):
+            found = zlib.crc32(block, found)
+            left -= len(block)
+        if found != check:
+            report.problem("the index at the end is damaged")
+    elif summary_start != start:
+        report.problem("the index at the end is damaged")
+
+
+def parse(kind: type[T], body: bytes) -> T | None:
+    """A record of one of the library's classes (Header, Metadata, Schema, Channel), None when it is damaged."""
+    from mcap.data_stream import ReadDataStream
+    from mcap.exceptions import McapError
+
+    try:
+        found: T = kind.read(ReadDataStream(BytesIO(body)))  # type: ignore[attr-defined]
+    except (McapError, struct.error, UnicodeDecodeError):
+        return None
+    return found
+
+
+# -- chunks ----------------------------------------------------------------------------------------------------
+
+
+def unpack_chunk(body: bytes) -> bytes | str:
+    """The records in a chunk record, or in words why they cannot be had."""
+    if len(body) < _CHUNK.size:
+        return "too short"
+    _, _, size, check, name_length = _CHUNK.unpack_from(body)
+    at = _CHUNK.size + name_length
+    if name_length < 0 or len(body) < at + 8:
+        return "too short"
+    name = body[_CHUNK.size : at]
+    if size > MOST_CHUNK:
+        return f"claims {size} octets; more than {MOST_CHUNK} are not unpacked"
+    (packed,) = struct.unpack_from("<Q", body, at)
+    if packed != len(body) - at - 8:
+        return "sizes contradict each other"
+    octets = _decompress(name, body[at + 8 :], size)
+    if isinstance(octets, str):
+        return octets
+    if len(octets) != size:
+        return "not as long as it claims"
+    if check and zlib.crc32(octets) != check:
+        return "its check fails"
+    return octets
+
+
+def _decompress(name: bytes, octets: bytes, size: int) -> bytes | str:
+    """At most `size` octets unpacked, or why not."""
+    if name == b"":
+        return octets
+    if name == b"zstd":
+        import zstandard
+
+        try:
+            # the size in the frame is what the library allocates
+            if zstandard.frame_content_size(octets) not in (size, -1):
+                return "sizes contradict each other"
+            return zstandard.ZstdDecompressor().decompress(octets, max_output_size=size)
+        except zstandard.ZstdError:
+            return "cannot be unpacked"
+    if name == b"lz4":
+        import lz4.frame  # type: ignore[import-untyped]
+
+        try:
+            return bytes(lz4.frame.LZ4FrameDecompressor().decompress(octets, max_length=size))
+        except (RuntimeError, EOFError, ValueError):
+            return "cannot be unpacked"
+    return "packed in a way that is not known here"
+
+
+def inner_records(octets: bytes) -> Iterator[tuple[int, bytes]]:
+    """Opcode and content of the records in an unpacked chunk, up to the first that does not fit."""
+    at = 0
+    while at + _RECORD.size <= len(octets):
+        opcode, length = _RECORD.unpack_from(octets, at)
+        at += _RECORD.size
+        if length > len(octets) - at:
+            return
+        yield opcode, octets[at : at + length]
+        at += length
+
+
+MESSAGE_HEAD = struct.Struct("<HIQQ")
+"""Channel, sequence, log time, publish time; the data follow."""
