@@ -1,0 +1,180 @@
+"""A virtual RS-485 bus: parties on pseudo-terminals (or in memory), paced at the baud rate, with faults.
+
+    with VirtualBus(LineSettings.parse("19200,8E1")) as bus:
+        client = bus.attach("client")     # "/dev/pts/5": open it like a serial port
+        server = bus.attach("server")
+        tap = bus.tap()                   # hears everything, is heard by nobody
+        ...
+        bus.report().tap_octets           # 0, or the tap was not passive
+
+The bus is a process of its own (`hub.py`), so that a busy main program does not disturb its timing.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import time
+from collections.abc import Sequence
+from types import TracebackType
+from typing import Any
+
+from dissectors.frame import Chunk
+from dissectors.line import LineSettings
+from sniff.simulation import hub
+from sniff.simulation.faults import Fault
+from sniff.simulation.hub import NO_STATIONS, Plan, Report
+from sniff.simulation.wire import Factory, Sent
+
+PATIENCE = 10.0  # s for the process to answer or to end
+
+
+class BusFailed(RuntimeError):
+    """The bus's process ended or does not answer."""
+
+
+class VirtualBus:
+    """One bus, from `__enter__` (or `open`) to `__exit__` (or `close`).
+
+    `stations`: makes the simulated parties; a module-level function or a partial of one, called in the bus's process.
+    `faults` strike every transmission in their order, repeatable by `seed`. `gap`: ns of silence that the protocol
+    wants before a frame (told to stations as `quiet`). `slice`: ns, how finely octets of a burst are handed out.
+    `paused`: the clock stands, and no octet moves, until `begin` is called.
+    """
+
+    def __init__(
+        self,
+        line: LineSettings,
+        stations: Factory = NO_STATIONS,
+        faults: Sequence[Fault] = (),
+        seed: int = 0,
+        gap: int = 0,
+        slice: int = 1_000_000,
+        paused: bool = False,
+    ) -> None:
+        self.line = line
+        self._plan = Plan(line, stations, tuple(faults), seed, gap, slice)
+        self._paused = paused
+        self._process: multiprocessing.process.BaseProcess | None = None
+        self._control: Any = None
+
+    def open(self) -> None:
+        """Start the process. Raises BusFailed."""
+        context = multiprocessing.get_context("spawn")
+        self._control, other = context.Pipe()
+        self._process = context.Process(target=hub.main, args=(self._plan, other), name="virtual-bus", daemon=True)
+        try:
+            self._process.start()
+        finally:
+            other.close()
+        if not self._paused:
+            self.begin()
+
+    def close(self) -> None:
+        """Stop the process and wait for it; harmless when called twice."""
+        process, control = self._process, self._control
+        self._process = self._control = None
+        if process is None:
+            return
+        control.close()  # its loop ends when this end is gone
+        process.join(PATIENCE)
+        if process.is_alive():
+            process.kill()
+            process.join()
+        process.close()
+
+    def __enter__(self) -> VirtualBus:
+        self.open()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    @property
+    def pid(self) -> int | None:
+        """The process's id, None when closed."""
+        return self._process.pid if self._process is not None else None
+
+    def begin(self) -> None:
+        """Let the clock run (at once unless `paused`)."""
+        self._ask("begin")
+
+    def attach(self, name: str, echo: bool = False, answers: bool = False) -> str:
+        """Put a party on the bus; give the path of its pseudo-terminal.
+
+        `echo`: it hears itself, as many adapters do. `answers`: faults of answers may strike it.
+        Raises OSError where the system has no pseudo-terminals: use `connect`.
+        """
+        return str(self._ask("attach", name, False, echo, answers))
+
+    def tap(self, name: str = "tap") -> str:
+        """Put a listener on the bus; give the path of its pseudo-terminal. What it writes is counted, not sent."""
+        return str(self._ask("attach", name, True, False, False))
+
+    def connect(self, name: str, echo: bool = False, answers: bool = False) -> MemoryPort:
+        """Put a party on the bus without a pseudo-terminal."""
+        self._ask("connect", name, False, echo, answers)
+        return MemoryPort(self, name)
+
+    def memory_tap(self, name: str = "memory-tap") -> MemoryPort:
+        """Put a listener on the bus without a pseudo-terminal; it gets line errors too."""
+        self._ask("connect", name, True, False, False)
+        return MemoryPort(self, name)
+
+    def detach(self, name: str) -> None:
+        """Take a party or a tap off the bus."""
+        self._ask("detach", name)
+
+    def switch(self, faults: Sequence[Fault]) -> None:
+        """Let these faults strike from now on, and no others."""
+        self._ask("switch", tuple(faults))
+
+    def truth(self) -> list[Sent]:
+        """What was transmitted since the last call, and what became of it; ns on the host's monotonic clock."""
+        truths: list[Sent] = self._ask("truth")
+        return truths
+
+    def report(self) -> Report:
+        """Counts so far."""
+        report: Report = self._ask("report")
+        return report
+
+    def _ask(self, *request: Any) -> Any:
+        if self._control is None:
+            raise BusFailed("the virtual bus is not open")
+        try:
+            self._control.send(request)
+            if not self._control.poll(PATIENCE):
+                raise BusFailed(f"the virtual bus does not answer {request[0]!r}")
+            verdict, value = self._control.recv()
+        except (EOFError, BrokenPipeError, ConnectionResetError) as gone:
+            raise BusFailed("the virtual bus's process has ended") from gone
+        if verdict == "error":
+            raise OSError(value)
+        return value
+
+
+class MemoryPort:
+    """A party or a tap in this program: chunks with line errors, timed at the end of their last octet."""
+
+    def __init__(self, bus: VirtualBus, name: str) -> None:
+        self._bus = bus
+        self.name = name
+
+    def read(self, timeout: float = 0.0) -> list[Chunk]:
+        """What came since the last call; waits up to `timeout` seconds for the first of it."""
+        until = time.monotonic() + timeout
+        while True:
+            chunks: list[Chunk] = self._bus._ask("read", self.name)
+            if chunks or time.monotonic() >= until:
+                return chunks
+            time.sleep(0.002)
+
+    def write(self, octets: bytes) -> None:
+        """Transmit."""
+        self._bus._ask("write", self.name, octets)
+
+    def close(self) -> None:
+        """Leave the bus."""
+        self._bus.detach(self.name)

@@ -1,0 +1,332 @@
+"""The process behind a virtual bus: one line in real time, its pseudo-terminals, its simulated stations.
+
+Pacing. An octet is written to a listener when its line time has passed: in slices of about `slice` ns, and always at
+the end of a burst, which is the moment that everything measures from. Where the host is late, the octets of a burst
+come in a larger batch, and when the *last* one is late by more than TOLERANCE the bus's clock stands still for that
+long: so a silence between bursts is never shorter than it should be by more than TOLERANCE plus what the
+pseudo-terminal itself takes; it may be longer. `Report.slipped` says by how much the bus ran behind the host's clock.
+
+A pseudo-terminal carries octets only: line errors reach memory ports and the ground truth, and a break is an octet 00.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import select
+import signal
+import sys
+import time
+from bisect import bisect_right
+from collections import Counter, deque
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from multiprocessing.connection import Connection
+
+from dissectors.frame import Chunk, Mark
+from dissectors.line import LineSettings, Timing
+from sniff.simulation.faults import Fault
+from sniff.simulation.line_mix import Received
+from sniff.simulation.wire import Burst, Factory, Sent, Wire
+
+TOLERANCE = 200_000
+TRUTHS = 200_000  # transmissions remembered
+UNREAD = 1 << 20  # octets that a memory port keeps for a reader that does not come
+NO_STATIONS: Factory = tuple
+HAS_PTY = os.name == "posix" and sys.platform not in ("emscripten", "wasi")
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """Everything the process needs to know to begin; see `VirtualBus`."""
+
+    line: LineSettings
+    stations: Factory = NO_STATIONS
+    faults: tuple[Fault, ...] = ()
+    seed: int = 0
+    gap: int = 0
+    slice: int = 1_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """What a bus did so far.
+
+    `written`: octets that each attached party wrote. `delivered`: octets written to each port. `unread`: octets that a
+    port lost because nobody read it. `tap_octets`: octets that taps wrote: not put on the line, and 0 for anything that
+    only listens; `tap_first`: the first of them. `struck`: transmissions by fault ("collision" among them).
+    `slipped`: ns by which the bus ran behind the host's clock. `latest`: ns, worst delay of a burst's last octet.
+    """
+
+    written: dict[str, int]
+    delivered: dict[str, int]
+    unread: dict[str, int]
+    tap_octets: int
+    tap_first: bytes
+    bursts: int
+    transmissions: int
+    struck: dict[str, int]
+    slipped: int
+    latest: int
+
+
+@dataclass(slots=True)
+class Port:
+    """A place on the bus: a pseudo-terminal (`master` ≥ 0), or memory."""
+
+    name: str
+    tap: bool
+    echo: bool = False
+    answers: bool = False
+    master: int = -1
+    slave: int = -1
+    written: int = 0
+    delivered: int = 0
+    unread: int = 0
+    waiting: deque[Chunk] = field(default_factory=deque)
+    held: int = 0
+
+    def put(self, chunk: Chunk) -> None:
+        """Give octets to the listener; what it has no room for is counted."""
+        if self.master >= 0:
+            try:
+                done = os.write(self.master, chunk.octets)
+            except BlockingIOError:
+                done = 0
+        else:
+            done = len(chunk.octets) if self.held < UNREAD else 0
+            if done:
+                self.waiting.append(chunk)
+                self.held += done
+        self.delivered += done
+        self.unread += len(chunk.octets) - done
+
+    def take(self) -> list[Chunk]:
+        """What waits in memory."""
+        chunks = list(self.waiting)
+        self.waiting.clear()
+        self.held = 0
+        return chunks
+
+    def close(self) -> None:
+        """Give the pseudo-terminal back."""
+        for descriptor in (self.master, self.slave):
+            if descriptor >= 0:
+                os.close(descriptor)
+        self.master = self.slave = -1
+
+
+class Hub:
+    """The loop: wait for the next moment of the line or for octets from outside, and do what is due."""
+
+    def __init__(self, plan: Plan, control: Connection) -> None:
+        self._plan = plan
+        self._control = control
+        self._wire = Wire(plan.line, plan.stations(), plan.faults, plan.seed, plan.gap)
+        self._linger = Timing(plan.line).t15
+        self._batch = max(1, plan.slice // plan.line.char)
+        self._origin: int | None = None  # the host's clock at bus time 0, None before the start
+        self._began = 0
+        self._ports: dict[str, Port] = {}
+        self._given = 0  # octets of the burst on the line that listeners have
+        self._truths: deque[Sent] = deque(maxlen=TRUTHS)
+        self._struck: Counter[str] = Counter()
+        self._bursts = self._transmissions = self._tap_octets = self._latest = 0
+        self._tap_first = b""
+        self._running = True
+
+    def run(self) -> None:
+        """Until told to stop, or until the other end of the control connection is gone."""
+        try:
+            while self._running:
+                due = self._due()
+                now = self._now()
+                if due is not None and due <= now:
+                    self._happen(now)
+                else:
+                    self._wait(due)
+        finally:
+            for port in self._ports.values():
+                port.close()
+            self._control.close()
+
+    def _now(self) -> int:
+        """Bus time, ns; 0 until the start."""
+        return 0 if self._origin is None else time.monotonic_ns() - self._origin
+
+    def _due(self) -> int | None:
+        """Bus time of the next thing to do by itself."""
+        if self._origin is None:
+            return None
+        event = self._wire.next_event()
+        received = self._wire.on_line()
+        if received is None or self._given >= len(received.octets):
+            return event
+        place = min(self._given + self._batch, len(received.octets)) - 1
+        octet = received.ends[place]
+        return octet if event is None else min(octet, event)
+
+    def _happen(self, now: int) -> None:
+        """Octets that have ended go out, then the line moves on, by one event at most."""
+        event = self._wire.next_event()
+        until = now if event is None else min(now, event)
+        received = self._wire.on_line()
+        if received is not None:
+            self._deliver(received, until)  # may set the clock back
+        for burst in self._wire.advance(min(until, self._now())):
+            self._finish(burst)
+
+    def _deliver(self, received: Received, until: int) -> None:
+        ready = bisect_right(received.ends, until)
+        if ready <= self._given:
+            return
+        begin, self._given = self._given, ready
+        assert self._origin is not None
+        marks = tuple(Mark(m.offset - begin, m.error) for m in received.marks if begin <= m.offset < ready)
+        chunk = Chunk(received.ends[ready - 1] + self._origin, received.octets[begin:ready], marks)
+        senders = self._wire.senders()
+        for port in self._ports.values():
+            if port.echo or port.name not in senders:
+                port.put(chunk)
+        if ready == len(received.octets):
+            late = self._now() - received.ends[-1]
+            self._latest = max(self._latest, late)
+            if late > TOLERANCE:
+                self._origin += late
+
+    def _finish(self, burst: Burst) -> None:
+        origin = self._origin or 0
+        if burst.octets:
+            self._given = 0
+            self._bursts += 1
+        for sent in burst.sent:
+            self._transmissions += 1
+            self._struck.update(sent.faults)
+            self._truths.append(replace(sent, start=sent.start + origin, end=sent.end + origin))
+
+    def _wait(self, due: int | None) -> None:
+        timeout = None if due is None else max(0.0, (due - self._now()) / 1e9)
+        masters = {port.master: port for port in self._ports.values() if port.master >= 0}
+        if not masters:  # also where `select` knows sockets only
+            if self._control.poll(timeout):
+                self._obey()
+            return
+        control = self._control.fileno()
+        for descriptor in select.select([control, *masters], [], [], timeout)[0]:
+            if descriptor == control:
+                self._obey()
+            else:
+                self._accept(masters[descriptor])
+
+    def _accept(self, port: Port) -> None:
+        """Octets that a party wrote into its pseudo-terminal."""
+        with contextlib.suppress(OSError):
+            self._put_on_line(port, os.read(port.master, 65536))
+
+    def _put_on_line(self, port: Port, octets: bytes) -> None:
+        port.written += len(octets)
+        if port.tap:
+            self._tap_octets += len(octets)
+            self._tap_first = (self._tap_first + octets)[:64]
+        elif self._origin is not None:
+            self._wire.send(port.name, self._now(), octets, port.answers, self._linger)
+
+    def _obey(self) -> None:
+        """One request of the other side, one reply: ("ok", value) or ("error", text)."""
+        try:
+            name, *arguments = self._control.recv()
+        except EOFError:
+            self._running = False
+            return
+        try:
+            reply = ("ok", getattr(self, f"do_{name}")(*arguments))
+        except (OSError, ValueError, KeyError) as trouble:
+            reply = ("error", str(trouble))
+        with contextlib.suppress(BrokenPipeError):
+            self._control.send(reply)
+
+    def do_begin(self) -> None:
+        """Start the clock of the bus."""
+        if self._origin is None:
+            self._origin = self._began = time.monotonic_ns()
+
+    def do_stop(self) -> None:
+        """End the process."""
+        self._running = False
+
+    def do_attach(self, name: str, tap: bool, echo: bool, answers: bool) -> str:
+        """Make a pseudo-terminal for a party or a tap; give the path to open."""
+        self._free(name)
+        port = Port(name, tap, echo, answers)
+        port.master, port.slave = _raw_pty()
+        self._ports[name] = port
+        return os.ttyname(port.slave)
+
+    def do_connect(self, name: str, tap: bool, echo: bool, answers: bool) -> None:
+        """Make a port in memory."""
+        self._free(name)
+        self._ports[name] = Port(name, tap, echo, answers)
+
+    def do_detach(self, name: str) -> None:
+        """Take a port off the bus."""
+        self._ports.pop(name).close()
+
+    def do_read(self, name: str) -> list[Chunk]:
+        """What a memory port has got since the last call."""
+        return self._ports[name].take()
+
+    def do_write(self, name: str, octets: bytes) -> None:
+        """Octets from a memory port."""
+        self._put_on_line(self._ports[name], octets)
+
+    def do_switch(self, faults: Sequence[Fault]) -> None:
+        """Other faults from now on."""
+        self._wire.switch(faults)
+
+    def do_truth(self) -> list[Sent]:
+        """The transmissions since the last call, times on the host's monotonic clock."""
+        truths = list(self._truths)
+        self._truths.clear()
+        return truths
+
+    def do_report(self) -> Report:
+        """Counts so far."""
+        ports = self._ports.values()
+        return Report(
+            written={port.name: port.written for port in ports},
+            delivered={port.name: port.delivered for port in ports},
+            unread={port.name: port.unread for port in ports},
+            tap_octets=self._tap_octets,
+            tap_first=self._tap_first,
+            bursts=self._bursts,
+            transmissions=self._transmissions,
+            struck=dict(self._struck),
+            slipped=(self._origin or 0) - self._began,
+            latest=self._latest,
+        )
+
+    def _free(self, name: str) -> None:
+        if name in self._ports:
+            raise ValueError(f"port {name!r} is on the bus already")
+
+
+def _raw_pty() -> tuple[int, int]:
+    """Master and slave of a new pseudo-terminal that passes octets as they are. Raises OSError where there is none.
+
+    The slave stays open here, so that its settings survive and the master never reads end of file.
+    """
+    if not HAS_PTY:
+        raise OSError("this system has no pseudo-terminals; use a port in memory")
+    import pty
+    import tty
+
+    master, slave = pty.openpty()
+    tty.setraw(slave)
+    os.set_blocking(master, False)
+    return master, slave
+
+
+def main(plan: Plan, control: Connection) -> None:
+    """Entry of the process. Interrupts from the keyboard are the parent's business."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    Hub(plan, control).run()
