@@ -1,0 +1,70 @@
+"""What a capture is asked to do; crosses to the capture process as JSON."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from dissectors.line import LineSettings
+
+
+@dataclass(frozen=True, slots=True)
+class SourceSpec:
+    """One bus to listen to. `spec`: as `open_source` takes it; `protocol`: a registry name; `bus`: its short name."""
+
+    spec: str
+    line: LineSettings = field(default_factory=LineSettings)
+    protocol: str = "modbus-rtu"
+    bus: str = "bus"
+
+
+@dataclass(frozen=True, slots=True)
+class RecordSpec:
+    """Where to record. `rotation`, `keep`: as the recorder takes them ("size:64MB", "time:1h"; parts to keep).
+
+    With several buses each has a file of its own: night.mcap becomes night.boiler-room.mcap.
+    """
+
+    path: str
+    rotation: str | None = None
+    keep: int | None = None
+
+    def path_of(self, source: SourceSpec, sources: Sequence[SourceSpec]) -> Path:
+        """The file of one of the buses."""
+        path = Path(self.path)
+        if len(sources) == 1:
+            return path
+        names = [other.bus for other in sources]
+        name = source.bus if names.count(source.bus) == 1 else f"{source.bus}-{sources.index(source) + 1}"
+        stem, dot, suffix = path.name.rpartition(".")
+        safe = re.sub(r"[^\w.-]+", "-", name)
+        return path.with_name(f"{stem}.{safe}.{suffix}" if dot else f"{path.name}.{safe}")
+
+
+@dataclass(frozen=True, slots=True)
+class CaptureConfig:
+    """Everything the capture process is told. `duration`: ns, None for no end."""
+
+    sources: tuple[SourceSpec, ...]
+    record: RecordSpec | None = None
+    duration: int | None = None
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain values."""
+        value = asdict(self)
+        for source, spec in zip(value["sources"], self.sources, strict=True):
+            source["line"] = str(spec.line)
+        return value
+
+    @classmethod
+    def from_json(cls, value: dict[str, Any]) -> CaptureConfig:
+        """Read what `to_json` gave. Raises ValueError, KeyError or TypeError."""
+        sources = tuple(
+            SourceSpec(source["spec"], LineSettings.parse(source["line"]), source["protocol"], source["bus"])
+            for source in value["sources"]
+        )
+        record = value["record"]
+        return cls(sources, None if record is None else RecordSpec(**record), value["duration"])

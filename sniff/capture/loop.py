@@ -1,0 +1,269 @@
+"""The capture loop: wait for octets, stamp them, hand them to recorder and pipe. Nothing in it waits but the poll.
+
+Time is cut into beats. In each beat what came is gathered and goes into the pipe in one write, closed by a Tick for
+every bus: all that the bus gave up to then has been sent. Beats are 20 ms apart while octets come and shortly after,
+250 ms in silence.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import selectors
+import socket
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from dissectors.frame import Chunk
+from dissectors.line import LineSettings
+from sniff.capture.outlet import Outlet
+from sniff.capture.wire import (
+    Kind,
+    MessageSplitter,
+    Status,
+    WireError,
+    decode_derived,
+    encode,
+    encode_status,
+    encode_tick,
+)
+from sniff.recording.writer import Recorder
+from sniff.session import Item, LineEvent, LineEventKind
+from sniff.sources import PortError, Source
+from sniff.sources.clock import NS_PER_MS, STEP, Clock
+
+BEAT = 20 * NS_PER_MS
+IDLE_BEAT = 250 * NS_PER_MS
+BUSY_FOR = 100 * NS_PER_MS
+"""After the last octet beats stay short for so long."""
+
+STATUS_EVERY = 1000 * NS_PER_MS
+FLUSH_AT = 32 * 1024
+"""Octets gathered that are sent before the beat."""
+
+_COMMAND_SIZE = 64 * 1024
+_FAR = 1 << 62
+
+
+@dataclass
+class _Bus:
+    """A source and what the loop knows of it."""
+
+    index: int
+    source: Source
+    fd: int | None = None
+    due: int = _FAR
+    octets: int = 0
+    ended: bool = False
+
+
+@dataclass
+class CaptureLoop:
+    """Runs until somebody says `stop`. `commands`: the descriptor that the main process writes to, None for none."""
+
+    clock: Clock
+    sources: list[Source]
+    recorders: list[Recorder]
+    outlet: Outlet
+    commands: int | None = None
+    waker: socket.socket | None = None  # readable when a signal came
+    priority: str = ""
+    end_at: int | None = None
+    reason: str | None = None
+    _offset: int = 0
+    _buses: list[_Bus] = field(default_factory=list)
+
+    def run(self) -> str:
+        """Capture; why it ended, in words."""
+        self._selector = selectors.DefaultSelector()
+        self._buses = [_Bus(index, source) for index, source in enumerate(self.sources)]
+        self._splitter = MessageSplitter()
+        now = self.clock.now()
+        self._beat_at = self._status_at = now
+        self._busy_until = now
+        if self.commands is not None:
+            os.set_blocking(self.commands, False)
+            self._selector.register(self.commands, selectors.EVENT_READ, self._take_commands)
+        if self.waker is not None:
+            waker = self.waker
+            self._selector.register(waker, selectors.EVENT_READ, lambda: (waker.recv(64), None)[1])
+        for bus in self._buses:
+            self._take(bus)
+        while self.reason is None:
+            self._step()
+        for bus in self._buses:  # what arrived meanwhile
+            if not bus.ended:
+                self._take(bus)
+        self._beat(self.clock.now())
+        return self.reason
+
+    def stop(self, reason: str) -> None:
+        """End soon; the first reason counts."""
+        self.reason = self.reason or reason
+
+    # -- one turn ----------------------------------------------------------------------------------------------
+
+    def _step(self) -> None:
+        now = self.clock.now()
+        due = min(self._beat_at, min((bus.due for bus in self._buses), default=_FAR))
+        for key, _ in self._selector.select(max(0, due - now) / 1e9):
+            call: Callable[[], None] = key.data
+            call()
+        now = self.clock.now()
+        for bus in self._buses:
+            if bus.due <= now:
+                self._take(bus)
+        if now >= self._beat_at or self.outlet.size > FLUSH_AT:
+            self._beat(now)
+
+    def _take(self, bus: _Bus) -> None:
+        """One read of a source."""
+        source = bus.source
+        index = bus.index
+        items = source.read()
+        for item in items:
+            self._keep(index, item)
+            if isinstance(item, Chunk):
+                bus.octets += len(item.octets)
+        if items:
+            self._hurry()
+        fd = source.fileno()
+        if fd != bus.fd:
+            self._watch(bus, fd)
+        deadline = source.deadline()
+        bus.due = _FAR if deadline is None else deadline
+        if source.ended and not bus.ended:
+            bus.ended = True
+            bus.due = _FAR
+            self._watch(bus, None)
+            if all(other.ended for other in self._buses):
+                self.stop("nothing more to read")
+
+    def _keep(self, index: int, item: Item) -> None:
+        if self.recorders:
+            if isinstance(item, Chunk):
+                self.recorders[index].chunk(item)
+            else:
+                self.recorders[index].line(item)
+        self.outlet.item(index, item)
+
+    def _hurry(self) -> None:
+        now = self.clock.now()
+        self._busy_until = now + BUSY_FOR
+        if self._beat_at > now + BEAT:
+            self._beat_at = now + BEAT
+
+    def _watch(self, bus: _Bus, fd: int | None) -> None:
+        if bus.fd is not None:
+            with contextlib.suppress(KeyError, ValueError, OSError):
+                self._selector.unregister(bus.fd)
+        bus.fd = fd
+        if fd is not None:
+            self._selector.register(fd, selectors.EVENT_READ, lambda: self._take(bus))
+
+    # -- beats -------------------------------------------------------------------------------------------------
+
+    def _beat(self, now: int) -> None:
+        for recorder in self.recorders:
+            recorder.tick(now)
+        for bus in self._buses:
+            self.outlet.droppable(encode_tick(bus.index, bus.source.now()))
+        if now >= self._status_at:
+            self._status_at = now + STATUS_EVERY
+            self._check_clock(now)
+            self._send_status()
+        self.outlet.flush()
+        busy = now < self._busy_until or self.outlet.size
+        self._beat_at = now + (BEAT if busy else IDLE_BEAT)
+        if self.end_at is not None:
+            self._beat_at = min(self._beat_at, self.end_at)
+            if now >= self.end_at:
+                self.stop("the time asked for is over")
+        if not self.recorders and not self.outlet.open:
+            self.stop("nobody listens")
+
+    def _check_clock(self, now: int) -> None:
+        offset = self.clock.drift()
+        if abs(offset - self._offset) > STEP:
+            self._offset = offset
+            text = f"wall clock is {offset / 1e6:+.3f} ms from the capture's"
+            for bus in self._buses:
+                event = LineEvent(now, LineEventKind.CLOCK, text, offset)
+                self._keep(bus.index, event)
+
+    def _send_status(self) -> None:
+        for bus in self._buses:
+            self.outlet.droppable(encode_status(self.status(bus.index)))
+
+    def status(self, index: int) -> Status:
+        """How one bus is doing."""
+        octets, dropped = self._buses[index].octets, self.outlet.dropped[index]
+        if not self.recorders:
+            return Status(index, octets=octets, dropped=dropped, priority=self.priority)
+        recorder = self.recorders[index]
+        return Status(
+            index,
+            str(recorder.path),
+            recorder.size,
+            octets,
+            dropped,
+            recorder.lost_octets,
+            self.priority,
+            recorder.trouble or "",
+        )
+
+    # -- what the main process says ----------------------------------------------------------------------------
+
+    def _take_commands(self) -> None:
+        assert self.commands is not None
+        try:
+            data = os.read(self.commands, _COMMAND_SIZE)
+        except BlockingIOError:
+            return
+        except OSError:
+            data = b""
+        try:
+            for kind, bus, body in self._splitter.feed(data):
+                self._command(kind, bus, body)
+        except WireError:
+            data = b""  # not our main process: stop listening to it
+        if not data:
+            self._selector.unregister(self.commands)
+            self.commands = None
+            if not self.recorders:
+                self.stop("the main process is gone")
+
+    def _command(self, kind: int, bus: int, body: bytes) -> None:
+        if kind == Kind.STOP:
+            self.stop("stopped")
+        elif kind == Kind.DERIVED and bus < len(self.recorders):
+            derived = decode_derived(bus, body)
+            self.recorders[bus].derived(
+                derived.topic,
+                derived.schema_name,
+                derived.log_time,
+                derived.publish_time,
+                derived.data,
+                derived.metadata,
+            )
+        elif kind == Kind.RECONFIGURE and bus < len(self._buses):
+            source = self._buses[bus].source
+            try:
+                source.reconfigure(LineSettings.parse(body.decode("ascii", "replace")))
+            except (PortError, ValueError) as error:
+                event = LineEvent(self.clock.now(), LineEventKind.NOTE, str(error))
+                self.outlet.item(bus, event)
+            self._take(self._buses[bus])
+
+
+def farewell(outlet: Outlet, reason: str, patience: float = 2.0) -> None:
+    """Say that it is over, to a reader that still reads."""
+    import time
+
+    outlet.send(encode(Kind.ENDED, 0, reason.encode()))
+    until = time.monotonic() + patience
+    outlet.flush()
+    while outlet.size and outlet.open and time.monotonic() < until:
+        time.sleep(0.02)
+        outlet.flush()
+    outlet.close()

@@ -1,0 +1,233 @@
+"""The messages between the capture process and the main process: compact, bounded, never executed.
+
+      u32 length of what follows    u8 kind    u8 bus    body          little-endian
+
+Both ends are the same version of this program, yet the body of a chunk comes from a line: whatever is malformed raises
+WireError, and nothing longer than LIMIT is ever held.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from dataclasses import asdict, dataclass
+from enum import IntEnum
+from typing import Any, NamedTuple
+
+from dissectors.frame import Chunk, LineError, Mark
+from sniff.session import Item, LineEvent, LineEventKind
+
+LIMIT = 16 * 1024 * 1024
+"""Longest message, octets."""
+
+
+class WireError(ValueError):
+    """Octets that are no message of this protocol."""
+
+
+class Kind(IntEnum):
+    """What a message is. The first group goes to the main process, the second comes from it."""
+
+    HELLO = 1  # JSON: sessions, pid, priority
+    FAILED = 2  # JSON: kind "port" or "capture", text
+    CHUNK = 3
+    LINE = 4
+    TICK = 5
+    STATUS = 6  # JSON
+    ENDED = 7  # text
+
+    CONFIG = 32  # JSON
+    DERIVED = 33
+    RECONFIGURE = 34  # text: line settings
+    STOP = 35
+
+
+class Received(NamedTuple):
+    """Something that came from a bus (its index as given at the start), in order of time."""
+
+    bus: int
+    item: Item
+
+
+class Tick(NamedTuple):
+    """Everything that this bus gave up to `now` (ns, as in its chunks) has been sent before."""
+
+    bus: int
+    now: int
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """How the capture of one bus is doing, once a second.
+
+    `path`: the file being written, "" for none; `size`: its octets. `octets`: all that came from the line. `dropped`:
+    octets that were recorded but not sent here, because this side did not keep up. `lost`: octets that are missing
+    from the file, because the disk did not keep up. `priority`: what the system granted. `error`: why nothing is
+    written any more, "" while all is well.
+    """
+
+    bus: int
+    path: str = ""
+    size: int = 0
+    octets: int = 0
+    dropped: int = 0
+    lost: int = 0
+    priority: str = ""
+    error: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Ended:
+    """The capture is over and its files are closed, unless `clean` is False."""
+
+    reason: str
+    clean: bool = True
+
+
+Message = Received | Tick | Status | Ended
+
+
+@dataclass(frozen=True, slots=True)
+class Derived:
+    """A result of the engine on its way into the file."""
+
+    bus: int
+    topic: str
+    schema_name: str
+    log_time: int
+    publish_time: int
+    data: bytes
+    metadata: dict[str, str] | None = None
+
+
+_FRAME = struct.Struct("<IBB")
+_CHUNK = struct.Struct("<qH")
+_MARK = struct.Struct("<IB")
+_TICK = struct.Struct("<q")
+_LINE = struct.Struct("<qqB")
+_DERIVED = struct.Struct("<qqHHI")
+_LINE_KINDS = tuple(LineEventKind)
+_LINE_CODES = {kind: code for code, kind in enumerate(_LINE_KINDS)}
+
+
+def encode(kind: Kind, bus: int = 0, body: bytes = b"") -> bytes:
+    """One message."""
+    return _FRAME.pack(len(body) + 2, kind, bus) + body
+
+
+def encode_item(bus: int, item: Item) -> bytes:
+    """A chunk or line event."""
+    if isinstance(item, Chunk):
+        if not item.marks:
+            octets = item.octets
+            return _FRAME.pack(len(octets) + 12, Kind.CHUNK, bus) + _CHUNK.pack(item.time, 0) + octets
+        marks = item.marks[:0xFFFF]
+        body = _CHUNK.pack(item.time, len(marks))
+        body += b"".join(_MARK.pack(mark.offset, mark.error.value) for mark in marks)
+        return encode(Kind.CHUNK, bus, body + item.octets)
+    text = item.text.encode("utf-8", "replace")
+    return encode(Kind.LINE, bus, _LINE.pack(item.time, item.count, _LINE_CODES[item.kind]) + text)
+
+
+def encode_tick(bus: int, now: int) -> bytes:
+    """A Tick."""
+    return encode(Kind.TICK, bus, _TICK.pack(now))
+
+
+def encode_json(kind: Kind, value: Any, bus: int = 0) -> bytes:
+    """A message whose body is JSON."""
+    return encode(kind, bus, json.dumps(value).encode())
+
+
+def encode_status(status: Status) -> bytes:
+    """A Status."""
+    return encode_json(Kind.STATUS, asdict(status), status.bus)
+
+
+def encode_derived(derived: Derived) -> bytes:
+    """A result on its way into the file."""
+    topic, schema = derived.topic.encode(), derived.schema_name.encode()
+    metadata = json.dumps(derived.metadata).encode() if derived.metadata else b""
+    head = _DERIVED.pack(derived.log_time, derived.publish_time, len(topic), len(schema), len(metadata))
+    return encode(Kind.DERIVED, derived.bus, head + topic + schema + metadata + derived.data)
+
+
+def decode_message(kind: int, bus: int, body: bytes) -> Message | None:
+    """A message to the main process; None for kinds that are not for it. Raises WireError."""
+    try:
+        if kind == Kind.CHUNK:
+            return Received(bus, _decode_chunk(body))
+        if kind == Kind.TICK:
+            return Tick(bus, _TICK.unpack(body)[0])
+        if kind == Kind.LINE:
+            time, count, code = _LINE.unpack_from(body)
+            text = body[_LINE.size :].decode("utf-8", "replace")
+            return Received(bus, LineEvent(time, _LINE_KINDS[code], text, count))
+        if kind == Kind.STATUS:
+            return Status(**decode_json(body))
+        if kind == Kind.ENDED:
+            return Ended(body.decode("utf-8", "replace"))
+    except (struct.error, IndexError, TypeError, ValueError) as error:
+        raise WireError(f"message {kind}: {error}") from error
+    return None
+
+
+def _decode_chunk(body: bytes) -> Chunk:
+    time, count = _CHUNK.unpack_from(body)
+    if not count:
+        return Chunk(time, body[_CHUNK.size :])
+    end = _CHUNK.size + count * _MARK.size
+    marks = tuple(Mark(offset, LineError(error)) for offset, error in _MARK.iter_unpack(body[_CHUNK.size : end]))
+    return Chunk(time, body[end:], marks)
+
+
+def decode_derived(bus: int, body: bytes) -> Derived:
+    """A result on its way into the file. Raises WireError."""
+    try:
+        log_time, publish_time, *lengths = _DERIVED.unpack_from(body)
+        parts = []
+        begin = _DERIVED.size
+        for length in lengths:
+            parts.append(body[begin : begin + length])
+            begin += length
+        topic, schema = parts[0].decode(), parts[1].decode()
+        metadata = {str(key): str(value) for key, value in decode_json(parts[2]).items()} if parts[2] else None
+    except (struct.error, ValueError) as error:
+        raise WireError(f"result: {error}") from error
+    return Derived(bus, topic, schema, log_time, publish_time, body[begin:], metadata)
+
+
+def decode_json(body: bytes) -> dict[str, Any]:
+    """A JSON object. Raises WireError."""
+    try:
+        value = json.loads(body)
+    except ValueError as error:
+        raise WireError(str(error)) from error
+    if not isinstance(value, dict):
+        raise WireError("not an object")
+    return value
+
+
+class MessageSplitter:
+    """Cuts a stream of octets into messages; holds at most one incomplete message."""
+
+    def __init__(self) -> None:
+        self._held = bytearray()
+
+    def feed(self, data: bytes) -> list[tuple[int, int, bytes]]:
+        """Complete messages as (kind, bus, body). Raises WireError on an impossible length."""
+        self._held += data
+        messages = []
+        begin = 0
+        held = self._held
+        while len(held) - begin >= _FRAME.size:
+            length, kind, bus = _FRAME.unpack_from(held, begin)
+            if not 2 <= length <= LIMIT:
+                raise WireError(f"a message of {length} octets")
+            end = begin + 4 + length
+            if end > len(held):
+                break
+            messages.append((kind, bus, bytes(held[begin + _FRAME.size : end])))
+            begin = end
+        del held[:begin]
+        return messages

@@ -1,0 +1,113 @@
+"""What serial drivers can report and how long they hold octets back; a table, from the drivers' sources.
+
+Linux kernel: drivers/usb/serial, drivers/usb/class/cdc-acm.c, drivers/tty/serial, drivers/tty/n_tty.c. Times marked
+"assumed" have no such source: adapters differ, and only a measurement tells.
+"""
+
+from __future__ import annotations
+
+import platform
+import re
+from dataclasses import dataclass
+
+NS_PER_MS = 1_000_000
+USB_FRAME = 1 * NS_PER_MS
+"""A full-speed USB host polls once a frame of 1 ms (USB 2.0, 5.3)."""
+
+ALL = ("parity", "framing", "break", "overrun")
+
+
+@dataclass(frozen=True, slots=True)
+class Driver:
+    """One driver. `reports`: None where nobody knows. `hold`, `hold_chars`: ns and characters it may keep an octet."""
+
+    name: str
+    reports: tuple[str, ...] | None
+    detail: str
+    hold: int
+    hold_from: str
+    hold_chars: int = 0
+    usb: bool = True
+
+
+DRIVERS: dict[str, Driver] = {
+    driver.name: driver
+    for driver in (
+        Driver(
+            "ftdi_sio",
+            ALL,
+            "one flag covers a whole USB packet of up to 62 octets: an error is somewhere among the octets marked",
+            17 * NS_PER_MS,
+            "latency timer at its default of 16 ms + 1 ms USB",
+        ),
+        Driver(
+            "cp210x",
+            ALL,
+            "reported since Linux 5.9 and only while INPCK is set; no break on CP2102; some clones report nothing",
+            4 * NS_PER_MS,
+            "assumed for cp210x",
+        ),
+        Driver(
+            "ch341",
+            (),
+            "the driver reports no line errors: none seen does not mean a clean line",
+            4 * NS_PER_MS,
+            "assumed for ch341",
+        ),
+        Driver("pl2303", ALL, "one flag covers a whole USB transfer", 4 * NS_PER_MS, "assumed for pl2303"),
+        Driver(
+            "cdc_acm",
+            ("parity", "framing", "break", "overrun"),
+            "one notification covers a whole transfer, and many devices send none",
+            4 * NS_PER_MS,
+            "assumed for cdc_acm",
+        ),
+        Driver("8250", ALL, "per octet", 1 * NS_PER_MS, "FIFO of 16 and 1 ms of scheduling", 16, usb=False),
+        Driver("pl011", ALL, "per octet", 1 * NS_PER_MS, "FIFO of 16 and 1 ms of scheduling", 16, usb=False),
+        Driver(
+            "pty",
+            (),
+            "a pseudo-terminal has no line, so no line errors",
+            3 * NS_PER_MS,
+            "one scheduler slice of the host",
+            usb=False,
+        ),
+    )
+}
+
+_ALIASES = {
+    "ftdi_sio": r"ftdi",
+    "cp210x": r"cp210x",
+    "ch341": r"ch341|ch34x|ch343",
+    "pl2303": r"pl2303",
+    "cdc_acm": r"cdc_acm|usb_cdc",
+    "8250": r".*8250.*|.*16550.*|dw-apb-uart|of_serial|serial",
+    "pl011": r".*pl011.*",
+    "pty": r"pty",
+}
+
+UNKNOWN = Driver("", None, "unknown driver: errors may go unreported", 20 * NS_PER_MS, "assumed for an unknown driver")
+
+
+def find_driver(name: str) -> Driver:
+    """The driver of a kernel's name for it ("ftdi_sio", "serial8250"); UNKNOWN where the table has none."""
+    if name in DRIVERS:
+        return _today(DRIVERS[name])
+    for known, pattern in _ALIASES.items():
+        if re.fullmatch(pattern, name, re.IGNORECASE):
+            return _today(DRIVERS[known])
+    return UNKNOWN
+
+
+def _today(driver: Driver) -> Driver:
+    """cp210x before Linux 5.9 reports nothing (commit a7207e9835a4)."""
+    if driver.name == "cp210x" and _kernel() < (5, 9):
+        return Driver(driver.name, (), "no line errors before Linux 5.9", driver.hold, driver.hold_from)
+    return driver
+
+
+def _kernel() -> tuple[int, int]:
+    match = re.match(r"(\d+)\.(\d+)", platform.release())
+    if platform.system() != "Linux" or match is None:
+        return (0, 0)
+    return int(match[1]), int(match[2])

@@ -1,0 +1,162 @@
+"""The serial ports of this machine: what they are, what they can report, who holds them."""
+
+from __future__ import annotations
+
+import os
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from dissectors.line import LineSettings
+from sniff.session import Adapter
+from sniff.sources.drivers import NS_PER_MS, UNKNOWN, USB_FRAME, Driver, find_driver
+
+_SYS = Path("/sys/class/tty")
+_PROC = Path("/proc")
+_BY_NAME = (("ttyS", "8250"), ("ttyAMA", "pl011"), ("ttyACM", "cdc_acm"))
+
+
+@dataclass(frozen=True, slots=True)
+class Holder:
+    """A process that has a port open."""
+
+    pid: int
+    name: str
+
+    def __str__(self) -> str:
+        return f"pid {self.pid} ({self.name})"
+
+
+@dataclass(frozen=True, slots=True)
+class PortInfo:
+    """One serial port. `latency_timer`: ms, FTDI only, None where there is none. `holders`: those that may be seen."""
+
+    device: str
+    adapter: Adapter
+    latency_timer: int | None = None
+    holders: tuple[Holder, ...] = ()
+
+
+def list_ports() -> list[PortInfo]:
+    """All serial ports, by name. Needs no rights; where the system hides something, less is said."""
+    from serial.tools import list_ports as tools
+
+    found = sorted((str(port.device) for port in tools.comports()), key=_natural)
+    held = find_holders(found)
+    return [
+        PortInfo(device, describe_port(device), latency_timer(device), tuple(held.get(device, ()))) for device in found
+    ]
+
+
+def describe_port(device: str, line: LineSettings | None = None) -> Adapter:
+    """The adapter behind a port and how long it may hold octets back. Total: what is unknown is said to be.
+
+    `line`: for UARTs whose FIFO waits for characters; 9600 Bd is assumed without it.
+    """
+    driver_name = _driver_name(device)
+    driver = find_driver(driver_name)
+    name, serial_number = _product(device)
+    latency, latency_from = _latency(device, driver, line or LineSettings())
+    return Adapter(
+        name=name or driver.name or "unknown",
+        driver=driver_name,
+        latency=latency,
+        latency_from=latency_from,
+        reports=driver.reports,
+        detail=driver.detail,
+        serial_number=serial_number,
+    )
+
+
+def latency_timer(device: str) -> int | None:
+    """FTDI's latency timer, ms; None where there is none."""
+    for folder in (_SYS / _tty(device) / "device", Path("/sys/bus/usb-serial/devices") / _tty(device)):
+        try:
+            return int((folder / "latency_timer").read_text().strip())
+        except (OSError, ValueError):
+            continue
+    return None
+
+
+def find_holders(devices: list[str]) -> dict[str, list[Holder]]:
+    """Which processes have which ports open, as far as this user may see (/proc); empty where there is no /proc."""
+    wanted: dict[str, list[str]] = {}
+    for device in devices:
+        wanted.setdefault(os.path.realpath(device), []).append(device)
+    held: dict[str, list[Holder]] = {}
+    for process in _PROC.glob("[0-9]*"):
+        for target in _open_files(process):
+            for device in wanted.get(target, ()):
+                holder = Holder(int(process.name), _process_name(process))
+                if holder not in held.setdefault(device, []):
+                    held[device].append(holder)
+    return held
+
+
+def is_pty(device: str) -> bool:
+    """Whether a path leads to a pseudo-terminal."""
+    return os.path.realpath(device).startswith("/dev/pts/")
+
+
+def _open_files(process: Path) -> set[str]:
+    try:
+        return {os.readlink(entry.path) for entry in os.scandir(process / "fd")}
+    except OSError:
+        return set()  # not ours to see, or gone meanwhile
+
+
+def _process_name(process: Path) -> str:
+    try:
+        words = (process / "cmdline").read_bytes().split(b"\0")
+    except OSError:
+        return "?"
+    if b"sniff.capture.process" in words:
+        return " ".join(["sniff485", *(word.decode("utf-8", "replace") for word in words[-2:] if word)])
+    try:
+        return (process / "comm").read_text().strip() or "?"
+    except OSError:
+        return "?"
+
+
+def _tty(device: str) -> str:
+    return os.path.basename(os.path.realpath(device))
+
+
+def _natural(name: str) -> list[tuple[int, str]]:
+    return [(int(part), "") if part.isdigit() else (0, part) for part in re.split(r"(\d+)", name)]
+
+
+def _driver_name(device: str) -> str:
+    if is_pty(device):
+        return "pty"
+    for link in ("device/driver", "device/../driver", "device/../../driver"):
+        path = _SYS / _tty(device) / link
+        if path.exists():
+            name = os.path.basename(os.path.realpath(path))
+            if find_driver(name) is not UNKNOWN:
+                return name
+    for prefix, name in _BY_NAME:
+        if _tty(device).startswith(prefix):
+            return name
+    return ""
+
+
+def _product(device: str) -> tuple[str, str]:
+    """Name and serial number of an adapter, as it says itself; empty where it says nothing."""
+    if is_pty(device):
+        return "pseudo-terminal", ""
+    from serial.tools import list_ports as tools
+
+    real = os.path.realpath(device)
+    for port in tools.comports():
+        if device == port.device or real == port.device:
+            name = port.product or (port.description if port.description != "n/a" else "")
+            return str(name or ""), str(port.serial_number or "")
+    return "", ""
+
+
+def _latency(device: str, driver: Driver, line: LineSettings) -> tuple[int, str]:
+    timer = latency_timer(device)
+    if timer is not None:
+        return timer * NS_PER_MS + USB_FRAME, f"latency timer {timer} ms + 1 ms USB"
+    return driver.hold + driver.hold_chars * line.char, driver.hold_from

@@ -1,0 +1,179 @@
+"""A gateway that speaks RFC 2217: the line is set through it, and it may report line errors.
+
+pyserial negotiates: Telnet options, line settings, RTS and DTR off, and our mask of line states. Those octets are
+control between this host and the gateway. Data octets, which would go out on the bus, cannot be written.
+pyserial keeps line states to itself and reads octet by octet, so its reading loop is replaced by ours: it stamps each
+packet at once and reports line states where they came in the stream. RFC 2217 ties a state to no octet.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+import threading
+from collections import deque
+from typing import Any, NoReturn, cast
+
+from serial import rfc2217
+
+from dissectors.frame import Chunk
+from dissectors.line import LineSettings
+from sniff.session import Item, LineEvent, LineEventKind
+from sniff.sources.clock import Clock
+from sniff.sources.telnet import Data, Negotiation, TelnetDecoder
+from sniff.sources.tty import stop_bits
+
+READ_SIZE = 65536
+
+_ERRORS = {2: "overrun", 4: "parity", 8: "framing", 16: "break"}
+_MASK = bytes([sum(_ERRORS)])
+_COM_PORT = 44
+_NOTIFY_LINESTATE = 106
+
+_Base: Any = rfc2217.Serial  # pyserial's inner names have no types
+
+
+class _ListeningGateway(_Base):  # type: ignore[misc]
+    """pyserial's client without its sending half; what it reads goes to `items`."""
+
+    batch = False  # several settings are being changed: negotiate once, afterwards
+
+    def __init__(self, clock: Clock) -> None:
+        self.clock = clock
+        self.items: deque[Item] = deque()
+        self.wake_in, self.wake_out = socket.socketpair()
+        self.wake_in.setblocking(False)
+        self.wake_out.setblocking(False)
+        self.listening = False  # octets from before the settings were in force belong to another line
+        self.lost: str | None = None
+        super().__init__()
+
+    def ask_line_states(self) -> None:
+        """Have the gateway report line errors (SET-LINESTATE-MASK)."""
+        self.rfc2217_send_subnegotiation(rfc2217.SET_LINESTATE_MASK, _MASK)
+
+    def _reconfigure_port(self) -> None:
+        if not self.batch:
+            super()._reconfigure_port()
+
+    def _telnet_read_loop(self) -> None:
+        decoder = TelnetDecoder()
+        while self.is_open:
+            try:
+                octets = self._socket.recv(READ_SIZE)
+            except TimeoutError:
+                continue  # only to look whether still open
+            except OSError as error:
+                self._lose(error.strerror or str(error))
+                return
+            now = self.clock.now()
+            if not octets:
+                self._lose("closed by the gateway")
+                return
+            for token in decoder.feed(octets):
+                self._take(now, token)
+
+    def _take(self, now: int, token: object) -> None:
+        if isinstance(token, Data):
+            if self.listening:
+                self._give(Chunk(now, token.octets))
+        elif isinstance(token, Negotiation):
+            self._telnet_negotiate_option(bytes([token.command]), bytes([token.option]))
+        else:
+            sub = cast(Any, token).octets
+            if sub[:2] == bytes([_COM_PORT, _NOTIFY_LINESTATE]) and len(sub) >= 3:
+                for bit, name in _ERRORS.items():
+                    if sub[2] & bit:
+                        self._give(LineEvent(now, LineEventKind.ERRORS, name, 1))
+            elif sub[:1] == bytes([_COM_PORT]):
+                # a gateway that answers otherwise than asked makes pyserial raise; then settings time out, in words
+                with contextlib.suppress(Exception):
+                    self._telnet_process_subnegotiation(sub)
+
+    def _give(self, item: Item) -> None:
+        self.items.append(item)
+        self.wake()
+
+    def _lose(self, reason: str) -> None:
+        self.lost = reason
+        self.wake()
+
+    def wake(self) -> None:
+        """Make the descriptor readable."""
+        with contextlib.suppress(OSError):
+            self.wake_in.send(b"\0")
+
+    def _refuse(self, *_: object, **__: object) -> NoReturn:
+        raise PermissionError("this port only listens")
+
+    write = writelines = send_break = _update_break_state = _refuse
+
+
+class Rfc2217Stream:
+    """A connection to a gateway. Raises OSError or ValueError when it cannot be made."""
+
+    reports: tuple[str, ...] | None = ("parity", "framing", "break", "overrun")
+    name = "RFC 2217 gateway"
+    detail = "line errors are reported for a time, not for an octet, and only if the gateway supports it"
+
+    def __init__(self, spec: str, line: LineSettings, clock: Clock) -> None:
+        gateway = _ListeningGateway(clock)
+        gateway.rts = False
+        gateway.dtr = False
+        gateway.port = spec
+        _apply(gateway, line)
+        try:
+            gateway.open()
+            gateway.ask_line_states()
+        except BaseException:
+            gateway.wake_in.close()
+            gateway.wake_out.close()
+            raise
+        gateway.listening = True
+        self._gateway = gateway
+
+    def fileno(self) -> int:
+        """Readable when something has come."""
+        return int(self._gateway.wake_out.fileno())
+
+    def read(self, clock: Clock) -> list[Item]:
+        """What is there. Raises OSError when the connection is gone."""
+        gateway = self._gateway
+        with contextlib.suppress(BlockingIOError):
+            gateway.wake_out.recv(READ_SIZE)
+        items: list[Item] = []
+        while gateway.items:
+            items.append(gateway.items.popleft())
+        if not items and gateway.lost is not None:
+            raise ConnectionResetError(gateway.lost)
+        if gateway.lost is not None:
+            gateway.wake()  # come again for the reason
+        return items
+
+    def reconfigure(self, line: LineSettings) -> None:
+        """Change the line through the gateway; waits for its answer. Raises OSError or ValueError."""
+        _apply(self._gateway, line)
+        self._gateway._reconfigure_port()
+
+    def close(self) -> None:
+        """Let go, without waiting for the gateway."""
+        gateway = self._gateway
+        # pyserial waits for its thread and then some; nobody else should
+        threading.Thread(target=self._close, args=(gateway,), daemon=True).start()
+
+    @staticmethod
+    def _close(gateway: Any) -> None:
+        gateway.close()
+        gateway.wake_in.close()
+        gateway.wake_out.close()
+
+
+def _apply(gateway: Any, line: LineSettings) -> None:
+    gateway.batch = True
+    try:
+        gateway.baudrate = line.baud
+        gateway.bytesize = line.data_bits
+        gateway.parity = line.parity
+        gateway.stopbits = stop_bits(line)
+    finally:
+        gateway.batch = False

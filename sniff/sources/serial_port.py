@@ -1,0 +1,294 @@
+"""A serial port as a source: opened once, read without waiting, found again after it was unplugged."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+from dataclasses import dataclass
+
+from dissectors.frame import Chunk
+from dissectors.line import NS_PER_S, LineSettings
+from sniff.session import Adapter, Item, LineEvent, LineEventKind
+from sniff.sources import PortError
+from sniff.sources.clock import NS_PER_MS, Clock
+from sniff.sources.parmrk import ParmrkDecoder
+from sniff.sources.ports import describe_port, find_holders, is_pty, list_ports
+from sniff.sources.tty import ListeningPort, error_counters, marks_errors, open_listening
+
+READ_SIZE = 65536
+COUNTERS_EVERY = 1 * NS_PER_S
+RETRY_EVERY = 1 * NS_PER_S
+POLL_EVERY = 1 * NS_PER_MS
+"""Between looks at a port that cannot be waited on (Windows)."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Identity:
+    """What a port is recognised by when it comes back."""
+
+    spec: str
+    serial_number: str
+    link: tuple[int, int, str] | None  # of a symbolic link: inode, change time, target
+
+    @classmethod
+    def of(cls, spec: str, serial_number: str) -> _Identity:
+        return cls(spec, serial_number, _link(spec))
+
+
+class SerialSource:
+    """Listens to a serial port. `adapter` is as found at opening.
+
+    Raises PortError when it cannot be opened; afterwards nothing raises: a port that disappears gives UNPLUGGED, is
+    tried again once a second (by the USB serial number, else by its path), and gives REPLUGGED.
+    """
+
+    def __init__(self, device: str, line: LineSettings, clock: Clock) -> None:
+        self.device = device
+        self.line = line
+        self._clock = clock
+        self._pending: list[Item] = []
+        self._port: ListeningPort | None = None
+        self._ended = False
+        self._open(device)
+        self._pty = is_pty(device)
+        self._adapter = describe_port(device, line)
+        self._identity = _Identity.of(device, self._adapter.serial_number)
+        self._retry_at = 0
+
+    # -- the source contract -----------------------------------------------------------------------------------
+
+    @property
+    def session_adapter(self) -> Adapter:
+        """The adapter as found at opening."""
+        return self._adapter
+
+    @property
+    def ended(self) -> bool:
+        """Whether the port is gone for good: closed, or a pseudo-terminal whose other side closed."""
+        return self._ended
+
+    def fileno(self) -> int | None:
+        """The open port's descriptor, None while it is unplugged (and on systems that cannot wait on ports)."""
+        return self._fd
+
+    def deadline(self) -> int | None:
+        """When to look at error counters, at a port without descriptor, or for a port to come back."""
+        if self._ended:
+            return None
+        if self._port is None:
+            return self._retry_at
+        if self._fd is None:
+            return self._clock.now() + POLL_EVERY
+        return self._counters_at
+
+    def now(self) -> int:
+        """The time on the clock."""
+        return self._clock.now()
+
+    def read(self) -> list[Item]:
+        """One read of the port, and whatever else is due."""
+        items, self._pending = self._pending, []
+        if self._ended:
+            return items
+        if self._port is None:
+            return items + self._try_again()
+        try:
+            data = self._read_port()
+        except OSError as error:  # includes serial.SerialException
+            return items + self._unplugged(error)
+        now = self._clock.now()
+        if data == b"":
+            return items + self._unplugged(None)
+        if data:
+            octets, marks = self._decoder.feed(data) if self._decoder is not None else (data, ())
+            self._marked += len(marks)
+            if octets:
+                items.append(Chunk(now, octets, marks))
+        if self._counters_at is not None and now >= self._counters_at:
+            items.extend(self._count_errors(now))
+        return items
+
+    def reconfigure(self, line: LineSettings) -> None:
+        """Change the settings in place, without closing: RTS and DTR do not move."""
+        if self._port is not None:
+            try:
+                self._port.apply(line)
+            except (OSError, ValueError) as error:
+                raise PortError(f"{self.device}: cannot be set to {line}: {_reason(error)}") from error
+            self._finish_escape()
+            self._set_decoder(line)
+        self.line = line
+        self._pending.append(LineEvent(self._clock.now(), LineEventKind.SETTINGS, f"line={line}"))
+
+    def close(self) -> None:
+        """Let go of the port."""
+        self._ended = True
+        self._release()
+
+    # -- opening -----------------------------------------------------------------------------------------------
+
+    def _open(self, device: str) -> None:
+        refuse_unfit(device)
+        try:
+            self._port = open_listening(device, self.line)
+        except (OSError, ValueError) as error:
+            raise PortError(explain(device, self.line, error)) from error
+        self._fd: int | None = getattr(self._port, "fd", None)
+        self._set_decoder(self.line)
+        self._counters = error_counters(self._fd) if self._fd is not None else None
+        self._counters_at = None if self._counters is None else self._clock.now() + COUNTERS_EVERY
+        self._marked = 0
+
+    def _set_decoder(self, line: LineSettings) -> None:
+        self._decoder = ParmrkDecoder(line.parity != "N") if marks_errors(self._fd) else None
+
+    def _release(self) -> None:
+        port, self._port, self._fd = self._port, None, None
+        if port is not None:
+            with contextlib.suppress(OSError):
+                port.close()
+
+    # -- reading -----------------------------------------------------------------------------------------------
+
+    def _read_port(self) -> bytes | None:
+        """Octets; None when there are none; empty when the port hung up. Raises OSError when it is gone."""
+        if self._fd is not None:
+            try:
+                return os.read(self._fd, READ_SIZE)
+            except BlockingIOError:
+                return None
+        assert self._port is not None
+        waiting = self._port.in_waiting
+        return bytes(self._port.read(waiting)) if waiting else None
+
+    def _count_errors(self, now: int) -> list[Item]:
+        """Errors that the driver counted in the last second without marking an octet, and overruns."""
+        self._counters_at = now + COUNTERS_EVERY
+        before, marked = self._counters, self._marked
+        self._marked = 0
+        after = error_counters(self._fd) if self._fd is not None else None
+        if before is None or after is None:
+            return []
+        self._counters = after
+        return [
+            LineEvent(now, LineEventKind.ERRORS, name, after[name] - before[name])
+            for name in after
+            if after[name] > before[name] and (not marked or "overrun" in name)
+        ]
+
+    def _finish_escape(self) -> None:
+        held = self._decoder.flush() if self._decoder is not None else b""
+        if held:
+            self._pending.append(Chunk(self._clock.now(), held))
+
+    # -- unplugged and back ------------------------------------------------------------------------------------
+
+    def _unplugged(self, error: OSError | None) -> list[Item]:
+        self._finish_escape()
+        items, self._pending = self._pending, []
+        reason = _reason(error) if error is not None else "hung up"
+        self._release()
+        now = self._clock.now()
+        self._retry_at = now + RETRY_EVERY
+        # The number of a pseudo-terminal is soon given to somebody else's terminal: only a link made anew is followed.
+        self._ended = self._pty and self._identity.link is None
+        return [*items, LineEvent(now, LineEventKind.UNPLUGGED, f"{self.device} is gone ({reason})")]
+
+    def _try_again(self) -> list[Item]:
+        now = self._clock.now()
+        if now < self._retry_at:
+            return []
+        self._retry_at = now + RETRY_EVERY
+        device = find_again(self._identity)
+        if device is None:
+            return []
+        try:
+            self._open(device)
+        except PortError:
+            return []
+        self.device = device
+        self._identity = _Identity.of(self._identity.spec, self._identity.serial_number)
+        return [LineEvent(self._clock.now(), LineEventKind.REPLUGGED, f"{device} is back")]
+
+
+def find_again(identity: _Identity) -> str | None:
+    """Where a port that was unplugged is now: the same USB serial number, else the same path; None while absent."""
+    if identity.serial_number:
+        from serial.tools import list_ports as tools
+
+        for port in tools.comports():
+            if port.serial_number == identity.serial_number:
+                # a stable link that the user named stays the name
+                same = os.path.realpath(identity.spec) == os.path.realpath(port.device)
+                return identity.spec if same else str(port.device)
+        return None
+    if not os.path.exists(identity.spec) and os.name == "posix":
+        return None
+    if is_pty(identity.spec) and (identity.link is None or _link(identity.spec) == identity.link):
+        return None
+    return identity.spec
+
+
+def refuse_unfit(device: str) -> None:
+    """Refuse what is no port, or somebody else's, before it is opened: opening alone moves RTS and DTR.
+
+    Raises PortError.
+    """
+    if os.name != "posix":
+        return
+    if not os.path.exists(device):
+        raise PortError(f"{device}: no such port; {_ports_there_are()}")
+    if os.path.isdir(device):
+        raise PortError(f"{device}: a folder, not a serial port; {_ports_there_are()}")
+    if os.path.isfile(device):
+        raise PortError(f"{device}: a file, not a serial port; to read a capture use: sniff485 open {device}")
+    if is_pty(device):
+        return  # a virtual bus holds both sides; its lock says whether somebody listens
+    holders = find_holders([device]).get(device)
+    if holders:
+        raise PortError(f"{device}: held by {', '.join(map(str, holders))}; stop that first")
+
+
+def explain(device: str, line: LineSettings, error: OSError | ValueError) -> str:
+    """Why a port did not open, in one line with the way out."""
+    code = getattr(error, "errno", None)
+    if code in (errno.EACCES, errno.EPERM):
+        return f"{device}: permission denied; add yourself to group {_group(device)}"
+    if code in (errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK):
+        holders = [holder for holder in find_holders([device]).get(device, ()) if holder.pid != os.getpid()]
+        held_by = ", ".join(map(str, holders)) or "another process"
+        return f"{device}: held by {held_by}; stop that first"
+    if code in (errno.ENOENT, errno.ENODEV, errno.ENXIO):
+        return f"{device}: no such port; {_ports_there_are()}"
+    if code in (errno.ENOTTY, errno.EINVAL) or "tcgetattr" in str(error) or "Inappropriate" in str(error):
+        return f"{device}: not a serial port, or it cannot do {line}; {_ports_there_are()}"
+    return f"{device}: cannot be opened as {line}: {_reason(error)}; {_ports_there_are()}"
+
+
+def _reason(error: Exception) -> str:
+    code = getattr(error, "errno", None)
+    text = os.strerror(code) if isinstance(code, int) and code > 0 else str(error)
+    return " ".join(text.split()) or type(error).__name__
+
+
+def _ports_there_are() -> str:
+    names = [port.device for port in list_ports()]
+    return f"ports here: {' '.join(names)}" if names else "this machine shows no serial ports"
+
+
+def _group(device: str) -> str:
+    try:
+        import grp
+
+        return grp.getgrgid(os.stat(device).st_gid).gr_name
+    except (ImportError, KeyError, OSError):
+        return "dialout"
+
+
+def _link(spec: str) -> tuple[int, int, str] | None:
+    try:
+        found = os.lstat(spec)
+        return found.st_ino, found.st_ctime_ns, os.readlink(spec)
+    except OSError:
+        return None
