@@ -30,7 +30,8 @@ def run(args: argparse.Namespace) -> int:
                 "latency_from": adapter.latency_from,
                 "reports": None if adapter.reports is None else list(adapter.reports),
                 "detail": adapter.detail,
-                "held_by": port.held_by,
+                "latency_timer_ms": port.latency_timer,
+                "held_by": [str(holder) for holder in port.holders],
             }
             print(json.dumps(record, ensure_ascii=False))
             continue
@@ -38,8 +39,8 @@ def run(args: argparse.Namespace) -> int:
         print(f"{port.device}  {adapter.name}{f' ({adapter.driver})' if adapter.driver else ''}")
         print(f"    holds octets back up to {milliseconds(adapter.latency)} ({adapter.latency_from})")
         print(f"    line errors it reports: {reports}{'; ' + adapter.detail if adapter.detail else ''}")
-        if port.held_by:
-            print(f"    held by {port.held_by}")
+        for holder in port.holders:
+            print(f"    held by {holder}")
     if not found and not args.json:
         print("no serial ports; try `sniff485 demo`, or a gateway: socket://HOST:PORT")
     return 0

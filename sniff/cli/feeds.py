@@ -1,0 +1,108 @@
+"""What fills the terminal UI: a live bus, or a capture file read in slices, so that the first screen comes at once."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+from sniff.engine import Output
+from sniff.formats import Capture
+from sniff.live import LiveBus
+from sniff.reading import dissector_for, outputs
+from sniff.session import LineEvent, Session
+from sniff.store import Store
+from sniff.tui.feed import FeedStatus
+
+SLICE = 0.05
+"""Seconds that one poll may spend on reading a file."""
+
+
+class LiveFeed:
+    """A running capture."""
+
+    def __init__(self, live: LiveBus) -> None:
+        self.live = live
+        self._store = Store(live.session, live.dissector)
+
+    @property
+    def store(self) -> Store:
+        """The rows so far."""
+        return self._store
+
+    def poll(self) -> bool:
+        """Take what has come."""
+        before = self._store.version
+        for item in self.live.poll():
+            if isinstance(item, Output):
+                self._store.add(item)
+            elif isinstance(item, LineEvent):
+                self._store.add_line_event(item)
+        return self._store.version != before
+
+    def status(self) -> FeedStatus:
+        """How the capture is doing."""
+        status, ended = self.live.status, self.live.ended
+        trouble = status.error or (ended.reason if ended is not None else "")
+        return FeedStatus(
+            port=self.live.session.port,
+            line=str(self.live.session.line),
+            protocol=self.live.session.protocol,
+            recording=status.path or None,
+            file_size=status.size,
+            dropped=status.dropped + status.lost,
+            live=True,
+            ended=trouble,
+            priority=status.priority,
+        )
+
+    def close(self) -> None:
+        """End the capture and close its file."""
+        self.live.stop()
+
+
+class FileFeed:
+    """A capture file, read on in every poll until its end."""
+
+    def __init__(self, path: str, capture: Capture, session: Session) -> None:
+        self.path = path
+        self.capture = capture
+        self._store = Store(session, dissector_for(session))
+        self._outputs: Iterator[Output | LineEvent] | None = outputs(capture.items(), session)
+        try:
+            self._size = Path(path).stat().st_size
+        except OSError:
+            self._size = 0
+
+    @property
+    def store(self) -> Store:
+        """The rows so far."""
+        return self._store
+
+    def poll(self) -> bool:
+        """Read on for a while."""
+        if self._outputs is None:
+            return False
+        until = time.monotonic() + SLICE
+        for output in self._outputs:
+            if isinstance(output, Output):
+                self._store.add(output)
+            else:
+                self._store.add_line_event(output)
+            if time.monotonic() > until:
+                return True
+        self._outputs = None
+        return True
+
+    def status(self) -> FeedStatus:
+        """Where the file ends, once it has been read."""
+        ended = ""
+        if self._outputs is None:
+            complete = self.capture.completeness()
+            ended = "" if complete.whole else complete.text
+        session = self._store.session
+        return FeedStatus(self.path, str(session.line), session.protocol, None, self._size, ended=ended)
+
+    def close(self) -> None:
+        """Nothing to stop."""
+        self._outputs = None

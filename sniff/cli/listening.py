@@ -1,0 +1,202 @@
+"""What `live`, `record` and `demo` share: which bus is meant, how frames are printed as they come, how a run ends."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import re
+import signal
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from dissectors import registry
+from dissectors.line import LineSettings
+from sniff.analysis.summary import Summary
+from sniff.analysis.wording import milliseconds
+from sniff.capture.config import RecordSpec, SourceSpec
+from sniff.capture.link import CaptureLink
+from sniff.capture.wire import Ended, Status
+from sniff.cli import PORT_TROUBLE, UNREADABLE, USAGE, Failure, rows
+from sniff.config import ConfigError, load
+from sniff.engine import Output
+from sniff.formats import CaptureError
+from sniff.live import LiveBus
+from sniff.reading import Settled, Settling
+from sniff.session import LineEvent
+from sniff.sources import PortError
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """The bus to listen to, and where its recording goes by configuration (None: not said)."""
+
+    source: SourceSpec
+    record: str | None = None
+
+
+def target_of(args: argparse.Namespace) -> Target:
+    """What PORT, -s and -p mean, with the configuration behind them; flags win. Ends with exit code 2."""
+    try:
+        config = load()
+    except ConfigError as error:
+        raise Failure(str(error), USAGE) from None
+    bus = config.buses.get(args.port)
+    port = (bus.port or args.port) if bus is not None else args.port
+    protocol = args.protocol or (bus.protocol if bus is not None else None) or "modbus-rtu"
+    line = args.line or (bus.line if bus is not None else None)
+    if line is None:
+        line = LineSettings.parse(registry.get(protocol).default_line)
+        print(f"sniff485: no line settings given (-s): assuming {line} for {protocol}", file=sys.stderr)
+    name = bus.name if bus is not None else re.sub(r"[^A-Za-z0-9_-]+", "-", Path(port).name).strip("-") or "bus"
+    return Target(SourceSpec(port, line, protocol, name), bus.record if bus is not None else None)
+
+
+def start(source: SourceSpec, record: RecordSpec | None, duration: float | None = None) -> LiveBus:
+    """Start the capture process. Ends with exit code 4 for the port, 3 for the file."""
+    try:
+        return LiveBus(CaptureLink.start([source], record, duration))
+    except PortError as error:
+        raise Failure(str(error), PORT_TROUBLE) from None
+    except CaptureError as error:
+        raise Failure(str(error), UNREADABLE) from None
+
+
+def new_recording(bus: str) -> str:
+    """A name in this folder that no file has: sniff485-<bus>-<date>-<time>.mcap."""
+    stem = f"sniff485-{bus}-{time.strftime('%Y%m%d-%H%M%S')}"
+    path, number = Path(f"{stem}.mcap"), 2
+    while path.exists():
+        path, number = Path(f"{stem}-{number}.mcap"), number + 1
+    return str(path)
+
+
+@contextlib.contextmanager
+def until_interrupted() -> Iterator[list[int]]:
+    """Collect SIGINT and SIGTERM instead of dying of them; the list holds their numbers."""
+    caught: list[int] = []
+    numbers = [signal.SIGINT, signal.SIGTERM]
+    before = [signal.signal(number, lambda received, _frame: caught.append(received)) for number in numbers]
+    try:
+        yield caught
+    finally:
+        for number, handler in zip(numbers, before, strict=True):
+            signal.signal(number, handler)
+
+
+class Printer:
+    """Frames as lines (or JSON), each with its verdict, as they come; counts them all."""
+
+    def __init__(self, live: LiveBus, as_json: bool = False, quiet: bool = False, colour: bool = False) -> None:
+        self.live = live
+        self.as_json = as_json
+        self.quiet = quiet
+        self.colour = colour
+        self.summary = Summary(live.session.line)
+        self._settling = Settling()
+
+    def take(self, items: list[Output | LineEvent | Status | Ended]) -> None:
+        """Print what has come."""
+        for item in items:
+            if isinstance(item, Output):
+                self._take_output(item)
+            elif isinstance(item, LineEvent):
+                self.summary.add_line_event(item)
+                self._say(f"{item.kind.value} {item.text}".strip())
+            elif isinstance(item, Ended) and not item.clean:
+                self._say(item.reason)
+        if not self.quiet:
+            sys.stdout.flush()
+
+    def finish(self) -> None:
+        """Print what still waits for a verdict."""
+        for settled in self._settling.flush():
+            self._print(settled)
+        sys.stdout.flush()
+
+    def _take_output(self, output: Output) -> None:
+        self.summary.add(output)
+        for settled in self._settling.add(output):
+            self._print(settled)
+
+    def _print(self, settled: Settled) -> None:
+        if self.quiet:
+            return
+        if self.as_json:
+            print(rows.json_line(settled, self.live.dissector, self.live.session))
+        else:
+            print(rows.text_line(settled, self.live.dissector, self.live.session, self.colour))
+
+    def _say(self, text: str) -> None:
+        print(f"sniff485: {self.live.session.port}: {text}", file=sys.stderr)
+
+
+def run(printer: Printer, count: int | None = None, duration: float | None = None, progress: bool = False) -> int:
+    """Listen until something ends it: a signal, `count` frames, `duration` seconds, the port. Gives the exit code."""
+    live = printer.live
+    until = None if duration is None else time.monotonic() + duration
+    meter = _Meter(printer) if progress and sys.stderr.isatty() else None
+    with until_interrupted() as caught:
+        while live.ended is None:
+            printer.take(live.poll(0.1))
+            if meter is not None:
+                meter.show()
+            full = count is not None and printer.summary.frames >= count
+            over = until is not None and time.monotonic() >= until
+            if caught or full or over:
+                printer.take(live.stop())
+                break
+        printer.finish()
+    if meter is not None:
+        meter.clear()
+    return PORT_TROUBLE if live.ended is not None and not live.ended.clean else 0
+
+
+def say_end(printer: Printer) -> None:
+    """The closing lines on standard error: what was heard, what was lost, where it is."""
+    summary, status = printer.summary, printer.live.status
+    noise = f", {summary.noise} octets of noise" if summary.noise else ""
+    print(
+        f"sniff485: {summary.frames} frames ({summary.damaged} damaged), {summary.octets} octets{noise}, "
+        f"bus load {summary.load.overall():.1%}",
+        file=sys.stderr,
+    )
+    if summary.latency.count:
+        middle, most = summary.latency.quantile(0.5), summary.latency.most
+        assert middle is not None
+        assert most is not None
+        bound = milliseconds(printer.live.session.adapter.latency)
+        print(
+            f"sniff485: response time p50 {milliseconds(middle)}, max {milliseconds(most)} (each ±{bound})",
+            file=sys.stderr,
+        )
+    for what, octets in (("not shown here", status.dropped), ("NOT RECORDED", status.lost)):
+        if octets:
+            print(f"sniff485: {octets} octets {what}: this host did not keep up", file=sys.stderr)
+    if status.error:
+        print(f"sniff485: recording: {status.error}", file=sys.stderr)
+    if status.path:
+        print(f"sniff485: recorded to {status.path}", file=sys.stderr)
+
+
+class _Meter:
+    """One line on the terminal, twice a second."""
+
+    def __init__(self, printer: Printer) -> None:
+        self.printer = printer
+        self.began = time.monotonic()
+        self.next = self.began
+
+    def show(self) -> None:
+        now = time.monotonic()
+        if now < self.next:
+            return
+        self.next = now + 0.5
+        summary, status = self.printer.summary, self.printer.live.status
+        text = f"{now - self.began:.0f} s  {summary.frames} frames  {summary.damaged} damaged  {status.size} octets written"
+        print(f"\r\x1b[K{text}", end="", file=sys.stderr, flush=True)
+
+    def clear(self) -> None:
+        print("\r\x1b[K", end="", file=sys.stderr)

@@ -1,0 +1,47 @@
+"""PORT: a serial port, socket://HOST:PORT, rfc2217://HOST:PORT, or a bus named in sniff485.toml. Records into this
+folder unless --no-record; says the file's name at the end. Where output is no terminal, frames come as lines.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+
+from sniff.capture.config import RecordSpec
+from sniff.cli import USAGE, Failure, arguments, listening
+from sniff.live import LiveBus
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Options of `live`."""
+    parser.add_argument("port", metavar="PORT", help="port, gateway, or a configured bus")
+    arguments.add_line(parser)
+    parser.add_argument("-w", "--write", metavar="FILE", help="recording (.mcap); default: a new name in this folder")
+    parser.add_argument("--no-record", action="store_true", help="do not record")
+    parser.add_argument("--duration", type=arguments.duration, metavar="TIME", help="stop after: 90, 90s, 5m, 2h")
+    parser.add_argument("--json", action="store_true", help="JSON lines instead of the terminal UI")
+    parser.add_argument("--lines", action="store_true", help="lines of text instead of the terminal UI")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Listen and show."""
+    target = listening.target_of(args)
+    if args.no_record and args.write:
+        raise Failure("--no-record and -w contradict each other", USAGE)
+    path = None if args.no_record else args.write or target.record or listening.new_recording(target.source.bus)
+    live = listening.start(target.source, RecordSpec(path) if path else None, args.duration)
+    return show(live, args.json, args.lines)
+
+
+def show(live: LiveBus, as_json: bool, as_lines: bool) -> int:
+    """The terminal UI on a terminal; else frames as lines and a summary."""
+    if not as_json and not as_lines and sys.stdout.isatty() and sys.stdin.isatty():
+        from sniff.cli.feeds import LiveFeed
+        from sniff.tui import run as run_tui
+
+        run_tui(LiveFeed(live))
+        return 0
+    printer = listening.Printer(live, as_json=as_json, colour=arguments.colour())
+    code = listening.run(printer)
+    listening.say_end(printer)
+    return code

@@ -1,0 +1,27 @@
+"""Keys are shown at the foot of the screen and under `?`. Several captures are shown one after the other."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+
+from sniff.cli import USAGE, Failure, arguments
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Options of `open`."""
+    arguments.add_files(parser)
+    arguments.add_line(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Show captures in the terminal UI."""
+    captures = [(path, arguments.open_capture(path)) for path in args.files]
+    if not (sys.stdout.isatty() and sys.stdin.isatty()):
+        raise Failure("open needs a terminal; use `sniff485 show` for text", USAGE)
+    from sniff.cli.feeds import FileFeed
+    from sniff.tui import run as run_tui
+
+    for path, capture in captures:
+        run_tui(FileFeed(path, capture, arguments.settings_of(args, capture.session)))
+    return 0

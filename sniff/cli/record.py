@@ -1,0 +1,36 @@
+"""PORT: a serial port, socket://HOST:PORT, rfc2217://HOST:PORT, or a bus named in sniff485.toml. Ends on Ctrl-C,
+SIGTERM, --duration or --count. A file cut off by a crash opens, and says where it ends.
+"""
+
+from __future__ import annotations
+
+import argparse
+
+from sniff.capture.config import RecordSpec
+from sniff.cli import USAGE, Failure, arguments, listening
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Options of `record`."""
+    parser.add_argument("port", metavar="PORT", help="port, gateway, or a configured bus")
+    arguments.add_line(parser)
+    parser.add_argument("-w", "--write", metavar="FILE", help="recording (.mcap); default: a new name in this folder")
+    parser.add_argument("--duration", type=arguments.duration, metavar="TIME", help="stop after: 90, 90s, 5m, 2h")
+    parser.add_argument("--count", type=int, metavar="N", help="stop after N frames")
+    parser.add_argument("--rotate", metavar="RULE", help="begin a new file by size:64MB, time:1h, or both with a comma")
+    parser.add_argument("--keep", type=int, metavar="N", help="keep the N newest files of a rotation")
+    parser.add_argument("-q", "--quiet", action="store_true", help="no progress, no summary")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Record until the end."""
+    target = listening.target_of(args)
+    path = args.write or target.record or listening.new_recording(target.source.bus)
+    if not str(path).lower().endswith(".mcap"):
+        raise Failure(f"{path}: recordings are .mcap; convert it afterwards with `sniff485 convert`", USAGE)
+    live = listening.start(target.source, RecordSpec(path, args.rotate, args.keep))
+    printer = listening.Printer(live, quiet=True)
+    code = listening.run(printer, args.count, args.duration, progress=not args.quiet)
+    if not args.quiet:
+        listening.say_end(printer)
+    return code

@@ -1,0 +1,63 @@
+"""A bus being captured: what the capture process sends, through the engine, for whoever shows it."""
+
+from __future__ import annotations
+
+from dissectors.frame import Chunk
+from sniff.capture.link import CaptureLink
+from sniff.capture.wire import Ended, Received, Status, Tick
+from sniff.engine import Engine, Output
+from sniff.reading import dissector_for
+from sniff.session import LineEvent
+
+LiveItem = Output | LineEvent | Status | Ended
+
+
+class LiveBus:
+    """One bus of a running capture. Not thread-safe; nothing here can hold up the recording.
+
+    `session`: of the bus; `status`: the newest report; `ended`: why it is over, None while it runs.
+    """
+
+    def __init__(self, link: CaptureLink, bus: int = 0) -> None:
+        self.link = link
+        self.bus = bus
+        self.session = link.session(bus)
+        self.dissector = dissector_for(self.session)
+        self.engine = Engine(self.dissector, self.session.timing)
+        self.status = Status(bus, path=link.paths[bus] if bus < len(link.paths) else "", priority=link.priority)
+        self.ended: Ended | None = None
+
+    def poll(self, timeout: float = 0.0) -> list[LiveItem]:
+        """What has come, in order; waits up to `timeout` seconds. The end closes the engine and comes last."""
+        items: list[LiveItem] = []
+        for message in self.link.receive(timeout):
+            items += self._take(message)
+        return items
+
+    def stop(self) -> list[LiveItem]:
+        """End the capture; what was still to come, and the end."""
+        items: list[LiveItem] = []
+        for message in self.link.stop():
+            items += self._take(message)
+        return items
+
+    def _take(self, message: Received | Tick | Status | Ended) -> list[LiveItem]:
+        if isinstance(message, Ended):
+            self.ended = message
+            return [*_some(self.engine.close()), message]
+        if message.bus != self.bus:
+            return []
+        if isinstance(message, Status):
+            self.status = message
+            return [message]
+        if isinstance(message, Tick):
+            deadline = self.engine.deadline()
+            due = deadline is not None and message.now >= deadline
+            return _some(self.engine.advance(message.now)) if due or deadline is None else []
+        if isinstance(message.item, Chunk):
+            return _some(self.engine.feed(message.item))
+        return [message.item]
+
+
+def _some(output: Output) -> list[LiveItem]:
+    return [output] if output else []
