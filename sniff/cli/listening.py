@@ -195,7 +195,7 @@ class _Meter:
             return
         self.next = now + 0.5
         summary, status = self.printer.summary, self.printer.live.status
-        text = f"{now - self.began:.0f} s  {summary.frames} frames  {summary.damaged} damaged  {status.size} octets written"
+        text = f"{now - self.began:.0f} s  {summary.frames} frames  {summary.damaged} damaged  {status.size} octets"
         print(f"\r\x1b[K{text}", end="", file=sys.stderr, flush=True)
 
     def clear(self) -> None:
