@@ -3,21 +3,16 @@
 from __future__ import annotations
 
 import contextlib
-import os
-import select
+import selectors
 import signal
 import subprocess
-import sys
-import tempfile
 import time
 from collections import deque
 from collections.abc import Sequence
-from pathlib import Path
-from typing import IO, Any
 
-import sniff
 from dissectors.line import LineSettings
 from sniff.capture.config import CaptureConfig, RecordSpec, SourceSpec
+from sniff.capture.spawn import Spawned, spawn
 from sniff.capture.wire import (
     Derived,
     Ended,
@@ -52,13 +47,12 @@ class CaptureLink:
     clock. `paths`: the files that it records to at first. `derived_dropped`: results that did not go back in time.
     """
 
-    def __init__(self, process: subprocess.Popen[bytes], errors: IO[bytes]) -> None:
-        assert process.stdin is not None
-        assert process.stdout is not None
+    def __init__(self, spawned: Spawned) -> None:
+        process = spawned.process
         self._process = process
-        self._errors = errors
-        self._in = process.stdout.fileno()
-        self._out: int | None = process.stdin.fileno()
+        self._errors = spawned.errors
+        self._connection = spawned.connection
+        self._sending = True
         self._splitter = MessageSplitter()
         self._waiting: deque[tuple[int, int, bytes]] = deque()
         self._unsent = bytearray()
@@ -81,7 +75,8 @@ class CaptureLink:
         `duration`: seconds, None for no end. Raises PortError or CaptureError with the reason.
         """
         config = CaptureConfig(tuple(sources), record, None if duration is None else int(duration * 1e9))
-        link = cls(*_spawn(config))
+        words = [source.spec for source in config.sources] + ([config.record.path] if config.record else [])
+        link = cls(spawn(words))
         try:
             link._greet(config)
         except BaseException:
@@ -90,16 +85,16 @@ class CaptureLink:
         return link
 
     def _greet(self, config: CaptureConfig) -> None:
-        assert self._out is not None
+        self._connection.setblocking(True)
         try:
-            _write_all(self._out, encode_json(Kind.CONFIG, config.to_json()))
+            self._connection.sendall(encode_json(Kind.CONFIG, config.to_json()))
         except OSError as error:
             raise PortError(self._why_dead()) from error
-        os.set_blocking(self._out, False)
-        os.set_blocking(self._in, False)
+        self._connection.setblocking(False)
         until = time.monotonic() + START_PATIENCE
         while not self._waiting:
-            if not self._fill(until - time.monotonic()) or time.monotonic() > until:
+            alive = self._fill(until - time.monotonic())
+            if not self._waiting and (not alive or time.monotonic() > until):  # it may say why, and end at once
                 raise PortError(self._why_dead())
         kind, _, body = self._waiting.popleft()
         value = decode_json(body)
@@ -120,7 +115,7 @@ class CaptureLink:
 
     def fileno(self) -> int:
         """What to wait on for reading."""
-        return self._in
+        return self._connection.fileno()
 
     def receive(self, timeout: float = 0.0) -> list[Message]:
         """What has come, in order; waits up to `timeout` seconds for something. After Ended always empty."""
@@ -153,14 +148,14 @@ class CaptureLink:
 
     def _fill(self, timeout: float) -> bool:
         """Read what there is; False when the other end is closed."""
-        poller = select.poll()
-        poller.register(self._in, select.POLLIN)
-        if not poller.poll(max(0, timeout) * 1000):
-            return True
+        with selectors.DefaultSelector() as selector:
+            selector.register(self._connection, selectors.EVENT_READ)
+            if not selector.select(max(0, timeout)):
+                return True
         taken = 0
         while taken < READ_AT_ONCE:
             try:
-                data = os.read(self._in, READ_SIZE)
+                data = self._connection.recv(READ_SIZE)
             except BlockingIOError:
                 return True
             except OSError:
@@ -184,7 +179,7 @@ class CaptureLink:
         metadata: dict[str, str] | None = None,
     ) -> bool:
         """Send a result back into the file, best effort; whether it is on its way. Arguments as `Recorder.derived`."""
-        if self._out is None or len(self._unsent) > DERIVED_BACKLOG:
+        if not self._sending or len(self._unsent) > DERIVED_BACKLOG:
             self.derived_dropped += 1
             return False
         self._unsent += encode_derived(Derived(bus, topic, schema_name, log_time, publish_time, data, metadata))
@@ -197,13 +192,13 @@ class CaptureLink:
         self._send()
 
     def _send(self) -> None:
-        while self._unsent and self._out is not None:
+        while self._unsent and self._sending:
             try:
-                del self._unsent[: os.write(self._out, self._unsent)]
+                del self._unsent[: self._connection.send(self._unsent)]
             except BlockingIOError:
                 return
             except OSError:
-                self._out = None
+                self._sending = False
                 self._unsent.clear()
 
     # -- ending ------------------------------------------------------------------------------------------------
@@ -242,10 +237,9 @@ class CaptureLink:
         if self._process.poll() is None:
             self._process.kill()
         self._process.wait()
-        self._out = None
-        for stream in (self._process.stdin, self._process.stdout, self._errors):
-            if stream is not None:
-                stream.close()
+        self._sending = False
+        self._connection.close()
+        self._errors.close()
 
     def _why_dead(self) -> str:
         try:
@@ -261,39 +255,3 @@ class CaptureLink:
             return "capture process does not answer"
         how = f"was ended by {signal.Signals(-code).name}" if code < 0 else f"ended with code {code}"
         return f"capture process {how}" + "".join(f": {line}" for line in last)
-
-
-def _spawn(config: CaptureConfig) -> tuple[subprocess.Popen[bytes], IO[bytes]]:
-    errors = tempfile.TemporaryFile()  # noqa: SIM115 (closed by _kill)
-    # the words after the module are for people who look at `ps`
-    words = [source.spec for source in config.sources] + ([config.record.path] if config.record else [])
-    options: dict[str, Any] = {}
-    if os.name == "nt":
-        options["creationflags"] = getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)
-    else:
-        options["start_new_session"] = True
-    process = subprocess.Popen(
-        [sys.executable, "-P", "-m", "sniff.capture.process", *words],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=errors,
-        bufsize=0,
-        env=_environment(),
-        **options,
-    )
-    return process, errors
-
-
-def _environment() -> dict[str, str]:
-    """The capture process must find this very package, and nothing in the current folder."""
-    root = str(Path(sniff.__file__).resolve().parents[1])
-    environment = dict(os.environ)
-    if not root.endswith(("site-packages", "dist-packages")):
-        paths = [root, *filter(None, [environment.get("PYTHONPATH")])]
-        environment["PYTHONPATH"] = os.pathsep.join(paths)
-    return environment
-
-
-def _write_all(fd: int, data: bytes) -> None:
-    while data:
-        data = data[os.write(fd, data) :]
