@@ -8,7 +8,6 @@ every bus: all that the bus gave up to then has been sent. Beats are 20 ms apart
 from __future__ import annotations
 
 import contextlib
-import os
 import selectors
 import socket
 from collections.abc import Callable
@@ -23,7 +22,6 @@ from sniff.capture.wire import (
     Status,
     WireError,
     decode_derived,
-    encode,
     encode_status,
     encode_tick,
 )
@@ -59,13 +57,13 @@ class _Bus:
 
 @dataclass
 class CaptureLoop:
-    """Runs until somebody says `stop`. `commands`: the descriptor that the main process writes to, None for none."""
+    """Runs until somebody says `stop`. `commands`: the connection that the main process sends on, None for none."""
 
     clock: Clock
     sources: list[Source]
     recorders: list[Recorder]
     outlet: Outlet
-    commands: int | None = None
+    commands: socket.socket | None = None
     waker: socket.socket | None = None  # readable when a signal came
     priority: str = ""
     end_at: int | None = None
@@ -82,7 +80,7 @@ class CaptureLoop:
         self._beat_at = self._status_at = now
         self._busy_until = now
         if self.commands is not None:
-            os.set_blocking(self.commands, False)
+            self.commands.setblocking(False)
             self._selector.register(self.commands, selectors.EVENT_READ, self._take_commands)
         if self.waker is not None:
             waker = self.waker
@@ -217,7 +215,7 @@ class CaptureLoop:
     def _take_commands(self) -> None:
         assert self.commands is not None
         try:
-            data = os.read(self.commands, _COMMAND_SIZE)
+            data = self.commands.recv(_COMMAND_SIZE)
         except BlockingIOError:
             return
         except OSError:
@@ -254,16 +252,3 @@ class CaptureLoop:
                 event = LineEvent(self.clock.now(), LineEventKind.NOTE, str(error))
                 self.outlet.item(bus, event)
             self._take(self._buses[bus])
-
-
-def farewell(outlet: Outlet, reason: str, patience: float = 2.0) -> None:
-    """Say that it is over, to a reader that still reads."""
-    import time
-
-    outlet.send(encode(Kind.ENDED, 0, reason.encode()))
-    until = time.monotonic() + patience
-    outlet.flush()
-    while outlet.size and outlet.open and time.monotonic() < until:
-        time.sleep(0.02)
-        outlet.flush()
-    outlet.close()

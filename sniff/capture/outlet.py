@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import contextlib
-import os
+import socket
+import time
 from collections import deque
 
 from sniff.capture.wire import encode_item
@@ -12,27 +13,27 @@ from sniff.session import Item, LineEvent, LineEventKind
 BACKLOG = 4 * 1024 * 1024
 """Octets of messages held for a reader that is behind; more are dropped."""
 
-PIPE_SIZE = 1024 * 1024
-_F_SETPIPE_SZ = 1031
+AT_ONCE = 256 * 1024
+"""Octets given to the connection in one call, and asked for as its buffer."""
 
 
 class Outlet:
-    """Sends messages over a pipe. `dropped[bus]`: octets of the line that were not sent."""
+    """Sends messages over a connection. `dropped[bus]`: octets of the line that were not sent."""
 
-    def __init__(self, fd: int, buses: int, backlog: int = BACKLOG) -> None:
-        self._fd: int | None = fd
+    def __init__(self, connection: socket.socket, buses: int, backlog: int = BACKLOG) -> None:
+        self._connection: socket.socket | None = connection.dup()  # closed here; others may still wait on theirs
         self._backlog = backlog
         self._parts: deque[bytes] = deque()
         self._size = 0
         self._gap = [0] * buses  # octets dropped since the last that were sent
         self.dropped = [0] * buses
-        os.set_blocking(fd, False)
-        _widen(fd)
+        connection.setblocking(False)
+        connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, AT_ONCE)
 
     @property
     def open(self) -> bool:
         """Whether anybody may still read."""
-        return self._fd is not None
+        return self._connection is not None
 
     @property
     def size(self) -> int:
@@ -41,7 +42,7 @@ class Outlet:
 
     def item(self, bus: int, item: Item) -> None:
         """Send a chunk or line event, unless the reader is too far behind."""
-        if self._fd is None:
+        if self._connection is None:
             return
         octets = getattr(item, "octets", b"")
         if self._size > self._backlog or (self._gap[bus] and self._size > self._backlog // 2):
@@ -61,17 +62,17 @@ class Outlet:
 
     def send(self, message: bytes) -> None:
         """Send a message that must arrive; `flush` does it."""
-        if self._fd is not None:
+        if self._connection is not None:
             self._parts.append(message)
             self._size += len(message)
 
     def flush(self) -> None:
-        """Give the pipe what it takes now."""
-        while self._parts and self._fd is not None:
+        """Give the connection what it takes now."""
+        while self._parts and self._connection is not None:
             data = b"".join(self._parts) if len(self._parts) > 1 else self._parts[0]
-            data, rest = data[:PIPE_SIZE], data[PIPE_SIZE:]
+            data, rest = data[:AT_ONCE], data[AT_ONCE:]
             try:
-                taken = os.write(self._fd, data)
+                taken = self._connection.send(data)
             except BlockingIOError:
                 taken = 0
             except OSError:
@@ -85,19 +86,22 @@ class Outlet:
                 return None
         return None
 
+    def finish(self, message: bytes, patience: float) -> None:
+        """Send a last message and close; a reader that does not read is waited for `patience` seconds."""
+        self.send(message)
+        until = time.monotonic() + patience
+        self.flush()
+        while self._size and time.monotonic() < until:
+            time.sleep(0.02)
+            self.flush()
+        self.close()
+
     def close(self) -> None:
         """Nobody reads any more: forget what was held."""
-        fd, self._fd = self._fd, None
+        connection, self._connection = self._connection, None
         self._parts.clear()
         self._size = 0
-        if fd is not None:
+        if connection is not None:
             with contextlib.suppress(OSError):
-                os.close(fd)
-
-
-def _widen(fd: int) -> None:
-    """A larger pipe, where the system has such a thing."""
-    with contextlib.suppress(ImportError, OSError):
-        import fcntl
-
-        fcntl.fcntl(fd, _F_SETPIPE_SZ, PIPE_SIZE)
+                connection.shutdown(socket.SHUT_RDWR)
+            connection.close()

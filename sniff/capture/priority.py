@@ -14,6 +14,8 @@ NICE = -10
 def raise_priority() -> str:
     """Ask for real-time priority, else a lower nice value; what was granted, in words. Affects this thread and those
     that it starts later."""
+    if os.name == "nt":
+        return "high (priority class, set at the start)"
     if hasattr(os, "sched_setscheduler"):
         with contextlib.suppress(OSError):
             os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(REALTIME))

@@ -1,4 +1,4 @@
-"""The capture process: `python -m sniff.capture.process`, told what to do over its standard input.
+"""The capture process: `python -m sniff.capture.process`, told what to do over a connection.
 
 It has a session of its own, so that neither Ctrl-C nor the end of the terminal reaches it. SIGTERM and SIGINT end it
 with its files closed; SIGHUP is ignored. When the main process dies while a recording runs, the recording goes on until
@@ -15,10 +15,10 @@ import sys
 from types import FrameType
 
 from sniff.capture.config import CaptureConfig
-from sniff.capture.loop import CaptureLoop, farewell
+from sniff.capture.loop import CaptureLoop
 from sniff.capture.outlet import Outlet
 from sniff.capture.priority import raise_priority
-from sniff.capture.wire import Kind, MessageSplitter, WireError, decode_json, encode_json
+from sniff.capture.wire import Kind, MessageSplitter, WireError, decode_json, encode, encode_json
 from sniff.formats import CaptureError
 from sniff.recording.rotation import Rotation
 from sniff.recording.writer import Recorder
@@ -26,14 +26,17 @@ from sniff.session import Adapter, Session
 from sniff.sources import PortError, Source, open_source
 from sniff.sources.clock import Clock
 
+FAREWELL = 2.0
+"""Seconds that the last message may wait for its reader."""
+
 SWITCH = 0.0002
 """Seconds after which a recorder's thread must give way to the reader."""
 
 
 def main() -> int:
     """Run one capture; 0 when it ended as asked."""
-    commands, answers = _own_pipes()
-    config = _read_config(commands)
+    connection = connect()
+    config = _read_config(connection)
     sys.setswitchinterval(SWITCH)
     priority = raise_priority()  # before the recorders start their threads, which inherit it
     clock = Clock.start()
@@ -47,9 +50,9 @@ def main() -> int:
         for source in sources:
             source.close()
         kind = "port" if isinstance(error, PortError) else "capture"
-        os.write(answers, encode_json(Kind.FAILED, {"kind": kind, "text": str(error)}))
+        connection.sendall(encode_json(Kind.FAILED, {"kind": kind, "text": str(error)}))
         return 4
-    return _capture(config, clock, sources, sessions, recorders, commands, answers, priority)
+    return _capture(config, clock, sources, sessions, recorders, connection, priority)
 
 
 def session_of(config: CaptureConfig, index: int, adapter: Adapter, clock: Clock) -> Session:
@@ -81,11 +84,10 @@ def _capture(
     sources: list[Source],
     sessions: list[Session],
     recorders: list[Recorder],
-    commands: int,
-    answers: int,
+    connection: socket.socket,
     priority: str,
 ) -> int:
-    outlet = Outlet(answers, len(sources))
+    outlet = Outlet(connection, len(sources))
     paths = [str(recorder.path) for recorder in recorders]
     hello = {
         "pid": os.getpid(),
@@ -96,7 +98,7 @@ def _capture(
         "paths": paths,
     }
     outlet.send(encode_json(Kind.HELLO, hello))
-    loop = CaptureLoop(clock, sources, recorders, outlet, commands, priority=priority)
+    loop = CaptureLoop(clock, sources, recorders, outlet, connection, priority=priority)
     if config.duration is not None:
         loop.end_at = clock.now() + config.duration
     waker = _end_on_signals(loop)
@@ -108,7 +110,7 @@ def _capture(
         for recorder in recorders:
             recorder.close()
     waker.close()
-    farewell(outlet, reason)
+    outlet.finish(encode(Kind.ENDED, 0, reason.encode()), FAREWELL)
     return 0
 
 
@@ -131,20 +133,27 @@ def _end_on_signals(loop: CaptureLoop) -> socket.socket:
     return here
 
 
-def _own_pipes() -> tuple[int, int]:
-    """Standard input and output for this protocol alone: nothing that prints may disturb it."""
-    commands, answers = os.dup(0), os.dup(1)
-    nothing = os.open(os.devnull, os.O_RDWR)
-    os.dup2(nothing, 0)
-    os.dup2(nothing, 1)
-    os.close(nothing)
-    return commands, answers
+def connect() -> socket.socket:
+    """The connection to the main process, by standard input.
+
+    POSIX: standard input is the connection. Elsewhere it says where to connect to and what to say there first.
+    """
+    if os.name == "posix":
+        connection = socket.socket(fileno=os.dup(0))
+        nothing = os.open(os.devnull, os.O_RDONLY)
+        os.dup2(nothing, 0)
+        os.close(nothing)
+        return connection
+    port, token = sys.stdin.readline().split()
+    connection = socket.create_connection(("127.0.0.1", int(port)))
+    connection.sendall(bytes.fromhex(token))
+    return connection
 
 
-def _read_config(commands: int) -> CaptureConfig:
+def _read_config(connection: socket.socket) -> CaptureConfig:
     splitter = MessageSplitter()
     while True:
-        data = os.read(commands, 4096)
+        data = connection.recv(4096)
         if not data:
             raise SystemExit("sniff485: the capture process is started by sniff485 itself")
         for kind, _, body in splitter.feed(data):

@@ -9,11 +9,13 @@ NS_PER_MS = 1_000_000
 STEP = 1 * NS_PER_MS
 """Wall and capture clock further apart than this (ns) is worth a CLOCK event."""
 
-_TRIES = 5
+_TRIES = 50
+_CLOSE = 20_000
+"""Two readings of the monotonic clock so far apart (ns) have nothing between them but the reading of the other."""
 
 
 def _together() -> tuple[int, int]:
-    """Wall and monotonic time of one instant, ns: the pair read closest together of a few."""
+    """Wall and monotonic time of one instant, ns: the first pair read close together, else the closest of some."""
     best = (0, 0)
     narrowest: int | None = None
     for _ in range(_TRIES):
@@ -23,6 +25,8 @@ def _together() -> tuple[int, int]:
         if narrowest is None or after - before < narrowest:
             narrowest = after - before
             best = (wall, before + (after - before) // 2)
+        if narrowest <= _CLOSE:
+            break
     return best
 
 

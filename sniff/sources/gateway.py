@@ -5,14 +5,15 @@ Their times are the network's: `latency` says how far they may be wrong, and onl
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable
+from functools import partial
 from typing import Protocol
 from urllib.parse import urlsplit
 
 from dissectors.line import NS_PER_S, LineSettings
 from sniff.session import Adapter, Item, LineEvent, LineEventKind
 from sniff.sources import PortError
+from sniff.sources.attempt import Attempt
 from sniff.sources.clock import NS_PER_MS, Clock
 
 LATENCY = 50 * NS_PER_MS
@@ -83,7 +84,7 @@ class GatewaySource:
         self._pending: list[Item] = []
         self._ended = False
         self._retry_at = 0
-        self._attempt: _Attempt | None = None
+        self._attempt: Attempt[Stream] | None = None
         try:
             self._stream: Stream | None = connect(line)
         except (OSError, ValueError) as error:
@@ -156,35 +157,16 @@ class GatewaySource:
         now = self._clock.now()
         if self._attempt is None:
             if now >= self._retry_at:
-                self._attempt = _Attempt(self._connect, self.line)
+                self._attempt = Attempt(partial(self._connect, self.line), (OSError, ValueError))
             return []
         if not self._attempt.done:
             return []
-        stream, self._attempt = self._attempt.stream, None
+        stream, self._attempt = self._attempt.result, None
         self._retry_at = now + RETRY_EVERY
         if stream is None:
             return []
         self._stream = stream
         return [LineEvent(now, LineEventKind.REPLUGGED, f"{self.spec} is back")]
-
-
-class _Attempt:
-    """A connection being made, in a thread: names and networks make one wait."""
-
-    def __init__(self, connect: Callable[[LineSettings], Stream], line: LineSettings) -> None:
-        self.stream: Stream | None = None
-        self._thread = threading.Thread(target=self._run, args=(connect, line), daemon=True)
-        self._thread.start()
-
-    @property
-    def done(self) -> bool:
-        return not self._thread.is_alive()
-
-    def _run(self, connect: Callable[[LineSettings], Stream], line: LineSettings) -> None:
-        try:
-            self.stream = connect(line)
-        except (OSError, ValueError):
-            self.stream = None
 
 
 def _reason(error: Exception) -> str:

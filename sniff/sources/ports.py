@@ -11,6 +11,9 @@ from dissectors.line import LineSettings
 from sniff.session import Adapter
 from sniff.sources.drivers import NS_PER_MS, UNKNOWN, USB_FRAME, Driver, find_driver
 
+CAPTURE_PROCESS = b"sniff.capture.process"
+"""In the command line of our own capture process; what follows says what it does."""
+
 _SYS = Path("/sys/class/tty")
 _PROC = Path("/proc")
 _BY_NAME = (("ttyS", "8250"), ("ttyAMA", "pl011"), ("ttyACM", "cdc_acm"))
@@ -110,12 +113,18 @@ def _process_name(process: Path) -> str:
         words = (process / "cmdline").read_bytes().split(b"\0")
     except OSError:
         return "?"
-    if b"sniff.capture.process" in words:
-        return " ".join(["sniff485", *(word.decode("utf-8", "replace") for word in words[-2:] if word)])
+    if CAPTURE_PROCESS in words:
+        said = words[words.index(CAPTURE_PROCESS) + 1 :]
+        return _printable(b" ".join([b"sniff485", *filter(None, said)]))
     try:
-        return (process / "comm").read_text().strip() or "?"
+        return _printable((process / "comm").read_bytes().strip()) or "?"
     except OSError:
         return "?"
+
+
+def _printable(name: bytes) -> str:
+    """A process may call itself anything."""
+    return "".join(character if character.isprintable() else "?" for character in name.decode("utf-8", "replace"))
 
 
 def _tty(device: str) -> str:

@@ -6,19 +6,24 @@ import contextlib
 import errno
 import os
 from dataclasses import dataclass
+from functools import partial
 
 from dissectors.frame import Chunk
 from dissectors.line import NS_PER_S, LineSettings
 from sniff.session import Adapter, Item, LineEvent, LineEventKind
 from sniff.sources import PortError
+from sniff.sources.attempt import Attempt
 from sniff.sources.clock import NS_PER_MS, Clock
 from sniff.sources.parmrk import ParmrkDecoder
-from sniff.sources.ports import describe_port, find_holders, is_pty, list_ports
+from sniff.sources.ports import Holder, describe_port, find_holders, is_pty, list_ports
 from sniff.sources.tty import ListeningPort, error_counters, marks_errors, open_listening
 
 READ_SIZE = 65536
 COUNTERS_EVERY = 1 * NS_PER_S
 RETRY_EVERY = 1 * NS_PER_S
+LOOK_EVERY = 50 * NS_PER_MS
+"""Between looks at a port that is being opened again."""
+
 POLL_EVERY = 1 * NS_PER_MS
 """Between looks at a port that cannot be waited on (Windows)."""
 
@@ -48,9 +53,9 @@ class SerialSource:
         self.line = line
         self._clock = clock
         self._pending: list[Item] = []
-        self._port: ListeningPort | None = None
         self._ended = False
-        self._open(device)
+        self._attempt: Attempt[_Found] | None = None
+        self._adopt(open_port(device, line), line)
         self._pty = is_pty(device)
         self._adapter = describe_port(device, line)
         self._identity = _Identity.of(device, self._adapter.serial_number)
@@ -77,7 +82,7 @@ class SerialSource:
         if self._ended:
             return None
         if self._port is None:
-            return self._retry_at
+            return self._retry_at if self._attempt is None else self._clock.now() + LOOK_EVERY
         if self._fd is None:
             return self._clock.now() + POLL_EVERY
         return self._counters_at
@@ -128,14 +133,10 @@ class SerialSource:
 
     # -- opening -----------------------------------------------------------------------------------------------
 
-    def _open(self, device: str) -> None:
-        refuse_unfit(device)
-        try:
-            self._port = open_listening(device, self.line)
-        except (OSError, ValueError) as error:
-            raise PortError(explain(device, self.line, error)) from error
-        self._fd: int | None = getattr(self._port, "fd", None)
-        self._set_decoder(self.line)
+    def _adopt(self, port: ListeningPort, line: LineSettings) -> None:
+        self._port: ListeningPort | None = port
+        self._fd: int | None = getattr(port, "fd", None)
+        self._set_decoder(line)
         self._counters = error_counters(self._fd) if self._fd is not None else None
         self._counters_at = None if self._counters is None else self._clock.now() + COUNTERS_EVERY
         self._marked = 0
@@ -197,19 +198,45 @@ class SerialSource:
 
     def _try_again(self) -> list[Item]:
         now = self._clock.now()
-        if now < self._retry_at:
+        if self._attempt is None:
+            if now >= self._retry_at:
+                self._attempt = Attempt(partial(_find, self._identity, self.line), (PortError, OSError))
             return []
+        if not self._attempt.done:
+            return []
+        found, self._attempt = self._attempt.result, None
         self._retry_at = now + RETRY_EVERY
-        device = find_again(self._identity)
-        if device is None:
+        if found is None:
             return []
-        try:
-            self._open(device)
-        except PortError:
-            return []
-        self.device = device
+        self._adopt(found.port, found.line)
+        if found.line != self.line:  # changed while the port was being looked for
+            self.reconfigure(self.line)
+        self.device = found.device
         self._identity = _Identity.of(self._identity.spec, self._identity.serial_number)
-        return [LineEvent(self._clock.now(), LineEventKind.REPLUGGED, f"{device} is back")]
+        return [LineEvent(self._clock.now(), LineEventKind.REPLUGGED, f"{found.device} is back")]
+
+
+@dataclass(frozen=True, slots=True)
+class _Found:
+    """A port that came back, opened."""
+
+    device: str
+    port: ListeningPort
+    line: LineSettings
+
+
+def _find(identity: _Identity, line: LineSettings) -> _Found | None:
+    device = find_again(identity)
+    return None if device is None else _Found(device, open_port(device, line), line)
+
+
+def open_port(device: str, line: LineSettings) -> ListeningPort:
+    """Open a serial port for listening. Raises PortError."""
+    refuse_unfit(device)
+    try:
+        return open_listening(device, line)
+    except (OSError, ValueError) as error:
+        raise PortError(explain(device, line, error)) from error
 
 
 def find_again(identity: _Identity) -> str | None:
@@ -247,7 +274,7 @@ def refuse_unfit(device: str) -> None:
         return  # a virtual bus holds both sides; its lock says whether somebody listens
     holders = find_holders([device]).get(device)
     if holders:
-        raise PortError(f"{device}: held by {', '.join(map(str, holders))}; stop that first")
+        raise PortError(_held(device, holders))
 
 
 def explain(device: str, line: LineSettings, error: OSError | ValueError) -> str:
@@ -256,14 +283,20 @@ def explain(device: str, line: LineSettings, error: OSError | ValueError) -> str
     if code in (errno.EACCES, errno.EPERM):
         return f"{device}: permission denied; add yourself to group {_group(device)}"
     if code in (errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK):
-        holders = [holder for holder in find_holders([device]).get(device, ()) if holder.pid != os.getpid()]
-        held_by = ", ".join(map(str, holders)) or "another process"
-        return f"{device}: held by {held_by}; stop that first"
+        return _held(device, find_holders([device]).get(device, []))
     if code in (errno.ENOENT, errno.ENODEV, errno.ENXIO):
         return f"{device}: no such port; {_ports_there_are()}"
     if code in (errno.ENOTTY, errno.EINVAL) or "tcgetattr" in str(error) or "Inappropriate" in str(error):
         return f"{device}: not a serial port, or it cannot do {line}; {_ports_there_are()}"
     return f"{device}: cannot be opened as {line}: {_reason(error)}; {_ports_there_are()}"
+
+
+def _held(device: str, holders: list[Holder]) -> str:
+    ours = [holder for holder in holders if holder.name.startswith("sniff485 ")]
+    if ours:
+        return f"{device}: held by {ours[0]}; to end it: kill {ours[0].pid}"
+    held_by = ", ".join(map(str, holders)) or "another process"
+    return f"{device}: held by {held_by}; stop that first"
 
 
 def _reason(error: Exception) -> str:

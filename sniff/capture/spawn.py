@@ -1,0 +1,85 @@
+"""Start the capture process and connect to it, on every system."""
+
+from __future__ import annotations
+
+import os
+import secrets
+import socket
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, Any
+
+import sniff
+
+CONNECT_PATIENCE = 20.0
+_TOKEN_SIZE = 32
+
+
+@dataclass(frozen=True, slots=True)
+class Spawned:
+    """A process, the connection to it, and what it says on its standard error."""
+
+    process: subprocess.Popen[bytes]
+    connection: socket.socket
+    errors: IO[bytes]
+
+
+def spawn(words: Sequence[str]) -> Spawned:
+    """Start it. `words` follow the module's name, for people who look at a list of processes. Raises OSError."""
+    errors = tempfile.TemporaryFile()  # noqa: SIM115 (lives as long as the process)
+    command = [sys.executable, "-P", "-m", "sniff.capture.process", *words]
+    options: dict[str, Any] = {"stdout": errors, "stderr": errors, "env": _environment()}
+    if os.name == "posix":
+        return _spawn_with_socket(command, options, errors)
+    return _spawn_and_listen(command, options, errors)
+
+
+def _spawn_with_socket(command: list[str], options: dict[str, Any], errors: IO[bytes]) -> Spawned:
+    ours, theirs = socket.socketpair()
+    with theirs:
+        process = subprocess.Popen(command, stdin=theirs.fileno(), start_new_session=True, **options)
+    return Spawned(process, ours, errors)
+
+
+def _spawn_and_listen(command: list[str], options: dict[str, Any], errors: IO[bytes]) -> Spawned:
+    """Where a socket cannot be inherited as standard input (Windows): it connects to us and proves who it is."""
+    flags = getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0) | getattr(subprocess, "HIGH_PRIORITY_CLASS", 0)
+    token = secrets.token_bytes(_TOKEN_SIZE)
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        server.settimeout(CONNECT_PATIENCE)
+        process = subprocess.Popen(command, stdin=subprocess.PIPE, creationflags=flags, **options)
+        assert process.stdin is not None
+        try:
+            with process.stdin as pipe:
+                pipe.write(f"{server.getsockname()[1]} {token.hex()}\n".encode())
+            while True:
+                connection, _ = server.accept()
+                connection.settimeout(CONNECT_PATIENCE)
+                if secrets.compare_digest(_receive(connection, _TOKEN_SIZE), token):
+                    return Spawned(process, connection, errors)
+                connection.close()
+        except BaseException:
+            process.kill()
+            process.wait()
+            raise
+
+
+def _receive(connection: socket.socket, size: int) -> bytes:
+    data = b""
+    while len(data) < size and (part := connection.recv(size - len(data))):
+        data += part
+    return data
+
+
+def _environment() -> dict[str, str]:
+    """The process must find this very package, and nothing in the current folder."""
+    root = str(Path(sniff.__file__).resolve().parents[1])
+    environment = dict(os.environ)
+    if not root.endswith(("site-packages", "dist-packages")):
+        paths = [root, *filter(None, [environment.get("PYTHONPATH")])]
+        environment["PYTHONPATH"] = os.pathsep.join(paths)
+    return environment
