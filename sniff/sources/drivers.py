@@ -76,10 +76,10 @@ DRIVERS: dict[str, Driver] = {
 }
 
 _ALIASES = {
-    "ftdi_sio": r"ftdi",
-    "cp210x": r"cp210x",
-    "ch341": r"ch341|ch34x|ch343",
-    "pl2303": r"pl2303",
+    "ftdi_sio": r"ftdi.*",
+    "cp210x": r"cp210.*",
+    "ch341": r"ch34.*",
+    "pl2303": r"pl2303.*",
     "cdc_acm": r"cdc_acm|usb_cdc",
     "8250": r".*8250.*|.*16550.*|dw-apb-uart|of_serial|serial",
     "pl011": r".*pl011.*",

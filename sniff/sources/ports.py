@@ -96,6 +96,16 @@ def find_holders(devices: list[str]) -> dict[str, list[Holder]]:
     return held
 
 
+def is_tty(device: str) -> bool:
+    """Whether a path leads to a terminal device, by the system's own list; True where there is no such list."""
+    try:
+        number = os.stat(device).st_rdev
+        kind = os.path.realpath(f"/sys/dev/char/{os.major(number)}:{os.minor(number)}/subsystem")
+    except (AttributeError, OSError):
+        return True
+    return is_pty(device) or not _SYS.exists() or os.path.basename(kind) == "tty"
+
+
 def is_pty(device: str) -> bool:
     """Whether a path leads to a pseudo-terminal."""
     return os.path.realpath(device).startswith("/dev/pts/")

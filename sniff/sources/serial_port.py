@@ -15,7 +15,7 @@ from sniff.sources import PortError
 from sniff.sources.attempt import Attempt
 from sniff.sources.clock import NS_PER_MS, Clock
 from sniff.sources.parmrk import ParmrkDecoder
-from sniff.sources.ports import Holder, describe_port, find_holders, is_pty, list_ports
+from sniff.sources.ports import Holder, describe_port, find_holders, is_pty, is_tty, list_ports
 from sniff.sources.tty import ListeningPort, error_counters, marks_errors, open_listening
 
 READ_SIZE = 65536
@@ -270,6 +270,8 @@ def refuse_unfit(device: str) -> None:
         raise PortError(f"{device}: a folder, not a serial port; {_ports_there_are()}")
     if os.path.isfile(device):
         raise PortError(f"{device}: a file, not a serial port; to read a capture use: sniff485 open {device}")
+    if not is_tty(device):
+        raise PortError(f"{device}: not a serial port; {_ports_there_are()}")
     if is_pty(device):
         return  # a virtual bus holds both sides; its lock says whether somebody listens
     holders = find_holders([device]).get(device)
