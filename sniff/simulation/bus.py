@@ -100,17 +100,20 @@ class VirtualBus:
         """Let the clock run (at once unless `paused`)."""
         self._ask("begin")
 
-    def attach(self, name: str, echo: bool = False, answers: bool = False) -> str:
+    def attach(self, name: str, echo: bool = False, answers: bool = False, link: str = "") -> str:
         """Put a party on the bus; give the path of its pseudo-terminal.
 
-        `echo`: it hears itself, as many adapters do. `answers`: faults of answers may strike it.
-        Raises OSError where the system has no pseudo-terminals: use `connect`.
+        `echo`: it hears itself, as many adapters do. `answers`: faults of answers may strike it. `link`: a symbolic
+        link to make for it and to give back instead; it is removed when the party leaves.
+        The pseudo-terminal takes any baud rate but, as the kernel has it, only 8 data bits without parity: open it so,
+        whatever the bus's line is.
+        Raises OSError where the system has no pseudo-terminals (use `connect`), or where the link cannot be made.
         """
-        return str(self._ask("attach", name, False, echo, answers))
+        return str(self._ask("attach", name, False, echo, answers, link))
 
-    def tap(self, name: str = "tap") -> str:
+    def tap(self, name: str = "tap", link: str = "") -> str:
         """Put a listener on the bus; give the path of its pseudo-terminal. What it writes is counted, not sent."""
-        return str(self._ask("attach", name, True, False, False))
+        return str(self._ask("attach", name, True, False, False, link))
 
     def connect(self, name: str, echo: bool = False, answers: bool = False) -> MemoryPort:
         """Put a party on the bus without a pseudo-terminal."""
@@ -123,7 +126,7 @@ class VirtualBus:
         return MemoryPort(self, name)
 
     def detach(self, name: str) -> None:
-        """Take a party or a tap off the bus."""
+        """Take a party or a tap off the bus, as if its adapter were unplugged."""
         self._ask("detach", name)
 
     def switch(self, faults: Sequence[Fault]) -> None:

@@ -25,6 +25,7 @@ from multiprocessing.connection import Connection
 
 from dissectors.frame import Chunk, Mark
 from dissectors.line import LineSettings, Timing
+from sniff.capture.priority import raise_priority
 from sniff.simulation.faults import Fault
 from sniff.simulation.line_mix import Received
 from sniff.simulation.wire import Burst, Factory, Sent, Wire
@@ -56,6 +57,7 @@ class Report:
     port lost because nobody read it. `tap_octets`: octets that taps wrote: not put on the line, and 0 for anything that
     only listens; `tap_first`: the first of them. `struck`: transmissions by fault ("collision" among them).
     `slipped`: ns by which the bus ran behind the host's clock. `latest`: ns, worst delay of a burst's last octet.
+    `priority`: what the system granted to the bus's process.
     """
 
     written: dict[str, int]
@@ -68,6 +70,7 @@ class Report:
     struck: dict[str, int]
     slipped: int
     latest: int
+    priority: str
 
 
 @dataclass(slots=True)
@@ -80,6 +83,7 @@ class Port:
     answers: bool = False
     master: int = -1
     slave: int = -1
+    link: str = ""
     written: int = 0
     delivered: int = 0
     unread: int = 0
@@ -109,7 +113,10 @@ class Port:
         return chunks
 
     def close(self) -> None:
-        """Give the pseudo-terminal back."""
+        """Give the pseudo-terminal back; whoever has it open sees it hang up."""
+        if self.link:
+            with contextlib.suppress(OSError):
+                os.unlink(self.link)
         for descriptor in (self.master, self.slave):
             if descriptor >= 0:
                 os.close(descriptor)
@@ -119,9 +126,10 @@ class Port:
 class Hub:
     """The loop: wait for the next moment of the line or for octets from outside, and do what is due."""
 
-    def __init__(self, plan: Plan, control: Connection) -> None:
+    def __init__(self, plan: Plan, control: Connection, priority: str = "") -> None:
         self._plan = plan
         self._control = control
+        self._priority = priority
         self._wire = Wire(plan.line, plan.stations(), plan.faults, plan.seed, plan.gap)
         self._linger = Timing(plan.line).t15
         self._batch = max(1, plan.slice // plan.line.char)
@@ -254,13 +262,21 @@ class Hub:
         """End the process."""
         self._running = False
 
-    def do_attach(self, name: str, tap: bool, echo: bool, answers: bool) -> str:
+    def do_attach(self, name: str, tap: bool, echo: bool, answers: bool, link: str) -> str:
         """Make a pseudo-terminal for a party or a tap; give the path to open."""
         self._free(name)
         port = Port(name, tap, echo, answers)
         port.master, port.slave = _raw_pty()
+        path = os.ttyname(port.slave)
+        if link:
+            try:
+                os.symlink(path, link)
+            except OSError:
+                port.close()
+                raise
+            port.link = link
         self._ports[name] = port
-        return os.ttyname(port.slave)
+        return link or path
 
     def do_connect(self, name: str, tap: bool, echo: bool, answers: bool) -> None:
         """Make a port in memory."""
@@ -303,6 +319,7 @@ class Hub:
             struck=dict(self._struck),
             slipped=(self._origin or 0) - self._began,
             latest=self._latest,
+            priority=self._priority,
         )
 
     def _free(self, name: str) -> None:
@@ -329,4 +346,4 @@ def _raw_pty() -> tuple[int, int]:
 def main(plan: Plan, control: Connection) -> None:
     """Entry of the process. Interrupts from the keyboard are the parent's business."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    Hub(plan, control).run()
+    Hub(plan, control, raise_priority()).run()

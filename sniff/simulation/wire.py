@@ -209,11 +209,13 @@ class Wire:
         """Let the faults strike, and put what is left of it on the agenda."""
         struck: tuple[Transmission, ...] = (sent,)
         for fault, dice in self._faults:
-            struck = tuple(
-                result
-                for one in struck
-                for result in (fault.strike(one, self.now, self.line, dice) if one.party != NOISE else (one,))
-            )
+            if len(struck) == 1:  # the usual case, and the one that must be quick
+                struck = fault.strike(struck[0], self.now, self.line, dice)
+                continue
+            results: list[Transmission] = []
+            for one in struck:
+                results += (one,) if one.party == NOISE else fault.strike(one, self.now, self.line, dice)
+            struck = tuple(results)
         for one in struck:
             self._push(one)
 

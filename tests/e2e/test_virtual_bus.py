@@ -7,6 +7,7 @@ import select
 import time
 from collections.abc import Iterator
 from functools import partial
+from pathlib import Path
 
 import pytest
 
@@ -225,6 +226,26 @@ def test_a_name_is_given_once_and_a_closed_bus_says_so() -> None:
     with pytest.raises(BusFailed, match="not open"):
         bus.attach("other")
     bus.close()
+
+
+def test_an_adapter_can_be_unplugged_and_plugged_in_again_under_one_name(open_pty: type[Pty], tmp_path: Path) -> None:
+    link = str(tmp_path / "ttyTAP")
+    with VirtualBus(LINE) as bus:
+        client = open_pty(bus.attach("client"))
+        assert bus.tap(link=link) == link
+        tap = open_pty(link)
+        client.write(b"one")
+        assert tap.read(3) == b"one"
+        bus.detach("tap")
+        assert not os.path.lexists(link)
+        assert os.read(tap.fd, 1) == b""  # hung up
+        client.write(b"two")
+        time.sleep(0.05)
+        bus.tap(link=link)
+        again = open_pty(link)
+        client.write(b"three")
+        assert again.read(5) == b"three"
+    assert not os.path.lexists(link)
 
 
 def test_nothing_is_left_behind() -> None:
