@@ -1,0 +1,87 @@
+"""The two envelopes of one PDU: unit and PDU octets out of an RTU or an ASCII frame, and the frame's own check.
+
+    RTU     unit 1 | PDU 1…253 octets | CRC-16, low octet first
+    ASCII   ':' | the same unit and PDU as hex pairs | LRC pair | CR LF
+
+Everything behind this file walks the same octets whichever envelope they came in.
+"""
+
+from __future__ import annotations
+
+from binascii import Error as HexError
+from binascii import unhexlify
+
+from dissectors.checksums import crc16_modbus, lrc
+from dissectors.frame import Check, Damage, Frame
+
+RTU_NAME = "modbus-rtu"
+ASCII_NAME = "modbus-ascii"
+
+_PARITY_BIT = bytes(value & 0x7F for value in range(256))
+_HEX = frozenset(b"0123456789ABCDEFabcdef")
+
+
+def rtu_adu(frame: Frame) -> bytes:
+    """Unit and PDU of an RTU frame, without its CRC; of a damaged one, what is there. Total."""
+    return frame.octets[: rtu_end(frame)]
+
+
+def rtu_end(frame: Frame) -> int:
+    """Where the CRC begins, or would: the number of octets of unit and PDU."""
+    size = len(frame.octets)
+    if frame.damage is None or frame.expected is None:
+        return max(0, size - 2) if frame.damage is not Damage.SHORT else size
+    return max(0, min(size, frame.expected - 2))
+
+
+def rtu_check(frame: Frame) -> tuple[int, int] | None:
+    """CRC received and computed, both as read in wire order (01 03 02 17 70 **B6 50** is 0xB650); None if not there."""
+    end = rtu_end(frame)
+    received = frame.octets[end : end + 2]
+    if end < 2 or len(received) < 2:
+        return None
+    return int.from_bytes(received, "big"), int.from_bytes(
+        crc16_modbus(frame.octets[:end]).to_bytes(2, "little"), "big"
+    )
+
+
+def hex_pairs(characters: bytes) -> tuple[bytes, bytes, bytes]:
+    """An ASCII frame as its start character, its hex pairs, and what follows the last pair. Total.
+
+    Bit 7 of a character is not looked at: an 8-bit port leaves the parity bit of a 7-bit line there.
+    """
+    plain = characters.translate(_PARITY_BIT)
+    start = int(plain[:1] == b":")
+    end = next((i for i in range(start, len(plain)) if plain[i] not in _HEX), len(plain))
+    end -= (end - start) & 1
+    return characters[:start], characters[start:end], characters[end:]
+
+
+def ascii_octets(frame: Frame) -> bytes:
+    """The hex pairs of an ASCII frame as octets: unit, PDU, LRC; those before the first that is no pair. Total."""
+    octets = frame.octets
+    if octets[:1] == b":":
+        try:
+            return unhexlify(octets[1 : octets.rindex(b"\r")])  # nearly all frames
+        except (HexError, ValueError):
+            pass
+    return unhexlify(hex_pairs(octets)[1].translate(_PARITY_BIT))
+
+
+def ascii_adu(frame: Frame) -> bytes:
+    """Unit and PDU of an ASCII frame, without its LRC; of a frame without check, what is there. Total."""
+    octets = ascii_octets(frame)
+    return octets if frame.check is Check.ABSENT else octets[:-1]
+
+
+def ascii_check(frame: Frame) -> tuple[int, int] | None:
+    """LRC received and computed; None if not there."""
+    octets = ascii_octets(frame)
+    if frame.check is Check.ABSENT or len(octets) < 2:
+        return None
+    return octets[-1], lrc(octets[:-1])
+
+
+def adu(frame: Frame) -> bytes:
+    """Unit and PDU of a frame of either kind, without check."""
+    return ascii_adu(frame) if frame.protocol == ASCII_NAME else rtu_adu(frame)

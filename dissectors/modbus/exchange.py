@@ -1,0 +1,168 @@
+"""What the tracker holds of a request until it closes, and the transactions that come of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from dissectors.frame import Frame, Header
+from dissectors.modbus.functions import EXCEPTION_BIT, FUNCTIONS
+from dissectors.tracker import Interval, Transaction, Verdict
+
+_WRITES = frozenset(code for code, function in FUNCTIONS.items() if function.writes)
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """One frame as the tracker sees it: its number, its header, its unit and PDU octets."""
+
+    no: int
+    frame: Frame
+    header: Header
+    octets: bytes
+
+    @property
+    def unit(self) -> int | None:
+        """First octet; None of an empty frame."""
+        return self.octets[0] if self.octets else None
+
+
+@dataclass(frozen=True, slots=True)
+class Garble:
+    """A damaged frame, or noise (`no` None), that came in place of an answer."""
+
+    no: int | None
+    end: int
+    error: str
+
+
+@dataclass(slots=True)
+class Exchange:
+    """A request and what became of it so far.
+
+    `sure`: its shape is that of a request only. `fault`: why the request itself is damaged. `silent`: nobody answers
+    it. `remark`: for the verdict when nothing answers. `disturbed`: something else came since, so the wait teaches
+    nothing. `copied`: response time of a copy taken for the answer, until the next frame confirms it.
+    """
+
+    tx: int
+    request: Seen
+    sure: bool
+    silent: bool = False
+    fault: str | None = None
+    attempt: int = 1
+    of: int | None = None
+    remark: str | None = None
+    garble: Garble | None = None
+    echoed: bool = False
+    disturbed: bool = False
+    answered: bool = False
+    copied: int | None = None
+
+    @property
+    def octets(self) -> bytes:
+        """Unit and PDU of the request."""
+        return self.request.octets
+
+    @property
+    def unit(self) -> int:
+        """The unit asked, 0 … 255."""
+        return self.octets[0] if self.octets else 0
+
+    @property
+    def end(self) -> int:
+        """End of the request, ns."""
+        return self.request.frame.end
+
+    @property
+    def writes(self) -> bool:
+        """Whether the station has something to store."""
+        return self.request.header.function in _WRITES
+
+    def is_for(self, octets: bytes) -> bool:
+        """Whether unit and function (as an exception or not) of an answer are those asked."""
+        own = self.octets
+        return len(octets) > 1 and own[:1] == octets[:1] and own[1:2] == bytes((octets[1] & ~EXCEPTION_BIT,))
+
+    def gap(self, start: int) -> int:
+        """From the end of the request to `start`, ns, never negative."""
+        return max(0, start - self.end)
+
+    def latency(self, answer: Frame) -> Interval:
+        """Response time with what the adapter allows: an answer may have begun, a request ended, earlier."""
+        gap = self.gap(answer.start)
+        return Interval(gap, max(0, gap - answer.slack), gap + self.request.frame.slack)
+
+    def close(self, verdict: Verdict) -> Transaction:
+        """The transaction when no good answer came."""
+        garble = self.garble if verdict is Verdict.DAMAGED_ANSWER else None
+        return Transaction(
+            id=self.tx,
+            station=self.unit if self.octets else None,
+            kind=self.request.header.kind,
+            request=self.request.no,
+            response=garble.no if garble else None,
+            verdict=verdict,
+            start=self.request.frame.start,
+            end=max(self.end, garble.end) if garble else self.end,
+            attempt=self.attempt,
+            of=self.of,
+            error=self.fault or (self.garble.error if self.garble else self.remark),
+        )
+
+    def close_with(self, answer: Seen, why: str | None) -> Transaction:
+        """The transaction with its answer; `why` it does not fit, if so."""
+        error = answer.header.error or why
+        if error is None and self.fault:
+            error = f"request damaged at this tap: {self.fault}"
+        if error is None and self.garble:
+            error = f"before the answer: {self.garble.error}"
+        if answer.octets[1] & EXCEPTION_BIT:
+            verdict = Verdict.EXCEPTION
+        else:
+            verdict = Verdict.RETRY if self.attempt > 1 else Verdict.ANSWERED
+        return Transaction(
+            id=self.tx,
+            station=answer.unit,
+            kind=(answer if self.fault else self.request).header.kind,
+            request=self.request.no,
+            response=answer.no,
+            verdict=verdict,
+            start=self.request.frame.start,
+            end=max(self.end, answer.frame.end),
+            latency=self.latency(answer.frame),
+            attempt=self.attempt,
+            of=self.of,
+            error=error,
+        )
+
+
+def answer_apart(tx: int, seen: Seen, verdict: Verdict, other: Exchange | None, error: str | None) -> Transaction:
+    """The transaction of an answer that is late, unsolicited or a second one; `other` is the exchange it is about."""
+    return Transaction(
+        id=tx,
+        station=seen.unit,
+        kind=seen.header.kind,
+        request=None,
+        response=seen.no,
+        verdict=verdict,
+        start=seen.frame.start,
+        end=seen.frame.end,
+        latency=other.latency(seen.frame) if other and verdict is not Verdict.ANSWERED_TWICE else None,
+        of=other.tx if other else None,
+        error=error or seen.header.error,
+    )
+
+
+def echo_of(tx: int, seen: Seen, original: Exchange) -> Transaction:
+    """The transaction of an echo."""
+    return Transaction(
+        id=tx,
+        station=original.unit,
+        kind=seen.header.kind,
+        request=seen.no,
+        response=None,
+        verdict=Verdict.ECHO,
+        start=seen.frame.start,
+        end=seen.frame.end,
+        of=original.tx,
+    )

@@ -1,0 +1,167 @@
+"""The quick look: unit, function, role by shape, first address, count, check verdict. No objects but one Header.
+
+Direction is not in a Modbus frame. Where its length and counts fit a request only, or a response only, the role is
+said; where both fit (writes and diagnostics, whose good answer repeats the request; some reads of coils), it is
+EITHER and the tracker decides. A good check with a length that fits neither is UNKNOWN and says so.
+"""
+
+from __future__ import annotations
+
+from dissectors.frame import Check, Damage, Frame, Header, Role
+from dissectors.modbus.adu import ASCII_NAME, RTU_NAME, ascii_check, ascii_octets, rtu_check
+from dissectors.modbus.functions import (
+    BROADCAST,
+    DIAGNOSTIC_LISTEN_ONLY,
+    EXCEPTION_BIT,
+    EXCEPTION_LENGTH,
+    EXCEPTIONS,
+    FUNCTIONS,
+    MEI_TYPES,
+    Function,
+)
+
+_DAMAGE = {
+    Damage.FORM: "characters that a frame may not hold",
+    Damage.TIMEOUT: "silence inside the frame",
+    Damage.RESTARTED: "a new start before the end",
+    Damage.HEADER: "header check wrong",
+}
+_COUNTERS = frozenset((0x02, *range(0x0B, 0x13)))  # diagnostics whose request carries 0000, whose answer a value
+
+
+def peek_rtu(frame: Frame) -> Header:
+    """The header of an RTU frame. Total; of a damaged frame, what its first octets say."""
+    error = None if frame.ok else _damage(frame, "CRC error: 0x{:04X}, computed 0x{:04X}", rtu_check(frame))
+    return _peek(RTU_NAME, frame.octets, frame, error, frame.expected)
+
+
+def peek_ascii(frame: Frame) -> Header:
+    """The header of an ASCII frame. Total; of a damaged frame, what its first characters say."""
+    octets = ascii_octets(frame)
+    error = None if frame.ok else _damage(frame, "LRC error: 0x{:02X}, computed 0x{:02X}", ascii_check(frame))
+    if frame.check is not Check.ABSENT:
+        octets += b"\0"  # one octet more makes it as long as its RTU twin: LRC and filler stand where the CRC would
+    return _peek(ASCII_NAME, octets, frame, error, None if frame.ok else _rtu_length(frame.expected))
+
+
+def exception_name(code: int) -> str:
+    """ "illegal data address", or "vendor 0x52" for a code that the standard does not name."""
+    return EXCEPTIONS.get(code) or f"vendor 0x{code:02X}"
+
+
+def kind_of(code: int, mei: int | None = None) -> str:
+    """The stable name of a function code (no exception bit); of an encapsulated interface, of its type."""
+    function = FUNCTIONS.get(code)
+    if function is None:
+        return f"function-0x{code:02X}"
+    if code == 0x2B and mei is not None:
+        return MEI_TYPES.get(mei, function.name)
+    return function.name
+
+
+def _peek(protocol: str, octets: bytes, frame: Frame, error: str | None, expected: int | None) -> Header:
+    """`octets` as an RTU frame has them: unit, PDU, two of check where there is one."""
+    size = len(octets)
+    ok = error is None
+    if size < 2:
+        unit = octets[0] if octets else None
+        return Header(protocol, None, unit, Role.UNKNOWN, "unknown", ok=ok, error=error or "too short for a frame")
+    unit, code = octets[0], octets[1]
+    if code & EXCEPTION_BIT:
+        code ^= EXCEPTION_BIT
+        if ok:
+            fits = size == EXCEPTION_LENGTH
+            error = exception_name(octets[2]) if fits else f"an exception of {size} octets"
+        return Header(protocol, unit, None, Role.RESPONSE, kind_of(code), code, None, None, ok, error)
+    function = FUNCTIONS.get(code)
+    if function is None:
+        kind, role = kind_of(code), Role.EITHER
+    else:
+        kind = function.name if code != 0x2B else kind_of(code, octets[2] if size > 2 else None)
+        role = _role(function, octets, size, expected)
+        if role is Role.UNKNOWN and ok:
+            error = f"{size} octets fit neither request nor response"
+    address, count = _address_count(code, role, octets, size if frame.check is Check.ABSENT else size - 2)
+    if role is Role.RESPONSE:
+        return Header(protocol, unit, None, role, kind, code, address, count, ok, error)
+    if unit == BROADCAST and role in (Role.REQUEST, Role.EITHER):
+        role = Role.BROADCAST
+    return Header(protocol, None, unit, role, kind, code, address, count, ok, error)
+
+
+def _role(function: Function, octets: bytes, size: int, expected: int | None) -> Role:
+    total = size if expected is None else expected
+    request = function.request.length(octets, 0, size) == total
+    response = function.response.length(octets, 0, size) == total
+    if request and response:
+        return _by_shape(function, octets, size) if size == total else Role.EITHER
+    if request or response:
+        return Role.REQUEST if request else Role.RESPONSE
+    if function.code == 0x08 and octets[2:4] == b"\0\0" and size >= 6:
+        return Role.EITHER  # loop-back of any length
+    if function.code == 0x2B and octets[2:3] != b"\x0e":
+        return Role.EITHER  # an interface that this table does not know
+    return Role.UNKNOWN
+
+
+def _by_shape(function: Function, octets: bytes, size: int) -> Role:
+    """Request and response have the same length: does what is inside fit both?"""
+    code = function.code
+    if code == 0x08:
+        sub = octets[2] << 8 | octets[3]
+        if sub == DIAGNOSTIC_LISTEN_ONLY:
+            return Role.REQUEST
+        return Role.RESPONSE if sub in _COUNTERS and octets[4:6] != b"\0\0" else Role.EITHER
+    if function.echoes:
+        return Role.EITHER
+    request = function.request.shape(octets, 0, size)
+    response = function.response.shape(octets, 0, size)
+    if request >= 0 and response >= 0:
+        return Role.EITHER
+    return Role.REQUEST if request >= response else Role.RESPONSE
+
+
+def _address_count(code: int, role: Role, octets: bytes, end: int) -> tuple[int | None, int | None]:
+    """First address and how many, as far as this direction of the function has them; unit and PDU end at `end`."""
+    if code in (0x0F, 0x10) and role is not Role.UNKNOWN:
+        return _u16(octets, 2, end), _u16(octets, 4, end)
+    if role in (Role.REQUEST, Role.BROADCAST):
+        if code in (0x01, 0x02, 0x03, 0x04, 0x17):
+            return _u16(octets, 2, end), _u16(octets, 4, end)
+        if code == 0x18:
+            return _u16(octets, 2, end), None
+        if code == 0x14:
+            return None, octets[2] // 7 if end > 2 else None
+        if code == 0x2B:
+            return (octets[4] if end > 4 else None), None
+    elif role is Role.RESPONSE:
+        if code in (0x03, 0x04, 0x17):
+            return None, octets[2] // 2 if end > 2 else None
+        if code == 0x18:
+            return None, _u16(octets, 4, end)
+        if code == 0x2B:
+            return None, octets[7] if end > 7 else None
+    if code in (0x05, 0x06, 0x16) and role is not Role.UNKNOWN:
+        return _u16(octets, 2, end), 1
+    return None, None
+
+
+def _u16(octets: bytes, at: int, end: int) -> int | None:
+    return octets[at] << 8 | octets[at + 1] if at + 2 <= end else None
+
+
+def _damage(frame: Frame, check_words: str, check: tuple[int, int] | None) -> str:
+    """Why a frame is not good, in words."""
+    there = len(frame.octets)
+    if frame.damage is Damage.SHORT or frame.damage is Damage.LONG:
+        least = f", {frame.expected} expected" if frame.expected is not None else ""
+        return f"{frame.damage.value}: {there} octets{least}"
+    if frame.damage in _DAMAGE:
+        return _DAMAGE[frame.damage]
+    if frame.check is Check.BAD and check is not None:
+        return check_words.format(*check)
+    return "no check"
+
+
+def _rtu_length(ascii_length: int | None) -> int | None:
+    return None if ascii_length is None else (ascii_length - 1) // 2

@@ -1,0 +1,111 @@
+"""What the tracker learns of a bus while it listens: response times, the master's timeout, the master's pauses.
+
+Only traffic whose direction the octets decide teaches. Each quantity keeps its last samples, so memory is bounded and
+a bus that changes is learnt anew. All times are int ns, as they were measured (nominal).
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from itertools import pairwise
+
+from dissectors.line import Timing
+
+_SAMPLES = 16
+_MARGIN = 2_000_000  # of a host clock: no limit is finer than 2 ms
+UNLEARNT_LIMIT = 250_000_000
+"""A copy of a request within 250 ms is its answer while nothing is learnt: few masters give up earlier."""
+
+
+class Learnt:
+    """Response times by unit, the master's timeout, its pauses between an answer and the next request."""
+
+    __slots__ = ("_pauses", "_reads", "_timeout", "_tolerance", "_unanswered", "_writes")
+
+    def __init__(self, timing: Timing) -> None:
+        self._tolerance = _MARGIN + timing.latency + 4 * timing.char
+        self._reads: dict[int, deque[int]] = {}
+        self._writes: dict[int, deque[int]] = {}
+        self._unanswered: deque[int] = deque(maxlen=_SAMPLES)
+        self._pauses: deque[int] = deque(maxlen=2 * _SAMPLES)
+        self._timeout: int | None = None
+
+    def answered(self, unit: int, write: bool, latency: int) -> None:
+        """A sure request was answered after `latency`."""
+        by_unit = self._writes if write else self._reads
+        by_unit.setdefault(unit, deque(maxlen=_SAMPLES)).append(latency)
+        if self._timeout is not None and latency > self._timeout:  # the master was still waiting
+            self._unanswered = deque((gap for gap in self._unanswered if gap > latency), maxlen=_SAMPLES)
+            self._timeout = self._agreed()
+
+    def unanswered(self, elapsed: int) -> None:
+        """A sure request got nothing for `elapsed`; then the master sent another."""
+        self._unanswered.append(elapsed)
+        self._timeout = self._agreed()
+
+    def paused(self, gap: int) -> None:
+        """The master sent a sure request `gap` after the answer before it."""
+        self._pauses.append(gap)
+
+    @property
+    def timeout(self) -> int | None:
+        """How long the master waits for an answer; None until two unanswered requests agree on it within 10 %.
+
+        One gap alone may be an answer that this tap missed. A master that pauses before it goes on makes it longer,
+        never shorter.
+        """
+        return self._timeout
+
+    def fastest(self, unit: int) -> int | None:
+        """Shortest response time of a unit, of any unit where it has none; None while unlearnt."""
+        samples = self._reads.get(unit) or self._writes.get(unit)
+        if samples:
+            return min(samples)
+        return min((min(each) for each in self._reads.values()), default=None)
+
+    def response_times(self) -> dict[int, tuple[int, int]]:
+        """Shortest and longest of the last response times, by unit."""
+        units = self._reads.keys() | self._writes.keys()
+        both = {unit: [*self._reads.get(unit, ()), *self._writes.get(unit, ())] for unit in sorted(units)}
+        return {unit: (min(samples), max(samples)) for unit, samples in both.items()}
+
+    def response_limit(self, unit: int, write: bool) -> int | None:
+        """Until when a frame may be the unit's answer rather than the master's next word; None while unlearnt.
+
+        Writes have a limit of their own: storing a parameter takes longer than reading one.
+        """
+        samples = (self._writes if write else self._reads).get(unit, ())
+        if len(samples) < 2:
+            return None
+        ordered = sorted(samples)
+        slowest = ordered[-2] if len(ordered) > 3 else ordered[-1]  # one outlier does not widen the window
+        limit = slowest + slowest // 2 + self._tolerance
+        return limit if self._timeout is None else min(limit, self._patience())
+
+    def in_time(self, unit: int, write: bool, gap: int) -> bool:
+        """Whether a frame `gap` after a request may be its answer; where nothing is learnt, a fixed limit decides."""
+        limit = self.response_limit(unit, write)
+        if limit is None:
+            limit = UNLEARNT_LIMIT if self._timeout is None else self._patience()
+        return gap <= limit
+
+    def too_soon(self, silence: int) -> int:
+        """The gap below which a frame after an answer is not the master's next request; `silence` while unlearnt."""
+        return max(silence, min(self._pauses) * 4 // 5) if len(self._pauses) >= 4 else silence
+
+    def misses_request(self, unit: int, write: bool, gap: int, request: int) -> bool:
+        """Whether `gap` since the last frame holds a pause, a request of `request` ns and a response time, and no
+        pause alone: so the request between was not seen. False while unlearnt.
+        """
+        limit, fastest = self.response_limit(unit, write), self.fastest(unit)
+        if limit is None or fastest is None or len(self._pauses) < 8:
+            return False
+        shortest, longest = min(self._pauses) * 4 // 5, max(self._pauses) * 6 // 5 + self._tolerance
+        return gap > longest and shortest + request + fastest // 2 <= gap <= longest + request + limit
+
+    def _patience(self) -> int:
+        return (self._timeout or 0) * 4 // 5
+
+    def _agreed(self) -> int | None:
+        ordered = sorted(self._unanswered)
+        return next((a for a, b in pairwise(ordered) if b <= a + a // 10 + _MARGIN), None)

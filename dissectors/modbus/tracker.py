@@ -1,0 +1,351 @@
+"""Pairs the frames of a Modbus serial line: one master, at most one unicast request outstanding.
+
+Direction is not in the octets of writes and diagnostics, whose good answer repeats the request. So:
+
+1. What the shape decides (`peek`: REQUEST or RESPONSE) is believed, and teaches (`learnt.py`).
+2. A copy of the open request is an echo when it comes sooner than a station can answer, an answer when it comes within
+   the station's response time, and a repeat of the request after that.
+3. A request closes the open one: unanswered, or answered by something damaged.
+4. An answer that does not fit belongs to an earlier request (late), to nobody (unsolicited), or is a second one.
+5. A frame missed by the tap therefore costs its own transaction and no other.
+
+Every frame is in exactly one transaction. A late or second answer has one of its own, which names the other (`of`).
+An answer from another unit than the one asked is unsolicited and names the request, which stays open: the right unit
+may still answer. (Some battery systems are asked at one address and always answer from another.)
+"""
+
+from __future__ import annotations
+
+from collections import deque
+
+from dissectors.frame import Event, Header, Noise, Reason, Role
+from dissectors.line import NS_PER_S, Timing
+from dissectors.modbus.adu import adu
+from dissectors.modbus.exchange import Exchange, Garble, Seen, answer_apart, echo_of
+from dissectors.modbus.functions import BROADCAST
+from dissectors.modbus.learnt import Learnt
+from dissectors.modbus.pairing import is_listen_only, is_restart, mismatch
+from dissectors.tracker import Placement, Tracked, Transaction, Verdict
+
+GIVE_UP = 5 * NS_PER_S
+"""An unanswered request is closed after 5 s of nothing while the master's timeout is unlearnt."""
+
+_REQUEST_OCTETS = 8  # of the commonest request, RTU
+_GARBLE = 3  # so many octets of noise in place of an answer are a damaged answer
+_QUIET_NOISE = frozenset((Reason.ZEROS, Reason.BREAK, Reason.PAD))
+
+
+class ModbusTracker:
+    """Implements `dissectors.tracker.Tracker` for RTU and ASCII lines.
+
+    `silence`: ns, the shortest time in which a station can begin an answer; 3.5 characters where not given (RTU).
+    `learnt`: what the traffic so far told of response times, timeout and pauses.
+    """
+
+    def __init__(self, timing: Timing, silence: int | None = None) -> None:
+        self.learnt = Learnt(timing)
+        self._timing = timing
+        self._silence = 7 * timing.char // 2 if silence is None else silence
+        self._echo_limit = max(self._silence, timing.char + timing.latency)
+        self._next_tx = 1
+        self._closed: list[Transaction] = []  # by the event under way
+        self._open: Exchange | None = None
+        self._last: Exchange | None = None  # the exchange that closed last
+        self._last_end: int | None = None  # of the newest frame
+        self._last_was_answer = False
+        self._given_up: deque[Exchange] = deque(maxlen=8)
+        self._echoing: bool | None = None  # whether this bus repeats requests at once; None while unlearnt
+        self._mute: set[int] = set()  # units in listen-only mode
+
+    @property
+    def timeout(self) -> int | None:
+        """How long the master waits for an answer, ns; None while unlearnt."""
+        return self.learnt.timeout
+
+    # ---- the contract
+
+    def track(self, no: int, event: Event, header: Header | None) -> Tracked:
+        """Place the next event; see `dissectors.tracker.Tracker`."""
+        self._expire(event.start)
+        if isinstance(event, Noise) or header is None:
+            self._noise(event)
+            return Tracked(None, self._take_closed())
+        seen = Seen(no, event, header, adu(event))
+        if not header.ok or len(seen.octets) < 2:
+            placement = self._damaged(seen)
+        elif header.role is Role.RESPONSE:
+            placement = self._response(seen)
+        elif header.role in (Role.REQUEST, Role.BROADCAST):
+            placement = self._request(seen)
+        else:
+            placement = self._either(seen)
+        self._last_end = event.end
+        self._last_was_answer = placement.role is Role.RESPONSE
+        return Tracked(placement, self._take_closed())
+
+    def advance(self, now: int) -> tuple[Transaction, ...]:
+        """Close the open request when the master has long given up at `now` (ns)."""
+        # an answer that began in time may still be under way through the adapter
+        self._expire(now - self._timing.latency - self._echo_limit)
+        return self._take_closed()
+
+    def close(self) -> tuple[Transaction, ...]:
+        """End of capture."""
+        if self._open is not None:
+            unfinished = not (self._open.fault or self._open.garble or self._open.silent)
+            self._close_open(Verdict.OPEN if unfinished else None)
+        return self._take_closed()
+
+    # ---- what the shape decides
+
+    def _request(self, seen: Seen, sure: bool = True, fault: str | None = None) -> Placement:
+        """A request: an echo of the newest one, its repeat, or another."""
+        if sure and self._is_echo_of_request(seen):
+            self._echoing = True
+            return self._echo(seen)
+        before = self._open
+        self._learn_from_next(seen, sure)
+        request = Exchange(self._take_tx(), seen, sure, fault=fault)
+        request.silent = is_listen_only(seen.octets) or (request.unit in self._mute and is_restart(seen.octets))
+        if before is not None:
+            if before.octets == seen.octets and not (before.fault or before.silent):
+                request.attempt, request.of = before.attempt + 1, before.of or before.tx
+            self._close_open()
+        self._note_mode(request)
+        if request.unit == BROADCAST and not fault:
+            self._last = request
+            self._closed.append(request.close(Verdict.BROADCAST))
+            return Placement(seen.no, request.tx, Role.BROADCAST, destination=BROADCAST)
+        self._open = request
+        return Placement(seen.no, request.tx, Role.REQUEST, destination=seen.unit)
+
+    def _response(self, seen: Seen) -> Placement:
+        """An answer: to the open request, a late, a second or an unsolicited one."""
+        request = self._open
+        late = self._late_for(seen)
+        if request is not None:
+            if request.is_for(seen.octets):
+                why = mismatch(request.octets, seen.octets)
+                if late is None or not (why or self._is_too_soon(request, seen)):
+                    return self._answer(request, seen, why)
+            elif request.fault and self._in_time(request, seen):
+                return self._answer(request, seen, None)
+            elif late is None:
+                return self._from_elsewhere(request, seen)
+            request.disturbed = True
+        if late is not None:
+            self._given_up.remove(late)
+            return self._answer_apart(seen, Verdict.LATE, late)
+        if self._is_second_answer(seen):
+            return self._answer_apart(seen, Verdict.ANSWERED_TWICE, self._last)
+        return self._answer_apart(seen, Verdict.UNSOLICITED)
+
+    # ---- what only time decides
+
+    def _either(self, seen: Seen) -> Placement:
+        """A frame that could be a request as well as a response, or is of no known shape."""
+        request = self._open
+        if request is None:
+            return self._either_unasked(seen)
+        if request.is_for(seen.octets):
+            if request.octets == seen.octets and self._is_echo_of_write(request, seen):
+                return self._echo(seen)
+            why = None if request.fault else mismatch(request.octets, seen.octets)
+            # a station may answer with the value that it really took, or with a wrong length
+            near = self._knows(request) and request.octets[:4] == seen.octets[:4]
+            if (why is None or near or seen.header.role is Role.UNKNOWN) and self._in_time(request, seen):
+                return self._answer(request, seen, why)
+        elif request.octets[1:] == seen.octets[1:] and self._knows(request) and self._in_time(request, seen):
+            return self._from_elsewhere(request, seen)
+        return self._request(seen, sure=False)
+
+    def _either_unasked(self, seen: Seen) -> Placement:
+        """No request is open: a new one, unless it comes too soon for that, or only a missed one explains its time."""
+        last = self._last
+        gap = 0 if self._last_end is None else max(0, seen.frame.start - self._last_end)
+        if last is not None and last.octets == seen.octets and gap < self.learnt.too_soon(self._silence):
+            if last.answered:
+                return self._answer_apart(seen, Verdict.ANSWERED_TWICE, last)
+            return self._echo(seen)
+        length = len(seen.frame.octets) * self._timing.char
+        writes = Exchange(0, seen, False).writes
+        if self._last_was_answer and self.learnt.misses_request(seen.octets[0], writes, gap, length):
+            return self._answer_apart(seen, Verdict.UNSOLICITED)
+        return self._request(seen, sure=False)
+
+    def _damaged(self, seen: Seen) -> Placement:
+        """A damaged frame: in answer to the open request, a damaged request, or neither."""
+        request, role = self._open, seen.header.role
+        error = seen.header.error or "damaged"
+        if request is None:
+            if role is Role.RESPONSE:
+                return self._answer_apart(seen, Verdict.UNSOLICITED)
+        elif role is not Role.REQUEST and (request.is_for(seen.octets) or self._in_time(request, seen)):
+            if request.garble is None:
+                request.garble = Garble(seen.no, seen.frame.end, error)
+            return Placement(seen.no, request.tx, Role.RESPONSE, source=request.unit)
+        return self._request(seen, sure=False, fault=error)
+
+    def _noise(self, noise: Event) -> None:
+        request = self._open
+        if request is None or not isinstance(noise, Noise):
+            return
+        request.disturbed = True
+        if request.garble or noise.reason in _QUIET_NOISE or len(noise.octets) < _GARBLE:
+            return
+        if self.learnt.in_time(request.unit, request.writes, request.gap(noise.start)):
+            request.garble = Garble(None, noise.end, f"{len(noise.octets)} octets came in answer, but no frame")
+
+    # ---- judging
+
+    def _in_time(self, request: Exchange, seen: Seen) -> bool:
+        return self.learnt.in_time(request.unit, request.writes, request.gap(seen.frame.start))
+
+    def _knows(self, request: Exchange) -> bool:
+        return self.learnt.response_limit(request.unit, request.writes) is not None
+
+    def _is_too_soon(self, request: Exchange, seen: Seen) -> bool:
+        """Whether it began before the station can have seen the end of this repeat: it answers an earlier attempt."""
+        soonest = request.latency(seen.frame).high
+        return request.attempt > 1 and soonest < self._silence
+
+    def _is_echo_of_request(self, seen: Seen) -> bool:
+        """Whether a sure request repeats the newest one at once; a master repeats only after its timeout."""
+        newest = self._open or self._last
+        if newest is None or newest.octets != seen.octets or newest.answered or newest.fault:
+            return False
+        gap = newest.gap(seen.frame.start)
+        return gap < self._echo_limit or (self.timeout is not None and gap * 8 < self.timeout)
+
+    def _is_echo_of_write(self, request: Exchange, seen: Seen) -> bool:
+        """Whether a copy that could be an answer comes too soon to be one."""
+        latency = request.latency(seen.frame)
+        if request.echoed or latency.low > self._echo_limit:
+            return False
+        if self._echoing is not None:
+            return self._echoing
+        if latency.high < self._silence:
+            return True
+        fastest = self.learnt.fastest(request.unit)
+        return fastest is not None and latency.nominal + self._timing.char < fastest // 2
+
+    def _is_second_answer(self, seen: Seen) -> bool:
+        """Whether an answer follows the last one of that unit with no room for a request between."""
+        last = self._last
+        if last is None or not last.answered or self._last_end is None or not last.is_for(seen.octets):
+            return False
+        room = self.learnt.too_soon(self._silence) + _REQUEST_OCTETS * self._timing.char
+        return seen.frame.start - self._last_end < room + (self.learnt.fastest(last.unit) or 0) // 2
+
+    def _late_for(self, seen: Seen) -> Exchange | None:
+        """The newest request given up lately that this answer fits."""
+        patience = 3 * (self.timeout or GIVE_UP)
+        for request in reversed(self._given_up):
+            if request.gap(seen.frame.start) > patience:
+                return None
+            if request.is_for(seen.octets) and mismatch(request.octets, seen.octets) is None:
+                return request
+        return None
+
+    # ---- learning
+
+    def _learn_from_next(self, seen: Seen, sure: bool) -> None:
+        """A request after all that came before it: how long the master waited, paused, and whether a copy answered."""
+        before, last = self._open, self._last
+        if before is not None:
+            undisturbed = not (before.disturbed or before.fault or before.garble or before.silent)
+            if sure and before.sure and undisturbed:
+                self.learnt.unanswered(before.gap(seen.frame.start))
+        elif last is not None:
+            if last.copied is not None and last.octets != seen.octets:
+                self.learnt.answered(last.unit, last.writes, last.copied)
+            last.copied = None
+            if sure and last.answered and self._last_was_answer and self._last_end is not None:
+                self.learnt.paused(max(0, seen.frame.start - self._last_end))
+
+    def _learn_from_answer(self, request: Exchange, seen: Seen, why: str | None) -> None:
+        gap = request.gap(seen.frame.start)
+        if request.octets == seen.octets:
+            request.copied = gap
+        elif request.sure and seen.header.role is Role.RESPONSE and not (why or request.fault):
+            self.learnt.answered(request.unit, request.writes, gap)
+            if self._echoing is None or request.echoed:
+                self._echoing = request.echoed
+
+    def _note_mode(self, request: Exchange) -> None:
+        """Listen-only mode begins with its command and ends with a restart, or when the unit speaks again."""
+        if is_restart(request.octets):
+            if request.unit == BROADCAST:
+                self._mute.clear()
+            self._mute.discard(request.unit)
+        elif is_listen_only(request.octets):
+            self._mute.add(request.unit)
+        elif request.unit in self._mute:
+            request.remark = f"unit {request.unit} was put into listen-only mode"
+
+    # ---- closing
+
+    def _answer(self, request: Exchange, seen: Seen, why: str | None) -> Placement:
+        self._learn_from_answer(request, seen, why)
+        request.answered = True
+        self._open, self._last = None, request
+        self._mute.discard(seen.octets[0])
+        self._closed.append(request.close_with(seen, why))
+        return Placement(seen.no, request.tx, Role.RESPONSE, source=seen.unit)
+
+    def _from_elsewhere(self, request: Exchange, seen: Seen) -> Placement:
+        """An answer of another unit or function while a request is open, which stays open."""
+        request.disturbed = True
+        error = None
+        if seen.unit != request.unit:
+            error = f"unit {seen.unit} answered a request to unit {request.unit}"
+            request.remark = f"unit {seen.unit} answered instead"
+        return self._answer_apart(seen, Verdict.UNSOLICITED, request, error)
+
+    def _answer_apart(
+        self, seen: Seen, verdict: Verdict, other: Exchange | None = None, error: str | None = None
+    ) -> Placement:
+        tx = self._take_tx()
+        self._closed.append(answer_apart(tx, seen, verdict, other, error))
+        return Placement(seen.no, tx, Role.RESPONSE, source=seen.unit)
+
+    def _echo(self, seen: Seen) -> Placement:
+        original = self._open or self._last
+        assert original is not None  # an echo is of something
+        original.echoed = True
+        tx = self._take_tx()
+        self._closed.append(echo_of(tx, seen, original))
+        role = Role.BROADCAST if original.unit == BROADCAST else Role.REQUEST
+        return Placement(seen.no, tx, role, destination=original.unit)
+
+    def _expire(self, now: int) -> None:
+        limit = GIVE_UP if self.timeout is None else self.timeout * 3 // 2
+        if self._open is not None and now >= self._open.end + limit:
+            self._close_open()
+
+    def _close_open(self, verdict: Verdict | None = None) -> None:
+        """Close the open request, that no good answer came to."""
+        request = self._open
+        if request is None:
+            return
+        self._open, self._last = None, request
+        if verdict is None:
+            if request.fault:
+                verdict = Verdict.DAMAGED_REQUEST
+            elif request.silent:
+                verdict = Verdict.DATA
+            elif request.garble:
+                verdict = Verdict.DAMAGED_ANSWER
+            else:
+                verdict = Verdict.NO_RESPONSE
+                self._given_up.append(request)
+        self._closed.append(request.close(verdict))
+
+    def _take_closed(self) -> tuple[Transaction, ...]:
+        closed, self._closed = tuple(self._closed), []
+        return closed
+
+    def _take_tx(self) -> int:
+        tx = self._next_tx
+        self._next_tx += 1
+        return tx
