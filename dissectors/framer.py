@@ -28,10 +28,13 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import Final, NamedTuple, Protocol
 
 from dissectors.frame import Chunk, Event, LineError, Mark
 from dissectors.line import Timing
+
+UNKNOWN_SILENCE: Final = 86_400 * 1_000_000_000
+"""Largest reading of the silence before the first octet of a capture, ns."""
 
 
 class Framer(Protocol):
@@ -113,7 +116,7 @@ class OctetWindow:
         index = len(self.octets)
         first_end = chunk.time - (count - 1) * self._char
         if self._last_end is None:  # nothing is known of the time before the first octet of a capture
-            gap, floor = _UNKNOWN, first_end - self._char
+            gap, floor = UNKNOWN_SILENCE, first_end - self._char
         else:
             floor = self._last_end
             gap = max(0, first_end - self._char - floor)
@@ -153,8 +156,8 @@ class OctetWindow:
         run = self._run(index)
         if run.index != index:
             return 0, run.slack
-        if run.gap == _UNKNOWN:
-            return 0, _UNKNOWN
+        if run.gap == UNKNOWN_SILENCE:
+            return 0, UNKNOWN_SILENCE
         return max(0, run.gap - self._latency), run.gap + run.room
 
     def gap(self, index: int) -> int:
@@ -209,9 +212,6 @@ class OctetWindow:
 
     def _end_in(self, run: _Run, index: int) -> int:
         return max(run.floor, run.first_end + (index - run.index) * self._char)
-
-
-_UNKNOWN = 86_400 * 1_000_000_000
 
 
 def _index_of(run: _Run) -> int:

@@ -1,0 +1,270 @@
+"""Candidates: stretches of octets that may be RTU frames, each with the evidence that its octets give.
+
+A function code predicts the length of its frame, as request and as response. Where the CRC is right at a predicted
+length there is a candidate. Its `bits` say how unlikely chance is to make it; what stands round it (silence, other
+frames, the open request) is weighed in segmentation.py.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Final, NamedTuple
+
+from dissectors.checksums import crc16_modbus
+from dissectors.modbus.functions import (
+    BROADCAST,
+    EXCEPTION_BIT,
+    EXCEPTION_LENGTH,
+    EXCEPTIONS,
+    FUNCTIONS,
+    MAX_FRAME,
+    MAX_UNIT,
+    MIN_FRAME,
+    MORE,
+    VENDOR_EXCEPTIONS,
+    Octets,
+    is_open_length,
+)
+
+CRC_BITS: Final = 16
+SHORT_FRAME: Final = -4
+"""Frames of 4 and 5 octets say little beside their CRC, and random octets make more of them than of all others."""
+
+VENDOR_CODE: Final = -2
+UNKNOWN_CODE: Final = -4
+HIGH_UNIT: Final = -4
+"""Units above 247: the standard forbids them, drives use them; a gap or the open request makes up for it."""
+
+ODD_BROADCAST: Final = -8
+"""Unit 0 with anything but a write request."""
+
+WHOLE_STRETCH: Final = 12
+"""All octets between two silences with a good CRC, whatever their function: good with both gaps proved, only then."""
+
+ZERO_TAIL: Final = -8
+"""A good frame and zeros after it is good again as a whole (the CRC is 0): the shorter reading wins."""
+
+
+class Reading(NamedTuple):
+    """A length that the first octets predict, and the directions that have it. MORE: not told yet."""
+
+    length: int
+    request: bool
+    response: bool
+
+
+class Candidate(NamedTuple):
+    """A stretch with a good CRC. `start` counts from the first octet ever fed."""
+
+    start: int
+    length: int
+    bits: int
+    unit: int
+    request: bool
+    response: bool
+    octets: bytes
+
+    @property
+    def end(self) -> int:
+        return self.start + self.length
+
+
+class Pending(NamedTuple):
+    """A stretch that would be a frame if the octets to come make its CRC good. `start` as in Candidate."""
+
+    start: int
+    reading: Reading
+
+
+_NOTHING: Final = Reading(-1, False, False)
+_UNTOLD: Final = Reading(MORE, True, True)
+_EXCEPTION = (Reading(EXCEPTION_LENGTH, False, True),)
+
+
+def readings(octets: Octets, start: int, end: int) -> tuple[Reading, ...]:
+    """The predicted lengths of a frame that begins at `start`, shorter first; looks at [start, end) only."""
+    if end - start < 2:
+        return ()
+    code = octets[start + 1]
+    function = FUNCTIONS.get(code & ~EXCEPTION_BIT)
+    if function is None:
+        return ()
+    if code & EXCEPTION_BIT:
+        return _EXCEPTION
+    asked = function.request.length(octets, start, end)
+    answered = function.response.length(octets, start, end)
+    if asked == answered:
+        return (Reading(asked, True, True),) if asked >= MORE else ()
+    found = []
+    if asked >= MORE:
+        found.append(Reading(asked, True, False))
+    if answered >= MORE:
+        found.append(Reading(answered, False, True))
+    if len(found) == 2 and asked > answered:
+        found.reverse()
+    return tuple(found)
+
+
+def octet_bits(octets: Octets, start: int, reading: Reading) -> int:
+    """Evidence in a complete frame's octets beside the CRC: its shape, its address, its length."""
+    unit, code = octets[start], octets[start + 1]
+    function = FUNCTIONS[code & ~EXCEPTION_BIT]
+    if code & EXCEPTION_BIT:
+        bits = exception_bits(octets[start + 2])
+        if unit == BROADCAST:
+            bits += ODD_BROADCAST
+    else:
+        length = reading.length
+        bits = -100
+        if reading.request:
+            bits = function.request.shape(octets, start, length)
+            if unit == BROADCAST and not function.writes:
+                bits += ODD_BROADCAST
+        if reading.response:
+            answer = function.response.shape(octets, start, length)
+            if unit == BROADCAST:
+                answer += ODD_BROADCAST
+            if answer > bits:
+                bits = answer
+        if length <= EXCEPTION_LENGTH:
+            bits += SHORT_FRAME
+    return bits + HIGH_UNIT if unit > MAX_UNIT else bits
+
+
+def octet_hope(octets: Octets, start: int, reading: Reading) -> int:
+    """The same for a frame that is not complete: what its octets may still come to."""
+    unit, code = octets[start], octets[start + 1]
+    function = FUNCTIONS[code & ~EXCEPTION_BIT]
+    if code & EXCEPTION_BIT:
+        bits = SHORT_FRAME
+    elif reading.length > 8 and code in _TOLD_EARLY:
+        bits = octet_bits(octets, start, reading)
+    else:
+        bits = _HOPED_SHAPE
+    if unit == BROADCAST and not (reading.request and function.writes):
+        bits += ODD_BROADCAST
+    return bits + HIGH_UNIT if unit > MAX_UNIT else bits
+
+
+_HOPED_SHAPE: Final = 4
+_TOLD_EARLY: Final = frozenset({0x01, 0x02, 0x03, 0x04, 0x0F, 0x10, 0x17})
+"""Functions whose shape is told by the octets that tell their length."""
+
+
+def exception_bits(code: int) -> int:
+    """Evidence in a frame of 5 octets with an exception code."""
+    if code in EXCEPTIONS:
+        return SHORT_FRAME
+    return SHORT_FRAME + (VENDOR_CODE if code in VENDOR_EXCEPTIONS else UNKNOWN_CODE)
+
+
+def candidate(octets: Octets, at: int, reading: Reading, start: int) -> Candidate | None:
+    """The candidate at index `at` of `octets` (complete there), numbered `start`; None when its CRC is wrong."""
+    stretch = bytes(octets[at : at + reading.length])
+    if crc16_modbus(stretch):
+        return None
+    bits = CRC_BITS + octet_bits(stretch, 0, reading)
+    if not stretch[-1] and zeros_follow_good(stretch):
+        bits += ZERO_TAIL
+    return Candidate(start, reading.length, bits, stretch[0], reading.request, reading.response, stretch)
+
+
+def zeros_follow_good(stretch: bytes) -> bool:
+    """Whether a stretch with a good CRC is a shorter good frame and zeros."""
+    bare = stretch.rstrip(b"\0")
+    for reading in readings(stretch, 0, len(stretch)):
+        if max(len(bare), MIN_FRAME) <= reading.length < len(stretch) and not crc16_modbus(stretch[: reading.length]):
+            return True
+    return False
+
+
+def whole_stretch(octets: Octets, at: int, end: int, start: int) -> Candidate | None:
+    """All of [at, end) as one frame, zeros at its end left off; None when its CRC is wrong or it is no frame.
+
+    Only for stretches with silence at both ends. Text is refused: it is another protocol's.
+    """
+    length = end - at
+    if not MIN_FRAME <= length <= MAX_FRAME:
+        return None
+    stretch = bytes(octets[at:end])
+    if crc16_modbus(stretch):
+        return None
+    while len(stretch) > MIN_FRAME and not stretch[-1] and not crc16_modbus(stretch[:-1]):
+        stretch = stretch[:-1]
+    code = stretch[1]
+    if code & EXCEPTION_BIT and len(stretch) != EXCEPTION_LENGTH:
+        return None
+    if code not in FUNCTIONS and not _NOT_TEXT.search(stretch):
+        return None
+    open_ended = is_open_length(stretch)
+    return Candidate(start, len(stretch), WHOLE_STRETCH, stretch[0], open_ended, open_ended, stretch)
+
+
+_NOT_TEXT = re.compile(rb"[^\x20-\x7e\r\n]")
+_HEADS = re.compile(
+    b"(?=.[%s])" % b"".join(re.escape(bytes((code, code | EXCEPTION_BIT))) for code in FUNCTIONS), re.DOTALL
+)
+
+
+class CandidateFinder:
+    """Finds every candidate of a growing window, looking at each octet once.
+
+    Positions count from the first octet ever fed, so that nothing moves when octets are taken from the front.
+    """
+
+    __slots__ = ("_scanned", "_unread", "_waiting", "base", "good")
+
+    def __init__(self) -> None:
+        self.base = 0  # octets taken so far: number of the window's first
+        self.good: list[Candidate] = []
+        self._scanned = 0
+        self._unread: list[Pending] = []  # heads that need more octets to tell a length, and what they told so far
+        self._waiting: list[Pending] = []
+
+    def look(self, octets: Octets, end: int) -> None:
+        """Take notice of the window's octets up to `end` (which never falls)."""
+        base = self.base
+        unread, self._unread = self._unread, []
+        for start, told in unread:
+            self._read(octets, start, end, told)
+        scan = max(self._scanned, base)
+        if base + end - 2 > scan:  # a head is read when its third octet is there: then most lengths are told
+            for match in _HEADS.finditer(octets, scan - base, end - 1):
+                self._read(octets, base + match.start(), end, _NOTHING)
+            self._scanned = base + end - 2
+        waiting: list[Pending] = []
+        for pending in self._waiting:
+            start, reading = pending
+            if start - base + reading.length > end:
+                waiting.append(pending)
+            elif (found := candidate(octets, start - base, reading, start)) is not None:
+                self.good.append(found)
+        self._waiting = waiting
+
+    def pending(self) -> list[Pending]:
+        """What is not complete yet; length MORE where the octets do not tell it yet."""
+        return self._waiting + [Pending(start, _UNTOLD) for start, _ in self._unread]
+
+    def drop(self, count: int) -> None:
+        """The window gave out its first `count` octets."""
+        base = self.base = self.base + count
+        if self.good:
+            self.good = [c for c in self.good if c.start >= base]
+        if self._waiting:
+            self._waiting = [p for p in self._waiting if p.start >= base]
+        if self._unread:
+            self._unread = [p for p in self._unread if p.start >= base]
+
+    def _read(self, octets: Octets, start: int, end: int, told: Reading) -> None:
+        more = False
+        for reading in readings(octets, start - self.base, end):
+            if reading.length == MORE:
+                more = True
+            elif reading.length != told.length:
+                self._waiting.append(Pending(start, reading))
+                told = reading
+            elif reading != told:
+                other = Reading(reading.length, not told.request, not told.response)
+                self._waiting.append(Pending(start, other))
+        if more:
+            self._unread.append(Pending(start, told))

@@ -1,0 +1,100 @@
+"""What no frame covers: is it a damaged frame of a station, or noise?"""
+
+from __future__ import annotations
+
+from enum import Enum, auto
+from typing import NamedTuple
+
+from dissectors.frame import Damage, LineError, Mark, Place, Reason
+from dissectors.modbus.candidates import readings
+from dissectors.modbus.expectation import Expected
+from dissectors.modbus.functions import (
+    BROADCAST,
+    EXCEPTION_BIT,
+    FUNCTIONS,
+    MAX_FRAME,
+    MAX_UNIT,
+    MIN_FRAME,
+    MORE,
+)
+
+
+class Side(Enum):
+    """What stands beside a stretch, without proved silence between (SILENCE: with it)."""
+
+    SILENCE = auto()  # proved, or the capture begins or ends here
+    FRAME = auto()
+    NOISE = auto()
+
+
+class Injury(NamedTuple):
+    """A damaged frame: the length it should have had (None: not known), and what is wrong with it."""
+
+    expected: int | None
+    damage: Damage
+
+
+def injury(octets: bytes, before: Side, after: Side, heard: bool, expected: Expected | None) -> Injury | None:
+    """The damaged frame that a stretch without a good one is; None when it is noise.
+
+    It must begin where a frame may begin, with a station and a known function, and end where a frame may end.
+    `heard`: good frames named the station that its first octet names. `expected`: the open request.
+    """
+    count = len(octets)
+    if before is Side.NOISE or after is Side.NOISE or not 2 <= count <= MAX_FRAME:
+        return None
+    unit, code = octets[0], octets[1]
+    awaited = expected if expected is not None and expected.unit == unit else None
+    function = FUNCTIONS.get(code & ~EXCEPTION_BIT)
+    if function is None:
+        # the function octet itself may be hit: the length of the awaited answer tells
+        return Injury(count, Damage.CHECK) if awaited is not None and count == awaited.length else None
+    if not heard and not (1 <= unit <= MAX_UNIT or (unit == BROADCAST and function.writes)):
+        return None
+    lengths = [r.length for r in readings(octets, 0, count) if r.length != MORE]
+    answers = awaited is not None and awaited.function == code & ~EXCEPTION_BIT
+    if count < MIN_FRAME and not answers:
+        return None
+    fits = count in lengths or (answers and awaited is not None and count == awaited.length)
+    if not fits and not heard and not (before is Side.SILENCE and after is Side.SILENCE):
+        return None
+    if fits:
+        return Injury(count, Damage.CHECK)
+    right = awaited.length if answers and awaited is not None and not code & EXCEPTION_BIT else None
+    if right is None:
+        right = predicted(lengths, count)
+    if right is None or count < right:
+        return Injury(right, Damage.SHORT)
+    return Injury(right, Damage.LONG)
+
+
+def predicted(lengths: list[int], count: int) -> int | None:
+    """Which of the predicted lengths a frame of `count` octets missed: the next longer one, else the longest."""
+    return min((n for n in lengths if n >= count), default=max(lengths, default=None))
+
+
+def zeros_at_start(octets: bytes) -> int:
+    """How many zeros a stretch begins with."""
+    return len(octets) - len(octets.lstrip(b"\0"))
+
+
+def noise_reason(octets: bytes, marks: tuple[Mark, ...]) -> Reason:
+    """Why these octets are no frame."""
+    if not octets.strip(b"\0") and any(m.error & LineError.BREAK for m in marks):
+        return Reason.BREAK
+    return Reason.NO_FRAME
+
+
+def noise_place(before: Side, after: Side, gap_before: int, gap_after: int) -> Place:
+    """Where noise lay: next to the frame that it touches, the nearer one when it touches two.
+
+    `gap_before`, `gap_after`: nominal silences, ns.
+    """
+    touches_before, touches_after = before is Side.FRAME, after is Side.FRAME
+    if touches_before and touches_after:
+        if gap_before == gap_after:
+            return Place.BETWEEN
+        return Place.AFTER if gap_before < gap_after else Place.BEFORE
+    if touches_before:
+        return Place.AFTER
+    return Place.BEFORE if touches_after else Place.BETWEEN
