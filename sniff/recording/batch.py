@@ -270,13 +270,9 @@ class Joiner:
     def raw(self, sequence: int, batch: Batch) -> Iterator[Item]:
         """Give the items of a /raw message; a hole in the numbering is a DROPPED event."""
         number = self._number(sequence)
-        expected = number if self.next is None else self.next
-        self.next = number + batch.count
-        self.backward += number < expected
-        if number > expected:
-            self.missing += number - expected
-            yield from self._before(expected)
-            many = number - expected
+        many = self._hole(sequence, batch)
+        if many:
+            yield from self._before(number - many)
             text = f"{many} read{'s' if many != 1 else ''} missing from the recording"
             yield LineEvent(batch.start, LineEventKind.DROPPED, text, -1)
         if self._pending:
@@ -286,10 +282,28 @@ class Joiner:
                 if octets:
                     yield Chunk(time, octets)
 
+    def skip(self, sequence: int, batch: Batch) -> None:
+        """Take a /raw message for its numbering only."""
+        if self._pending:
+            for _ in self.raw(sequence, batch):
+                pass
+        else:
+            self._hole(sequence, batch)
+
     def close(self) -> Iterator[Item]:
         """End of the file: the events that no chunk followed."""
         while self._events:
             yield self._events.popleft()[1]
+
+    def _hole(self, sequence: int, batch: Batch) -> int:
+        """How many entries are missing before a batch."""
+        number = self._number(sequence)
+        expected = number if self.next is None else self.next
+        self.next = number + batch.count
+        self.backward += number < expected
+        many = max(0, number - expected)
+        self.missing += many
+        return many
 
     def _number(self, sequence: int) -> int:
         """The full number of a sequence of 32 bits: the nearest to what is expected."""

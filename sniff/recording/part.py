@@ -11,11 +11,14 @@ from collections.abc import Mapping
 from typing import BinaryIO
 
 from sniff import __version__
+from sniff.recording import frames
 from sniff.recording.batch import Message
 from sniff.recording.topics import FIXED_CHANNELS, PART_RECORD, PROFILE, SCHEMAS, SESSION_RECORD, VERSION
 from sniff.session import Session
 
 CHUNK_SIZE = 1 << 20
+
+_KNOWN = {**SCHEMAS, frames.SCHEMA.name: frames.SCHEMA}
 
 
 class _Pending:
@@ -102,7 +105,7 @@ class PartFile:
             self._pending.written += done
 
     def _register(self, topic: str, name: str, metadata: dict[str, str]) -> int:
-        schema = SCHEMAS.get(name)
+        schema = _KNOWN.get(name)
         if schema is None:
             channel: int = self._writer.register_channel(topic, "json", 0, metadata)
         else:

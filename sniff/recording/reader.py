@@ -14,14 +14,18 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
-from dissectors.frame import Chunk
 from sniff.formats import CaptureError
 from sniff.formats.files import explain, open_capture
 from sniff.formats.text import iso
 from sniff.recording import scan
 from sniff.recording.batch import Batch, Joiner
-from sniff.recording.topics import FIXED_CHANNELS, LINE, PART_RECORD, PROFILE, RAW, SESSION_RECORD, VERSION
+from sniff.recording.frames import METADATA, SCHEMA, FrameBatch
+from sniff.recording.messages import MessagePass
+from sniff.recording.topics import FRAMES, LINE, PART_RECORD, PROFILE, RAW, SESSION_RECORD, VERSION
 from sniff.session import Completeness, Item, Session
+
+MOST_SAID = 5
+"""Damaged places that `completeness` names one by one."""
 
 
 def read(path: str | Path) -> McapCapture:
@@ -43,6 +47,7 @@ class McapCapture:
         self.octets_before = 0
         self._known_first = False
         self._completeness: Completeness | None = None
+        self._holes = False
         try:
             self._read_start()
         except OSError as error:
@@ -56,74 +61,89 @@ class McapCapture:
         `since`: only those at or after that time (ns), without reading the chunks of the file before it.
         Raises CaptureError only when the file cannot be read any more at all.
         """
+        items = self._items(since)
+        return items if since is None else (item for item in items if item.time >= since)
+
+    def _items(self, since: int | None) -> Iterator[Item]:
         joiner = self._joiner(since)
-        last: int | None = None
-        with self._open() as (stream, report):
-            for item in self._joined(stream, report, joiner, since):
-                if since is None or item.time >= since:
-                    yield item
-                if isinstance(item, Chunk):
-                    last = item.time
+        with self._pass(since) as one:
+            for topic, head, data in one.messages():
+                if topic == LINE:
+                    joiner.line(head[2], data)
+                elif topic == RAW and (batch := one.batch(head, data)) is not None:
+                    if one.jumped:
+                        joiner.next, one.jumped = None, False
+                    yield from joiner.raw(head[1], batch)
+            yield from joiner.close()
             if since is None:
-                self._completeness = self._judge(report, joiner, last)
+                self._note(one, joiner)
 
     def completeness(self) -> Completeness:
         """Whether the file is whole; reads all of it, once."""
-        if self._completeness is None:
-            for _ in self.items():
-                pass
-        assert self._completeness is not None
-        return self._completeness
+        if self._completeness is not None:
+            return self._completeness
+        joiner = self._joiner(None)
+        with self._pass() as one:
+            for topic, head, data in one.messages():
+                if topic == LINE:
+                    joiner.line(head[2], data)
+                elif topic == RAW and (batch := one.batch(head, data)) is not None:
+                    joiner.skip(head[1], batch)
+            return self._note(one, joiner)
 
-    # one pass
+    # what else is in the file
+
+    def batches(self, since: int | None = None) -> Iterator[Batch]:
+        """The batches of /raw as they are, for work on columns; those that end before `since` (ns) left out."""
+        with self._pass(since) as one:
+            for topic, head, data in one.messages():
+                if topic == RAW and (since is None or head[2] >= since):
+                    batch = one.batch(head, data)
+                    if batch is not None:
+                        yield batch
+
+    def frames(self) -> Iterator[FrameBatch]:
+        """What the engine found when this was recorded: nothing when another version of the program wrote it, or
+        when the recording has a hole, since the places of octets are not known then. Best effort: the last
+        messages, or some between, may be missing; the numbers of the rows show it.
+        """
+        self.completeness()
+        if self._holes:
+            return
+        with self._pass() as one:
+            for topic, head, data in one.messages():
+                if topic == FRAMES and one.channels[head[0]].same(SCHEMA, METADATA):
+                    batch = FrameBatch.decode(data)
+                    if batch is not None:
+                        yield batch
+
+    def messages(self, prefix: str = "/") -> Iterator[tuple[str, int, bytes]]:
+        """Topic, log time (ns) and data of all messages whose topic begins so, as they are in the file."""
+        with self._pass() as one:
+            for topic, head, data in one.messages():
+                if topic.startswith(prefix):
+                    yield topic, head[2], data
+
+    # inside
 
     @contextmanager
-    def _open(self) -> Iterator[tuple[BinaryIO, scan.Report]]:
-        """The file after its magic, and a report for one pass over it. Raises CaptureError."""
+    def _pass(self, since: int | None = None) -> Iterator[MessagePass]:
+        """The file from after its magic. Raises CaptureError."""
         with open_capture(self.path) as stream:
             try:
                 stream.seek(len(scan.MAGIC))
-                yield stream, scan.Report(os.fstat(stream.fileno()).st_size)
+                yield MessagePass(stream, scan.Report(os.fstat(stream.fileno()).st_size), since)
             except OSError as error:
                 raise explain(self.path, error) from None
 
     def _joiner(self, since: int | None) -> Joiner:
         return Joiner(self.first_chunk if since is None and self._known_first else None)
 
-    def _joined(self, stream: BinaryIO, report: scan.Report, joiner: Joiner, since: int | None) -> Iterator[Item]:
-        for topic, head, data in _messages(stream, report, since):
-            if topic == LINE:
-                joiner.line(head[2], data)
-            elif topic == RAW:
-                batch = Batch.decode(data)
-                if batch is None:
-                    report.problem(f"the sizes in the batch of reads {head[1]} contradict each other", len(data))
-                else:
-                    yield from joiner.raw(head[1], batch)
-        yield from joiner.close()
-
-    def _judge(self, report: scan.Report, joiner: Joiner, last: int | None) -> Completeness:
-        """What a whole pass found, in words."""
-        said: list[str] = []
-        when = f"last chunk read at {iso(last)}" if last is not None else "no chunk in it"
-        if not report.footer:
-            said.append(
-                f"cut at octet {report.end} of {report.size}, or still being written; {when}; "
-                f"{report.size - report.end} octets of an unfinished record not read"
-            )
-        said.extend(report.problems[:5])
-        if len(report.problems) > 5:
-            said.append(f"{len(report.problems) - 5} more such places")
-        if report.problems and report.unread:
-            said.append(f"{report.unread} octets of the file lost")
-        for count, words in (
-            (joiner.missing, "reads missing in the numbering"),
-            (joiner.backward, "batches numbered backwards"),
-            (joiner.strange, "messages on /line that belong to nothing"),
-        ):
-            if count:
-                said.append(f"{count} {words}")
-        return Completeness(not said, "; ".join(said) if said else "complete")
+    def _note(self, one: MessagePass, joiner: Joiner) -> Completeness:
+        """Keep what a whole pass found."""
+        self._completeness = _judge(one, joiner)
+        self._holes = bool(joiner.missing or joiner.backward)
+        return self._completeness
 
     # the start
 
@@ -150,8 +170,7 @@ class McapCapture:
             if record.body is None:
                 continue
             if record.opcode == scan.CHUNK:
-                topics = _topics(scan.unpack_chunk(record.body))
-                return ours or RAW in topics.values()
+                return ours or RAW in _topics(record.body)
             if record.opcode == scan.HEADER:
                 header = scan.parse(Header, record.body)
                 ours = ours or (header is not None and header.profile == PROFILE)
@@ -180,46 +199,39 @@ class McapCapture:
         return True
 
 
-def _messages(
-    stream: BinaryIO, report: scan.Report, since: int | None
-) -> Iterator[tuple[str, tuple[int, int, int, int], bytes]]:
-    """Topic, head (`scan.MESSAGE_HEAD`) and data of all messages that can be read."""
-    topics = {number: topic for number, (topic, _) in enumerate(FIXED_CHANNELS, 1)}
-    for record in scan.records(stream, report, since):
-        if record.body is None:
-            continue
-        if record.opcode == scan.CHUNK:
-            octets = scan.unpack_chunk(record.body)
-            if isinstance(octets, str):
-                report.problem(f"chunk at octet {record.offset}: {octets}", len(record.body))
-                continue
-            inner = scan.inner_records(octets)
-        else:
-            inner = iter([(record.opcode, record.body)])
-        for opcode, body in inner:
-            if opcode == scan.MESSAGE and len(body) >= scan.MESSAGE_HEAD.size:
-                head = scan.MESSAGE_HEAD.unpack_from(body)
-                topic = topics.get(head[0])
-                if topic is not None:
-                    yield topic, head, body[scan.MESSAGE_HEAD.size :]
-            elif opcode == scan.CHANNEL:
-                topics.update(_channel(body))
-
-
-def _topics(octets: bytes | str) -> dict[int, str]:
-    topics: dict[int, str] = {}
-    if isinstance(octets, bytes):
-        for opcode, body in scan.inner_records(octets):
-            if opcode == scan.CHANNEL:
-                topics.update(_channel(body))
-    return topics
-
-
-def _channel(body: bytes) -> dict[int, str]:
+def _topics(chunk: bytes) -> set[str]:
+    """Topics of the channels that a chunk record defines."""
     from mcap.records import Channel
 
-    channel = scan.parse(Channel, body)
-    return {} if channel is None else {channel.id: channel.topic}
+    octets = scan.unpack_chunk(chunk)
+    if isinstance(octets, str):
+        return set()
+    found = (scan.parse(Channel, body) for opcode, body in scan.inner_records(octets) if opcode == scan.CHANNEL)
+    return {channel.topic for channel in found if channel is not None}
+
+
+def _judge(one: MessagePass, joiner: Joiner) -> Completeness:
+    """What a whole pass found, in words."""
+    report = one.report
+    said: list[str] = []
+    if not report.footer:
+        when = f"last chunk read at {iso(one.last)}" if one.last is not None else "no chunk in it"
+        said.append(f"cut at octet {report.end} of {report.size}, or still being written; {when}")
+        if report.size > report.end:
+            said.append(f"{report.size - report.end} octets after it lost")
+    said.extend(report.problems[:MOST_SAID])
+    if len(report.problems) > MOST_SAID:
+        said.append(f"{len(report.problems) - MOST_SAID} more such places")
+    if report.skipped:
+        said.append(f"{report.skipped} octets of the file passed over")
+    for count, words in (
+        (joiner.missing, "reads missing in the numbering"),
+        (joiner.backward, "batches numbered backwards"),
+        (joiner.strange, "messages on /line that belong to nothing"),
+    ):
+        if count:
+            said.append(f"{count} {words}")
+    return Completeness(not said, "; ".join(said) if said else "complete")
 
 
 def _number(text: str | None, default: int) -> int:

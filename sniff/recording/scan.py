@@ -44,11 +44,11 @@ class Report:
     end: int = 0
     footer: bool = False
     problems: list[str] = field(default_factory=list)
-    unread: int = 0  # octets skipped or beyond the end
+    skipped: int = 0  # octets before `end` that could not be read
 
     def problem(self, text: str, octets: int = 0) -> None:
-        """Write down something that could not be read."""
-        self.unread += octets
+        """Write down something that could not be read, and how many octets were passed over."""
+        self.skipped += octets
         if len(self.problems) < MOST_PROBLEMS:
             self.problems.append(text)
 
@@ -71,30 +71,31 @@ def records(stream: BinaryIO, report: Report, since: int | None = None) -> Itera
     position = len(MAGIC)
     check = zlib.crc32(MAGIC)
     whole = since is None
+    anchor = position  # after the last chunk whose sizes agree: what lies beyond may have been misread
     while True:
         head = stream.read(_RECORD.size)
         if len(head) < _RECORD.size:
             report.end = position
-            report.unread += report.size - position
             return
         opcode, length = _RECORD.unpack(head)
         left = report.size - position - _RECORD.size
         if not _plausible(opcode, length, left):
-            found = _next_chunk(stream, position + 1, report.size)
+            found = _next_chunk(stream, anchor, report.size)
             if found is None:
                 report.end = position
-                report.unread += report.size - position
                 if not (length > left and opcode <= LAST_OPCODE):
                     report.problem(f"damaged at octet {position}")
                 return
-            report.problem(f"damaged at octet {position}, reading goes on at octet {found}", found - position)
+            report.problem(f"damaged at octet {position}, reading goes on at octet {found}", found - anchor)
             whole = False
-            position = found
+            position = anchor = found
             stream.seek(position)
             continue
         if opcode == DATA_END:
-            told = stream.read(min(length, 4))
-            if whole and told not in (bytes(4), struct.pack("<I", check)):
+            told = stream.read(4)
+            if length != 4:
+                report.problem("the index at the end is damaged")
+            elif whole and told not in (bytes(4), struct.pack("<I", check)):
                 report.problem("the check over the whole file fails: some octet has changed")
             report.end = position
             _summary(stream, report)
@@ -103,9 +104,9 @@ def records(stream: BinaryIO, report: Report, since: int | None = None) -> Itera
             start = stream.read(16)
             if struct.unpack("<QQ", start)[1] < since:
                 stream.seek(length - 16, 1)
-                position += _RECORD.size + length
-                continue
-            body: bytes | None = start + stream.read(length - 16)
+                body: bytes | None = None
+            else:
+                body = start + stream.read(length - 16)
         elif length <= MOST_RECORD:
             body = stream.read(length)
         else:
@@ -117,10 +118,17 @@ def records(stream: BinaryIO, report: Report, since: int | None = None) -> Itera
         yield Record(opcode, position, body)
         position += _RECORD.size + length
         report.end = position
+        if opcode == CHUNK and body is not None and _sizes_agree(body):
+            anchor = position
 
 
 def _plausible(opcode: int, length: int, left: int) -> bool:
     return length <= left and (0 < opcode <= LAST_OPCODE or opcode >= PRIVATE_OPCODES)
+
+
+def _sizes_agree(body: bytes) -> bool:
+    at = _CHUNK.size + (_CHUNK.unpack_from(body)[4] if len(body) >= _CHUNK.size else 0)
+    return _CHUNK.size <= at <= len(body) - 8 and struct.unpack_from("<Q", body, at)[0] == len(body) - at - 8
 
 
 def _next_chunk(stream: BinaryIO, position: int, size: int) -> int | None:

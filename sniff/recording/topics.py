@@ -41,8 +41,6 @@ publish_time that of the first. A time bounds the end of the entry's last octet 
 from one batch to the next. Errors of single octets are on /line.
 """
 
-FRAMES_LAYOUT = "sniff485 /frames, version {version}: see the table of columns below. Little-endian, no padding.\n"
-
 
 @dataclass(frozen=True, slots=True)
 class SchemaText:
