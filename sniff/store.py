@@ -22,6 +22,9 @@ from sniff.session import LineEvent, Session
 KEPT_ROWS = 1_000_000
 """Rows kept for viewing; older ones are dropped from the view (never from a recording), with a count."""
 
+CLOSING_DISORDER = 256
+"""How far a transaction may close out of the order of opening and still be found by its id."""
+
 
 class Store:
     """Rows in order of the wire; `rows[i].no == first_no + i` always holds."""
@@ -117,6 +120,17 @@ class Store:
         """The transaction that closed as number `no` (from 1, without holes), None when dropped or not yet."""
         index = no - 1 - self.dropped_transactions
         return self.transactions.get(self.closed[index]) if 0 <= index < len(self.closed) else None
+
+    def closed_number(self, transaction: int) -> int | None:
+        """The number under which a transaction closed, by its id; None when dropped or open.
+
+        Transactions close nearly in the order of opening, so it is looked for near the place where that would put it.
+        """
+        near = bisect_left(self.closed, transaction)
+        for index in range(max(0, near - CLOSING_DISORDER), min(len(self.closed), near + CLOSING_DISORDER)):
+            if self.closed[index] == transaction:
+                return index + 1 + self.dropped_transactions
+        return None
 
     @property
     def last_closed(self) -> int:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 _STEPS = 32  # buckets per factor of two: a quantile is right to about 2 %
@@ -56,6 +58,14 @@ class Histogram:
             if seen >= rank:
                 return min(self.most, max(self.least, _middle(bucket)))
         return self.most
+
+    def spread(self, edges: Sequence[int]) -> list[int]:
+        """Counts of the values below the first edge, between two neighbours …, and from the last edge on (edges
+        ascending, ns); a value nearer to an edge than the precision may be counted on its other side."""
+        counts = [0] * (len(edges) + 1)
+        for bucket, count in self.buckets.items():
+            counts[bisect_right(edges, _middle(bucket))] += count
+        return counts
 
 
 def _bucket(value: int) -> int:

@@ -1,1 +1,28 @@
+"""The terminal UI. Importing this package loads no Textual; `run` does."""
 
+from __future__ import annotations
+
+import sys
+
+from sniff.tui.feed import Feed
+
+
+def run(feed: Feed, start_screen: str = "frames") -> None:
+    """Show a feed until the user quits; then say where a recording is. Closes the feed in every case."""
+    from sniff.tui.app import SnifferApp
+
+    try:
+        SnifferApp(feed, start_screen).run()
+        status = feed.status()
+    finally:
+        feed.close()
+    if status.ended:
+        sys.stdout.write(f"{_plain(status.port)}: {_plain(status.ended)}\n")
+    if status.live and status.recording:
+        sys.stdout.write(f"recorded to {_plain(status.recording)}\n")
+
+
+def _plain(text: str) -> str:
+    from sniff.tui.plain import plain
+
+    return plain(text)

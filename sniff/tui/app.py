@@ -1,0 +1,197 @@
+"""The application: polls its feed ten times a second and keeps the shown screen up to date."""
+
+from __future__ import annotations
+
+import time
+from functools import partial
+from typing import ClassVar
+
+from textual.app import App
+from textual.binding import Binding, BindingType
+from textual.screen import Screen
+from textual.timer import Timer
+
+from sniff.analysis.filtering import FilterError
+from sniff.store import Store
+from sniff.tui.feed import Feed, FeedStatus
+from sniff.tui.header import StatusHeader
+from sniff.tui.help import HelpScreen
+from sniff.tui.palette import ActionCommands
+from sniff.tui.plain import plain
+from sniff.tui.prompt import Prompt
+from sniff.tui.screens import SCREENS, Entry, load
+from sniff.tui.screens.base import ViewScreen
+from sniff.tui.viewing import Viewing
+
+POLL_SECONDS = 0.1
+WORK_SECONDS = 0.02
+"""Pause between two pieces of pending work, so that keys are answered in between."""
+SURE_SECONDS = 4.0
+"""How long a first `q` during a recording waits for the second."""
+THEMES = ("textual-dark", "textual-light")
+
+
+class SnifferApp(App[None]):
+    """Shows what a feed brings. Nothing that the user does here touches the capture."""
+
+    TITLE = "sniff485"
+    CSS_PATH = "app.tcss"
+    COMMANDS = App.COMMANDS | {ActionCommands}
+    ENABLE_COMMAND_PALETTE = True
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("space", "freeze", "freeze", tooltip="freeze the view, or let it go on; the capture never stops"),
+        Binding("f", "follow", "follow", tooltip="follow the newest row, or stay"),
+        Binding("t", "time", "time", tooltip="time as absolute, relative to the first row, or since the row before"),
+        Binding("question_mark", "help", "help", tooltip="this page"),
+        Binding("q", "go_back", "back", tooltip="go back to the screen before; quit at the first one"),
+        *(
+            Binding(entry.key, f"switch('{entry.name}')", entry.title, tooltip=f"screen {entry.title}", show=False)
+            for entry in SCREENS
+        ),
+        Binding("T", "theme", "theme", tooltip="dark or light theme", show=False),
+        Binding("ctrl+p", "command_palette", "commands", tooltip="all commands by name", show=False),
+        Binding("ctrl+q,ctrl+c", "quit", "quit", tooltip="quit at once", show=False),
+    ]
+
+    def __init__(self, feed: Feed, start_screen: str = "frames") -> None:
+        if start_screen not in {entry.name for entry in SCREENS}:
+            raise ValueError(f"screen {start_screen!r}: expected one of {', '.join(entry.name for entry in SCREENS)}")
+        self.DEFAULT_MODE = start_screen
+        super().__init__()
+        for entry in SCREENS:
+            self.add_mode(entry.name, partial(_make, entry))
+        self.feed = feed
+        self.status: FeedStatus = feed.status()
+        self.viewing = Viewing(feed.store, follow=self.status.live)
+        self.tabs = tuple((entry.key, entry.title) for entry in SCREENS)
+        self.visited = [start_screen]
+        self._worker: Timer | None = None
+        self._told_end = False
+        self._asked_to_quit = 0.0
+
+    @property
+    def store(self) -> Store:
+        """The rows."""
+        return self.feed.store
+
+    # -- keeping up --------------------------------------------------------------------------------------------
+
+    def on_mount(self) -> None:
+        """Start to poll."""
+        self._worker = self.set_interval(WORK_SECONDS, self._work, pause=True)
+        self.set_interval(POLL_SECONDS, self.poll)
+        self.poll()
+
+    def poll(self) -> None:
+        """Take what the feed has and show it."""
+        changed = self.feed.poll()
+        self.status = self.feed.status()
+        if self.status.ended and not self._told_end:
+            self._told_end = True
+            self.notify(plain(self.status.ended), title="the capture has ended", severity="warning", markup=False)
+        if changed:
+            self.draw_screen()
+        self._draw_header()
+
+    def draw_screen(self) -> None:
+        """Bring the shown screen up to date."""
+        screen = self.shown
+        if screen is not None and screen.is_mounted:
+            screen.draw()
+            if self._worker is not None and screen.work_left():
+                self._worker.resume()
+            self._draw_header()
+
+    @property
+    def shown(self) -> ViewScreen | None:
+        """The analyzer's screen in front, or behind a help page or palette."""
+        screens = [screen for screen in self.screen_stack if isinstance(screen, ViewScreen)]
+        return screens[-1] if screens else None
+
+    def _work(self) -> None:
+        screen = self.shown
+        if screen is None or not screen.is_mounted or not screen.work():
+            self._worker.pause()
+        self._draw_header()
+
+    def _draw_header(self) -> None:
+        for header in self.screen.query(StatusHeader):
+            header.refresh()
+
+    # -- what keys do everywhere -------------------------------------------------------------------------------
+
+    def action_switch(self, name: str) -> None:
+        """Show a screen; `q` comes back from it."""
+        if name == self.current_mode:
+            return
+        if name in self.visited:
+            del self.visited[self.visited.index(name) :]
+        self.visited.append(name)
+        self.switch_mode(name)
+
+    def action_go_back(self) -> None:
+        """Go to the screen before; quit at the first one, asking again while a recording runs."""
+        if len(self.visited) > 1:
+            self.visited.pop()
+            self.switch_mode(self.visited[-1])
+            return
+        if self.status.live and self.status.recording and time.monotonic() - self._asked_to_quit > SURE_SECONDS:
+            self._asked_to_quit = time.monotonic()
+            self.notify(
+                f"recording to {plain(self.status.recording)}; q again stops it and quits",
+                severity="warning",
+                timeout=SURE_SECONDS,
+                markup=False,
+            )
+            return
+        self.exit()
+
+    def action_freeze(self) -> None:
+        """Freeze the view or let it go on."""
+        self.viewing.freeze(not self.viewing.frozen)
+        self.draw_screen()
+
+    def action_follow(self) -> None:
+        """Follow the newest row or stay."""
+        self.viewing.follow = not self.viewing.follow
+        self.draw_screen()
+
+    def action_time(self) -> None:
+        """Next way to count time."""
+        self.viewing.time_mode = self.viewing.time_mode.next()
+        self.notify(f"time: {self.viewing.time_mode.value}", timeout=2)
+        self.draw_screen()
+
+    def action_theme(self) -> None:
+        """Dark or light."""
+        self.theme = THEMES[1] if self.theme == THEMES[0] else THEMES[0]
+
+    def action_help(self) -> None:
+        """All keys that work here."""
+        shown = self.shown
+        if shown is not None and not isinstance(self.screen, HelpScreen):
+            self.push_screen(HelpScreen(shown, shown.TITLE))
+
+    def filter(self, text: str) -> None:
+        """Show only what a filter accepts, on all lists."""
+        try:
+            self.viewing.set_filter(text)
+        except FilterError as error:
+            self.notify(plain(error), severity="error", markup=False)
+            return
+        self.draw_screen()
+
+    def show_row(self, no: int) -> None:
+        """Put the cursor of the frame list on a row and show it."""
+        self.viewing.follow = False
+        self.viewing.row = no
+        self.action_switch("frames")
+
+    def on_prompt_answered(self, message: Prompt.Answered) -> None:
+        """Filters work on every screen."""
+        if message.purpose == "filter":
+            self.filter(message.text)
+
+
+def _make(entry: Entry) -> Screen[None]:
+    return load(entry)()

@@ -1,0 +1,57 @@
+"""Columns of a list and how they share the width. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+from rich.cells import cell_len, set_cell_size
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """One column: `width` in cells, 0 takes what is left; `needs`: the list's width from which it is shown."""
+
+    name: str
+    title: str
+    width: int = 0
+    right: bool = False
+    needs: int = 0
+
+
+class Cell(NamedTuple):
+    """What stands in a column; `style` names a component style of the list ("" for the normal one)."""
+
+    text: str
+    style: str = ""
+
+
+def lay_out(columns: Iterable[Column], width: int, **widths: int) -> list[Column]:
+    """The columns that fit into `width`, the flexible one widened; `widths` replaces fixed widths by name."""
+    shown = [
+        replace(column, width=widths.get(column.name, column.width)) for column in columns if column.needs <= width
+    ]
+    shown = [column for column in shown if column.width > 0 or column.name not in widths]
+    fixed = sum(column.width for column in shown) + len(shown) - 1
+    rest = max(1, width - fixed)
+    return [column if column.width else replace(column, width=rest) for column in shown]
+
+
+def fit(text: str, width: int, right: bool = False) -> str:
+    """Text in exactly `width` cells; what is cut off ends in "…"."""
+    length = cell_len(text)
+    if length > width:
+        return set_cell_size(text, width - 1) + "…" if width > 0 else ""
+    return " " * (width - length) + text if right else text + " " * (width - length)
+
+
+def pieces(columns: Sequence[Column], cells: dict[str, Cell]) -> list[Cell]:
+    """Cells in the order of the columns, each exactly as wide as its column, one space between."""
+    line: list[Cell] = []
+    for position, column in enumerate(columns):
+        if position:
+            line.append(Cell(" "))
+        cell = cells.get(column.name, Cell(""))
+        line.append(Cell(fit(cell.text, column.width, column.right), cell.style))
+    return line

@@ -1,0 +1,80 @@
+"""Where the terminal UI gets its rows from: a live capture, a file, or memory. No UI in here."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from sniff.store import Store
+
+
+@dataclass(frozen=True, slots=True)
+class FeedStatus:
+    """What the header says of a feed.
+
+    `port`: as the user named it, or the file. `line`: settings as a token ("19200,8E1"). `protocol`: a registry name.
+    `recording`: path of the file written, None when nothing is recorded. `file_size`: octets, of the file written or
+    read. `dropped`: octets or rows that were lost on the way here. `live`: whether rows still come from a port.
+    `ended`: why nothing more comes ("unplugged", "file ends inside a record"), empty while all is well.
+    `priority`: what the system allowed the capture process, in words ("real-time", "normal"), empty when unknown.
+    """
+
+    port: str
+    line: str
+    protocol: str
+    recording: str | None = None
+    file_size: int = 0
+    dropped: int = 0
+    live: bool = False
+    ended: str = ""
+    priority: str = ""
+
+
+class Feed(Protocol):
+    """Fills a store. The app calls `poll` ten times a second, from its own thread; it must return quickly."""
+
+    @property
+    def store(self) -> Store:
+        """The rows so far; always the same object."""
+        ...
+
+    def poll(self) -> bool:
+        """Move what has come into the store; whether anything changed."""
+        ...
+
+    def status(self) -> FeedStatus:
+        """How things stand now."""
+        ...
+
+    def close(self) -> None:
+        """Stop; called once, when the UI has ended."""
+        ...
+
+
+class StoreFeed:
+    """A feed from memory: a store that somebody else has filled, or still fills in the same thread."""
+
+    def __init__(self, store: Store, status: FeedStatus | None = None) -> None:
+        self._store = store
+        self._version = -1
+        self.current = status or FeedStatus(store.session.port, str(store.session.line), store.session.protocol)
+        self.closed = False
+
+    @property
+    def store(self) -> Store:
+        """The store given at the start."""
+        return self._store
+
+    def poll(self) -> bool:
+        """Whether the store changed since the last call."""
+        changed = self._store.version != self._version
+        self._version = self._store.version
+        return changed
+
+    def status(self) -> FeedStatus:
+        """What `current` was set to."""
+        return self.current
+
+    def close(self) -> None:
+        """Remember that it was closed."""
+        self.closed = True

@@ -1,0 +1,26 @@
+"""The line that says which filter is on and how much it lets through."""
+
+from __future__ import annotations
+
+from rich.text import Text
+from textual.widgets import Static
+
+from sniff.tui.index import Index
+from sniff.tui.plain import plain
+from sniff.tui.viewing import Viewing
+
+
+class FilterLine(Static):
+    """Hidden while everything is shown."""
+
+    def show(self, viewing: Viewing, index: Index, things: str) -> None:
+        """Say what is shown of `things`."""
+        self.set_class(bool(viewing.filter), "on")
+        if not viewing.filter:
+            return
+        whole = max(0, index.last - index.first + 1)
+        state = f", {index.pending} to be searched" if index.pending else ""
+        text = Text(f"filter: {plain(viewing.filter)}", no_wrap=True, overflow="ellipsis")
+        tail = f"{len(index)} of {whole} {things}{state} · esc removes it "
+        text.truncate(max(20, self.size.width - len(tail) - 2), overflow="ellipsis", pad=True)
+        self.update(text.append("  ").append(tail))

@@ -1,0 +1,124 @@
+"""The list of all frames and noise, one line each."""
+
+from __future__ import annotations
+
+from dissectors.frame import Event, Found, Frame, LineError
+from sniff.engine import Row
+from sniff.store import Store
+from sniff.tui.columns import Cell, Column, lay_out
+from sniff.tui.linelist import LineList
+from sniff.tui.plain import plain
+from sniff.tui.times import TimeMode, clock, seconds
+from sniff.tui.verdicts import latency_cell, latency_width, verdict_cell
+from sniff.tui.viewing import Viewing
+
+COLUMNS = (
+    Column("no", "no", 6, right=True),
+    Column("time", "time", 12, right=True),
+    Column("src", "src", 4, right=True, needs=94),
+    Column("dst", "dst", 4, right=True, needs=94),
+    Column("text", "what"),
+    Column("verdict", "verdict", 9),
+    Column("latency", "latency ms", 14, right=True),
+    Column("len", "len", 4, right=True, needs=98),
+    Column("flags", "flag", 4),
+)
+WIDE = 110
+"""From this width on the verdict is written in full."""
+
+FOUND_LETTERS = {Found.LENGTH: "l", Found.SPLIT: "s", Found.JOINED: "j"}
+
+
+def mark_letter(error: LineError) -> str:
+    """One letter for the line errors of one octet; "E" where the driver did not tell parity from framing."""
+    if LineError.BREAK in error:
+        return "B"
+    if LineError.PARITY in error and LineError.FRAMING in error:
+        return "E"
+    if LineError.PARITY in error:
+        return "P"
+    if LineError.FRAMING in error:
+        return "F"
+    return "O" if LineError.OVERRUN in error else "?"
+
+
+def flags(event: Event) -> str:
+    """Letters for what is odd about a row; the help page explains them."""
+    letters = dict.fromkeys(mark_letter(mark.error) for mark in event.marks)
+    if not isinstance(event, Frame):
+        return "~" + "".join(letters)
+    found = FOUND_LETTERS.get(event.found, "")
+    return ("" if event.ok else "!") + "".join(letters) + ("n" if event.skipped else "") + found
+
+
+class FrameList(LineList):
+    """Rows of the store by number."""
+
+    def __init__(self, store: Store, viewing: Viewing, *, id: str | None = None) -> None:
+        super().__init__(viewing, id=id)
+        self.store = store
+
+    def lay_out_columns(self, width: int) -> list[Column]:
+        """Addresses and length give way first; the text takes what is left."""
+        return lay_out(
+            COLUMNS,
+            width,
+            no=max(4, len(str(self.index.last))),
+            verdict=15 if width >= WIDE else 9,
+            latency=max(10, latency_width(self.store.session.adapter.latency)),
+        )
+
+    def edge(self, number: int) -> Cell:
+        """Cursor or partner, and the user's mark."""
+        here = ">" if number == self.cursor else "=" if number == self._partner() else " "
+        mark = "*" if number in self.viewing.marks else " "
+        return Cell(here + mark, "linked" if here == "=" else "mark" if mark == "*" else "")
+
+    def _partner(self) -> int | None:
+        row = self.store.by_no(self.cursor)
+        return None if row is None else self.store.partner(row)
+
+    def cells(self, number: int, line: int) -> dict[str, Cell]:
+        """What is known of one row."""
+        row = self.store.by_no(number)
+        if row is None:
+            return {"no": Cell(str(number), "dim"), "text": Cell("no longer in memory", "dim")}
+        event = row.event
+        transaction = self.store.transaction(row)
+        verdict_width = next(column.width for column in self.columns if column.name == "verdict")
+        style = "doubt" if not isinstance(event, Frame) else "" if event.ok else "bad"
+        source, destination = self._addresses(row)
+        answers = transaction is not None and (transaction.response in (number, None))
+        return {
+            "no": Cell(str(number), "dim"),
+            "time": Cell(self._time(row, line)),
+            "src": Cell("" if source is None else str(source)),
+            "dst": Cell("" if destination is None else str(destination)),
+            "text": Cell(plain(self.store.text(row)), style),
+            "verdict": verdict_cell(transaction, verdict_width),
+            "latency": latency_cell(transaction.latency if transaction is not None and answers else None),
+            "len": Cell(str(len(event.octets)), "dim"),
+            "flags": Cell(flags(event), style or "dim"),
+        }
+
+    def _time(self, row: Row, line: int) -> str:
+        start = row.event.start
+        mode = self.viewing.time_mode
+        if mode is TimeMode.ABSOLUTE:
+            return clock(start)
+        if mode is TimeMode.RELATIVE:
+            first = self.store.load.first
+            return seconds(start - (start if first is None else first), 6 if start - (first or 0) < 10**14 else 3)
+        before = self.store.by_no(self.index[line - 1]) if line else None
+        return seconds(0 if before is None else start - before.event.start)
+
+    @staticmethod
+    def _addresses(row: Row) -> tuple[int | None, int | None]:
+        place = row.placement or row.header
+        return (None, None) if place is None else (place.source, place.destination)
+
+    def empty_text(self) -> str:
+        """Why nothing is shown."""
+        if self.index.pending:
+            return "searching …"
+        return "no frame passes the filter" if self.viewing.filter and len(self.store) else "no frames yet"

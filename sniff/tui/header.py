@@ -1,0 +1,96 @@
+"""The two lines at the top: what the bus and the capture do, and which screen this is."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from rich.cells import cell_len
+from rich.text import Text
+from textual.widget import Widget
+
+from sniff.store import Store
+from sniff.tui.columns import fit
+from sniff.tui.feed import FeedStatus
+from sniff.tui.plain import plain
+from sniff.tui.times import size
+from sniff.tui.viewing import Viewing
+
+
+def record_state(status: FeedStatus) -> str:
+    """One word or two: what happens to what comes in."""
+    if status.ended:
+        return "ENDED"
+    if not status.live:
+        return "FILE"
+    return "REC" if status.recording else "NOT REC"
+
+
+def status_line(status: FeedStatus, store: Store, viewing: Viewing, width: int) -> list[tuple[str, str]]:
+    """Pieces of text with a style name each, together at most `width` cells: the port gives way first."""
+    state = record_state(status)
+    pieces = [
+        (plain(status.line), ""),
+        (plain(status.protocol), ""),
+        (f"load {store.load.share():.0%}", ""),
+        (f"err {store.error_total}", "bad" if store.error_total else ""),
+        (state, {"REC": "bad", "NOT REC": "doubt", "ENDED": "doubt"}.get(state, "")),
+        (size(status.file_size), ""),
+    ]
+    if status.dropped:
+        pieces.append((f"LOST {status.dropped}", "bad"))
+    if viewing.frozen:
+        pieces.append((f"FROZEN +{viewing.came_since}", "frozen"))
+    elif viewing.follow:
+        pieces.append(("FOLLOW", ""))
+    gap = "  " if sum(cell_len(text) + 2 for text, _ in pieces) + 12 <= width else " "
+    room = width - sum(cell_len(text) + len(gap) for text, _ in pieces)
+    port = plain(status.port)
+    if cell_len(port) > room:  # the end of a path says more than its beginning
+        port = port.rsplit("/", 1)[-1] if cell_len(port.rsplit("/", 1)[-1]) <= room else fit(port, max(0, room))
+    line: list[tuple[str, str]] = [(port, "port")] if port else []
+    for piece in pieces:
+        line.extend([(gap, ""), piece] if line else [piece])
+    return line
+
+
+class StatusHeader(Widget):
+    """Port, line, protocol, load, errors, record state, file size; below it the screens and what is shown."""
+
+    COMPONENT_CLASSES: ClassVar[set[str]] = {
+        "status-header--port",
+        "status-header--bad",
+        "status-header--doubt",
+        "status-header--frozen",
+        "status-header--here",
+        "status-header--dim",
+    }
+
+    def __init__(self, here: str) -> None:
+        super().__init__()
+        self.here = here  # name of the screen it stands on
+
+    def render(self) -> Text:
+        """Both lines."""
+        width = self.size.width
+        app = self.app
+        text = Text(no_wrap=True, overflow="crop", end="")
+        for piece, style in status_line(app.status, app.store, app.viewing, width):
+            text.append(piece, self._style(style) if style else "")
+        text.append("\n")
+        text.append_text(self._second_line(width))
+        return text
+
+    def _second_line(self, width: int) -> Text:
+        tabs = Text(end="")
+        for key, title in self.app.tabs:
+            here = title == self.here
+            label = f"[{key} {title}]" if here else f" {key} {title} "
+            tabs.append(label, self._style("here" if here else "dim"))
+        note = self.screen.note() if hasattr(self.screen, "note") else ""
+        room = width - tabs.cell_len - 1
+        if room > 3 and note:
+            tabs.append(" " + fit(plain(note), room, right=True), self._style("dim"))
+        return tabs
+
+    def _style(self, name: str):
+        return self.get_component_rich_style(f"status-header--{name}", partial=True)

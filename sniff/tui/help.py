@@ -1,0 +1,67 @@
+"""The help page: all keys that work on the screen below, and what the letters in the lists mean."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from rich.table import Table
+from rich.text import Text
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.containers import VerticalScroll
+from textual.screen import ModalScreen, Screen
+from textual.widgets import Static
+
+from sniff.tui.keybar import explanation, working_keys
+
+LEGEND: tuple[tuple[str, str], ...] = (
+    (">", "the row under the cursor"),
+    ("=", "the row that belongs to it: its request or response"),
+    ("*", "a row that you marked"),
+    ("!", "damaged frame"),
+    ("~", "noise: octets that are no frame"),
+    ("P F B O", "line error on an octet: parity, framing, break, overrun"),
+    ("E", "parity or framing error, the driver did not say which"),
+    ("n", "noise directly before the frame"),
+    ("l s j", "frame found by its length, split out of a run, joined over a silence"),
+    ("38 (−0/+16)", "a time in ms: in truth up to 0 less or 16 more, as far as the adapter tells"),
+)
+
+
+class HelpScreen(ModalScreen[None]):
+    """Closed by the keys that anybody would try."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("escape,q,question_mark,enter", "dismiss", "close", show=False),
+    ]
+
+    def __init__(self, below: Screen, title: str) -> None:
+        super().__init__()
+        self.below = below
+        self.title_text = title
+
+    def compose(self) -> ComposeResult:
+        """One scrolling page."""
+        with VerticalScroll() as page:
+            page.border_title = Text(f"keys on {self.title_text}")
+            page.border_subtitle = Text("esc closes")
+            yield Static(self._keys())
+            yield Static(Text("\nmarks in the lists", style="bold"))
+            yield Static(_table(LEGEND))
+
+    def _keys(self) -> Table:
+        """What keys do first, then those that only move; those have no explanation beyond their name."""
+        together: dict[tuple[bool, str], list[str]] = {}
+        for key, active in working_keys(self.below):
+            together.setdefault((not active.binding.tooltip, explanation(active)), []).append(key)
+        ordered = sorted(together.items(), key=lambda item: item[0][0])
+        return _table(tuple(("  ".join(keys), words) for (_, words), keys in ordered))
+
+
+def _table(rows: tuple[tuple[str, str], ...]) -> Table:
+    table = Table(box=None, show_header=False, padding=(0, 2, 0, 0), pad_edge=False)
+    table.add_column(no_wrap=True, min_width=11)
+    table.add_column()
+    for keys, words in rows:
+        table.add_row(Text(keys, style="bold"), Text(words))
+    return table

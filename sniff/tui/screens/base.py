@@ -1,0 +1,71 @@
+"""What all screens share: header, prompt, key bar, and being brought up to date."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from textual.app import ComposeResult
+from textual.screen import Screen
+from textual.widget import Widget
+
+from sniff.store import Store
+from sniff.tui.header import StatusHeader
+from sniff.tui.keybar import KeyBar
+from sniff.tui.prompt import Prompt
+from sniff.tui.viewing import Viewing
+
+
+class ViewScreen(Screen[None]):
+    """A screen of the analyzer.
+
+    A subclass gives `TITLE` (as in the table of screens), `compose_view` (its widgets) and `draw` (brings them up to
+    date: called when shown and then ten times a second while anything changes; it must not walk over all rows).
+    """
+
+    TITLE: ClassVar[str] = ""
+    AUTO_FOCUS: ClassVar[str] = "#main"
+
+    def compose(self) -> ComposeResult:
+        """Header, the view, prompt, keys."""
+        yield StatusHeader(self.TITLE)
+        yield from self.compose_view()
+        yield Prompt()
+        yield KeyBar()
+
+    def compose_view(self) -> ComposeResult:
+        """The widgets of the view; the one with the id "main" gets the focus."""
+        raise NotImplementedError
+
+    def draw(self) -> None:
+        """Bring the view up to date; while `viewing.frozen` nothing newer than the freeze is shown."""
+        raise NotImplementedError
+
+    def work_left(self) -> bool:
+        """Whether `work` has something to do."""
+        return False
+
+    def work(self) -> bool:
+        """Do a small piece of pending work (some ms); whether more is left."""
+        return False
+
+    def note(self) -> str:
+        """Some words for the right end of the header."""
+        return ""
+
+    @property
+    def viewing(self) -> Viewing:
+        """How the user looks at things."""
+        return self.app.viewing
+
+    @property
+    def store(self) -> Store:
+        """The rows."""
+        return self.app.store
+
+    def on_screen_resume(self) -> None:
+        """Shown (again): catch up."""
+        self.app.draw_screen()
+
+    def on_prompt_closed(self) -> None:
+        """Back to where the keys were."""
+        self.query_one(self.AUTO_FOCUS, Widget).focus()

@@ -1,0 +1,203 @@
+"""Screen 1: every frame and all noise, with the fields and octets of the one under the cursor."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.containers import Horizontal
+from textual.timer import Timer
+
+from dissectors.frame import Frame
+from sniff.tui import places
+from sniff.tui.field_tree import FieldTree
+from sniff.tui.filter_line import FilterLine
+from sniff.tui.frame_list import FrameList
+from sniff.tui.hex_pane import HexPane
+from sniff.tui.linelist import LineList
+from sniff.tui.prompt import Prompt
+from sniff.tui.screens.listing import ListingScreen
+from sniff.tui.summary import tree_of
+
+DETAIL_SECONDS = 0.05
+"""How long the cursor must rest before fields and octets are shown: holding a key down stays fluent."""
+FOLLOWING_SECONDS = 0.5
+"""The same while the list follows a live bus: nobody reads ten frames a second."""
+
+
+class FramesScreen(ListingScreen):
+    """List, tree and hex dump, linked both ways."""
+
+    TITLE = "Frames"
+    THINGS = "frames"
+    CSS_PATH = "frames.tcss"
+    HORIZONTAL_BREAKPOINTS: ClassVar[list[tuple[int, str]]] = [(0, "-narrow"), (124, "-wide")]
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("x", "partner", "pair", tooltip="jump between request and response"),
+        Binding("m", "mark", "mark", tooltip="mark this row, or take the mark away"),
+        Binding("apostrophe", "next_mark", "mark", tooltip="next marked row"),
+        Binding("colon", "go_to", "go to", tooltip="go to a row number or a time"),
+        Binding("tab", "app.focus_next", "pane", tooltip="next pane: list, fields, octets", show=False),
+        Binding("shift+tab", "app.focus_previous", "pane", tooltip="pane before", show=False),
+        Binding("z", "zoom", "zoom", tooltip="the pane as large as the screen, and back", show=False),
+        Binding("y", "copy", "copy", tooltip="copy the octets as hex to the clipboard", show=False),
+    ]
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._detail: tuple[int, object] | None = None  # row and transaction that tree and hex show
+        self._detail_timer: Timer | None = None
+
+    def compose_view(self) -> ComposeResult:
+        """List above, fields and octets side by side below."""
+        yield FilterLine()
+        yield FrameList(self.store, self.viewing, id="main")
+        with Horizontal(id="details"):
+            yield FieldTree(id="fields")
+            yield HexPane(id="octets")
+
+    def test(self, number: int) -> bool:
+        """The filter on a row."""
+        return self.viewing.accepts_row(number)
+
+    def bounds(self) -> tuple[int, int]:
+        """Rows in memory, up to the freeze."""
+        return self.store.first_no, self.viewing.last_row
+
+    def place(self) -> int:
+        """The row itself."""
+        return self.viewing.row
+
+    def touched(self, closed: int) -> tuple[int, ...]:
+        """Request and response."""
+        transaction = self.store.closed_by_no(closed)
+        if transaction is None:
+            return ()
+        return tuple(no for no in (transaction.request, transaction.response) if no is not None)
+
+    def draw(self) -> None:
+        """List first; details when the cursor rests."""
+        super().draw()
+        if self.viewing.row and self.viewing.row != self.lines.cursor and not self.viewing.follow:
+            self.lines.go_to(self.viewing.row, by_user=False)
+        self._plan_detail()
+
+    # -- list, tree and hex linked -----------------------------------------------------------------------------
+
+    def on_line_list_moved(self, message: LineList.Moved) -> None:
+        """Another row."""
+        self.viewing.row = message.number
+        self._plan_detail()
+
+    def on_line_list_chosen(self, message: LineList.Chosen) -> None:
+        """Look into the row."""
+        self._show_detail()
+        self.query_one(FieldTree).focus()
+
+    def on_field_tree_picked(self, message: FieldTree.Picked) -> None:
+        """A field selects its octets."""
+        field = message.field
+        self.query_one(HexPane).select(field.begin, field.end, field.name)
+
+    def on_hex_pane_picked(self, message: HexPane.Picked) -> None:
+        """An octet selects its field."""
+        field = self.query_one(FieldTree).pick_octet(message.offset)
+        begin, end, name = (None, None, "") if field is None else (field.begin, field.end, field.name)
+        self.query_one(HexPane).select(begin, end, name, cursor=message.offset)
+
+    def _plan_detail(self) -> None:
+        row = self.store.by_no(self.lines.cursor)
+        wanted = None if row is None else (row.no, self.store.transaction(row))
+        if wanted == self._detail or self._detail_timer is not None:
+            return
+        delay = FOLLOWING_SECONDS if self.viewing.follow and not self.viewing.frozen else DETAIL_SECONDS
+        self._detail_timer = self.set_timer(delay, self._show_detail)
+
+    def _show_detail(self) -> None:
+        if self._detail_timer is not None:
+            self._detail_timer.stop()
+            self._detail_timer = None
+        row = self.store.by_no(self.lines.cursor)
+        if row is None:
+            return
+        self._detail = (row.no, self.store.transaction(row))
+        self.query_one(HexPane).show(row.event.octets, row.event.marks)
+        self.query_one(FieldTree).show(tree_of(self.store, row))
+
+    # -- keys --------------------------------------------------------------------------------------------------
+
+    def action_error(self, direction: int) -> None:
+        """Next or previous row that is trouble and that is shown."""
+        store, lines = self.store, self.lines
+        no = lines.cursor
+        for _ in range(100_000):  # a filter may hide errors
+            found = store.next_error(no) if direction > 0 else store.previous_error(no)
+            if found is None or found > self.viewing.last_row:
+                break
+            if found in lines.index:
+                lines.go_to(found)
+                return
+            no = found
+        self.notify("no error after this row" if direction > 0 else "no error before this row", timeout=2)
+
+    def action_partner(self) -> None:
+        """From request to response and back."""
+        row = self.store.by_no(self.lines.cursor)
+        partner = None if row is None else self.store.partner(row)
+        if partner is None:
+            transaction = None if row is None else self.store.transaction(row)
+            self.notify("no partner" + (f": {transaction.verdict.value}" if transaction else ""), timeout=2)
+        elif partner not in self.lines.index:
+            self.notify(f"frame {partner} is hidden by the filter or no longer in memory", timeout=3)
+        else:
+            self.lines.go_to(partner)
+
+    def action_mark(self) -> None:
+        """Mark the row or take its mark away."""
+        if self.lines.cursor:
+            self.viewing.toggle_mark(self.lines.cursor)
+            self.lines.refresh()
+
+    def action_next_mark(self) -> None:
+        """Go to the next mark."""
+        found = self.viewing.next_mark()
+        if found is None:
+            self.notify("no row is marked", timeout=2)
+        else:
+            self.lines.go_to(found)
+
+    def action_go_to(self) -> None:
+        """Ask where to go."""
+        self.query_one(Prompt).ask("go to", "", "1200   10:32:05.5   +12.5", self._no_place)
+
+    def _no_place(self, text: str) -> str:
+        if text.strip():
+            try:
+                places.find(self.store, text, self.viewing.last_row)
+            except ValueError as error:
+                return str(error)
+        return ""
+
+    def on_prompt_answered(self, message: Prompt.Answered) -> None:
+        """Go there."""
+        if message.purpose == "go to" and message.text.strip():
+            message.stop()
+            found = places.find(self.store, message.text, self.viewing.last_row)
+            if found is not None:
+                self.lines.go_to(found)
+
+    def action_zoom(self) -> None:
+        """One pane over all, and back."""
+        if self.maximized is not None:
+            self.minimize()
+        elif self.focused is not None:
+            self.maximize(self.focused, container=False)
+
+    def action_copy(self) -> None:
+        """Octets to the clipboard of the terminal (OSC 52)."""
+        row = self.store.by_no(self.lines.cursor)
+        if row is not None:
+            self.app.copy_to_clipboard(row.event.octets.hex(" ").upper())
+            kind = "frame" if isinstance(row.event, Frame) else "noise"
+            self.notify(f"{kind} {row.no} copied as hex, if your terminal allows it", timeout=2)

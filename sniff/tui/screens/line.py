@@ -1,0 +1,222 @@
+"""Screen 8: the line, what the adapter can know of it, and what happened to it."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from rich.table import Table
+from rich.text import Text
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.containers import VerticalScroll
+from textual.widgets import Static
+
+from dissectors.frame import LineError
+from dissectors.line import NS_PER_S
+from sniff.analysis.wording import milliseconds
+from sniff.session import LineEvent
+from sniff.store import Store
+from sniff.tui.charts import bar, sparkline
+from sniff.tui.feed import FeedStatus
+from sniff.tui.plain import plain
+from sniff.tui.screens.base import ViewScreen
+from sniff.tui.times import clock, date_and_clock, size
+
+MS = 1_000_000
+GAP_EDGES = tuple(edge * MS // 10 for edge in (1, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000))
+"""0.1 ms … 1 s."""
+EVENTS_SHOWN = 200
+LABEL = 7
+REPORTABLE = (
+    ("parity", LineError.PARITY),
+    ("framing", LineError.FRAMING),
+    ("break", LineError.BREAK),
+    ("overrun", LineError.OVERRUN),
+)
+
+EITHER = LineError.PARITY | LineError.FRAMING
+
+
+Part = tuple[str, Text]
+"""A label and what it says; several lines stand below each other."""
+
+
+def settings(store: Store, status: FeedStatus) -> list[Part]:
+    """Line settings, adapter, capture."""
+    session = store.session
+    timing, adapter = session.timing, session.adapter
+    names = ", ".join(plain(part) for part in (adapter.name, adapter.driver, adapter.serial_number) if part)
+    characters = f"one character {milliseconds(timing.char)}, 3.5 of them {milliseconds(timing.t35)}"
+    held = f"holds octets back up to {milliseconds(adapter.latency)} ({plain(adapter.latency_from)})"
+    return [
+        ("line", Text(f"{plain(session.line)} · {characters}")),
+        ("adapter", Text(f"{names} · {held if adapter.latency else 'times are exact'}")),
+        ("reports", Text(reports(store))),
+        ("started", Text(date_and_clock(session.started) if session.started else "unknown")),
+        ("capture", Text(capture(status))),
+    ]
+
+
+def reports(store: Store) -> str:
+    """Which line errors the adapter can report, in words."""
+    adapter = store.session.adapter
+    if adapter.reports is None:
+        said = "nobody knows which line errors this adapter reports: 0 means unknown"
+    elif not adapter.reports:
+        said = "no line errors at all: 0 means unknown"
+    else:
+        said = ", ".join(plain(name) for name in adapter.reports)
+    return said + (f" ({plain(adapter.detail)})" if adapter.detail else "")
+
+
+def capture(status: FeedStatus) -> str:
+    """What happens to what comes in."""
+    parts = [f"recorded to {plain(status.recording)}, {size(status.file_size)}" if status.recording else "not recorded"]
+    if not status.live:
+        parts = [f"from {plain(status.port)}, {size(status.file_size)}"]
+    if status.priority:
+        parts.append(f"priority {plain(status.priority)}")
+    parts.append(f"{status.dropped} lost" if status.dropped else "nothing lost")
+    if status.ended:
+        parts.append(f"ended: {plain(status.ended)}")
+    return " · ".join(parts)
+
+
+def errors(store: Store) -> list[Part]:
+    """Counts, each said to be unknown where the adapter cannot report it."""
+    total = store.load.total
+    share = f" ({total.damaged / total.frames:.2%})" if total.frames else ""
+    noise = f" ({total.noise / total.octets:.2%})" if total.octets else ""
+    words = [_count(store, name, flag) for name, flag in REPORTABLE]
+    both = sum(number for error, number in store.marks.items() if EITHER in error)
+    if both:
+        words.insert(0, f"parity or framing {both}")
+    return [
+        ("frames", Text(f"{total.frames} · damaged {total.damaged}{share}")),
+        ("octets", Text(f"{total.octets} · noise {total.noise}{noise}")),
+        ("errors", Text(" · ".join(words))),
+    ]
+
+
+def _count(store: Store, name: str, flag: LineError) -> str:
+    count = sum(
+        number for error, number in store.marks.items() if flag in error and not (flag in EITHER and EITHER in error)
+    )
+    able = store.session.adapter.reports
+    if not count and (able is None or name not in able):
+        return f"{name} unknown"
+    return f"{name} {count}"
+
+
+def load(store: Store, width: int) -> list[Part]:
+    """Bus load second by second; the newest at the right."""
+    known = store.load
+    text = Text(f"{known.share():.0%} now, {known.overall():.0%} overall")
+    if known.last is None:
+        return [("load", text)]
+    newest = known.last // NS_PER_S
+    shares = [
+        min(1.0, second.busy / NS_PER_S) if (second := known.seconds.get(number)) is not None else 0.0
+        for number in range(newest - width + 1, newest + 1)
+    ]
+    top = max(0.01, max(shares))
+    text.append(f" · the last {width} s, full height is {top:.0%}\n").append(sparkline(shares, top))
+    return [("load", text)]
+
+
+def gaps(store: Store, width: int) -> list[Part]:
+    """How long the line was silent between frames, from first to last range that occurred."""
+    counts = store.gaps.spread(GAP_EDGES)
+    held = store.session.adapter.latency
+    doubt = f", right to ±{milliseconds(held)}" if held else ""
+    text = Text(f"between frames, {store.gaps.count} times{doubt}")
+    seen = [position for position, count in enumerate(counts) if count]
+    room = max(8, width - 31)
+    for position in range(seen[0], seen[-1] + 1) if seen else ():
+        count = counts[position]
+        share = f"{count / store.gaps.count:.1%}"
+        text.append(f"\n{_range(position):>13} {bar(count / max(counts), room)} {count:>8} {share:>6}")
+    return [("silence", text)]
+
+
+def _range(position: int) -> str:
+    if position == 0:
+        return f"< {_edge(GAP_EDGES[0])} ms"
+    if position == len(GAP_EDGES):
+        return f"≥ {_edge(GAP_EDGES[-1])} ms"
+    return f"{_edge(GAP_EDGES[position - 1])} … {_edge(GAP_EDGES[position])} ms"
+
+
+def _edge(value: int) -> str:
+    return f"{value / MS:g}"
+
+
+def events(happened: list[LineEvent]) -> list[Part]:
+    """What happened to the line, the newest first."""
+    lines = []
+    for event in reversed(happened[-EVENTS_SHOWN:]):
+        count = f" {event.count}" if event.count > 0 else " (how many is unknown)" if event.count < 0 else ""
+        words = f": {plain(event.text)}" if event.text else ""
+        lines.append(f"{clock(event.time)}  {event.kind.value}{count}{words}")
+    if len(happened) > EVENTS_SHOWN:
+        lines.append(f"and {len(happened) - EVENTS_SHOWN} earlier ones")
+    return [("events", Text("\n".join(lines or ["nothing happened to the line"])))]
+
+
+def _table(parts: list[Part]) -> Table:
+    table = Table.grid(padding=(0, 2, 0, 0))
+    table.add_column(width=LABEL, no_wrap=True)
+    table.add_column(ratio=1)
+    for label, text in parts:
+        table.add_row(Text(label, style="bold"), text)
+    return table
+
+
+class LineScreen(ViewScreen):
+    """One scrolling page."""
+
+    TITLE = "Line"
+    CSS_PATH = "line.tcss"
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("up,k", "scroll_page('up')", "up", show=False),
+        Binding("down,j", "scroll_page('down')", "down", show=False),
+        Binding("home,g", "scroll_page('home')", "first line", show=False),
+        Binding("end,G", "scroll_page('end')", "last line", show=False),
+    ]
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._drawn: tuple[int, int] | None = None
+
+    def compose_view(self) -> ComposeResult:
+        """The sections."""
+        with VerticalScroll(id="main"):
+            for name in ("settings", "errors", "load", "gaps", "events"):
+                yield Static(id=name)
+
+    def draw(self) -> None:
+        """Bring the page up to date, unless frozen."""
+        page = self.query_one("#main", VerticalScroll)
+        width = page.scrollable_content_region.width - LABEL - 4
+        state = (self.store.version, width)
+        if self._drawn == state or (self.viewing.frozen and self._drawn and self._drawn[1] == width) or width < 1:
+            return
+        self._drawn = state
+        store = self.store
+        sections = {
+            "settings": settings(store, self.app.status),
+            "errors": errors(store),
+            "load": load(store, width),
+            "gaps": gaps(store, width),
+            "events": events(store.line_events),
+        }
+        for name, parts in sections.items():
+            self.query_one(f"#{name}", Static).update(_table(parts))
+
+    def on_resize(self) -> None:
+        """Charts take the new width."""
+        self.call_after_refresh(self.draw)
+
+    def action_scroll_page(self, where: str) -> None:
+        """Scroll the page."""
+        getattr(self.query_one("#main", VerticalScroll), f"scroll_{where}")(animate=False)

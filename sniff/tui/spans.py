@@ -1,0 +1,164 @@
+"""A scapy packet as a tree of fields, each with the octets of the frame that it was read from.
+
+scapy keeps no positions. They are found by building the packet again field by field, as scapy itself does, and
+comparing with the frame: where both agree the span is right; from the first difference in a layer on nothing is
+claimed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from dissectors.frame import Frame, Role
+from dissectors.registry import Dissector
+from sniff.tui.plain import plain
+
+DEEPEST = 20
+"""Layers and nested packets deeper than this are not shown; no honest frame has them."""
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """One line of the tree. `begin`, `end`: octets of the frame, end exclusive; None where nobody can tell."""
+
+    name: str
+    value: str = ""
+    begin: int | None = None
+    end: int | None = None
+    children: tuple[Field, ...] = ()
+
+    def __contains__(self, offset: object) -> bool:
+        return (
+            self.begin is not None
+            and self.end is not None
+            and isinstance(offset, int)
+            and self.begin <= offset < self.end
+        )
+
+
+def fields_of(dissector: Dissector, frame: Frame, role: Role) -> tuple[Field, ...]:
+    """The layers of a frame; the dissector's flat fields, without spans, where its packet fails. Never raises."""
+    try:
+        return tuple(_layers(dissector.packet(frame, role), frame.octets, 0, len(frame.octets), 0))
+    except Exception as error:  # a dissector from anywhere meets octets from anywhere
+        return (Field("packet", plain(f"not readable as a packet: {error}")), *_flat(dissector, frame, role))
+
+
+def _flat(dissector: Dissector, frame: Frame, role: Role) -> tuple[Field, ...]:
+    try:
+        return tuple(Field(plain(name), plain(value)) for name, value in dissector.fields(frame, role).items())
+    except Exception as error:  # the same
+        return (Field("fields", plain(f"not readable: {error}")),)
+
+
+def _layers(packet: Any, octets: bytes, begin: int, end: int, depth: int) -> Iterator[Field]:
+    """Every layer of a packet, the outermost first; each holds only its own fields."""
+    layer = packet
+    while getattr(layer, "fields_desc", None) and depth < DEEPEST:
+        walk = _Walk(layer, octets, begin, end, depth)
+        fields = tuple(walk.fields())
+        yield Field(plain(layer.name), "", *_cover(fields), fields)
+        begin, end = walk.begin, walk.end
+        layer = layer.payload
+        depth += 1
+
+
+def _cover(fields: tuple[Field, ...]) -> tuple[int | None, int | None]:
+    begins = [field.begin for field in fields if field.begin is not None]
+    ends = [field.end for field in fields if field.end is not None]
+    return min(begins, default=None), max(ends, default=None)
+
+
+class _Walk:
+    """Goes through the fields of one layer; `begin`, `end` close in on what is left for its payload."""
+
+    def __init__(self, layer: Any, octets: bytes, begin: int, end: int, depth: int) -> None:
+        self.layer = layer
+        self.octets = octets
+        self.begin = begin
+        self.end = end
+        self.depth = depth
+        self.lost = False  # a field was built that is not what the frame has there
+
+    def fields(self) -> Iterator[Field]:
+        start = self.begin
+        built: Any = b""  # bytes, or (bytes, bits, value) inside a run of bit fields
+        for description in self.layer.fields_desc:
+            description = _present(description, self.layer)
+            if description is None:
+                continue
+            value = self.layer.getfieldval(description.name)
+            if hasattr(description, "fld") and "Trailer" in "".join(
+                base.__name__ for base in type(description).__mro__
+            ):
+                yield self._trailer(description, value)
+                continue
+            before = built
+            built = description.addfield(self.layer, built, value)
+            first = start + len(_whole(before))
+            last = start + len(_whole(built)) + isinstance(built, tuple)
+            if isinstance(before, bytes) and isinstance(built, bytes):
+                self._compare(built[len(before) :], first, last)
+            self.begin = start + len(_whole(built))
+            yield self._field(description, value, first, last)
+
+    def _compare(self, built: bytes, first: int, last: int) -> None:
+        if self.octets[first:last] != built or last > self.end:
+            self.lost = True
+
+    def _trailer(self, description: Any, value: Any) -> Field:
+        built = description.fld.addfield(self.layer, b"", value)
+        first, last = self.end - len(built), self.end
+        self.end = first
+        known = self.octets[first:last] == built
+        span = (first, last) if known else (None, None)
+        return Field(plain(description.name), _text(description, self.layer, value), *span)
+
+    def _field(self, description: Any, value: Any, first: int, last: int) -> Field:
+        span = (None, None) if self.lost else (first, last)
+        name = plain(description.name)
+        packets = [item for item in (value if isinstance(value, list) else [value]) if hasattr(item, "fields_desc")]
+        if packets:
+            children: list[Field] = []
+            for packet in packets:
+                size = len(bytes(packet))
+                inner = tuple(_layers(packet, self.octets, first, first + size, self.depth + 1))
+                children.extend(_without_spans(inner) if self.lost else inner)
+                first += size
+            return Field(name, "", *span, tuple(children))
+        if isinstance(value, list) and hasattr(description, "field"):
+            return Field(name, f"{len(value)}", *span, tuple(self._items(description.field, value, first)))
+        return Field(name, _text(description, self.layer, value), *span)
+
+    def _items(self, description: Any, values: list[Any], first: int) -> Iterator[Field]:
+        for position, value in enumerate(values):
+            size = len(description.addfield(self.layer, b"", value))
+            span = (None, None) if self.lost else (first, first + size)
+            yield Field(f"[{position}]", _text(description, self.layer, value), *span)
+            first += size
+
+
+def _present(description: Any, layer: Any) -> Any:
+    """The field behind a condition, None when the condition says that it is not there."""
+    while hasattr(description, "cond"):
+        if not description._evalcond(layer):
+            return None
+        description = description.fld
+    return description
+
+
+def _whole(built: Any) -> bytes:
+    return built if isinstance(built, bytes) else built[0]
+
+
+def _text(description: Any, layer: Any, value: Any) -> str:
+    try:
+        return plain(description.i2repr(layer, value))
+    except Exception:  # scapy's fields raise at will on values that they did not expect
+        return plain(repr(value))
+
+
+def _without_spans(fields: tuple[Field, ...]) -> tuple[Field, ...]:
+    return tuple(Field(field.name, field.value, None, None, _without_spans(field.children)) for field in fields)

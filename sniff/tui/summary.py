@@ -1,0 +1,82 @@
+"""What is known of a row besides its octets: how it was found, and its transaction. Lines for the field tree."""
+
+from __future__ import annotations
+
+from dissectors.frame import Frame
+from dissectors.tracker import Transaction
+from sniff.analysis.wording import duration, mark_names, milliseconds
+from sniff.engine import Row
+from sniff.store import Store
+from sniff.tui.plain import plain
+from sniff.tui.spans import Field, fields_of
+from sniff.tui.times import date_and_clock
+
+
+def tree_of(store: Store, row: Row) -> tuple[Field, ...]:
+    """Everything about a row: frame or noise, transaction, then the layers of its packet."""
+    event = row.event
+    known = [_event(row)]
+    transaction = store.transaction(row)
+    if transaction is not None:
+        known.append(_transaction(transaction, row.no))
+    if isinstance(event, Frame):
+        role = row.placement.role if row.placement is not None else row.header.role if row.header else None
+        return (*fields_of(store.dissector, event, role), *known) if role is not None else tuple(known)
+    return tuple(known)
+
+
+def _event(row: Row) -> Field:
+    event = row.event
+    count = len(event.octets)
+    times = [
+        Field("start", date_and_clock(event.start)),
+        Field("end", date_and_clock(event.end)),
+        Field("lasts", milliseconds(event.end - event.start)),
+    ]
+    marks = [
+        Field(f"octet {mark.offset}", mark_names(mark.error), mark.offset, mark.offset + 1)
+        for mark in event.marks[:100]
+    ]
+    errors = [Field("line errors", str(len(event.marks)), None, None, tuple(marks))] if marks else []
+    if not isinstance(event, Frame):
+        about = [Field("place", event.place.value), Field("why", event.reason.value)]
+        return Field("noise", f"{row.no}: {_octets(count)}", 0, count, (*about, *times, *errors))
+    about = [Field("found by", event.found.value), Field("check", event.check.value)]
+    if event.damage is not None:
+        about.append(Field("damage", event.damage.value))
+    if event.expected is not None and event.expected != count:
+        about.append(Field("expected length", _octets(event.expected)))
+    if event.skipped:
+        about.append(Field("noise before", _octets(event.skipped)))
+    if event.slack:
+        about.append(Field("ends up to", f"{milliseconds(event.slack)} earlier"))
+    if event.flags:
+        about.append(Field("odd", plain(", ".join(event.flags))))
+    if row.header is not None and row.header.error:
+        about.append(Field("error", plain(row.header.error)))
+    return Field("frame", f"{row.no}: {_octets(count)}", None, None, (*about, *times, *errors))
+
+
+def _transaction(transaction: Transaction, no: int) -> Field:
+    parts = [
+        Field("kind", plain(transaction.kind)),
+        Field("station", "none" if transaction.station is None else str(transaction.station)),
+        Field("request", "not seen" if transaction.request is None else _frame(transaction.request, no)),
+        Field("response", "none" if transaction.response is None else _frame(transaction.response, no)),
+    ]
+    if transaction.latency is not None:
+        parts.append(Field("latency", duration(transaction.latency)))
+    if transaction.attempt > 1 or transaction.of is not None:
+        of = "" if transaction.of is None else f" of transaction {transaction.of}"
+        parts.append(Field("attempt", f"{transaction.attempt}{of}"))
+    if transaction.error:
+        parts.append(Field("error", plain(transaction.error)))
+    return Field("transaction", f"{transaction.id}: {transaction.verdict.value}", None, None, tuple(parts))
+
+
+def _frame(number: int, here: int) -> str:
+    return f"frame {number} (this)" if number == here else f"frame {number}"
+
+
+def _octets(count: int) -> str:
+    return f"{count} octet" if count == 1 else f"{count} octets"

@@ -1,0 +1,57 @@
+"""Times and sizes as text for narrow columns. Pure."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from enum import Enum
+
+from dissectors.line import NS_PER_S
+
+
+class TimeMode(Enum):
+    """How the time column counts; `t` goes round."""
+
+    ABSOLUTE = "absolute"
+    RELATIVE = "relative"
+    DELTA = "delta"
+
+    def next(self) -> TimeMode:
+        """The one after it."""
+        modes = list(TimeMode)
+        return modes[(modes.index(self) + 1) % len(modes)]
+
+
+def clock(time: int) -> str:
+    """Local time of day to the millisecond, "10:00:00.123"; ns since the Unix epoch."""
+    return f"{_local(time):%H:%M:%S}.{time % NS_PER_S // 1_000_000:03d}"
+
+
+def date_and_clock(time: int) -> str:
+    """Local date and time to the microsecond with the zone, "2026-03-01 10:00:00.123456 +0000"."""
+    local = _local(time)
+    return f"{local:%Y-%m-%d %H:%M:%S}.{time % NS_PER_S // 1_000:06d} {local:%z}"
+
+
+def seconds(time: int, places: int = 6) -> str:
+    """A span in seconds with sign, "+12.345678"; the size of the column bounds what makes sense."""
+    sign = "-" if time < 0 else "+"
+    whole, rest = divmod(abs(time), NS_PER_S)
+    return f"{sign}{whole}.{rest:09d}"[: len(str(whole)) + 2 + places]
+
+
+def size(octets: int) -> str:
+    """A file size in at most 8 characters, "12.3 MB" (decimal units)."""
+    value, unit = float(octets), "B"
+    for unit in ("B", "kB", "MB", "GB", "TB"):
+        if value < 999.5 or unit == "TB":
+            break
+        value /= 1000
+    return f"{value:.0f} {unit}" if unit == "B" or value >= 99.95 else f"{value:.1f} {unit}"
+
+
+def _local(time: int) -> datetime:
+    """Local time; times that no calendar has are shown as the epoch's."""
+    try:
+        return datetime.fromtimestamp(time // NS_PER_S).astimezone()
+    except (OverflowError, OSError, ValueError):
+        return datetime.fromtimestamp(0).astimezone()

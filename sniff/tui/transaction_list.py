@@ -1,0 +1,92 @@
+"""The list of closed transactions, in the order of closing, one line each."""
+
+from __future__ import annotations
+
+from dissectors.tracker import Transaction, Verdict
+from sniff.store import Store
+from sniff.tui.columns import Cell, Column, lay_out
+from sniff.tui.linelist import LineList
+from sniff.tui.plain import plain
+from sniff.tui.times import TimeMode, clock, seconds
+from sniff.tui.verdicts import STYLE, latency_cell, latency_width, verdict_cell
+from sniff.tui.viewing import Viewing
+
+COLUMNS = (
+    Column("tx", "tx", 6, right=True),
+    Column("time", "time", 12, right=True),
+    Column("station", "stn", 3, right=True),
+    Column("kind", "what"),
+    Column("verdict", "verdict", 12),
+    Column("latency", "latency ms", 14, right=True),
+    Column("attempt", "try", 3, right=True),
+    Column("request", "request", 8, right=True, needs=96),
+    Column("response", "response", 8, right=True, needs=96),
+)
+WIDE = 110
+
+
+class TransactionList(LineList):
+    """Closed transactions by the number of their closing."""
+
+    def __init__(self, store: Store, viewing: Viewing, *, id: str | None = None) -> None:
+        super().__init__(viewing, id=id)
+        self.store = store
+
+    def lay_out_columns(self, width: int) -> list[Column]:
+        """Frame numbers give way first; the kind takes what is left."""
+        return lay_out(
+            COLUMNS,
+            width,
+            tx=max(4, len(str(self.index.last))),
+            verdict=15 if width >= WIDE else 9,
+            latency=max(10, latency_width(self.store.session.adapter.latency)),
+        )
+
+    def edge(self, number: int) -> Cell:
+        """Cursor, and trouble."""
+        transaction = self.store.closed_by_no(number)
+        bad = transaction is not None and STYLE.get(transaction.verdict) == "bad"
+        return Cell((">" if number == self.cursor else " ") + ("!" if bad else " "), "bad" if bad else "")
+
+    def cells(self, number: int, line: int) -> dict[str, Cell]:
+        """What is known of one transaction."""
+        transaction = self.store.closed_by_no(number)
+        if transaction is None:
+            return {"kind": Cell("no longer in memory", "dim")}
+        width = next(column.width for column in self.columns if column.name == "verdict")
+        return {
+            "tx": Cell(str(transaction.id), "dim"),
+            "time": Cell(self._time(transaction, line)),
+            "station": Cell("" if transaction.station is None else str(transaction.station)),
+            "kind": Cell(self._kind(transaction)),
+            "verdict": verdict_cell(transaction, width, attempts=False),
+            "latency": latency_cell(transaction.latency),
+            "attempt": Cell(str(transaction.attempt), "doubt" if transaction.attempt > 1 else "dim"),
+            "request": Cell("–" if transaction.request is None else str(transaction.request), "dim"),
+            "response": Cell("–" if transaction.response is None else str(transaction.response), "dim"),
+        }
+
+    @staticmethod
+    def _kind(transaction: Transaction) -> str:
+        parts = [plain(transaction.kind)]
+        if transaction.error:
+            parts.append(plain(transaction.error))
+        if transaction.of is not None and transaction.verdict in (Verdict.LATE, Verdict.ECHO, Verdict.ANSWERED_TWICE):
+            parts.append(f"of tx {transaction.of}")
+        return " · ".join(parts)
+
+    def _time(self, transaction: Transaction, line: int) -> str:
+        start = transaction.start
+        if self.viewing.time_mode is TimeMode.ABSOLUTE:
+            return clock(start)
+        if self.viewing.time_mode is TimeMode.RELATIVE:
+            first = self.store.load.first
+            return seconds(start - (start if first is None else first))
+        before = self.store.closed_by_no(self.index[line - 1]) if line else None
+        return seconds(0 if before is None else start - before.start)
+
+    def empty_text(self) -> str:
+        """Why nothing is shown."""
+        if self.index.pending:
+            return "searching …"
+        return "no transaction passes the filter" if self.viewing.filter else "no transaction has closed yet"

@@ -1,0 +1,54 @@
+"""Verdicts in words that fit a narrow column, and how alarming each is. Data."""
+
+from __future__ import annotations
+
+from dissectors.tracker import Interval, Transaction, Verdict
+from sniff.analysis.wording import duration, milliseconds
+from sniff.tui.columns import Cell
+
+SHORT: dict[Verdict, str] = {
+    Verdict.NO_RESPONSE: "no answer",
+    Verdict.UNSOLICITED: "unasked",
+    Verdict.ANSWERED_TWICE: "twice",
+    Verdict.DAMAGED_ANSWER: "bad answ.",
+    Verdict.DAMAGED_REQUEST: "bad requ.",
+}
+"""At most 9 characters; the other verdicts fit as they are."""
+
+STYLE: dict[Verdict, str] = {
+    Verdict.OPEN: "dim",
+    Verdict.ANSWERED: "good",
+    Verdict.RETRY: "doubt",
+    Verdict.EXCEPTION: "doubt",
+    Verdict.NO_RESPONSE: "bad",
+    Verdict.LATE: "bad",
+    Verdict.ECHO: "doubt",
+    Verdict.UNSOLICITED: "bad",
+    Verdict.ANSWERED_TWICE: "bad",
+    Verdict.DAMAGED_ANSWER: "bad",
+    Verdict.DAMAGED_REQUEST: "bad",
+    Verdict.BROADCAST: "dim",
+    Verdict.DATA: "dim",
+}
+"""Component style of the lists."""
+
+
+def verdict_cell(transaction: Transaction | None, width: int, attempts: bool = True) -> Cell:
+    """The verdict in a column of that width; nothing while the transaction is open; "×2" marks a repeated request."""
+    if transaction is None:
+        return Cell("")
+    verdict = transaction.verdict
+    text = verdict.value if width >= len(verdict.value) else SHORT.get(verdict, verdict.value)
+    if attempts and transaction.attempt > 1 and width >= len(text) + 3:
+        text += f" ×{transaction.attempt}"
+    return Cell(text, STYLE.get(verdict, ""))
+
+
+def latency_cell(latency: Interval | None) -> Cell:
+    """Milliseconds with what the adapter allows, without the unit (the column's title has it): "38.0 (−0/+16)"."""
+    return Cell("" if latency is None else duration(latency).replace(" ms", ""))
+
+
+def latency_width(adapter_latency: int) -> int:
+    """How wide that gets: bounds need room only where the adapter holds octets back (ns)."""
+    return 14 if adapter_latency else len(milliseconds(99_999_000_000)) - 2

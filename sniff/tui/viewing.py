@@ -1,0 +1,84 @@
+"""How the user looks at the rows: what all screens share. Touches the store's rows, never the capture."""
+
+from __future__ import annotations
+
+from bisect import bisect_right, insort
+from dataclasses import dataclass, field
+
+from sniff.analysis.filtering import Predicate, compile_filter
+from sniff.store import Store
+from sniff.tui.times import TimeMode
+
+
+@dataclass(slots=True)
+class Viewing:
+    """Freeze, follow, filter, marks, time mode and the row under the cursor."""
+
+    store: Store
+    follow: bool = False
+    time_mode: TimeMode = TimeMode.ABSOLUTE
+    row: int = 0  # number of the row under the cursor, 0 before there is one
+    filter: str = ""
+    accepts: Predicate | None = None
+    filter_version: int = 0  # changes with the filter, so that lists know when to begin anew
+    marks: list[int] = field(default_factory=list)  # row numbers, ascending
+    _frozen: tuple[int, int] | None = None  # last row and last closed transaction that are shown
+
+    @property
+    def frozen(self) -> bool:
+        """Whether the view stands still."""
+        return self._frozen is not None
+
+    def freeze(self, on: bool) -> None:
+        """Stand still at what is there now, or go on."""
+        self._frozen = (self.store.last_no, self.store.last_closed) if on else None
+
+    @property
+    def came_since(self) -> int:
+        """Rows that came since the view was frozen."""
+        return 0 if self._frozen is None else self.store.last_no - self._frozen[0]
+
+    @property
+    def last_row(self) -> int:
+        """Number of the last row to show."""
+        return self.store.last_no if self._frozen is None else self._frozen[0]
+
+    @property
+    def last_closed(self) -> int:
+        """Number of the last closed transaction to show."""
+        return self.store.last_closed if self._frozen is None else self._frozen[1]
+
+    def set_filter(self, text: str) -> None:
+        """Show only what `text` accepts; an empty text shows everything. Raises FilterError."""
+        text = text.strip()
+        self.accepts = compile_filter(text, self.store.dissector) if text else None
+        self.filter = text
+        self.filter_version += 1
+
+    def accepts_row(self, no: int) -> bool:
+        """Whether the filter lets a row through."""
+        row = self.store.by_no(no)
+        return row is not None and (self.accepts is None or self.accepts(row, self.store.transaction(row)))
+
+    def accepts_closed(self, no: int) -> bool:
+        """Whether the filter lets a closed transaction through: one of its frames passes."""
+        transaction = self.store.closed_by_no(no)
+        if transaction is None:
+            return False
+        return any(self.accepts_row(row) for row in (transaction.request, transaction.response) if row is not None)
+
+    def toggle_mark(self, no: int) -> bool:
+        """Mark a row or take its mark away; whether it is marked now."""
+        if no in self.marks:
+            self.marks.remove(no)
+            return False
+        insort(self.marks, no)
+        return True
+
+    def next_mark(self) -> int | None:
+        """The marked row after the cursor, round to the first; None without marks."""
+        kept = [no for no in self.marks if self.store.by_no(no) is not None]
+        if not kept:
+            return None
+        position = bisect_right(kept, self.row)
+        return kept[position % len(kept)]
