@@ -1,1 +1,35 @@
+"""BACnet MS/TP: token passing on RS-485, with the network and application layers. README.md draws the frames."""
 
+from __future__ import annotations
+
+from typing import Any
+
+from dissectors.bacnet.fields import fields
+from dissectors.bacnet.framing import MstpFramer
+from dissectors.bacnet.header import peek
+from dissectors.bacnet.summary import text
+from dissectors.bacnet.tracker import MstpTracker
+from dissectors.frame import Frame, Role
+from dissectors.registry import Dissector
+
+__all__ = ["MSTP", "MstpFramer", "MstpTracker", "fields", "packet", "peek", "text"]
+
+
+def packet(frame: Frame, role: Role) -> Any:
+    """The scapy packet of a frame; scapy is imported on first use."""
+    from dissectors.bacnet.packets import dissect
+
+    return dissect(frame.octets)
+
+
+MSTP = Dissector(
+    name="mstp",
+    title="BACnet MS/TP",
+    framer=MstpFramer,
+    peek=peek,
+    tracker=MstpTracker,
+    text=text,
+    fields=fields,
+    packet=packet,
+    default_line="38400,8N1",
+)

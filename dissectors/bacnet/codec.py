@@ -1,0 +1,320 @@
+"""One decoder and one encoder for all parameter tables: tags ↔ named values.
+
+Decoding is total: what does not fit its layout keeps what was read, says why, and leaves the rest as tags. `Any` is
+read with the type of the property that the message names; where that does not fit, by the tags alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from dissectors.bacnet import layout as notation
+from dissectors.bacnet import tags as tagging
+from dissectors.bacnet.layout import Field
+from dissectors.bacnet.property_types import BY_OBJECT, PROPERTY_TYPES
+from dissectors.bacnet.tags import Tag
+from dissectors.bacnet.values import (
+    APPLICATION,
+    NUMBER_OF,
+    Enumerated,
+    ObjectId,
+    Record,
+    base,
+    pack,
+    primitive,
+    show,
+    type_of,
+)
+
+_DEPTH_MAX = 40  # nested types; the tags themselves are bounded by tags.DEPTH_MAX
+
+
+@dataclass(frozen=True, slots=True)
+class Decoded:
+    """What a layout made of octets: the values, the tags left over, and why decoding stopped (None: all fitted)."""
+
+    record: Record
+    rest: tuple[Tag, ...] = ()
+    error: str | None = None
+
+
+class _Misfit(Exception):
+    """The tags are not what the layout says; `entries` were read before."""
+
+    def __init__(self, why: str, entries: Sequence[tuple[str, Any]] = (), at: int = 0) -> None:
+        super().__init__(why)
+        self.entries = tuple(entries)
+        self.at = at
+
+
+@dataclass(slots=True)
+class _Scope:
+    """Which property is spoken of: the type of its value follows from it."""
+
+    object_type: int | None = None
+    property: int | None = None
+    index: int | None = None
+    names: dict[int, str] | None = None  # by the place of each tag, for those who ask
+
+    def inner(self) -> _Scope:
+        return _Scope(self.object_type, self.property, self.index, self.names)
+
+    def name(self, tag: Tag, text: str) -> None:
+        if self.names is not None:
+            self.names.setdefault(tag.start, text)
+
+    def note(self, field: Field, value: Any) -> None:
+        if isinstance(value, ObjectId) and field.name != "initiating-device-identifier":
+            self.object_type = value.type
+        elif isinstance(value, Enumerated) and field.type == "PropertyIdentifier":
+            self.property, self.index = value.value, None
+        elif field.name.endswith("array-index") and isinstance(value, int):
+            self.index = value
+
+    def value_type(self) -> str | None:
+        if self.property is None:
+            return None
+        found = PROPERTY_TYPES.get(self.property)
+        if self.object_type is not None:
+            found = BY_OBJECT.get((self.object_type, self.property), found)
+        if found is not None and found.startswith("{") and self.index is not None:
+            return "Unsigned" if self.index == 0 else found[1:-1]
+        return found
+
+
+def decode(layout: str | None, octets: bytes, names: dict[int, str] | None = None) -> Decoded:
+    """The parameters in `octets` by a layout (None: tags only). Total.
+
+    `names`, when given, is filled with what each tag is ("property-identifier: present-value"), by its place.
+    """
+    tree = tagging.read(octets)
+    if layout is None:
+        return Decoded(Record(None, ()), tree.tags, tree.error)
+    entries: tuple[tuple[str, Any], ...] = ()
+    error, at = None, 0
+    try:
+        found, at = _sequence(notation.parse(layout), tree.tags, 0, _Scope(names=names), 0)
+        entries = tuple(found)
+    except _Misfit as misfit:
+        entries, at, error = misfit.entries, misfit.at, str(misfit)
+    rest = tree.tags[at:]
+    if error is None and rest:
+        error = f"{len(rest)} tags more than the service has"
+    return Decoded(Record(None, entries), rest, tree.error or error)
+
+
+def _sequence(
+    fields: Sequence[Field], tags: Sequence[Tag], at: int, scope: _Scope, depth: int
+) -> tuple[list[tuple[str, Any]], int]:
+    entries: list[tuple[str, Any]] = []
+    for field in fields:
+        start = at
+        try:
+            if not _fits(field, tags, at):
+                if field.optional:
+                    continue
+                raise _Misfit(f"{field.name} is missing")
+            value, at = _field(field, tags, at, scope, depth)
+        except _Misfit as misfit:
+            raise _Misfit(str(misfit), entries, start) from None
+        scope.note(field, value)
+        entries.append((field.name, value))
+    return entries, at
+
+
+def _fits(field: Field, tags: Sequence[Tag], at: int) -> bool:
+    if field.tag is None and (field.item is not None or field.type == "Any"):
+        return True
+    if at >= len(tags):
+        return False
+    tag = tags[at]
+    if field.tag is not None:
+        return tag.context and tag.number == field.tag
+    kind = base(field.type)
+    if kind is not None:
+        return not tag.context and tag.number == NUMBER_OF[kind]
+    alternatives = notation.choice(field.type)
+    if alternatives is not None:
+        return any(_fits(alternative, tags, at) for alternative in alternatives)
+    parts = notation.sequence(field.type) or ()
+    for part in parts:
+        if _fits(part, tags, at):
+            return True
+        if not part.optional:
+            return False
+    return not parts
+
+
+def _field(field: Field, tags: Sequence[Tag], at: int, scope: _Scope, depth: int) -> tuple[Any, int]:
+    if depth > _DEPTH_MAX:
+        raise _Misfit(f"{field.name} is nested too deep")
+    if field.tag is None:
+        value, after = _in_place(field.type, tags, at, scope, depth)
+        if base(field.type) is not None:
+            scope.name(tags[at], f"{field.name}: {show(value)}")
+        return value, after
+    tag = tags[at]
+    if base(field.type) is not None:
+        if tag.children is not None:
+            raise _Misfit(f"{field.name} is no primitive value")
+        value = _primitive(field.type, tag)
+        scope.name(tag, f"{field.name}: {show(value)}")
+        return value, at + 1
+    if tag.children is None:
+        raise _Misfit(f"{field.name} has no opening tag")
+    inner = scope.inner()
+    scope.name(tag, field.name)
+    value, used = _in_place(field.type, tag.children, 0, inner, depth + 1)
+    if used != len(tag.children):
+        raise _Misfit(f"{field.name} holds more than its type")
+    if not field.item:
+        scope.property, scope.index = inner.property, inner.index
+    return value, at + 1
+
+
+def _in_place(type_name: str, tags: Sequence[Tag], at: int, scope: _Scope, depth: int) -> tuple[Any, int]:
+    """A value of the type whose tags stand at `at`, without a context tag around it."""
+    if depth > _DEPTH_MAX:
+        raise _Misfit(f"{type_name} is nested too deep")
+    if type_name == "Any":
+        return _any(tags[at:], scope, depth), len(tags)
+    if type_name.startswith("{"):
+        item, values = type_name[1:-1], []
+        while at < len(tags):
+            value, after = _in_place(item, tags, at, scope, depth + 1)
+            if after == at:
+                raise _Misfit(f"{item} has no tags")
+            values.append(value)
+            at = after
+        return tuple(values), at
+    if base(type_name) is not None:
+        return _application(type_name, tags, at), at + 1
+    alternatives = notation.choice(type_name)
+    if alternatives is not None:
+        for field in alternatives:
+            if _fits(field, tags, at):
+                value, after = _field(field, tags, at, scope, depth + 1)
+                return Record(type_name, ((field.name, value),)), after
+        raise _Misfit(f"no alternative of {type_name} fits")
+    fields = notation.sequence(type_name)
+    if fields is None:
+        raise _Misfit(f"{type_name} is not known")
+    try:
+        entries, after = _sequence(fields, tags, at, scope, depth + 1)
+    except _Misfit as misfit:
+        raise _Misfit(str(misfit)) from None
+    return Record(type_name, tuple(entries)), after
+
+
+def _application(type_name: str, tags: Sequence[Tag], at: int) -> Any:
+    kind = base(type_name)
+    if at >= len(tags):
+        raise _Misfit(f"{type_name} is missing")
+    tag = tags[at]
+    if kind is None or tag.context or tag.number != NUMBER_OF[kind]:
+        raise _Misfit(f"{type_name} expected")
+    return _primitive(type_name, tag)
+
+
+def _primitive(type_name: str, tag: Tag) -> Any:
+    try:
+        return primitive(type_name, tag.octets)
+    except ValueError as error:
+        raise _Misfit(str(error)) from None
+
+
+def _any(tags: Sequence[Tag], scope: _Scope, depth: int) -> Any:
+    """The value of a property: by its type where that fits, else by its tags. One value, or a tuple of several."""
+    expected = scope.value_type()
+    if expected is not None:
+        try:
+            value, used = _in_place(expected, tags, 0, _Scope(names=scope.names), depth + 1)
+            if len(tags) == 1 and base(expected) is not None:
+                scope.name(tags[0], show(value))
+            if used == len(tags) and (used or expected.startswith("{")):
+                return value
+        except _Misfit:
+            pass
+    values = tuple(plain(tag) for tag in tags)
+    return values[0] if len(values) == 1 else values
+
+
+def plain(tag: Tag) -> Any:
+    """The value of an application tag; other tags stay tags."""
+    if tag.context or tag.number >= len(APPLICATION):
+        return tag
+    try:
+        return primitive(APPLICATION[tag.number], tag.octets)
+    except ValueError:
+        return tag
+
+
+# Encoding
+
+
+def encode(layout: str, values: Mapping[str, Any] | Record) -> bytes:
+    """The octets of parameters by a layout.
+
+    Values are what `decode` gives, or plain Python ones: names for enumerations, "device,1" for objects, mappings for
+    sequences, a mapping of one for a choice. Raises ValueError, KeyError or TypeError when they do not fit.
+    """
+    return tagging.write(_encode_sequence(notation.parse(layout), values))
+
+
+def _encode_sequence(fields: Sequence[Field], values: Mapping[str, Any] | Record) -> list[Tag]:
+    given = dict(values.entries) if isinstance(values, Record) else dict(values)
+    tags: list[Tag] = []
+    for field in fields:
+        if field.name not in given:
+            if field.optional:
+                continue
+            raise KeyError(f"{field.name} is missing")
+        tags += _encode_field(field, given.pop(field.name))
+    if given:
+        raise KeyError(f"no such parameter: {', '.join(sorted(given))}")
+    return tags
+
+
+def _encode_field(field: Field, value: Any) -> list[Tag]:
+    if field.tag is None:
+        return _encode_in_place(field.type, value)
+    if base(field.type) is not None:
+        return [Tag(field.tag, True, pack(field.type, value))]
+    return [Tag(field.tag, True, b"", tuple(_encode_in_place(field.type, value)))]
+
+
+def _encode_in_place(type_name: str, value: Any) -> list[Tag]:
+    if type_name == "Any":
+        return encode_any(value)
+    if type_name.startswith("{"):
+        return [tag for item in value for tag in _encode_in_place(type_name[1:-1], item)]
+    kind = base(type_name)
+    if kind is not None:
+        return [Tag(NUMBER_OF[kind], False, pack(type_name, value))]
+    alternatives = notation.choice(type_name)
+    if alternatives is not None:
+        ((name, chosen),) = dict(value.entries if isinstance(value, Record) else value).items()
+        for field in alternatives:
+            if field.name == name:
+                return _encode_field(field, chosen)
+        raise KeyError(f"{type_name} has no alternative {name}")
+    fields = notation.sequence(type_name)
+    if fields is None:
+        raise ValueError(f"{type_name} is not known")
+    return _encode_sequence(fields, value)
+
+
+def encode_any(value: Any) -> list[Tag]:
+    """The tags of any value: a plain one, a Record of a known type, tags, or several of them."""
+    if isinstance(value, Tag):
+        return [value]
+    if isinstance(value, Record):
+        if value.type is None:
+            raise ValueError("a record without a type has no layout")
+        return _encode_in_place(value.type, value)
+    if isinstance(value, (tuple, list)):
+        return [tag for item in value for tag in encode_any(item)]
+    kind = type_of(value)
+    return [Tag(NUMBER_OF[kind], False, pack(kind, value))]

@@ -1,0 +1,375 @@
+"""MS/TP framing for a listener: preamble, header CRC, length, data CRC; no gap is needed (ANSI/ASHRAE 135, 9.5.4).
+
+The rules:
+
+1. A frame begins with 55 FF and six octets whose header CRC is good. From there its length is known, and nothing
+   inside it restarts it while header and data are good: a preamble among the data of a good frame is data.
+2. A frame whose data CRC is bad ends where the next good header begins inside it (it was cut short and the next frame
+   ran into its place), else where silence of over 100 ms stands inside it, else at its length.
+3. A good header directly after proved silence of 60 bit times (Tframe_abort) ends the frame before it, and so does
+   the silence that loses the token (500 ms). Other silence inside a frame proves nothing: hosts read late.
+4. A preamble with a bad header is kept as a damaged frame, up to the next good header or the length it claims, when
+   that many octets make sense: a node would have to drop it, we can often still say who sent it. Of a doubled
+   preamble the second one counts.
+5. One FF directly after a good frame belongs to it (the tail octet that some drivers send): flag "trailing-pad".
+6. All else is noise, cut at silence of 60 bit times and at NOISE_MAX octets.
+"""
+
+from __future__ import annotations
+
+import struct
+
+from dissectors.bacnet import cobs
+from dissectors.bacnet.frame_types import HEADER, PREAMBLE, is_encoded, total
+from dissectors.bacnet.limits import (
+    FRAME_ABORT_BITS,
+    MAX_DATA,
+    MAX_ENCODED,
+    MIN_ENCODED,
+    T_FRAME_ABORT_MAX,
+    T_NO_TOKEN,
+)
+from dissectors.checksums import crc8_mstp, crc16_x25
+from dissectors.frame import Check, Chunk, Damage, Event, Found, Frame, LineError, Noise, Place, Reason
+from dissectors.framer import OctetWindow
+from dissectors.line import Timing
+
+NOISE_MAX = 1024
+"""Most octets in one Noise event."""
+
+_PIECE = 4096  # octets of a chunk taken at once: bounds memory and keeps the window cheap to cut
+_NAMED = 5  # preamble, type, destination, source: from here on a fragment says who sent it
+_WAIT = -1
+
+
+def header_is_good(header: bytes | bytearray) -> bool:
+    """Whether eight octets are a preamble and a header with a good CRC."""
+    return len(header) >= HEADER and header[:2] == PREAMBLE and crc8_mstp(bytes(header[2:7])) == header[7]
+
+
+def body_is_good(frame_type: int, length: int, body: bytes) -> bool:
+    """Whether the octets after the header (data and CRC) fit the length and the CRC of the frame type."""
+    if not length:
+        return not body
+    if len(body) != length + 2:
+        return False
+    if is_encoded(frame_type):
+        return cobs.crc_is_good(body)
+    return crc16_x25(body[:-2]) == body[-2] | body[-1] << 8
+
+
+class MstpFramer:
+    """Sans-I/O framer for MS/TP; see the rules above and `dissectors.framer` for the contract."""
+
+    protocol = "mstp"
+
+    def __init__(self, timing: Timing) -> None:
+        self._window = OctetWindow(timing)
+        self._char = timing.char
+        self._pause = timing.line.bits(FRAME_ABORT_BITS)
+        self._noise = 0  # octets at the front of the window that begin no frame
+        self._skipped = 0  # octets of noise given out since the last frame
+        self._after_frame = False  # the event before was a frame
+        self._needs_pause = 0  # the silence that decides what is held; 0 while nothing is held
+        self._plain = 0  # octets of the good frame without silence inside at the front of the window, 0 unknown
+
+    def feed(self, chunk: Chunk) -> list[Event]:
+        """Take one read; give the events it completes."""
+        count = len(chunk.octets)
+        if count <= _PIECE:
+            self._window.append(chunk)
+            return self._drain(0, final=False)
+        events: list[Event] = []
+        for begin in range(0, count, _PIECE):
+            end = min(begin + _PIECE, count)
+            self._window.append(_part(chunk, begin, end, self._char))
+            events += self._drain(0, final=False)
+        return events
+
+    def advance(self, now: int) -> list[Event]:
+        """Say that no read returned up to `now`; give what the silence completes."""
+        return self._drain(self._window.least_silence_at(now) or 0, final=False) if len(self._window) else []
+
+    def close(self) -> list[Event]:
+        """End of capture: give everything still held."""
+        return self._drain(0, final=True)
+
+    def deadline(self) -> int | None:
+        """When silence will mean something next; None when nothing is held."""
+        return self._window.proves_silence(self._needs_pause) if len(self._window) else None
+
+    def _drain(self, quiet: int, final: bool) -> list[Event]:
+        events: list[Event] = []
+        while len(self._window):
+            event = self._next(quiet, final)
+            if event is None:
+                break
+            events.append(event)
+        return events
+
+    # What comes next: noise up to the next candidate, or the frame there
+
+    def _next(self, quiet: int, final: bool) -> Event | None:
+        octets = self._window.octets
+        if not self._noise:
+            size = self._plain or self._look()
+            if size and len(octets) > size and octets[size] != 0xFF:
+                return self._take_frame(size, Check.GOOD, None, self._found(0))
+            if size and len(octets) == size and not final and quiet < self._pause:
+                self._needs_pause = self._pause
+                return None
+        while True:
+            at = self._noise
+            if at:
+                if at >= NOISE_MAX or (at < len(octets) and self._window.silence(at)[0] >= self._pause):
+                    return self._take_noise(before_frame=False)
+                if at == len(octets):
+                    self._needs_pause = self._pause
+                    return self._take_noise(before_frame=False) if final or quiet >= self._pause else None
+            frame = self._frame_at(at, quiet, final) if octets[at] == PREAMBLE[0] else 1
+            if isinstance(frame, int):
+                if frame == _WAIT:
+                    return None
+                self._noise += frame
+            elif at:  # the noise before it goes first; the frame is found again at the front
+                return self._take_noise(before_frame=True)
+            else:
+                return self._take_frame(*frame)
+
+    def _look(self) -> int:
+        """The plain case, which is nearly every case: octets of a good frame at the front with no gap in it, else 0."""
+        window, octets = self._window, self._window.octets
+        if len(octets) < HEADER or octets[:2] != PREAMBLE or crc8_mstp(bytes(octets[2:7])) != octets[7]:
+            return 0
+        frame_type, length = octets[2], octets[5] << 8 | octets[6]
+        size = total(length)
+        if length > MAX_DATA or is_encoded(frame_type) or len(octets) < size:
+            return 0
+        if window.end(size - 1) - window.end(0) > (size - 1) * self._char + self._pause:
+            return 0
+        if length and not body_is_good(frame_type, length, bytes(octets[HEADER:size])):
+            return 0
+        self._plain = size
+        return size
+
+    def _frame_at(self, at: int, quiet: int, final: bool) -> int | tuple[int, Check, Damage | None, Found]:
+        """The frame at a 55: (octets, check, damage, found), or how many octets here are noise, or _WAIT."""
+        octets = self._window.octets
+        stop, ended = self._reach(at, quiet, final)
+        have = stop - at
+        if have >= 2 and octets[at + 1] != PREAMBLE[1]:
+            return 1
+        if have < HEADER:
+            if not ended:
+                self._needs_pause = T_NO_TOKEN
+                return _WAIT
+            return (have, Check.ABSENT, Damage.SHORT, self._found(at)) if have >= _NAMED else 1
+        frame_type, length = octets[at + 2], octets[at + 5] << 8 | octets[at + 6]
+        if crc8_mstp(bytes(octets[at + 2 : at + 7])) != octets[at + 7]:
+            return self._bad_header(at, frame_type, length, stop, ended)
+        if length > MAX_ENCODED:
+            return HEADER, Check.ABSENT, Damage.LONG, self._found(at)
+        size = total(length)
+        cut = self._restart(at, min(at + size, stop), stop, ended)
+        if cut is not None:
+            if cut == _WAIT:
+                return _WAIT
+            return cut - at, Check.ABSENT, Damage.RESTARTED, self._found(at)
+        if have < size:
+            return self._incomplete(at, stop, ended)
+        if body_is_good(frame_type, length, bytes(octets[at + HEADER : at + size])):
+            return self._complete(at, size, frame_type, length, quiet, ended)
+        return self._bad_body(at, size, stop, ended)
+
+    def _complete(
+        self, at: int, size: int, frame_type: int, length: int, quiet: int, ended: bool
+    ) -> int | tuple[int, Check, Damage | None, Found]:
+        octets, after = self._window.octets, at + size
+        found = self._found(at)
+        if self._silence_in(at + 1, after, T_FRAME_ABORT_MAX) is not None:
+            found = Found.JOINED
+        if after == len(octets):
+            if not ended and quiet < self._pause:
+                self._needs_pause = self._pause
+                return _WAIT
+        elif octets[after] == 0xFF and self._window.silence(after)[0] < self._pause:
+            size += 1
+        damage = None
+        if is_encoded(frame_type):
+            damage = Damage.FORM if length < MIN_ENCODED else None
+        elif length > MAX_DATA:
+            damage = Damage.LONG
+        return size, Check.GOOD, damage, found
+
+    def _restart(self, at: int, end: int, stop: int, ended: bool) -> int | None:
+        """Where rule 3 ends the frame at `at` before `end`; _WAIT when the header there is not whole yet."""
+        begin = at + HEADER
+        while (silent := self._silence_in(begin, end, self._pause)) is not None:
+            if silent + HEADER <= stop:
+                if header_is_good(self._window.octets[silent : silent + HEADER]):
+                    first = self._good_header(at + HEADER, silent, stop)
+                    return silent if first is None else first
+            elif not ended and PREAMBLE.startswith(bytes(self._window.octets[silent : min(silent + 2, stop)])):
+                self._needs_pause = T_NO_TOKEN
+                return _WAIT
+            begin = silent + 1
+        return None
+
+    def _incomplete(self, at: int, stop: int, ended: bool) -> int | tuple[int, Check, Damage | None, Found]:
+        if not ended:
+            self._needs_pause = T_NO_TOKEN
+            return _WAIT
+        cut = self._good_header(at + HEADER, stop, stop)
+        if cut is not None:
+            return cut - at, Check.ABSENT, Damage.RESTARTED, self._found(at)
+        return stop - at, Check.ABSENT, Damage.SHORT, self._found(at)
+
+    def _bad_body(self, at: int, size: int, stop: int, ended: bool) -> int | tuple[int, Check, Damage | None, Found]:
+        cut = self._good_header(at + HEADER, at + size, stop)
+        if cut is None and not ended and self._undecided_header(at + HEADER, at + size, stop):
+            self._needs_pause = T_NO_TOKEN
+            return _WAIT
+        silent = self._silence_in(at + 1, at + size if cut is None else cut, T_FRAME_ABORT_MAX)
+        if silent is not None:
+            return max(silent - at, 1), Check.ABSENT, Damage.TIMEOUT, self._found(at)
+        if cut is not None:
+            return cut - at, Check.ABSENT, Damage.RESTARTED, self._found(at)
+        return size, Check.BAD, Damage.CHECK, self._found(at)
+
+    def _bad_header(
+        self, at: int, frame_type: int, length: int, stop: int, ended: bool
+    ) -> int | tuple[int, Check, Damage | None, Found]:
+        octets = self._window.octets
+        if octets[at + 2 : at + 4] == PREAMBLE:  # a doubled preamble: the second one counts
+            return 2
+        plausible = length <= (MAX_ENCODED if is_encoded(frame_type) else MAX_DATA)
+        limit = at + (total(length) if plausible else HEADER)
+        cut = self._good_header(at + 1, min(limit, stop), stop)
+        if cut is None:
+            if not ended and (limit > stop or self._undecided_header(at + 1, limit, stop)):
+                self._needs_pause = T_NO_TOKEN
+                return _WAIT
+            if limit <= stop and body_is_good(frame_type, length, bytes(octets[at + HEADER : limit])):
+                return limit - at, Check.BAD, Damage.HEADER, self._found(at)
+            cut = min(limit, stop)
+        silent = self._silence_in(at + 1, cut, T_FRAME_ABORT_MAX)
+        if silent is not None:
+            cut = silent
+        have = cut - at
+        if have < _NAMED:
+            return have
+        if have < HEADER:
+            return have, Check.ABSENT, Damage.RESTARTED, self._found(at)
+        return have, Check.BAD, Damage.HEADER, self._found(at)
+
+    # Looking around
+
+    def _reach(self, at: int, quiet: int, final: bool) -> tuple[int, bool]:
+        """How far the octets from `at` on may belong together, and whether more can still come."""
+        length = len(self._window.octets)
+        cut = self._silence_in(at + 1, length, T_NO_TOKEN)
+        if cut is not None:
+            return cut, True
+        return length, final or quiet >= T_NO_TOKEN
+
+    def _silence_in(self, begin: int, end: int, limit: int) -> int | None:
+        """The first octet of [begin, end) with at least `limit` of proved silence before it."""
+        window = self._window
+        if end <= begin or window.end(end - 1) - window.end(begin - 1) - (end - begin) * self._char < limit:
+            return None
+        for index in range(begin, end):
+            if window.silence(index)[0] >= limit:
+                return index
+        return None
+
+    def _good_header(self, begin: int, end: int, stop: int) -> int | None:
+        """The first place in [begin, end) where a good header begins that is whole before `stop`."""
+        octets = self._window.octets
+        at = octets.find(PREAMBLE, begin, min(end + 1, stop))
+        while at != -1 and at < end and at + HEADER <= stop:
+            if header_is_good(octets[at : at + HEADER]):
+                return at
+            at = octets.find(PREAMBLE, at + 1, min(end + 1, stop))
+        return None
+
+    def _undecided_header(self, begin: int, end: int, stop: int) -> bool:
+        """Whether a header may begin in [begin, end) that is not whole before `stop`."""
+        octets = self._window.octets
+        for at in range(max(begin, stop - HEADER + 1), min(end, stop)):
+            if octets[at] == PREAMBLE[0] and (at + 1 >= stop or octets[at + 1] == PREAMBLE[1]):
+                return True
+        return False
+
+    def _found(self, at: int) -> Found:
+        if (at or self._skipped) and self._window.silence(at)[0] < self._pause:
+            return Found.SPLIT
+        return Found.LENGTH
+
+    # Giving out
+
+    def _take_frame(self, size: int, check: Check, damage: Damage | None, found: Found) -> Frame:
+        octets = self._window.octets
+        expected = None
+        if size >= HEADER and (damage is not Damage.HEADER):
+            expected = total(octets[5] << 8 | octets[6])
+        flags: tuple[str, ...] = ()
+        if check is Check.GOOD and expected is not None and size > expected:
+            flags = ("trailing-pad",)
+        taken = self._window.take(size)
+        skipped, self._skipped = self._skipped, 0
+        self._plain = 0
+        self._after_frame = True
+        return Frame(
+            "mstp",
+            taken.octets,
+            taken.start,
+            taken.end,
+            check,
+            found,
+            damage,
+            expected,
+            skipped,
+            taken.slack,
+            taken.marks,
+            flags,
+        )
+
+    def _take_noise(self, before_frame: bool) -> Noise:
+        window, count = self._window, self._noise
+        place = Place.BETWEEN
+        if self._after_frame and window.silence(0)[1] < self._pause:
+            place = Place.AFTER
+        elif before_frame and window.silence(count)[1] < self._pause:
+            place = Place.BEFORE
+        taken = window.take(count)
+        self._noise = 0
+        self._skipped += count
+        self._after_frame = False
+        reason = _reason(taken.octets, place, any(mark.error & LineError.BREAK for mark in taken.marks))
+        return Noise(taken.octets, taken.start, taken.end, place, reason, taken.marks)
+
+
+def _reason(octets: bytes, place: Place, broken: bool) -> Reason:
+    if broken:
+        return Reason.BREAK
+    if not octets.strip(b"\x00"):
+        return Reason.ZEROS if place is Place.AFTER else Reason.NO_FRAME
+    if not octets.strip(b"\xff"):
+        return Reason.PAD
+    if octets[0] == PREAMBLE[0] and (len(octets) == 1 or octets[1] in PREAMBLE):
+        return Reason.FALSE_START
+    return Reason.NO_FRAME
+
+
+def _part(chunk: Chunk, begin: int, end: int, char: int) -> Chunk:
+    """Octets [begin, end) of a chunk as a chunk of their own: the same octets at the same times."""
+    marks = tuple(type(mark)(mark.offset - begin, mark.error) for mark in chunk.marks if begin <= mark.offset < end)
+    return Chunk(chunk.time - (len(chunk.octets) - end) * char, chunk.octets[begin:end], marks)
+
+
+def parse_header(octets: bytes) -> tuple[int, int, int, int, int] | None:
+    """(type, destination, source, length, header CRC) of a frame's octets; None when they are fewer than eight."""
+    if len(octets) < HEADER:
+        return None
+    found: tuple[int, int, int, int, int] = struct.unpack_from(">BBBHB", octets, 2)
+    return found

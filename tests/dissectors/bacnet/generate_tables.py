@@ -1,0 +1,225 @@
+"""Write the BACnet tables of dissectors/bacnet from bacpypes3's classes (MIT), which only tests need.
+
+    python tests/dissectors/bacnet/generate_tables.py        writes enumerations.py, constructed.py, property_types.py
+
+tests/dissectors/bacnet/test_tables.py fails when the committed files and bacpypes3 differ.
+"""
+
+from __future__ import annotations
+
+import re
+import textwrap
+from pathlib import Path
+from typing import Any
+
+import bacpypes3.apdu as apdu
+import bacpypes3.basetypes as basetypes
+import bacpypes3.constructeddata as constructed
+import bacpypes3.object as objects
+import bacpypes3.primitivedata as primitive
+
+FOLDER = Path(__file__).parents[3] / "dissectors/bacnet"
+
+PRIMITIVES = (  # noqa: SIM905
+    "Null Boolean Unsigned Integer Real Double OctetString CharacterString BitString Enumerated Date Time "
+    "ObjectIdentifier"
+).split()
+RENAMED = {"Integer": "Signed", "OptionalInteger": "OptionalSigned"}
+
+MISSPELT = {
+    "tle-error": "tls-error",
+    "who-iam": "who-am-i",
+    "who-ami": "who-am-i",
+    "property-is-not-alist": "property-is-not-a-list",
+    "not-abacnet-sc-hub": "not-a-bacnet-sc-hub",
+    "http-not-aserver": "http-not-a-server",
+}
+"""Slips in bacpypes3's names, and words that its capitals do not divide."""
+
+
+def kebab(name: str) -> str:
+    """`presentValue` → `present-value`; names that already have hyphens stay."""
+    if "-" in name:
+        return name.lower()
+    name = re.sub(r"([A-Z]+)([A-Z][a-z])", r"\1-\2", name)
+    name = re.sub(r"([a-z0-9])([A-Z])", r"\1-\2", name).lower()
+    return name.replace("success-ful", "successful")
+
+
+def _names(table: dict[str, int]) -> dict[int, str]:
+    """One name a number: the hyphenated spelling where there is one."""
+    found: dict[int, str] = {}
+    for name, number in table.items():
+        if number not in found or "-" in name:
+            found[number] = MISSPELT.get(kebab(name), kebab(name))
+    return dict(sorted(found.items()))
+
+
+def enumerations() -> dict[str, dict[int, str]]:
+    """Every enumeration: {class name: {number: name}}."""
+    classes = [getattr(basetypes, n) for n in dir(basetypes)] + [getattr(primitive, n) for n in dir(primitive)]
+    classes += [apdu.ConfirmedServiceChoice, apdu.UnconfirmedServiceChoice, apdu.AbortReason, apdu.RejectReason]
+    found = {
+        cls.__name__: _names(cls._enum_map)
+        for cls in classes
+        if isinstance(cls, type) and issubclass(cls, primitive.Enumerated) and cls is not primitive.Enumerated
+    }
+    return dict(sorted(found.items()))
+
+
+def bit_strings() -> dict[str, dict[int, str]]:
+    """Every bit string with named bits: {class name: {bit: name}}."""
+    classes = [getattr(basetypes, n) for n in dir(basetypes)]
+    found = {
+        cls.__name__: _names(cls._bitstring_names)
+        for cls in classes
+        if isinstance(cls, type) and issubclass(cls, primitive.BitString) and cls is not primitive.BitString
+    }
+    return dict(sorted(found.items()))
+
+
+def type_name(cls: Any) -> str:
+    """Our name of the type of an element: "Unsigned", "{TimeStamp}", "Any" …"""
+    if issubclass(cls, (constructed.Any,)):
+        return "Any"
+    subtype = getattr(cls, "_subtype", None)
+    if subtype is not None and issubclass(cls, (list, constructed.Array, constructed.List)):
+        return "{" + type_name(subtype) + "}"
+    for base in cls.__mro__:
+        name = base.__name__
+        known = name in PRIMITIVES or name in _KNOWN
+        if known and (base.__module__ or "").startswith("bacpypes3"):
+            return RENAMED.get(name, name)
+    raise TypeError(f"{cls!r}: no known base")
+
+
+def _element(name: str, cls: Any) -> str:
+    context = getattr(cls, "_context", None)
+    optional = "?" if getattr(cls, "_optional", None) else ""
+    tag = f"[{context}]{optional} " if context is not None else f"{optional} " if optional else ""
+    return f"{tag}{kebab(name)} {type_name(cls)}"
+
+
+def constructed_types() -> dict[str, tuple[str, str]]:
+    """Every sequence and choice of basetypes: {name: (kind, layout)}."""
+    found = {}
+    for name in sorted(dir(basetypes)):
+        cls = getattr(basetypes, name)
+        if not (isinstance(cls, type) and issubclass(cls, constructed.Sequence)):
+            continue
+        if cls in (constructed.Sequence, constructed.Choice) or cls.__name__ != name:
+            continue
+        choice = issubclass(cls, constructed.Choice)
+        order = list(cls._elements) if choice else list(cls._order)
+        layout = ", ".join(_element(n, cls._elements[n]) for n in order)
+        found[RENAMED.get(name, name)] = ("choice" if choice else "sequence", layout)
+    return found
+
+
+def property_types() -> tuple[dict[int, str], dict[tuple[int, int], str]]:
+    """Type by property, and by (object type, property) where object types differ from the most common one."""
+    by_property: dict[int, dict[int, str]] = {}
+    for cls in vars(objects).values():
+        if not (isinstance(cls, type) and issubclass(cls, objects.Object) and cls is not objects.Object):
+            continue
+        object_type = cls.__dict__.get("objectType")
+        if object_type is None:
+            continue
+        for name, element in cls._elements.items():
+            number = int(primitive.PropertyIdentifier(name))
+            by_property.setdefault(number, {})[int(object_type)] = type_name(element)
+    common: dict[int, str] = {}
+    special: dict[tuple[int, int], str] = {}
+    for number, types in sorted(by_property.items()):
+        values = list(types.values())
+        common[number] = max(sorted(set(values)), key=values.count)
+        for object_type, name in sorted(types.items()):
+            if name != common[number]:
+                special[object_type, number] = name
+    return common, special
+
+
+_KNOWN = {
+    cls.__name__
+    for module in (basetypes, primitive)
+    for cls in vars(module).values()
+    if isinstance(cls, type)
+    and issubclass(cls, (primitive.Enumerated, primitive.BitString, constructed.Sequence))
+    and cls not in (primitive.Enumerated, primitive.BitString, constructed.Sequence, constructed.Choice)
+} | {"DateTime"}
+
+_HEADING = """\"\"\"{what}.
+
+Generated by tests/dissectors/bacnet/generate_tables.py from bacpypes3's tables: do not edit.
+\"\"\"
+"""
+
+
+def _packed(tables: dict[str, dict[int, str]]) -> str:
+    lines = []
+    for name, entries in tables.items():
+        text = " ".join(f"{number} {entry}" for number, entry in entries.items())
+        body = textwrap.fill(text, 112, initial_indent=" " * 8, subsequent_indent=" " * 8, break_on_hyphens=False)
+        lines.append(f'    "{name}": _table(\n        """\n{body}\n        """\n    ),\n')
+    return "".join(lines)
+
+
+_TABLE = """
+from __future__ import annotations
+
+
+def _table(text: str) -> dict[int, str]:
+    words = text.split()
+    return {int(number): name for number, name in zip(words[::2], words[1::2], strict=True)}
+
+
+"""
+
+
+def render() -> dict[str, str]:
+    """The three files: {name: text}."""
+    common, special = property_types()
+    plain = "".join(f"    {number}: {_quoted(name)},\n" for number, name in common.items())
+    by_object = "".join(f"    ({t}, {p}): {_quoted(name)},\n" for (t, p), name in special.items())
+    layouts = {"sequence": "", "choice": ""}
+    for name, (kind, layout) in constructed_types().items():
+        line = f"    {_quoted(name)}: {_quoted(layout)},\n"
+        if len(line) > 121:
+            fits = len(layout) <= 110
+            parts = [layout] if fits else textwrap.wrap(layout, 100, break_on_hyphens=False)
+            inner = "".join(
+                f"        {_quoted(part + (' ' if n < len(parts) else ''))}\n" for n, part in enumerate(parts, 1)
+            )
+            line = f"    {_quoted(name)}: (\n{inner}    ),\n"
+        layouts[kind] += line
+    return {
+        "enumerations.py": _HEADING.format(what="BACnet enumerations and named bits")
+        + _TABLE
+        + "ENUMERATIONS: dict[str, dict[int, str]] = {\n"
+        + _packed(enumerations())
+        + "}\n\nBIT_STRINGS: dict[str, dict[int, str]] = {\n"
+        + _packed(bit_strings())
+        + "}\n",
+        "constructed.py": _HEADING.format(what="BACnet sequences and choices in the notation of layout.py")
+        + "\nfrom __future__ import annotations\n\nSEQUENCES: dict[str, str] = {\n"
+        + layouts["sequence"]
+        + "}\n\nCHOICES: dict[str, str] = {\n"
+        + layouts["choice"]
+        + "}\n",
+        "property_types.py": _HEADING.format(what="The type of each BACnet property")
+        + "\nfrom __future__ import annotations\n\nPROPERTY_TYPES: dict[int, str] = {\n"
+        + plain
+        + "}\n\nBY_OBJECT: dict[tuple[int, int], str] = {\n"
+        + by_object
+        + '}\n"""(object type, property) where it differs from PROPERTY_TYPES."""\n',
+    }
+
+
+def _quoted(text: str) -> str:
+    return '"' + text + '"'
+
+
+if __name__ == "__main__":
+    for name, text in render().items():
+        (FOLDER / name).write_text(text, encoding="utf-8")
+        print(f"{name}: {len(text.splitlines())} lines")
