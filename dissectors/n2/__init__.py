@@ -6,6 +6,7 @@ from typing import Any
 
 from dissectors.frame import Frame, Role
 from dissectors.n2.fields import fields
+from dissectors.n2.findings import RULES, N2Findings
 from dissectors.n2.framing import N2Framer
 from dissectors.n2.header import peek
 from dissectors.n2.interpretation import Interpretation, interpret
@@ -13,7 +14,18 @@ from dissectors.n2.text import text
 from dissectors.n2.tracker import N2Tracker
 from dissectors.registry import Dissector
 
-__all__ = ["N2", "Interpretation", "N2Framer", "N2Tracker", "fields", "interpret", "packet", "peek", "text"]
+__all__ = [
+    "N2",
+    "Interpretation",
+    "N2Findings",
+    "N2Framer",
+    "N2Tracker",
+    "fields",
+    "interpret",
+    "packet",
+    "peek",
+    "text",
+]
 
 
 def packet(frame: Frame, role: Role) -> Any:
@@ -33,5 +45,5 @@ N2 = Dissector(
     fields=fields,
     packet=packet,
     default_line="9600,8N1",
-    extras={"interpret": interpret},
+    extras={"findings": N2Findings, "rules": RULES, "interpret": interpret},
 )

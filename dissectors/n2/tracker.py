@@ -5,15 +5,17 @@
 2. A command closes the one before it: no response, or a damaged answer where octets came that are no frame.
 3. The same octets again, at once, are an echo; within GIVE_UP of the unanswered try, with no other command between,
    a retry.
-4. A second answer without a command between: answered twice (two stations with one address).
+4. A second answer without a command between: late where that station still owes one within GIVE_UP (a retry makes
+   two commands, and both may be answered), else answered twice (two stations with one address).
 5. How long a master waits is its own setting (NAE 250 ms to 3 s), so silence alone closes a command after GIVE_UP.
 """
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass, replace
 
-from dissectors.frame import Event, Frame, Header, Noise, Role
+from dissectors.frame import Event, Frame, Header, Noise, Reason, Role
 from dissectors.line import NS_PER_S, Timing
 from dissectors.n2.commands import Command, fields_of, parse_command
 from dissectors.n2.header import BROADCAST
@@ -24,6 +26,7 @@ GIVE_UP = 3 * NS_PER_S
 """Longest time that a master waits for an answer, ns (upper end of the NAE's setting; digimat.n2's default)."""
 
 _LONGEST = 256  # characters of an answer that may have begun in time and not be read yet
+_OWING = 16  # commands remembered that a late answer may still answer
 _SPOILT = 2  # octets of noise in answer to a command that count as a damaged answer
 
 
@@ -61,6 +64,7 @@ class N2Tracker:
         self._next = 1
         self._open: _Exchange | None = None
         self._missed: _Exchange | None = None  # the last command, closed without a good answer
+        self._owing: deque[_Exchange] = deque(maxlen=_OWING)  # commands without any answer, oldest first
         self._done: _Exchange | None = None  # the last command, when it was closed by an answer
 
     def track(self, no: int, event: Event, header: Header | None) -> Tracked:
@@ -126,11 +130,20 @@ class N2Tracker:
             return _transaction(exchange, Verdict.DAMAGED_REQUEST)
         if exchange.station == BROADCAST:
             return _transaction(exchange, Verdict.BROADCAST)
+        self._owing.append(exchange)
         return _transaction(exchange, Verdict.NO_RESPONSE)
 
+    def _owing_answer(self, station: int | None, now: int) -> _Exchange | None:
+        """Take the oldest command to a station that had no answer within GIVE_UP."""
+        for exchange in self._owing:
+            if exchange.station == station and now - exchange.end <= GIVE_UP:
+                self._owing.remove(exchange)
+                return exchange
+        return None
+
     def _hear_noise(self, event: Event) -> None:
-        if self._open is not None:
-            self._open.spoilt += len(event.octets.strip(b"\r\n"))
+        if self._open is not None and not (isinstance(event, Noise) and event.reason is Reason.PAD):
+            self._open.spoilt += len(event.octets)
 
     # --- answers ---
 
@@ -140,6 +153,7 @@ class N2Tracker:
             return self._orphan(no, frame, header, closed)
         if missed is not None and frame.start - missed.end <= 2 * GIVE_UP and _answers_rather(missed, open_, frame):
             self._missed = None
+            self._owing = deque((e for e in self._owing if e is not missed), _OWING)
             return self._separate(no, frame, header, Verdict.LATE, missed, closed)
         self._open, self._missed, self._done = None, None, open_
         open_.answer, open_.answer_end = frame.octets, frame.end
@@ -160,12 +174,15 @@ class N2Tracker:
         """An answer that no open command asked for."""
         done, missed = self._done, self._missed
         if done is not None:
+            if (owing := self._owing_answer(done.station, frame.start)) is not None:
+                return self._separate(no, frame, header, Verdict.LATE, owing, closed)
             if frame.octets == done.answer and frame.start - done.answer_end <= self._at_once:
                 return self._echo(no, frame, header, Role.RESPONSE, done, closed)
             if frame.start - done.end <= GIVE_UP:
                 return self._separate(no, frame, header, Verdict.ANSWERED_TWICE, done, closed)
         elif missed is not None and frame.start - missed.end <= 2 * GIVE_UP:
             self._missed = None
+            self._owing = deque((e for e in self._owing if e is not missed), _OWING)
             return self._separate(no, frame, header, Verdict.LATE, missed, closed)
         return self._separate(no, frame, header, Verdict.UNSOLICITED, None, closed)
 

@@ -1,0 +1,331 @@
+"""A simulated bus, listened to: values read back are those held, each fault gets its finding, a clean bus none."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+
+import pytest
+
+from dissectors.findings import Finding, Severity
+from dissectors.frame import Chunk, Frame
+from dissectors.line import LineSettings, Timing
+from dissectors.n2 import N2, interpret
+from dissectors.n2.f510 import POINTS
+from dissectors.n2.findings import RULES, N2Findings
+from dissectors.n2.framing import judge
+from dissectors.n2.simulated import (
+    Follower,
+    Job,
+    Master,
+    command,
+    overriding,
+    reading,
+    readings,
+    releasing,
+)
+from dissectors.tracker import Transaction, Verdict
+from sniff.simulation.faults import BitFlips, DuplicateAddress, Fault, LateResponse, LostResponse, NoiseInGaps
+from sniff.simulation.wire import Party, Wire
+
+MS = 1_000_000
+S = 1_000 * MS
+LINE = LineSettings.parse("9600,8N1")
+FAST = 20 * MS  # between an answer and the next command, so that a test sees more of them
+
+
+@dataclass
+class Heard:
+    """All that a listener made of a bus."""
+
+    frames: dict[int, Frame] = field(default_factory=dict)
+    transactions: list[Transaction] = field(default_factory=list)
+    findings: tuple[Finding, ...] = ()
+    octets: int = 0
+
+    def codes(self) -> set[str]:
+        return {f.code for f in self.findings}
+
+    def verdicts(self) -> set[Verdict]:
+        return {t.verdict for t in self.transactions}
+
+
+def listen(wire: Wire, until: int, timing: Timing | None = None, held: int = 0) -> Heard:
+    """Run a bus and listen to it; `held`: ns by which the adapter keeps each burst back."""
+    timing = timing or Timing(LINE)
+    framer, tracker, found, heard, no = N2.framer(timing), N2.tracker(timing), N2Findings(timing), Heard(), 0
+
+    def take(events: Iterable) -> None:
+        nonlocal no
+        for event in events:
+            no += 1
+            header = N2.peek(event) if isinstance(event, Frame) else None
+            tracked = tracker.track(no, event, header)
+            if header is not None:
+                heard.frames[no] = event
+                N2.text(event, header, header.role)
+            heard.octets += len(event.octets)
+            found.see(no, event, header, tracked.placement)
+            close(tracked.closed)
+
+    def close(transactions: Iterable[Transaction]) -> None:
+        for transaction in transactions:
+            heard.transactions.append(transaction)
+            found.settle(transaction)
+
+    for burst in wire.run(until):
+        if burst.octets:
+            take(framer.feed(Chunk(burst.end + held, burst.octets, burst.marks)))
+    take(framer.close())
+    close(tracker.close())
+    heard.findings = found.findings()
+    return heard
+
+
+def bus(stations: Sequence[Follower], masters: Sequence[Master], faults: Sequence[Fault] = (), seed: int = 1) -> Wire:
+    parties = [Party(f"master {n}", master, answers=False) for n, master in enumerate(masters, 1)]
+    parties += [Party(f"station {s.address}", s) for s in stations]
+    return Wire(LINE, parties, faults, seed, start=S)
+
+
+def every_point(*addresses: int) -> list[Job]:
+    return [job for address in addresses for job in readings(address)]
+
+
+# --- a clean bus ------------------------------------------------------------------------------------------------------
+
+
+def test_the_points_are_those_of_the_manual():
+    counts = {region: sum(p.region == region for p in POINTS) for region in (1, 2, 3, 4)}
+    assert counts == {1: 15, 2: 10, 3: 34, 4: 5}
+    assert all(p.low <= p.initial <= p.high for p in POINTS)
+    for region, count in counts.items():
+        assert [p.number for p in POINTS if p.region == region] == list(range(1, count + 1))
+
+
+class Watched(Follower):
+    """A follower whose process changes all the time, and which remembers what it held at each read."""
+
+    def __init__(self, address: int) -> None:
+        super().__init__(address)
+        self.held: list[tuple[int, int, int, float]] = []
+        self.heard = 0
+
+    def hear(self, now, octets, quiet):
+        self.heard += 1
+        self.set(1, 13, (self.heard * 7 % 1000) / 10)
+        self.set(2, 5, self.heard // 50 % 2)
+        if octets[3:4] == b"1" and int(octets[1:3], 16) == self.address and judge(octets)[1] is None:
+            region, number = int(octets[4:5], 16), int(octets[5:7], 16)
+            self.held.append((self.address, region, number, self.value(region, number)))
+        return super().hear(now, octets, quiet)
+
+
+def test_a_day_of_polling_reads_back_what_was_held():
+    stations = [Watched(1), Watched(17)]
+    master = Master(every_point(1, 17), line=LINE, delay=5 * S)
+    wire = bus(stations, [master])
+    master.ask(overriding(1, 3, 1, 42.5), overriding(1, 4, 1, 1), releasing(1, 3, 1), releasing(1, 4, 1))
+    heard = listen(wire, 86_400 * S)
+    assert heard.findings == ()
+    assert heard.verdicts() <= {Verdict.ANSWERED, Verdict.OPEN}
+    read = []
+    for transaction in heard.transactions:
+        if transaction.kind == "read-attribute" and transaction.response is not None:
+            got = interpret(heard.frames[transaction.request], heard.frames[transaction.response])
+            read.append((got.station, got.region, got.object, got.value))
+    held = {address: [h for h in s.held if h[0] == address] for s in stations for address in [s.address]}
+    assert len(read) > 8000
+    for address, values in held.items():
+        assert [r for r in read if r[0] == address] == values[: len([r for r in read if r[0] == address])]
+        assert len(values) - len([r for r in read if r[0] == address]) <= 1
+    assert (1, 1, 10, 42.5) in read
+
+
+def test_the_life_cycle_of_a_follower():
+    drive = Follower(1)
+
+    def ask(body: str) -> bytes:
+        (send,) = drive.hear(0, command(1, body), True)
+        return send.octets
+
+    assert ask("04") == b"N00\r"
+    assert ask("F") == b"A1061\r"
+    reports = []
+    while (report := ask("05")) != b"A\r":
+        assert len(report) <= 204
+        reports.append(report)
+    assert len(reports) > 3
+    drive.set(2, 3, 1)
+    first = ask("04")
+    assert first == b"A203402A\r" or first.startswith(b"A20340")
+    assert ask("04") == first, "not acknowledged: told again"
+    assert ask("05") == b"A\r"
+    assert ask("08") == b"A\r"
+    assert ask("110A03") == b"N00\r"
+
+
+@pytest.mark.parametrize(
+    ("body", "reply"),
+    [
+        ("116303", b"N11\r"),  # no AI 99
+        ("110104", b"N11\r"),  # reserved by JCI
+        ("1101", b"N05\r"),
+        ("2101" + "03" + "42480000", b"N12\r"),
+        ("2101" + "01" + "0D", b"A\r"),
+        ("2441" + "03" + "003C", b"N11\r"),  # no BO 65
+        ("2401" + "03" + "003C", b"A\r"),
+        ("720301" + "43FA0000", b"N10\r"),  # 500 Hz
+        ("720302" + "42480000", b"N12\r"),
+        ("720301" + "42480000", b"A\r"),
+        ("720101" + "42480000", b"A\r"),  # answered without action
+        ("730301", b"A\r"),
+        ("0001", b"A\r"),
+        ("F1", b"N05\r"),
+        ("9", b"N01\r"),
+        ("3", b"N01\r"),
+    ],
+)
+def test_what_a_follower_refuses(body, reply):
+    drive = Follower(1)
+    drive.hear(0, command(1, "F"), True)
+    (send,) = drive.hear(0, command(1, body), True)
+    assert send.octets == reply
+
+
+def test_a_follower_keeps_to_itself():
+    drive = Follower(1)
+    assert drive.hear(0, command(2, "F"), True) == ()
+    assert drive.hear(0, b"\xff\x00", True) == ()
+    assert drive.hear(0, b">01", True) == ()
+    assert drive.hear(0, b">01F00\r", True)[0].octets == b"N02\r"
+
+
+# --- faults -----------------------------------------------------------------------------------------------------------
+
+
+def quick(jobs: Sequence[Job], **settings: int) -> Master:
+    return Master(jobs, line=LINE, **{"delay": FAST, **settings})
+
+
+def test_a_bus_without_faults_has_no_findings():
+    heard = listen(bus([Follower(1), Follower(2)], [quick(every_point(1, 2))]), 200 * S)
+    assert heard.findings == ()
+    assert len(heard.transactions) > 2000
+
+
+def test_a_reset_is_found():
+    drive = Follower(1)
+    wire = bus([drive], [quick(every_point(1))])
+    assert listen(wire, 30 * S).findings == ()
+    drive.reset()
+    heard = listen(wire, 60 * S)
+    assert heard.codes() == {"N2001"}
+    assert heard.findings[0].subject == "station 1"
+
+
+def test_a_point_that_does_not_exist_is_found():
+    heard = listen(bus([Follower(1)], [quick([reading(1, 1, 99), reading(1, 1, 1)])]), 30 * S)
+    assert [(f.code, f.subject) for f in heard.findings] == [("N2002", "station 1, AI 99")]
+    assert "current value" in heard.findings[0].seen
+    assert Verdict.EXCEPTION in heard.verdicts()
+
+
+def test_a_slow_station_is_found():
+    jobs = every_point(1)
+    heard = listen(bus([Follower(1, delay=300 * MS)], [quick(jobs, timeout=800 * MS)]), 30 * S)
+    assert heard.codes() == {"N2003"}
+    assert listen(bus([Follower(1, delay=240 * MS)], [quick(jobs, timeout=800 * MS)]), 30 * S).findings == ()
+
+
+def test_slowness_is_not_judged_beyond_what_the_adapter_allows():
+    def hear(delay: int, latency: int) -> set[str]:
+        wire = bus([Follower(1, delay=delay)], [quick(every_point(1), timeout=800 * MS)])
+        return listen(wire, 30 * S, Timing(LINE, latency)).codes()
+
+    assert hear(260 * MS, 0) == {"N2003"}
+    assert hear(260 * MS, 17 * MS) == set()
+    assert hear(300 * MS, 17 * MS) == {"N2003"}
+
+
+def test_damaged_frames_are_found_at_their_station():
+    faults = [BitFlips(0.01, parties=("station 2",))]
+    heard = listen(bus([Follower(1), Follower(2)], [quick(every_point(1, 2))], faults), 120 * S)
+    assert {f.subject for f in heard.findings if f.code == "N2004"} == {"station 2"}
+    assert Verdict.DAMAGED_ANSWER in heard.verdicts()
+
+
+def test_a_lost_answer_is_found_and_inverts_nothing():
+    heard = listen(bus([Follower(1)], [quick(every_point(1))], [LostResponse(0.05)]), 120 * S)
+    assert heard.codes() == {"N2005"}
+    assert {Verdict.NO_RESPONSE, Verdict.RETRY} <= heard.verdicts()
+    for t in heard.transactions:
+        if t.response is not None and t.kind == "read-attribute":
+            got = interpret(heard.frames[t.request], heard.frames[t.response])
+            assert got.value is not None
+
+
+def test_a_station_that_is_not_there_is_an_error():
+    heard = listen(bus([Follower(1)], [quick(every_point(1, 9))]), 60 * S)
+    (finding,) = heard.findings
+    assert (finding.code, finding.subject, finding.severity) == ("N2005", "station 9", Severity.ERROR)
+
+
+def test_an_override_left_on_a_point_is_found():
+    master = quick([reading(1, 1, 10)], delay=S)
+    wire = bus([Follower(1)], [master])
+    master.ask(overriding(1, 3, 1, 42.5), overriding(1, 4, 1, 1))
+    assert listen(wire, 500 * S).findings == ()
+    master = quick([reading(1, 1, 10)], delay=S)
+    wire = bus([Follower(1)], [master])
+    master.ask(overriding(1, 3, 1, 42.5), overriding(1, 4, 1, 1), releasing(1, 4, 1))
+    heard = listen(wire, 1000 * S)
+    assert [(f.code, f.subject) for f in heard.findings] == [("N2006", "station 1, AO 1")]
+    assert "42.5" in heard.findings[0].seen
+
+
+def test_two_masters_are_found():
+    masters = [quick(every_point(1)), quick(every_point(1, 2), delay=47 * MS, timeout=310 * MS, start=1300 * MS)]
+    heard = listen(bus([Follower(1), Follower(2)], masters), 120 * S)
+    assert "N2007" in heard.codes()
+
+
+def test_a_double_address_is_found():
+    faults = [DuplicateAddress("station 1", by=30 * MS)]
+    heard = listen(bus([Follower(1)], [quick(every_point(1), delay=100 * MS)], faults), 60 * S)
+    assert "N2008" in heard.codes()
+
+
+def test_a_refusal_is_found():
+    heard = listen(bus([Follower(1)], [quick([overriding(1, 3, 2, 1.0), reading(1, 1, 1)])]), 30 * S)
+    assert [(f.code, f.seen.split(":")[1]) for f in heard.findings] == [("N2009", " N12 read-only")]
+
+
+def test_a_master_that_starts_again_is_found():
+    drive = Follower(1)
+    first, second = quick(every_point(1)), quick(every_point(1), start=40 * S)
+    wire = bus([drive], [first, second])
+    first_half = listen(wire, 30 * S)
+    assert first_half.findings == ()
+    job = Job(1, command(1, "F"))
+    master = quick([reading(1, 1, 1)])
+    master.ask(job)
+    heard = listen(bus([Follower(1)], [master]), 30 * S)
+    assert heard.codes() == {"N2010"}
+
+
+def test_a_late_answer_is_told_apart():
+    faults = [LateResponse(0.03, by=300 * MS)]
+    heard = listen(bus([Follower(1)], [quick(every_point(1), delay=100 * MS)], faults), 200 * S)
+    assert heard.codes() == {"N2005", "N2011"}
+    assert {f.subject for f in heard.findings} == {"station 1"}
+
+
+def test_noise_loses_no_octet_and_no_exchange():
+    heard = listen(bus([Follower(1)], [quick(every_point(1))], [NoiseInGaps(0.3)]), 60 * S)
+    assert sum(v is Verdict.ANSWERED for v in (t.verdict for t in heard.transactions)) > 300
+    assert "N2007" not in heard.codes()
+
+
+def test_a_catalogue_entry_for_each_finding():
+    assert all(code == rule.code and rule.explanation and rule.next for code, rule in RULES.items())
