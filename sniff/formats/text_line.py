@@ -1,0 +1,224 @@
+"""One line of a text capture, read from the left; what the lines mean is in `sniff.formats.text`."""
+
+from __future__ import annotations
+
+import json
+import re
+from datetime import UTC, datetime, timedelta
+from typing import NoReturn
+
+from dissectors.frame import Chunk, LineError, Mark
+from dissectors.line import LineSettings
+from sniff.formats import CaptureError
+from sniff.session import LineEvent, LineEventKind
+
+MAGIC = "#!sniff-capture"
+VERSION = 1
+HEADER = {
+    "line": "line",
+    "protocol": "protocol",
+    "start": "started_ns",  # ISO 8601 with a zone, up to nine decimals
+    "port": "port",
+    "bus": "bus",
+    "program": "program",
+    "adapter": "adapter",
+    "driver": "adapter_driver",
+    "latency": "adapter_latency_ns",  # ms
+    "latency-from": "adapter_latency_from",
+    "reports": "adapter_reports",  # "unknown", or the line errors it reports with commas between
+    "detail": "adapter_detail",
+    "serial-number": "adapter_serial_number",
+}
+"""Header key → key of `Session.to_metadata`."""
+
+MARKS = {"P": LineError.PARITY, "F": LineError.FRAMING, "B": LineError.BREAK, "O": LineError.OVERRUN}
+
+LATEST = (1 << 63) - 1  # ns; what the other formats can hold
+
+_DELAY = re.compile(r"([+~-])([0-9]{1,15})(?:\.([0-9]{1,6}))?(?![0-9.])")
+_OCTETS = re.compile(r"(?:[0-9A-Fa-f]{2})+(?![0-9A-Za-z])")
+_QUOTED = re.compile(r'"((?:[ !#-\[\]-~]|\\[\\"rn]|\\x[0-9A-Fa-f]{2})+)"')
+_ESCAPE = re.compile(r"\\(x..|.)")
+_MARK = re.compile(r"!([PFBOpfbo]+)(?![0-9A-Za-z])")
+_SPACE = re.compile(r"\s*")
+_HEADER = re.compile(r'#\s*(?P<note>note\s+)?(?P<key>"(?:[^"\\]|\\.)*"\s*|[^:"]*):\s*')
+_EVENT = re.compile(r"#!\s*(?:(?P<delay>[+-][0-9.]+)\s+)?(?P<kind>[A-Za-z]+)(?:\s+count=(?P<count>-?[0-9]{1,19}))?")
+_START = re.compile(r"(\d{4}-\d\d-\d\d)[Tt ](\d\d:\d\d:\d\d)(?:\.(\d{1,9}))?(Z|z|[+-]\d\d:\d\d)", re.ASCII)
+EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+
+
+class Line:
+    """One line being read from the left; every complaint says file, line and column."""
+
+    def __init__(self, name: str, number: int, text: str) -> None:
+        self.name = name
+        self.number = number
+        self.text = text
+        self.at = 0
+        self.skip_space()
+
+    def expected(self, what: str, at: int | None = None) -> NoReturn:
+        column = self.at if at is None else at
+        rest = self.text[column:].split()
+        found = f"{rest[0][:20]!r}" if rest else "the end of the line"
+        raise CaptureError(f"{self.name}:{self.number}:{column + 1}: expected {what}, found {found}")
+
+    def skip_space(self) -> None:
+        self.at = _SPACE.match(self.text, self.at).end()  # type: ignore[union-attr]
+
+    # a chunk
+
+    def chunk(self, last: int, line: LineSettings | None) -> Chunk:
+        """`last`: time of the chunk before. `line` for `~`, None when the header does not say."""
+        begin = self.at
+        sign, delay = self.delay()
+        octets, marks = self.octets()
+        time = last + delay
+        if sign == "~":
+            if line is None:
+                self.expected("'+'; '~' needs the line speed, from a header line such as '# line: 19200,8E1'", begin)
+            time += line.bits(len(octets) * line.bits_per_char)
+        self.check_time(time, begin)
+        return Chunk(time, octets, marks)
+
+    def delay(self) -> tuple[str, int]:
+        match = _DELAY.match(self.text, self.at)
+        if match is None:
+            self.expected("+D, ~D or -D with D in milliseconds, at most six decimals")
+        self.at = match.end()
+        delay = int(match[2]) * 1_000_000 + int((match[3] or "").ljust(6, "0"))
+        return match[1], -delay if match[1] == "-" else delay
+
+    def check_time(self, time: int, at: int) -> None:
+        if abs(time) > LATEST:
+            self.expected("a time before the year 2262", at)
+
+    def octets(self) -> tuple[bytes, tuple[Mark, ...]]:
+        octets = bytearray()
+        marks: dict[int, LineError] = {}
+        while True:
+            self.skip_space()
+            here = self.text[self.at : self.at + 1]
+            if here in ("", "#"):
+                break
+            if here == "!":
+                self.mark(len(octets) - 1, marks)
+            elif here == '"':
+                octets += self.quoted()
+            else:
+                octets += self.pairs()
+        if not octets:
+            self.expected("octets such as 01 03, or ASCII in quotes")
+        return bytes(octets), tuple(Mark(offset, error) for offset, error in sorted(marks.items()))
+
+    def pairs(self) -> bytes:
+        match = _OCTETS.match(self.text, self.at)
+        if match is None:
+            self.expected("pairs of hexadecimal digits, ASCII in quotes, !P !F !B !O, or #")
+        self.at = match.end()
+        return bytes.fromhex(match[0])
+
+    def quoted(self) -> bytes:
+        match = _QUOTED.match(self.text, self.at)
+        if match is None:
+            self.expected('printable ASCII in quotes (\\" \\\\ \\r \\n \\xNN are allowed in them)')
+        self.at = match.end()
+        return _ESCAPE.sub(_unescape, match[1]).encode("latin-1")
+
+    def mark(self, offset: int, marks: dict[int, LineError]) -> None:
+        match = _MARK.match(self.text, self.at)
+        if match is None:
+            self.expected("!P (parity), !F (framing), !B (break) or !O (overrun)")
+        if offset < 0:
+            self.expected("an octet before the mark")
+        self.at = match.end()
+        for letter in match[1].upper():
+            marks[offset] = marks.get(offset, LineError(0)) | MARKS[letter]
+
+    # comments that are read
+
+    def version(self) -> None:
+        told = self.text[self.at + len(MAGIC) :].strip()
+        if told != str(VERSION):
+            self.expected(f"version {VERSION}; a newer sniff485 may read this file", self.at + len(MAGIC))
+
+    def header(self) -> dict[str, str]:
+        match = _HEADER.match(self.text, self.at)
+        if match is None:
+            return {}
+        at = match.end()
+        if match["note"]:
+            name = self.unquoted(match["key"], match.start("key"))
+            return {f"note_{name}": self.unquoted(self.text[at:], at)}
+        key = HEADER.get(match["key"].strip().lower())
+        if key is None:
+            return {}  # a comment that happens to have a colon
+        value = self.unquoted(self.text[at:], at)
+        if key == "line":
+            try:
+                value = str(LineSettings.parse(value))
+            except ValueError:
+                self.expected("line settings such as 19200,8E1", at)
+        elif key == "started_ns":
+            value = str(self.start(value, at))
+        elif key == "adapter_latency_ns":
+            value = str(self.latency(value, at))
+        elif key == "adapter_reports":
+            value = ",".join(word.strip() for word in value.split(","))
+        return {key: value}
+
+    def start(self, value: str, at: int) -> int:
+        match = _START.fullmatch(value)
+        try:
+            if match is None:
+                raise ValueError
+            moment = datetime.fromisoformat(f"{match[1]}T{match[2]}{match[4].upper().replace('Z', '+00:00')}")
+            seconds = (moment - EPOCH) // timedelta(seconds=1)
+        except (ValueError, OverflowError):
+            self.expected("a time with a zone such as 2026-03-01T10:00:00Z", at)
+        time = seconds * 1_000_000_000 + int((match[3] or "").ljust(9, "0"))
+        self.check_time(time, at)
+        return time
+
+    def latency(self, value: str, at: int) -> int:
+        match = _DELAY.fullmatch(f"+{value.removesuffix('ms').strip()}")
+        if match is None:
+            self.expected("milliseconds, at most six decimals", at)
+        return int(match[2]) * 1_000_000 + int((match[3] or "").ljust(6, "0"))
+
+    def unquoted(self, value: str, at: int) -> str:
+        value = value.strip()
+        if not value.startswith('"'):
+            return value
+        try:
+            text = json.loads(value)
+        except ValueError:
+            self.expected("a JSON string", at)
+        return str(text)
+
+    def event(self, last: int) -> LineEvent:
+        begin = self.at
+        match = _EVENT.match(self.text, begin)
+        kinds = ", ".join(kind.value for kind in LineEventKind)
+        if match is None:
+            self.expected(f"'#! +D KIND count=N text' with KIND one of {kinds}")
+        try:
+            kind = LineEventKind(match["kind"].lower())
+        except ValueError:
+            self.expected(f"one of {kinds}", match.start("kind"))
+        time = last
+        if match["delay"]:
+            self.at = match.start("delay")
+            time += self.delay()[1]
+            if self.at != match.end("delay"):
+                self.expected("a space")
+        self.check_time(time, begin)
+        rest = self.text[match.end() :]
+        if rest and not rest[0].isspace():
+            self.expected("a space", match.end())
+        return LineEvent(time, kind, self.unquoted(rest, match.end()), int(match["count"] or 0))
+
+
+def _unescape(match: re.Match[str]) -> str:
+    named = {"r": "\r", "n": "\n", '"': '"', "\\": "\\"}
+    return named.get(match[1]) or chr(int(match[1][1:], 16))
