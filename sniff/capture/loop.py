@@ -93,6 +93,8 @@ class CaptureLoop:
             if not bus.ended:
                 self._take(bus)
         self._beat(self.clock.now())
+        for bus in self._buses:
+            self.outlet.post(encode_status(self.status(bus.index)))
         return self.reason
 
     def stop(self, reason: str) -> None:

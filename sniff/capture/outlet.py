@@ -10,8 +10,8 @@ from collections import deque
 from sniff.capture.wire import encode_item
 from sniff.session import Item, LineEvent, LineEventKind
 
-BACKLOG = 4 * 1024 * 1024
-"""Octets of messages held for a reader that is behind; more are dropped."""
+BACKLOG = 2 * 1024 * 1024
+"""Octets of messages held for a reader that is behind (9 s of ten buses at 115200 Bd); more are dropped."""
 
 AT_ONCE = 256 * 1024
 """Octets given to the connection in one call, and asked for as its buffer."""
@@ -51,16 +51,16 @@ class Outlet:
             return
         if self._gap[bus]:
             text = "not shown: this side did not keep up; the recording has them"
-            self.send(encode_item(bus, LineEvent(item.time, LineEventKind.DROPPED, text, self._gap[bus])))
+            self.post(encode_item(bus, LineEvent(item.time, LineEventKind.DROPPED, text, self._gap[bus])))
             self._gap[bus] = 0
-        self.send(encode_item(bus, item))
+        self.post(encode_item(bus, item))
 
     def droppable(self, message: bytes) -> None:
         """Send a message that the next one of its kind replaces."""
         if self._size <= self._backlog:
-            self.send(message)
+            self.post(message)
 
-    def send(self, message: bytes) -> None:
+    def post(self, message: bytes) -> None:
         """Send a message that must arrive; `flush` does it."""
         if self._connection is not None:
             self._parts.append(message)
@@ -88,7 +88,7 @@ class Outlet:
 
     def finish(self, message: bytes, patience: float) -> None:
         """Send a last message and close; a reader that does not read is waited for `patience` seconds."""
-        self.send(message)
+        self.post(message)
         until = time.monotonic() + patience
         self.flush()
         while self._size and time.monotonic() < until:

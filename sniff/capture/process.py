@@ -97,7 +97,7 @@ def _capture(
         "sessions": [session.to_metadata() for session in sessions],
         "paths": paths,
     }
-    outlet.send(encode_json(Kind.HELLO, hello))
+    outlet.post(encode_json(Kind.HELLO, hello))
     loop = CaptureLoop(clock, sources, recorders, outlet, connection, priority=priority)
     if config.duration is not None:
         loop.end_at = clock.now() + config.duration
