@@ -28,6 +28,11 @@ class Node:
     latency: Histogram = field(default_factory=Histogram)
 
     @property
+    def seen(self) -> bool:
+        """Whether there is a sign of it but being polled for: it sent something, or was asked something."""
+        return bool(self.sent or self.asked)
+
+    @property
     def asked(self) -> int:
         """Transactions that expected an answer from it."""
         return sum(self.verdicts[verdict] for verdict in EXPECTING)
@@ -106,6 +111,14 @@ class NodeTable:
         for address, node in other.nodes.items():
             merged[address] = merged[address].merge(node) if address in merged else node
         return NodeTable(merged)
+
+    def present(self) -> list[Node]:
+        """Stations of which there is more than a poll for a possible new one (MS/TP polls all free addresses)."""
+        return [node for node in self if node.seen]
+
+    def absent(self) -> list[int]:
+        """Addresses that were only polled for."""
+        return [node.address for node in self if not node.seen]
 
     def __iter__(self) -> Iterator[Node]:
         return iter(sorted(self.nodes.values(), key=lambda node: node.address))

@@ -96,8 +96,9 @@ def _as_json(path: str, capture: Capture, session: Session, summary: Summary) ->
                 "verdicts": {verdict.value: count for verdict, count in node.verdicts.items()},
                 "errors": dict(node.errors),
             }
-            for node in summary.nodes
+            for node in summary.nodes.present()
         ],
+        "polled_only": summary.nodes.absent(),
     }
 
 
@@ -135,11 +136,14 @@ def _print(path: str, capture: Capture, session: Session, summary: Summary, even
         shown = ", ".join(f"{name} {milliseconds(value)}" for name, value in quantiles if value is not None)
         bound = f" (each known to ±{milliseconds(adapter.latency)})" if adapter.latency else ""
         _line("response", shown + bound)
-    for node in summary.nodes:
+    for node in summary.nodes.present():
         verdicts = {verdict.value: count for verdict, count in node.verdicts.items()}
         _line(f"node {node.address}", f"{node.sent} frames from, {node.received} to; {_listed(verdicts)}")
         if node.errors:
             _line("", _listed(node.errors))
+    absent = summary.nodes.absent()
+    if absent:
+        _line("polled only", f"{spans(absent)}: never heard, never asked anything")
     for event in events[:20]:
         _line("event", f"{iso(event.time)} {event.kind.value} {event.text} {event.count or ''}".rstrip())
     if len(events) > 20:
@@ -155,7 +159,7 @@ def _span(seconds: float) -> str:
     if seconds < 120:
         return f"{seconds:.3f} s"
     hours, rest = divmod(int(seconds), 3600)
-    return f"{hours} h {rest // 60} min {rest % 60} s"
+    return f"{f'{hours} h ' if hours else ''}{rest // 60} min {rest % 60} s"
 
 
 def _listed(counts: dict[str, int]) -> str:
@@ -165,3 +169,14 @@ def _listed(counts: dict[str, int]) -> str:
 
 def _counts(counts: dict[str, int]) -> str:
     return f" ({_listed(counts)})" if counts else ""
+
+
+def spans(numbers: list[int]) -> str:
+    """Ascending numbers with runs drawn together: "0–10, 13, 15–26"."""
+    parts: list[list[int]] = []
+    for number in numbers:
+        if parts and parts[-1][-1] == number - 1:
+            parts[-1][1:] = [number]
+        else:
+            parts.append([number])
+    return ", ".join("–".join(map(str, part)) for part in parts)

@@ -14,6 +14,7 @@ from dissectors.frame import Frame
 from dissectors.registry import Dissector
 from sniff.analysis.filtering import FilterError, compile_filter
 from sniff.cli import USAGE, Failure, arguments, rows
+from sniff.cli.tables import safe_cell
 from sniff.reading import Settled, dissector_for, settled
 from sniff.session import Session
 
@@ -90,9 +91,9 @@ def _cells(item: Settled, names: list[str], dissector: Dissector, session: Sessi
 def _cell(value: object) -> str:
     if value is None:
         return ""
-    text = str(int(value)) if isinstance(value, bool) else str(value)
-    # A spreadsheet would run such a cell as a formula.
-    return "'" + text if isinstance(value, str) and text[:1] in "=+-@" else text
+    return (
+        str(int(value)) if isinstance(value, bool) else str(safe_cell(str(value)) if isinstance(value, str) else value)
+    )
 
 
 def _tree(item: Settled, dissector: Dissector) -> str:

@@ -1,0 +1,114 @@
+"""Tables: nodes (each station), transactions (by kind and verdict), latency (each station's response times), load (by
+second or --every). Response times are uncertain by what the adapter may hold back: see `info`.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections import Counter
+
+from dissectors.line import NS_PER_S
+from sniff.analysis.histogram import Histogram
+from sniff.analysis.load import Second
+from sniff.analysis.nodes import Node
+from sniff.analysis.summary import Summary
+from sniff.cli import arguments, tables
+from sniff.cli.rows import iso
+from sniff.cli.tables import Cell
+from sniff.engine import Output
+from sniff.reading import outputs
+
+TABLES = ("nodes", "transactions", "latency", "load")
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Options of `stats`."""
+    parser.add_argument("file", metavar="FILE", help="capture")
+    parser.add_argument("table", nargs="?", choices=TABLES, default="nodes", help="which table (default: nodes)")
+    arguments.add_line(parser)
+    parser.add_argument("--every", type=arguments.duration, default=1.0, metavar="TIME", help="load: length of a row")
+    style = parser.add_mutually_exclusive_group()
+    style.add_argument("--json", action="store_const", const="json", dest="style", help="one JSON object a row")
+    style.add_argument("--csv", action="store_const", const="csv", dest="style", help="comma-separated values")
+    parser.set_defaults(style="text")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print one table."""
+    capture = arguments.open_capture(args.file)
+    session = arguments.settings_of(args, capture.session)
+    summary = Summary(session.line)
+    kinds: Counter[tuple[str, str]] = Counter()
+    for output in outputs(capture.items(), session):
+        if isinstance(output, Output):
+            summary.add(output)
+            kinds.update((transaction.kind, transaction.verdict.value) for transaction in output.transactions)
+    if args.table == "nodes":
+        tables.write(NODE_HEADINGS, [_node(node) for node in summary.nodes.present()], args.style)
+    elif args.table == "transactions":
+        ordered = sorted(kinds.items(), key=lambda pair: (pair[0][0], -pair[1]))
+        tables.write(("kind", "verdict", "count"), [(*key, count) for key, count in ordered], args.style)
+    elif args.table == "latency":
+        rows = [(node.address, *_quantiles(node.latency)) for node in summary.nodes if node.latency.count]
+        bound = session.adapter.latency / 1e6
+        tables.write(LATENCY_HEADINGS, [(*row, bound) for row in rows], args.style)
+    else:
+        tables.write(LOAD_HEADINGS, _load(summary, int(args.every * NS_PER_S)), args.style)
+    return 0
+
+
+NODE_HEADINGS = (
+    "address",
+    "frames from",
+    "frames to",
+    "asked",
+    "answered",
+    "exceptions",
+    "no response",
+    "late",
+    "twice",
+    "damaged",
+    "p50 ms",
+    "p95 ms",
+    "max ms",
+)
+LATENCY_HEADINGS = ("address", "answers", "least ms", "p50 ms", "p95 ms", "max ms", "± ms")
+LOAD_HEADINGS = ("from", "load %", "frames", "damaged", "noise octets", "octets")
+
+
+def _node(node: Node) -> tuple[Cell, ...]:
+    by_name = {verdict.value: count for verdict, count in node.verdicts.items()}
+    return (
+        node.address,
+        node.sent,
+        node.received,
+        node.asked,
+        by_name.get("answered", 0) + by_name.get("retry", 0),
+        by_name.get("exception", 0),
+        by_name.get("no-response", 0),
+        by_name.get("late", 0),
+        by_name.get("answered-twice", 0),
+        node.damaged,
+        *_quantiles(node.latency)[2:],
+    )
+
+
+def _quantiles(latency: Histogram) -> tuple[Cell, ...]:
+    values = (latency.least, latency.quantile(0.5), latency.quantile(0.95), latency.most)
+    return (latency.count, *(None if value is None else value / 1e6 for value in values))
+
+
+def _load(summary: Summary, every: int) -> list[tuple[Cell, ...]]:
+    every = max(NS_PER_S, every // NS_PER_S * NS_PER_S)
+    spans: dict[int, Second] = {}
+    for number, second in summary.load.seconds.items():
+        part = spans.setdefault(number * NS_PER_S // every, Second())
+        part.busy += second.busy
+        part.octets += second.octets
+        part.frames += second.frames
+        part.damaged += second.damaged
+        part.noise += second.noise
+    return [
+        (iso(number * every), 100 * min(1.0, part.busy / every), part.frames, part.damaged, part.noise, part.octets)
+        for number, part in sorted(spans.items())
+    ]

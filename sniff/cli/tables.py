@@ -1,0 +1,54 @@
+"""Tables as text, CSV or JSON Lines. A cell is text or a number; units stand in the heading."""
+
+from __future__ import annotations
+
+import csv
+import json
+import sys
+from collections.abc import Iterable, Sequence
+
+Cell = str | int | float | None
+
+
+def write(headings: Sequence[str], rows: Iterable[Sequence[Cell]], style: str = "text") -> None:
+    """Print a table. `style`: "text" (aligned), "csv", "json" (one object a row, headings as keys)."""
+    if style == "json":
+        for row in rows:
+            print(json.dumps(dict(zip(headings, row, strict=True)), ensure_ascii=False))
+    elif style == "csv":
+        writer = csv.writer(sys.stdout, lineterminator="\n")
+        writer.writerow(headings)
+        writer.writerows([[safe_cell(cell) for cell in row] for row in rows])
+    else:
+        _write_text(headings, [[_shown(cell) for cell in row] for row in rows])
+
+
+def safe_cell(cell: Cell) -> Cell:
+    """A cell that no spreadsheet takes for a formula (it would run what begins with = + - @)."""
+    return "'" + cell if isinstance(cell, str) and cell[:1] in ("=", "+", "-", "@", "\t", "\r") else cell
+
+
+def _shown(cell: Cell) -> str:
+    if cell is None:
+        return "–"
+    if isinstance(cell, float):
+        return f"{cell:.2f}" if abs(cell) < 100 else f"{cell:.0f}"
+    return str(cell)
+
+
+def _write_text(headings: Sequence[str], rows: list[list[str]]) -> None:
+    if not rows:
+        print("nothing")
+        return
+    widths = [max(len(line[column]) for line in [list(headings), *rows]) for column in range(len(headings))]
+    numeric = [all(_is_number(row[column]) for row in rows) for column in range(len(headings))]
+    for line in [list(headings), *rows]:
+        cells = [
+            cell.rjust(width) if right else cell.ljust(width)
+            for cell, width, right in zip(line, widths, numeric, strict=True)
+        ]
+        print("  ".join(cells).rstrip())
+
+
+def _is_number(text: str) -> bool:
+    return text == "–" or text.replace(".", "", 1).replace("%", "", 1).lstrip("-−").isdigit()
