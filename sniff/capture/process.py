@@ -11,6 +11,7 @@ import contextlib
 import os
 import signal
 import socket
+import stat
 import sys
 from types import FrameType
 
@@ -136,9 +137,9 @@ def _end_on_signals(loop: CaptureLoop) -> socket.socket:
 def connect() -> socket.socket:
     """The connection to the main process, by standard input.
 
-    POSIX: standard input is the connection. Elsewhere it says where to connect to and what to say there first.
+    It is that connection, or (Windows) a pipe that says where to connect to and what to say there first.
     """
-    if os.name == "posix":
+    if stat.S_ISSOCK(os.fstat(0).st_mode):
         connection = socket.socket(fileno=os.dup(0))
         nothing = os.open(os.devnull, os.O_RDONLY)
         os.dup2(nothing, 0)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import platform
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 NS_PER_MS = 1_000_000
 USB_FRAME = 1 * NS_PER_MS
@@ -86,6 +86,9 @@ _ALIASES = {
     "pty": r"pty",
 }
 
+BY_VENDOR = {0x0403: "ftdi_sio", 0x10C4: "cp210x", 0x1A86: "ch341", 0x067B: "pl2303"}
+"""USB vendor → driver, for systems that do not name one: how long the chip holds octets back is the same there."""
+
 UNKNOWN = Driver("", None, "unknown driver: errors may go unreported", 20 * NS_PER_MS, "assumed for an unknown driver")
 
 
@@ -99,10 +102,18 @@ def find_driver(name: str) -> Driver:
     return UNKNOWN
 
 
+def guess_driver(vendor: int | None) -> Driver:
+    """The driver of a USB vendor where the system is not Linux; what it reports there is not known."""
+    known = DRIVERS.get(BY_VENDOR.get(vendor or 0, ""))
+    if known is None:
+        return UNKNOWN
+    return replace(known, reports=None, detail="what this system's driver reports is not known")
+
+
 def _today(driver: Driver) -> Driver:
     """cp210x before Linux 5.9 reports nothing (commit a7207e9835a4)."""
     if driver.name == "cp210x" and _kernel() < (5, 9):
-        return Driver(driver.name, (), "no line errors before Linux 5.9", driver.hold, driver.hold_from)
+        return replace(driver, reports=(), detail="no line errors before Linux 5.9")
     return driver
 
 

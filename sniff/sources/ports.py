@@ -9,7 +9,7 @@ from pathlib import Path
 
 from dissectors.line import LineSettings
 from sniff.session import Adapter
-from sniff.sources.drivers import NS_PER_MS, UNKNOWN, USB_FRAME, Driver, find_driver
+from sniff.sources.drivers import NS_PER_MS, UNKNOWN, USB_FRAME, Driver, find_driver, guess_driver
 
 CAPTURE_PROCESS = b"sniff.capture.process"
 """In the command line of our own capture process; what follows says what it does."""
@@ -56,18 +56,21 @@ def describe_port(device: str, line: LineSettings | None = None) -> Adapter:
 
     `line`: for UARTs whose FIFO waits for characters; 9600 Bd is assumed without it.
     """
+    product = _product(device)
     driver_name = _driver_name(device)
-    driver = find_driver(driver_name)
-    name, serial_number = _product(device)
+    driver = find_driver(driver_name) if driver_name else guess_driver(product.vendor)
+    reports, detail = driver.reports, driver.detail
+    if os.name != "posix":
+        reports, detail = (), "this system hands over no line errors: none seen does not mean a clean line"
     latency, latency_from = _latency(device, driver, line or LineSettings())
     return Adapter(
-        name=name or driver.name or "unknown",
+        name=product.name or driver.name or "unknown",
         driver=driver_name,
         latency=latency,
         latency_from=latency_from,
-        reports=driver.reports,
-        detail=driver.detail,
-        serial_number=serial_number,
+        reports=reports,
+        detail=detail,
+        serial_number=product.serial_number,
     )
 
 
@@ -160,18 +163,26 @@ def _driver_name(device: str) -> str:
     return ""
 
 
-def _product(device: str) -> tuple[str, str]:
-    """Name and serial number of an adapter, as it says itself; empty where it says nothing."""
+@dataclass(frozen=True, slots=True)
+class _Product:
+    """What an adapter says about itself."""
+
+    name: str = ""
+    serial_number: str = ""
+    vendor: int | None = None
+
+
+def _product(device: str) -> _Product:
     if is_pty(device):
-        return "pseudo-terminal", ""
+        return _Product("pseudo-terminal")
     from serial.tools import list_ports as tools
 
     real = os.path.realpath(device)
     for port in tools.comports():
-        if device == port.device or real == port.device:
+        if port.device in (device, real):
             name = port.product or (port.description if port.description != "n/a" else "")
-            return str(name or ""), str(port.serial_number or "")
-    return "", ""
+            return _Product(str(name or ""), str(port.serial_number or ""), port.vid)
+    return _Product()
 
 
 def _latency(device: str, driver: Driver, line: LineSettings) -> tuple[int, str]:

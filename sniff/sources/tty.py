@@ -18,6 +18,7 @@ from typing import Any, NoReturn, cast
 import serial
 
 from dissectors.line import LineSettings
+from sniff.sources.ports import is_pty
 
 
 class ListeningPort(serial.Serial):
@@ -78,6 +79,7 @@ def open_listening(device: str, line: LineSettings) -> ListeningPort:
     port.timeout = 0
     port.apply(line)
     port.open()
+    keep_others_out(port)
     ask_low_latency(port)
     return port
 
@@ -104,6 +106,22 @@ def release_transmitter(fd: int | None) -> None:
     if fd is not None:
         with contextlib.suppress(OSError):
             fcntl.ioctl(fd, termios.TIOCMBIC, struct.pack("I", termios.TIOCM_RTS | termios.TIOCM_DTR))
+
+
+def keep_others_out(port: ListeningPort) -> None:
+    """Have the system refuse others that open the port: they would take octets away and raise RTS and DTR.
+
+    The lock that pyserial takes stops only those who ask for it. Not for a pseudo-terminal: whoever made it holds it
+    open, so that the refusal would outlive a process that is killed.
+    """
+    fd = getattr(port, "fd", None)
+    if fd is None or is_pty(str(port.port)):
+        return
+    with contextlib.suppress(ImportError, OSError):
+        import fcntl
+        import termios
+
+        fcntl.ioctl(fd, termios.TIOCEXCL)
 
 
 def mark_line_errors(fd: int | None) -> bool:

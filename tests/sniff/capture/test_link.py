@@ -193,6 +193,25 @@ def wait_until_gone(pid: int, seconds: float = 10.0) -> None:
     pytest.fail(f"process {pid} did not end")
 
 
+def test_where_no_socket_can_be_inherited(pty, tmp_path, monkeypatch, collect, octets) -> None:
+    """As on Windows: the capture process connects to the main process and proves who it is."""
+    import tempfile
+
+    from sniff.capture import link, spawn
+
+    def over_the_network(words):
+        errors = tempfile.TemporaryFile()  # noqa: SIM115 (closed by the link)
+        command = [sys.executable, "-P", "-m", "sniff.capture.process", *words]
+        return spawn._spawn_and_listen(command, {"stdout": errors, "stderr": errors}, errors)
+
+    monkeypatch.setattr(link, "spawn", over_the_network)
+    file = str(tmp_path / "x.mcap")
+    with CaptureLink.start([SourceSpec(pty.path, LINE)], RecordSpec(file)) as running:
+        pty.feed(b"\x01\xff")
+        collect(running, lambda got: octets(got) == b"\x01\xff")
+        assert running.derived(0, "/bus/bus", "sniff485.Bus", 1, 1, b"{}")
+
+
 def test_nothing_in_the_current_folder_is_imported(pty, tmp_path, monkeypatch) -> None:
     (tmp_path / "serial.py").write_text("raise SystemExit('hostile')")
     (tmp_path / "mcap.py").write_text("raise SystemExit('hostile')")

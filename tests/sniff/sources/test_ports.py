@@ -86,3 +86,17 @@ def test_who_holds_a_port(pty, tmp_path) -> None:
 
 def test_listing_needs_no_rights() -> None:
     assert all(port.device and port.adapter.name for port in list_ports())
+
+
+def test_a_usb_chip_is_known_where_the_system_names_no_driver(monkeypatch) -> None:
+    from types import SimpleNamespace
+
+    import serial.tools.list_ports as tools
+
+    port = SimpleNamespace(device="COM7", vid=0x0403, product="FT232R", description="", serial_number="A1")
+    monkeypatch.setattr(tools, "comports", lambda: [port])
+    adapter = describe_port("COM7")
+    assert (adapter.name, adapter.serial_number, adapter.latency) == ("FT232R", "A1", 17_000_000)
+    assert adapter.reports is None
+    port.vid = None
+    assert describe_port("COM7").latency == 20_000_000

@@ -147,6 +147,21 @@ def test_a_second_listener_is_refused_and_told_who(pty, source) -> None:
     assert f"pid {os.getpid()}" in str(caught.value)
 
 
+@pytest.mark.parametrize("real", [True, False])
+def test_others_are_kept_out_of_a_real_port(pty, monkeypatch, real) -> None:
+    import fcntl
+    import termios
+
+    requests = []
+    ioctl = fcntl.ioctl
+    monkeypatch.setattr(
+        fcntl, "ioctl", lambda fd, request, *rest: requests.append(request) or ioctl(fd, request, *rest)
+    )
+    monkeypatch.setattr(tty, "is_pty", lambda device: not real)
+    SerialSource(pty.path, LINE, Clock.start()).close()
+    assert (termios.TIOCEXCL in requests) is real
+
+
 def test_free_again_after_closing(pty, source) -> None:
     source.close()
     assert source.ended
