@@ -10,6 +10,7 @@ buses use the same frame.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 from dissectors.n2.objects import ATTRIBUTES, INTERNAL, REGIONS, Encoding, decode, is_hex
 
@@ -135,6 +136,7 @@ def fields_of(octets: bytes) -> str:
     return characters(octets[1:-3]) if len(octets) >= 4 else characters(octets[1:-1])
 
 
+@lru_cache(maxsize=4096)  # a master asks the same things all day
 def parse_command(octets: bytes) -> Command:
     """Take a whole command frame apart; total, also for damaged ones."""
     body = fields_of(octets)

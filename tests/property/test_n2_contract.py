@@ -13,6 +13,7 @@ from dissectors.line import Timing
 from dissectors.n2.framing import MAX_LENGTH, N2Framer
 from tests.property.framer_contract import framer_contract
 
+relaxed = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
 MS = 1_000_000
 START = 10**18
 
@@ -47,14 +48,7 @@ def run(framer: N2Framer, chunks: list[Chunk]) -> list[Event]:
     return events + framer.close()
 
 
-@given(stretches, latencies)
-def test_every_octet_is_in_exactly_one_event_in_order(parts, latency):
-    timing = Timing(latency=latency)
-    events = run(N2Framer(timing), chunks_of(parts, timing))
-    assert b"".join(e.octets for e in events) == b"".join(p for p, _ in parts)
-    assert all(e.octets and e.start <= e.end for e in events)
-
-
+@relaxed
 @given(stretches, latencies, st.data())
 def test_cuts_do_not_matter(parts, latency, data):
     timing = Timing(latency=latency)
@@ -69,18 +63,7 @@ def test_cuts_do_not_matter(parts, latency, data):
     assert run(N2Framer(timing), cut) == run(N2Framer(timing), chunks)
 
 
-@given(stretches, latencies)
-def test_whole_or_octet_by_octet(parts, latency):
-    timing = Timing(latency=latency)
-    chunks = chunks_of(parts, timing)
-    single = [
-        Chunk(c.time - (len(c.octets) - 1 - i) * timing.char, c.octets[i : i + 1])
-        for c in chunks
-        for i in range(len(c.octets))
-    ]
-    assert run(N2Framer(timing), single) == run(N2Framer(timing), chunks)
-
-
+@relaxed
 @given(stretches, latencies)
 def test_listening_live_gives_what_a_replay_gives(parts, latency):
     """Octet by octet, `advance` at every deadline and just before each octet changes nothing."""
@@ -102,8 +85,8 @@ def test_listening_live_gives_what_a_replay_gives(parts, latency):
     assert events == run(N2Framer(timing), single)
 
 
+@relaxed
 @given(st.lists(st.tuples(st.integers(-(10**12), 10**12), st.binary(max_size=300)), max_size=20), latencies)
-@settings(suppress_health_check=[HealthCheck.too_slow])
 def test_any_octets_any_times(reads, latency):
     framer, seen = N2Framer(Timing(latency=latency)), b""
     for time, octets in reads:
@@ -116,6 +99,7 @@ def test_any_octets_any_times(reads, latency):
     framer.close()
 
 
+@settings(relaxed, max_examples=25)
 @given(st.binary(min_size=2000, max_size=4000).map(lambda o: o.replace(b"\r", b"\n")))
 def test_memory_is_bounded_without_any_end(octets):
     timing = Timing()
@@ -124,6 +108,7 @@ def test_memory_is_bounded_without_any_end(octets):
     assert len(octets) - given_out <= 2 * MAX_LENGTH
 
 
+@relaxed
 @given(stretches, latencies, st.sampled_from(COMMANDS))
 def test_after_any_rubbish_the_next_command_is_found_at_once(parts, latency, command):
     timing = Timing(latency=latency)
@@ -138,6 +123,7 @@ def test_after_any_rubbish_the_next_command_is_found_at_once(parts, latency, com
     assert events[-1].octets == command
 
 
+@relaxed
 @given(stretches, latencies, st.sampled_from(ANSWERS))
 def test_after_any_rubbish_and_silence_the_next_answer_is_found(parts, latency, answer):
     timing = Timing(latency=latency)
@@ -151,6 +137,7 @@ def test_after_any_rubbish_and_silence_the_next_answer_is_found(parts, latency, 
     assert events[-1].octets == answer
 
 
+@relaxed
 @given(stretches, latencies, st.sampled_from(COMMANDS), st.sampled_from(ANSWERS + SHORT))
 def test_after_any_rubbish_an_exchange_without_a_pause_is_found(parts, latency, command, answer):
     timing = Timing(latency=latency)
@@ -159,11 +146,13 @@ def test_after_any_rubbish_an_exchange_without_a_pause_is_found(parts, latency, 
     assert all(isinstance(e, Frame) and e.damage is None for e in events[-2:])
 
 
+@relaxed
 @given(stretches, latencies)
 def test_what_a_frame_says_of_how_it_was_found_is_true(parts, latency):
     timing = Timing(latency=latency)
-    skipped = 0
+    skipped, seen = 0, b""
     for event in run(N2Framer(timing), chunks_of(parts, timing)):
+        seen += event.octets
         if isinstance(event, Noise):
             skipped += len(event.octets)
             continue
@@ -175,8 +164,10 @@ def test_what_a_frame_says_of_how_it_was_found_is_true(parts, latency):
             assert event.octets.count(b">") == (event.octets[0] == 0x3E)
         if event.check is Check.GOOD:
             assert int(event.octets[-3:-1], 16) == sum8(event.octets[1:-3])
+    assert seen == b"".join(octets for octets, _ in parts)
 
 
+@relaxed
 @given(st.lists(st.sampled_from(COMMANDS), min_size=1, max_size=4), st.integers(1, 60), latencies)
 def test_joined_in_the_middle_no_answer_is_made_of_a_command(commands, cut, latency):
     """`A` is a hex digit: a tail of a command must not pass for an answer that nobody sent."""
@@ -186,6 +177,7 @@ def test_joined_in_the_middle_no_answer_is_made_of_a_command(commands, cut, late
     assert all(e.octets[:1] == b">" for e in events if isinstance(e, Frame))
 
 
+@relaxed
 @given(st.sampled_from(COMMANDS + ANSWERS), st.data())
 def test_one_damaged_octet_is_never_a_good_frame(frame, data):
     at = data.draw(st.integers(1, len(frame) - 1))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dissectors.checksums import sum8
@@ -15,6 +15,7 @@ from dissectors.n2.framing import judge
 from dissectors.n2.objects import Encoding, decode, encode
 from dissectors.n2.simulated import Follower, Master, command, readings
 
+relaxed = settings(deadline=None)
 START = st.sampled_from([b">", b"A", b"N"])
 CHARACTERS = st.text("0123456789ABCDEFabcdefZ\x00\x1b[]\xff", max_size=30).map(lambda t: t.encode("latin-1"))
 
@@ -35,6 +36,7 @@ def frame_of(octets: bytes) -> Frame:
     return Frame("n2", octets, 0, 10**6, check, Found.DELIMITER, damage)
 
 
+@relaxed
 @given(octets)
 def test_a_frame_is_always_shown(octets):
     frame = frame_of(octets)
@@ -48,6 +50,7 @@ def test_a_frame_is_always_shown(octets):
     assert all(value.isprintable() for value in named.values() if isinstance(value, str))
 
 
+@relaxed
 @given(octets)
 def test_a_packet_is_always_made_and_gives_its_octets_back(octets):
     made = packet(frame_of(octets), Role.EITHER)
@@ -56,6 +59,7 @@ def test_a_packet_is_always_made_and_gives_its_octets_back(octets):
     made.show(dump=True)
 
 
+@relaxed
 @given(octets)
 def test_packet_and_peek_agree(octets):
     frame = frame_of(octets)
@@ -67,6 +71,7 @@ def test_packet_and_peek_agree(octets):
         assert header.address == made.region << 8 | made.object
 
 
+@relaxed
 @given(octets, octets)
 def test_any_two_frames_can_be_interpreted(request, response):
     read = interpret(frame_of(request), frame_of(response))
@@ -75,6 +80,7 @@ def test_any_two_frames_can_be_interpreted(request, response):
         assert read.value is None
 
 
+@relaxed
 @given(st.lists(octets, max_size=10))
 def test_simulated_stations_stand_anything(bursts):
     drive, master, now = Follower(1), Master(readings(1)), 0
@@ -89,6 +95,7 @@ def test_simulated_stations_stand_anything(bursts):
             assert due is None or isinstance(due, int)
 
 
+@relaxed
 @given(st.lists(octets, max_size=12))
 def test_findings_may_be_asked_at_any_time(parts):
     curious, patient = N2Findings(Timing()), N2Findings(Timing())
@@ -110,12 +117,14 @@ def test_findings_may_be_asked_at_any_time(parts):
         assert all(f.isprintable() for f in (finding.subject, finding.seen, finding.means, finding.next))
 
 
+@relaxed
 @given(st.floats(width=32, allow_nan=False))
 def test_a_float_is_read_as_the_single_that_was_sent(value):
     read = decode(encode(value, Encoding.FLOAT), Encoding.FLOAT)
     assert struct.pack(">f", read) == struct.pack(">f", value)
 
 
+@relaxed
 @given(st.integers(-(2**15), 2**15 - 1))
 def test_an_integer_is_read_as_sent(value):
     assert decode(encode(value, Encoding.INTEGER), Encoding.INTEGER, signed=True) == value

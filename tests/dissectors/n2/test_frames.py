@@ -146,6 +146,12 @@ def test_an_answer_is_found_behind_a_stray_octet_while_one_is_awaited():
     assert events[2].skipped == 2
 
 
+def test_behind_text_an_answer_does_not_begin_even_while_one_is_awaited():
+    # the first character of an answer was lost: its rest ends like an acknowledgement with an empty checksum
+    events = wire(b">0111010387\r", b"4A00\r")
+    assert [type(e) for e in events] == [Frame, Noise]
+
+
 def test_a_damaged_answer_is_kept():
     events = wire(b">0111010387\r", b"A00429\xb10000F0\r")
     assert [(e.octets, e.damage) for e in events[1:]] == [(b"A00429\xb10000F0\r", Damage.FORM)]

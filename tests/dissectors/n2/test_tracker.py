@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dissectors.frame import Check, Chunk, Damage, Found, Frame, Noise, Place, Reason, Role
@@ -14,6 +14,7 @@ from dissectors.n2.framing import judge
 from dissectors.n2.tracker import GIVE_UP, fits
 from dissectors.tracker import Tracked, Transaction, Verdict
 
+relaxed = settings(deadline=None)
 MS = 1_000_000
 TIMING = Timing()
 READ, READ_OTHER, POLL = b">0111010387\r", b">1011010387\r", b">0104C5\r"
@@ -236,6 +237,7 @@ pieces = st.one_of(
 )
 
 
+@relaxed
 @given(st.lists(st.tuples(pieces, st.sampled_from([0, 2 * MS, 10 * MS, 300 * MS, 4000 * MS, 10**11])), max_size=25))
 def test_every_frame_has_a_place_and_every_transaction_one_end(parts):
     framer, tracker, now = N2Framer(TIMING), N2Tracker(TIMING), 10**18
@@ -260,6 +262,7 @@ def test_every_frame_has_a_place_and_every_transaction_one_end(parts):
     assert all(t.request < t.response and t.latency is not None for t in answers)
 
 
+@relaxed
 @given(st.lists(st.tuples(pieces, st.integers(-(10**12), 10**12)), max_size=15))
 def test_any_times(parts):
     tracker = N2Tracker(TIMING)
