@@ -55,7 +55,6 @@ class Batcher:
 
     def __init__(self, first: int = 0) -> None:
         self.next = first
-        self.since: int | None = None  # when the oldest thing not yet given out happened
         self._line_number = 0
         self._clear()
 
@@ -92,8 +91,6 @@ class Batcher:
             record["count"] = event.count
         if stamp(event.time) != event.time:
             record["time_ns"] = event.time
-        if self.since is None:
-            self.since = event.time
         self._line(event.time, record)
 
     def close(self) -> list[Message]:
@@ -120,7 +117,6 @@ class Batcher:
         self._octets: list[bytes] = []
         self._held = 0
         self._lines: list[Message] = []
-        self.since = None
 
     def _fits(self, time: int) -> bool:
         """Whether a chunk of that time may join the batch: none is earlier than the one before it."""
@@ -133,8 +129,6 @@ class Batcher:
         )
 
     def _entry(self, time: int, octets: bytes) -> None:
-        if self.since is None:
-            self.since = time
         self._times.append(time)
         self._octets.append(octets)
         self._held += len(octets)

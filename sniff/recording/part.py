@@ -18,6 +18,7 @@ from sniff.session import Session
 
 CHUNK_SIZE = 1 << 20
 
+_WRITTEN_AT_ONCE = 1 << 18
 _KNOWN = {**SCHEMAS, frames.SCHEMA.name: frames.SCHEMA}
 
 
@@ -95,12 +96,8 @@ class PartFile:
 
     def _drain(self) -> None:
         waiting = self._pending.octets
-        done = 0
-        try:
-            with memoryview(waiting) as view:
-                while done < len(view):
-                    done += self.stream.write(view[done:]) or 0
-        finally:
+        while waiting:
+            done = self.stream.write(bytes(waiting[:_WRITTEN_AT_ONCE])) or 0
             del waiting[:done]
             self._pending.written += done
 

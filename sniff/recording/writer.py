@@ -2,28 +2,25 @@
 
 A recorder never waits for the disk: the capture's thread only collects octets; another thread packs, writes, syncs
 and rotates. Loss is bounded in time by the caller's `tick`: a chunk is in the file within 1 s and on the disk within
-10 s. When the disk does not take it, `trouble` says so in words, up to `MOST_WAITING` octets wait in memory for room,
-and what comes after that is counted in `lost_octets`; the numbering in the file shows the hole. Nothing is raised
-into the capture but a file that cannot be created at the start.
+10 s. When the disk does not take it, `trouble` says so in words, up to `keeper.MOST_WAITING` octets wait in memory for
+room, and what comes after that is counted in `lost_octets`; the numbering in the file shows the hole. Nothing is
+raised into the capture but a file that cannot be created at the start.
 """
 
 from __future__ import annotations
 
-import contextlib
 import threading
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
-from queue import SimpleQueue
-from typing import BinaryIO
 
 from dissectors.frame import Chunk
-from sniff.formats import CaptureError
 from sniff.formats.files import NewFile, explain
+from sniff.recording import keeper
 from sniff.recording.batch import Batcher, Message, stamp
+from sniff.recording.keeper import CLOSE, FLUSH, SYNC, Keeper, Parcel
 from sniff.recording.part import PartFile
-from sniff.recording.rotation import Rotation, part_name, parts, remove_old
-from sniff.recording.topics import RAW
+from sniff.recording.rotation import Rotation
+from sniff.recording.topics import LINE, RAW
 from sniff.session import Item, LineEvent, Session
 
 FLUSH_AFTER = 700_000_000
@@ -31,9 +28,6 @@ FLUSH_AFTER = 700_000_000
 
 SYNC_AFTER = 8_000_000_000
 """ns between syncs: with a slow disk, all is on it within 10 s."""
-
-MOST_WAITING = 32 << 20
-"""Octets kept in memory for a disk that is slow or full: 45 min at 115200 Bd."""
 
 
 # -- converting ------------------------------------------------------------------------------------------------
@@ -93,31 +87,6 @@ class McapWriter:
 # -- recording -------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True)
-class _Batch:
-    """Messages that stay together, with how many octets and reads of the bus they hold."""
-
-    messages: list[Message]
-    octets: int
-    next: int
-    schema: str = ""
-    metadata: Mapping[str, str] | None = None
-
-    @property
-    def weight(self) -> int:
-        return sum(len(message.data) + 64 for message in self.messages)
-
-
-class _Order:
-    """What the writing thread is told besides messages."""
-
-    def __init__(self, name: str) -> None:
-        self.name = name
-
-
-_FLUSH, _SYNC, _CLOSE = _Order("flush"), _Order("sync"), _Order("close")
-
-
 class Recorder:
     """Records one bus. All methods are for one thread; none of them waits for the disk but `close`.
 
@@ -143,7 +112,8 @@ class Recorder:
         self._sent = 0
         self._dropped_octets = 0
         self._closed = False
-        self._keeper = _Keeper(Path(path), session, rotation, keep)
+        self._stuck: str | None = None
+        self._keeper = Keeper(Path(path), session, rotation, keep)
         self._thread = threading.Thread(target=self._keeper.run, name="recorder", daemon=True)
         self._thread.start()
 
@@ -179,13 +149,13 @@ class Recorder:
         metadata: Mapping[str, str] | None = None,
     ) -> None:
         """Record a result of the engine, best effort. `schema_name`: one of `topics.SCHEMAS`; `metadata`: of the
-        channel, taken when the topic is new in a file."""
-        if self._closed:
+        channel, taken when the topic is new in a file. /raw and /line are not for results."""
+        if self._closed or topic in (RAW, LINE):
             return
         sequence = self._sequences.get(topic, 0)
         self._sequences[topic] = (sequence + 1) % (1 << 32)
         message = Message(topic, stamp(log_time), stamp(publish_time), sequence, data)
-        self._send(_Batch([message], 0, self._batcher.first, schema_name, metadata))
+        self._send(Parcel([message], 0, self._batcher.first, schema_name, metadata))
         self._note(log_time if self._now is None else self._now)
 
     def tick(self, now_ns: int) -> None:
@@ -199,10 +169,10 @@ class Recorder:
             return
         self._close_batch()
         self._closed = True
-        self._keeper.orders.put(_CLOSE)
+        self._keeper.orders.put(CLOSE)
         self._thread.join(60)
         if self._thread.is_alive():
-            self._keeper.trouble = f"{self.path}: the disk does not answer; the last seconds may be missing"
+            self._stuck = f"{self.path}: the disk does not answer; the last seconds may be missing"
 
     # what it tells
 
@@ -224,7 +194,7 @@ class Recorder:
     @property
     def trouble(self) -> str | None:
         """What is wrong, in words; None while all is well."""
-        return self._keeper.trouble
+        return self._stuck or self._keeper.trouble
 
     @property
     def lost_octets(self) -> int:
@@ -242,12 +212,12 @@ class Recorder:
         if self._oldest is not None and _due(self._oldest, now, FLUSH_AFTER):
             self._oldest = None
             self._close_batch()
-            self._keeper.orders.put(_FLUSH)
+            self._keeper.orders.put(FLUSH)
             if self._unsynced is None:
                 self._unsynced = now
         if self._unsynced is not None and _due(self._unsynced, now, SYNC_AFTER):
             self._unsynced = None
-            self._keeper.orders.put(_SYNC)
+            self._keeper.orders.put(SYNC)
 
     def _close_batch(self) -> None:
         messages = self._batcher.close()
@@ -255,137 +225,17 @@ class Recorder:
             self._send_raw(messages, self._batcher.first)
 
     def _send_raw(self, messages: list[Message], following: int) -> None:
-        self._send(_Batch(messages, self._open_octets, following))
+        self._send(Parcel(messages, self._open_octets, following))
         self._open_octets = 0
 
-    def _send(self, batch: _Batch) -> None:
-        if self._sent - self._keeper.taken > MOST_WAITING:
-            self._dropped_octets += batch.octets
+    def _send(self, parcel: Parcel) -> None:
+        if self._sent - self._keeper.taken > keeper.MOST_WAITING:
+            self._dropped_octets += parcel.octets
             return
-        self._sent += batch.weight
-        self._keeper.orders.put(batch)
+        self._sent += parcel.weight
+        self._keeper.orders.put(parcel)
 
 
 def _due(since: int, now: int, limit: int) -> bool:
     """Whether that long has passed, or the clock jumped back and nobody knows."""
     return not -limit < now - since < limit
-
-
-class _Keeper:
-    """The writing thread's side: owns the files. Its numbers are read by the other thread, never written there."""
-
-    def __init__(self, path: Path, session: Session, rotation: Rotation | None, keep: int | None) -> None:
-        self.orders: SimpleQueue[_Batch | _Order] = SimpleQueue()
-        self.paths: list[Path] = []
-        self.trouble: str | None = None
-        self.taken = 0
-        self.lost_octets = 0
-        self._path = path
-        self._session = session
-        self._rotation = rotation
-        self._keep = keep
-        self._next = 0  # number of the next entry of /raw
-        self._octets = 0  # of the bus, in all parts
-        self._finished_size = 0
-        self._first = 0  # of the part
-        self._began: int | None = None  # time of the part's first batch
-        try:
-            self._open()
-        except OSError as error:
-            raise _refused(path, error) from None
-
-    @property
-    def size(self) -> int:
-        return self._finished_size + self._part.size
-
-    def run(self) -> None:
-        order: _Batch | _Order | None = None
-        while order is not _CLOSE:
-            order = self.orders.get()
-            try:
-                if isinstance(order, _Batch):
-                    self._take(order)
-                elif order is _FLUSH:
-                    self._flush()
-                elif order is _SYNC:
-                    self._part.sync()
-                else:
-                    self._finish()
-            except OSError as error:
-                self.trouble = str(explain(self.paths[-1], error))
-            except Exception as error:  # the capture must go on whatever is wrong in here
-                self.trouble = f"{self.paths[-1]}: {type(error).__name__}: {error}"
-
-    def _take(self, batch: _Batch) -> None:
-        self.taken += batch.weight
-        if self._part.waiting > MOST_WAITING:
-            self.lost_octets += batch.octets
-            return
-        if batch.messages[-1].topic == RAW and self._part_is_full(batch):
-            try:
-                self._rotate()
-            except OSError as error:  # the old part goes on; the next batch tries again
-                self.trouble = str(explain(error.filename or self._path, error))
-        for message in batch.messages:
-            self._part.add(message, batch.schema, batch.metadata)
-        self._octets += batch.octets
-        self._next = batch.next
-        if self._began is None and batch.messages[-1].topic == RAW:
-            self._began = batch.messages[-1].publish_time
-
-    def _part_is_full(self, batch: _Batch) -> bool:
-        if self._rotation is None or self._began is None:
-            return False
-        age = batch.messages[-1].publish_time - self._began
-        return self._rotation.due(self._part.size, age, self._next - self._first)
-
-    def _flush(self) -> None:
-        self._part.flush()
-        self.trouble = None
-
-    def _rotate(self) -> None:
-        """Go on in a new part. Raises OSError before anything changed, so that the old part simply goes on."""
-        old, old_stream = self._part, self._stream
-        self._open()
-        self._finished_size += old.size
-        try:
-            old.finish()
-            old.sync()
-        finally:
-            old_stream.close()
-            if self._keep is not None:
-                remove_old(self._path, max(1, self._keep))
-
-    def _finish(self) -> None:
-        try:
-            self._part.finish()
-            self._part.sync()
-        finally:
-            with contextlib.suppress(OSError):
-                self._stream.close()
-
-    def _open(self) -> None:
-        path, number = self._path, 1
-        if self._rotation is not None:
-            number = max((number for number, _ in parts(path)), default=0) + 1
-            path = part_name(path, number)
-        stream: BinaryIO = open(path, "xb", buffering=0)  # noqa: SIM115
-        try:
-            before = {"first_chunk": self._next, "octets_before": self._octets}
-            part = PartFile(stream, self._session, len(self.paths) + 1, before)
-            part.flush()
-        except OSError:
-            stream.close()
-            path.unlink(missing_ok=True)
-            raise
-        self._stream = stream
-        self._part = part
-        self._first = self._next
-        self._began = None
-        self.paths.append(path)
-
-
-def _refused(path: Path, error: OSError) -> CaptureError:
-    if isinstance(error, FileNotFoundError):
-        return CaptureError(f"{path}: no such directory; create {path.parent} first")
-    return explain(error.filename or path, error)

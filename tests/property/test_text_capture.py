@@ -63,7 +63,8 @@ def test_values_come_back(session: Session, items: list[Item]) -> None:
     assert render(capture.session, capture.items()) == text
 
 
-TOKENS = """#!sniff-capture␣1 ⏎ ␍ #␣ line:␣ 19200,8E1 start:␣ note␣ :␣ 2026-03-01T10:00:00 Z + ~ - 1.5 ␣ 01 ! P " \\x0 #!␣
+TOKENS = """#!sniff-capture␣1 ⏎ ␍ #␣
+line:␣ 19200,8E1 start:␣ note␣ :␣ 2026-03-01T10:00:00 Z + ~ - 1.5 ␣ 01 ! P " \\x0 #!␣
 settings␣ count= note \ufeff ９""".replace("␍", "\r")
 TABLE = [token.replace("␣", " ").replace("⏎", "\n") for token in re.split(r"[ \n]", TOKENS)]
 FRAGMENTS = st.lists(st.one_of(st.sampled_from(TABLE), st.text(max_size=5), st.integers().map(str)), max_size=30).map(
