@@ -1,0 +1,53 @@
+"""Simulated stations on a virtual bus of pseudo-terminals, with faults; the capture is the real one. Nothing is
+recorded unless -w says where. Where output is no terminal, frames come as lines for --duration, then a summary.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+
+from dissectors.line import LineSettings
+from sniff.capture.config import RecordSpec, SourceSpec
+from sniff.cli import PORT_TROUBLE, USAGE, Failure, arguments, listening
+from sniff.cli.live import show
+
+DEFAULT_DURATION = 10.0
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Options of `demo`."""
+    arguments.add_line(parser)
+    parser.add_argument("--seed", type=int, default=485, metavar="N", help="which faults strike when (default 485)")
+    parser.add_argument("--clean", action="store_true", help="no faults")
+    parser.add_argument("-w", "--write", metavar="FILE", help="record to FILE (.mcap)")
+    parser.add_argument(
+        "--duration", type=arguments.duration, metavar="TIME", help="stop after (default without a terminal: 10 s)"
+    )
+    parser.add_argument("--json", action="store_true", help="JSON lines instead of the terminal UI")
+    parser.add_argument("--lines", action="store_true", help="lines of text instead of the terminal UI")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the virtual bus and listen to it."""
+    from sniff.simulation.bus import BusFailed, VirtualBus
+    from sniff.simulation.scenarios import UnknownScenario, scenario
+
+    try:
+        plan = scenario(args.protocol or "modbus-rtu", args.seed, not args.clean, args.line)
+    except UnknownScenario as error:
+        raise Failure(f"demo: {error}", USAGE) from None
+    on_terminal = sys.stdout.isatty() and sys.stdin.isatty() and not args.json and not args.lines
+    duration = args.duration or (None if on_terminal else DEFAULT_DURATION)
+    print(f"sniff485: virtual bus, {plan.line}: {plan.text}", file=sys.stderr)
+    try:
+        with VirtualBus.from_scenario(plan) as bus:
+            return _listen(bus.tap(), plan.line, plan.protocol, args, duration)
+    except (BusFailed, OSError) as error:
+        raise Failure(f"demo: no virtual bus here: {error}", PORT_TROUBLE) from None
+
+
+def _listen(port: str, line: LineSettings, protocol: str, args: argparse.Namespace, duration: float | None) -> int:
+    record = RecordSpec(args.write) if args.write else None
+    live = listening.start(SourceSpec(port, line, protocol, "demo"), record, duration)
+    return show(live, args.json, args.lines)
