@@ -69,6 +69,7 @@ class CaptureLoop:
     end_at: int | None = None
     reason: str | None = None
     _offset: int = 0
+    _due: int = _FAR
     _buses: list[_Bus] = field(default_factory=list)
 
     def run(self) -> str:
@@ -104,15 +105,15 @@ class CaptureLoop:
     # -- one turn ----------------------------------------------------------------------------------------------
 
     def _step(self) -> None:
-        now = self.clock.now()
-        due = min(self._beat_at, min((bus.due for bus in self._buses), default=_FAR))
-        for key, _ in self._selector.select(max(0, due - now) / 1e9):
+        wait = min(self._beat_at, self._due) - self.clock.now()
+        for key, _ in self._selector.select(max(0, wait) / 1e9):
             call: Callable[[], None] = key.data
             call()
         now = self.clock.now()
-        for bus in self._buses:
-            if bus.due <= now:
-                self._take(bus)
+        if self._due <= now:
+            for bus in self._buses:
+                if bus.due <= now:
+                    self._take(bus)
         if now >= self._beat_at or self.outlet.size > FLUSH_AT:
             self._beat(now)
 
@@ -131,13 +132,18 @@ class CaptureLoop:
         if fd != bus.fd:
             self._watch(bus, fd)
         deadline = source.deadline()
-        bus.due = _FAR if deadline is None else deadline
+        self._set_due(bus, _FAR if deadline is None else deadline)
         if source.ended and not bus.ended:
             bus.ended = True
-            bus.due = _FAR
+            self._set_due(bus, _FAR)
             self._watch(bus, None)
             if all(other.ended for other in self._buses):
                 self.stop("nothing more to read")
+
+    def _set_due(self, bus: _Bus, due: int) -> None:
+        if bus.due != due:
+            bus.due = due
+            self._due = min(other.due for other in self._buses)
 
     def _keep(self, index: int, item: Item) -> None:
         if self.recorders:
