@@ -23,6 +23,7 @@ from dissectors.line import LineSettings
 from sniff.simulation import hub
 from sniff.simulation.faults import Fault
 from sniff.simulation.hub import NO_STATIONS, Plan, Report
+from sniff.simulation.scenarios import Scenario
 from sniff.simulation.wire import Factory, Sent
 
 PATIENCE = 10.0  # s for the process to answer or to end
@@ -56,6 +57,11 @@ class VirtualBus:
         self._paused = paused
         self._process: multiprocessing.process.BaseProcess | None = None
         self._control: Any = None
+
+    @classmethod
+    def from_scenario(cls, plan: Scenario, paused: bool = False) -> VirtualBus:
+        """The bus of a scenario, in real time."""
+        return cls(plan.line, plan.stations, plan.faults, plan.seed, plan.gap, paused=paused)
 
     def open(self) -> None:
         """Start the process. Raises BusFailed."""

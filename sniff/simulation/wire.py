@@ -10,6 +10,7 @@ ground truth a test compares a capture with.
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from heapq import heappop, heappush
@@ -251,10 +252,19 @@ class Wire:
         truths = []
         for sent in current:
             if collided and any(_overlap((sent, other), self.line) for other in current if other is not sent):
-                truths.append(self._truth(sent.hit("collision"), False))
+                truths.append(self._truth(sent.hit("collision"), self._survived(sent, received)))
             else:
                 truths.append(self._truth(sent, _alone(self.line, sent).octets == sent.meant))
         return tuple(truths)
+
+    def _survived(self, sent: Transmission, received: Received) -> bool:
+        """Whether a transmission came through a collision: all its octets, right and in step, between others or not."""
+        first = bisect_left(received.ends, sent.start + self.line.char)
+        count = len(sent.meant)
+        ends = range(sent.start + self.line.char, sent.end(self.line) + 1, self.line.char)
+        return received.octets[first : first + count] == sent.meant and [*received.ends[first : first + count]] == [
+            *ends
+        ]
 
     def _truth(self, sent: Transmission, intact: bool) -> Sent:
         return Sent(sent.party, sent.start, sent.end(self.line), sent.meant, intact, sent.faults)

@@ -55,6 +55,22 @@ def open_pty() -> Iterator[type[Pty]]:
         os.close(one.fd)
 
 
+@pytest.fixture(scope="module")
+def running() -> Iterator[VirtualBus]:
+    with VirtualBus(LINE) as bus:
+        yield bus
+
+
+@pytest.fixture
+def bus(running: VirtualBus) -> Iterator[VirtualBus]:
+    """A bus without stations, for tests that take nobody else's word for it; everybody leaves it afterwards."""
+    running.switch([])
+    running.truth()
+    yield running
+    for name in running.report().delivered:
+        running.detach(name)
+
+
 class Clock:
     """Says one octet, ascending, every 20 ms."""
 
@@ -92,22 +108,21 @@ def clock_and_reverser(clock: bool) -> list[Party]:
     return [Party("clock", Clock(), answers=False), reverser] if clock else [reverser]
 
 
-def test_everybody_else_hears_what_one_party_writes(open_pty: type[Pty]) -> None:
-    with VirtualBus(LINE) as bus:
-        client, server, tap = (open_pty(path) for path in (bus.attach("client"), bus.attach("server"), bus.tap()))
-        client.write(bytes(range(256)))
-        assert server.read(256) == tap.read(256) == bytes(range(256))
-        server.write(b"answer")
-        assert client.read(6) == tap.read(6) == b"answer"
-        truths = bus.truth()
-        while len(truths) < 2:  # a burst of a party outside stays open for more of the same
-            truths += bus.truth()
-        assert [(one.party, one.octets) for one in truths if one.intact] == [
-            ("client", bytes(range(256))),
-            ("server", b"answer"),
-        ]
-        assert truths[0].end - truths[0].start == 256 * LINE.char
-        assert truths[1].start >= truths[0].end
+def test_everybody_else_hears_what_one_party_writes(bus: VirtualBus, open_pty: type[Pty]) -> None:
+    client, server, tap = (open_pty(path) for path in (bus.attach("client"), bus.attach("server"), bus.tap()))
+    client.write(bytes(range(256)))
+    assert server.read(256) == tap.read(256) == bytes(range(256))
+    server.write(b"answer")
+    assert client.read(6) == tap.read(6) == b"answer"
+    truths = bus.truth()
+    while len(truths) < 2:  # a burst of a party outside stays open for more of the same
+        truths += bus.truth()
+    assert [(one.party, one.octets) for one in truths if one.intact] == [
+        ("client", bytes(range(256))),
+        ("server", b"answer"),
+    ]
+    assert truths[0].end - truths[0].start == 256 * LINE.char
+    assert truths[1].start >= truths[0].end
 
 
 def test_octets_arrive_no_earlier_than_the_line_allows(open_pty: type[Pty]) -> None:
@@ -123,28 +138,27 @@ def test_octets_arrive_no_earlier_than_the_line_allows(open_pty: type[Pty]) -> N
         assert all(time_ns >= (place + 1) * line.char for place, time_ns in enumerate(arrived))
 
 
-def test_octets_that_a_tap_writes_are_counted_and_reach_nobody(open_pty: type[Pty]) -> None:
-    with VirtualBus(LINE) as bus:
-        client, tap = open_pty(bus.attach("client")), open_pty(bus.tap())
-        assert bus.report().tap_octets == 0
-        tap.write(b"\x01\x02\x03")
-        client.write(b"x")
-        assert tap.read(1) == b"x"
-        report = bus.report()
-        assert (report.tap_octets, report.tap_first) == (3, b"\x01\x02\x03")
-        assert client.read(1, patience=0.05) == b""
-        assert {one.party for one in bus.truth()} <= {"client"}
+def test_octets_that_a_tap_writes_are_counted_and_reach_nobody(bus: VirtualBus, open_pty: type[Pty]) -> None:
+    client, tap = open_pty(bus.attach("client")), open_pty(bus.tap())
+    before = bus.report().tap_octets
+    tap.write(b"\x01\x02\x03")
+    client.write(b"x")
+    assert tap.read(1) == b"x"
+    report = bus.report()
+    assert report.tap_octets - before == 3
+    assert report.tap_first.startswith(b"\x01\x02\x03")
+    assert client.read(1, patience=0.05) == b""
+    assert {one.party for one in bus.truth()} <= {"client"}
 
 
-def test_a_party_hears_itself_only_with_echo(open_pty: type[Pty]) -> None:
-    with VirtualBus(LINE) as bus:
-        plain, echoing = open_pty(bus.attach("plain")), open_pty(bus.attach("echoing", echo=True))
-        echoing.write(b"one")
-        assert plain.read(3) == b"one"
-        assert echoing.read(3) == b"one"
-        plain.write(b"two")
-        assert echoing.read(3) == b"two"
-        assert plain.read(1, patience=0.05) == b""
+def test_a_party_hears_itself_only_with_echo(bus: VirtualBus, open_pty: type[Pty]) -> None:
+    plain, echoing = open_pty(bus.attach("plain")), open_pty(bus.attach("echoing", echo=True))
+    echoing.write(b"one")
+    assert plain.read(3) == b"one"
+    assert echoing.read(3) == b"one"
+    plain.write(b"two")
+    assert echoing.read(3) == b"two"
+    assert plain.read(1, patience=0.05) == b""
 
 
 def test_stations_inside_answer_a_party_outside(open_pty: type[Pty]) -> None:
@@ -228,23 +242,25 @@ def test_a_name_is_given_once_and_a_closed_bus_says_so() -> None:
     bus.close()
 
 
-def test_an_adapter_can_be_unplugged_and_plugged_in_again_under_one_name(open_pty: type[Pty], tmp_path: Path) -> None:
+def test_an_adapter_can_be_unplugged_and_plugged_in_again_under_one_name(
+    bus: VirtualBus, open_pty: type[Pty], tmp_path: Path
+) -> None:
     link = str(tmp_path / "ttyTAP")
-    with VirtualBus(LINE) as bus:
-        client = open_pty(bus.attach("client"))
-        assert bus.tap(link=link) == link
-        tap = open_pty(link)
-        client.write(b"one")
-        assert tap.read(3) == b"one"
-        bus.detach("tap")
-        assert not os.path.lexists(link)
-        assert os.read(tap.fd, 1) == b""  # hung up
-        client.write(b"two")
-        time.sleep(0.05)
-        bus.tap(link=link)
-        again = open_pty(link)
-        client.write(b"three")
-        assert again.read(5) == b"three"
+    client = open_pty(bus.attach("client"))
+    assert bus.tap(link=link) == link
+    tap = open_pty(link)
+    client.write(b"one")
+    assert tap.read(3) == b"one"
+    bus.detach("tap")
+    assert not os.path.lexists(link)
+    assert os.read(tap.fd, 1) == b""  # hung up
+    client.write(b"two")
+    time.sleep(0.05)
+    bus.tap(link=link)
+    again = open_pty(link)
+    client.write(b"three")
+    assert again.read(5) == b"three"
+    bus.detach("tap")
     assert not os.path.lexists(link)
 
 

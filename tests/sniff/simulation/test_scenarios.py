@@ -1,0 +1,122 @@
+"""The named buses, as fast as they go: what the engine makes of them against what was really sent."""
+
+from __future__ import annotations
+
+import pickle
+from collections import Counter
+from dataclasses import replace
+
+import pytest
+
+from dissectors import registry
+from dissectors.frame import Chunk, Frame
+from dissectors.line import LineSettings
+from dissectors.tracker import Transaction, Verdict
+from sniff.engine import Engine, Row
+from sniff.session import Session
+from sniff.simulation import scenarios
+from sniff.simulation.scenarios import Scenario, UnknownScenario, bursts, scenario, simulate
+from sniff.simulation.tap import EXACT, FTDI, FTDI_LOW_LATENCY, OCTETS, UART, TapModel
+from sniff.simulation.wire import Sent
+
+NAMES = scenarios.names()
+
+
+def sniff(plan: Scenario, seconds: float, tap: TapModel = EXACT) -> tuple[list[Row], list[Transaction]]:
+    session, items = simulate(plan, seconds, tap)
+    engine = Engine(registry.get(plan.protocol), session.timing)
+    outputs = [engine.feed(item) for item in items if isinstance(item, Chunk)] + [engine.close()]
+    return [row for output in outputs for row in output.rows], [t for output in outputs for t in output.transactions]
+
+
+def truth(plan: Scenario, seconds: float) -> list[Sent]:
+    return [sent for burst in bursts(plan, seconds) for sent in burst.sent]
+
+
+def good(rows: list[Row]) -> list[bytes]:
+    return [row.event.octets for row in rows if isinstance(row.event, Frame) and row.event.ok]
+
+
+def intact(truths: list[Sent], parties: set[str]) -> list[bytes]:
+    return [sent.octets for sent in truths if sent.intact and sent.party in parties]
+
+
+def parties(plan: Scenario) -> set[str]:
+    names = {party.name for party in plan.stations()}
+    return names | {f"{name}'" for name in names} | {f"{name} echo" for name in names}
+
+
+@pytest.mark.parametrize("tap", [EXACT, OCTETS, FTDI, FTDI_LOW_LATENCY, UART], ids=lambda tap: tap.name)
+@pytest.mark.parametrize("name", NAMES)
+def test_on_a_perfect_bus_every_frame_is_found_through_every_adapter(name: str, tap: TapModel) -> None:
+    plan = scenario(name, faults=False)
+    seconds = 2 if "busy" in name else 15
+    sent = truth(plan, seconds)
+    assert all(one.intact and not one.faults for one in sent)
+    rows, _ = sniff(plan, seconds, tap)
+    assert [row.event.octets for row in rows] == [one.octets for one in sent]
+    assert all(isinstance(row.event, Frame) and row.event.ok for row in rows)
+
+
+@pytest.mark.parametrize("tap", [EXACT, replace(FTDI, cut=0.2)], ids=["exact", "FTDI, cut"])
+@pytest.mark.parametrize("name", NAMES)
+def test_with_faults_the_good_frames_are_those_that_arrived_intact(name: str, tap: TapModel) -> None:
+    plan = scenario(name, seed=7)
+    seconds = 5 if "busy" in name else 50
+    sent = truth(plan, seconds)
+    assert sum(bool(one.faults) for one in sent) >= 5, "the scenario shows nothing"
+    rows, _ = sniff(plan, seconds, tap)
+    found, meant = Counter(good(rows)), Counter(intact(sent, parties(plan)))
+    assert not found - meant, "a good frame that nobody sent"
+    assert (meant - found).total() <= meant.total() // 200
+    octets = b"".join(row.event.octets for row in rows)
+    assert octets == b"".join(burst.octets for burst in bursts(plan, seconds))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_same_seed_is_the_same_run(name: str) -> None:
+    assert truth(scenario(name, 3), 5) == truth(scenario(name, 3), 5) != truth(scenario(name, 4), 5)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_scenario_travels_to_another_process_and_says_what_it_is(name: str) -> None:
+    plan = scenario(name)
+    travelled = pickle.loads(pickle.dumps(plan))
+    assert truth(travelled, 2) == truth(plan, 2)
+    assert plan.text
+    assert plan.protocol in registry.names()
+    assert Session.from_metadata(simulate(plan, 1)[0].to_metadata()) == simulate(plan, 1)[0]
+
+
+@pytest.mark.parametrize("name", ["modbus-rtu", "modbus-ascii"])
+def test_modbus_shows_answers_exceptions_an_absent_unit_and_a_broadcast(name: str) -> None:
+    _, transactions = sniff(scenario(name, faults=False), 60)
+    verdicts = Counter(t.verdict for t in transactions)
+    assert set(verdicts) - {Verdict.OPEN} == {
+        Verdict.ANSWERED,
+        Verdict.EXCEPTION,
+        Verdict.NO_RESPONSE,
+        Verdict.BROADCAST,
+    }
+    assert verdicts[Verdict.ANSWERED] > 400
+    assert {t.station for t in transactions if t.verdict is Verdict.NO_RESPONSE} == {4}
+    assert {t.station for t in transactions if t.verdict is Verdict.EXCEPTION} == {2}
+
+
+def test_another_line_may_be_asked_for() -> None:
+    plan = scenario("modbus-ascii", line=LineSettings.parse("9600,8N1"))
+    session, items = simulate(plan, 2)
+    assert str(session.line) == "9600,8N1"
+    assert any(isinstance(item, Chunk) and item.octets.startswith(b":0103") for item in items)
+
+
+def test_times_begin_when_the_capture_is_said_to_have_started() -> None:
+    plan = scenario("n2")
+    at_zero = list(simulate(plan, 5)[1])
+    later = list(simulate(plan, 5, started=10**18)[1])
+    assert [replace(item, time=item.time + 10**18) for item in at_zero] == later
+
+
+def test_an_unknown_name_is_answered_with_those_there_are() -> None:
+    with pytest.raises(UnknownScenario, match=r"'modbus'.*modbus-rtu"):
+        scenario("modbus")
