@@ -26,6 +26,7 @@ from dissectors.n2.simulated import (
 )
 from dissectors.tracker import Transaction, Verdict
 from sniff.simulation.faults import BitFlips, DuplicateAddress, Fault, LateResponse, LostResponse, NoiseInGaps
+from sniff.simulation.tap import EXACT, MODELS, Tap, TapModel
 from sniff.simulation.wire import Party, Wire
 
 MS = 1_000_000
@@ -50,9 +51,9 @@ class Heard:
         return {t.verdict for t in self.transactions}
 
 
-def listen(wire: Wire, until: int, timing: Timing | None = None, held: int = 0) -> Heard:
-    """Run a bus and listen to it; `held`: ns by which the adapter keeps each burst back."""
-    timing = timing or Timing(LINE)
+def listen(wire: Wire, until: int, timing: Timing | None = None, model: TapModel = EXACT) -> Heard:
+    """Run a bus and listen to it through an adapter."""
+    timing = timing or Timing(LINE, model.latency(LINE))
     framer, tracker, found, heard, no = N2.framer(timing), N2.tracker(timing), N2Findings(timing), Heard(), 0
 
     def take(events: Iterable) -> None:
@@ -73,9 +74,9 @@ def listen(wire: Wire, until: int, timing: Timing | None = None, held: int = 0) 
             heard.transactions.append(transaction)
             found.settle(transaction)
 
-    for burst in wire.run(until):
-        if burst.octets:
-            take(framer.feed(Chunk(burst.end + held, burst.octets, burst.marks)))
+    for item in Tap(LINE, model).tap(wire.run(until)):
+        if isinstance(item, Chunk):
+            take(framer.feed(item))
     take(framer.close())
     close(tracker.close())
     heard.findings = found.findings()
@@ -209,9 +210,35 @@ def quick(jobs: Sequence[Job], **settings: int) -> Master:
 
 
 def test_a_bus_without_faults_has_no_findings():
-    heard = listen(bus([Follower(1), Follower(2)], [quick(every_point(1, 2))]), 200 * S)
+    heard = listen(bus([Follower(1), Follower(2)], [quick(every_point(1, 2))]), 100 * S)
     assert heard.findings == ()
-    assert len(heard.transactions) > 2000
+    assert len(heard.transactions) > 1000
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_no_adapter_makes_findings_where_there_are_none(name):
+    heard = listen(bus([Follower(1), Follower(2)], [quick(every_point(1, 2))]), 30 * S, model=MODELS[name])
+    assert heard.findings == ()
+    assert heard.verdicts() <= {Verdict.ANSWERED, Verdict.OPEN}
+    assert len(heard.transactions) > 250
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_whatever_the_adapter_no_value_goes_to_the_wrong_point(name):
+    faults = [LostResponse(0.03), BitFlips(0.001), NoiseInGaps(0.05)]
+    stations = [Watched(1), Watched(2)]
+    heard = listen(bus(stations, [quick(every_point(1, 2))], faults), 30 * S, model=MODELS[name])
+    held = {s.address: {(r, n): set() for _, r, n, _ in s.held} for s in stations}
+    for station in stations:
+        for address, region, number, value in station.held:
+            held[address][region, number].add(value)
+    read = 0
+    for transaction in heard.transactions:
+        if transaction.kind == "read-attribute" and transaction.verdict in (Verdict.ANSWERED, Verdict.RETRY):
+            got = interpret(heard.frames[transaction.request], heard.frames[transaction.response])
+            assert got.value in held[got.station][got.region, got.object]
+            read += 1
+    assert read > 80
 
 
 def test_a_reset_is_found():
