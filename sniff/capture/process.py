@@ -15,7 +15,7 @@ import stat
 import sys
 from types import FrameType
 
-from sniff.capture.config import CaptureConfig
+from sniff.capture.config import CaptureConfig, SourceSpec
 from sniff.capture.loop import CaptureLoop
 from sniff.capture.outlet import Outlet
 from sniff.capture.priority import raise_priority
@@ -23,8 +23,9 @@ from sniff.capture.wire import Kind, MessageSplitter, WireError, decode_json, en
 from sniff.formats import CaptureError
 from sniff.recording.rotation import Rotation
 from sniff.recording.writer import Recorder
-from sniff.session import Adapter, Session
+from sniff.session import Session
 from sniff.sources import PortError, Source, open_source
+from sniff.sources.capture_file import CaptureFileSource
 from sniff.sources.clock import Clock
 
 FAREWELL = 2.0
@@ -45,7 +46,7 @@ def main() -> int:
     try:
         for spec in config.sources:
             sources.append(open_source(spec.spec, spec.line, clock))
-        sessions = [session_of(config, index, source.session_adapter, clock) for index, source in enumerate(sources)]
+        sessions = [session_of(*pair, clock) for pair in zip(config.sources, sources, strict=True)]
         recorders = open_recorders(config, sessions)
     except (PortError, CaptureError, OSError, ValueError) as error:
         for source in sources:
@@ -56,10 +57,10 @@ def main() -> int:
     return _capture(config, clock, sources, sessions, recorders, connection, priority)
 
 
-def session_of(config: CaptureConfig, index: int, adapter: Adapter, clock: Clock) -> Session:
+def session_of(spec: SourceSpec, source: Source, clock: Clock) -> Session:
     """What is known of a bus at the start of its capture."""
-    spec = config.sources[index]
-    return Session(spec.spec, spec.line, spec.protocol, clock.wall, spec.bus, adapter)
+    started = source.session.started if isinstance(source, CaptureFileSource) else clock.wall
+    return Session(spec.spec, spec.line, spec.protocol, started, spec.bus, source.session_adapter)
 
 
 def open_recorders(config: CaptureConfig, sessions: list[Session]) -> list[Recorder]:

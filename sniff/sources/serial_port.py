@@ -14,6 +14,7 @@ from sniff.session import Adapter, Item, LineEvent, LineEventKind
 from sniff.sources import PortError
 from sniff.sources.attempt import Attempt
 from sniff.sources.clock import NS_PER_MS, Clock
+from sniff.sources.identity import PortIdentity
 from sniff.sources.parmrk import ParmrkDecoder
 from sniff.sources.ports import Holder, describe_port, find_holders, is_pty, is_tty, list_ports
 from sniff.sources.tty import ListeningPort, error_counters, marks_errors, open_listening
@@ -26,19 +27,6 @@ LOOK_EVERY = 50 * NS_PER_MS
 
 POLL_EVERY = 1 * NS_PER_MS
 """Between looks at a port that cannot be waited on (Windows)."""
-
-
-@dataclass(frozen=True, slots=True)
-class _Identity:
-    """What a port is recognised by when it comes back."""
-
-    spec: str
-    serial_number: str
-    link: tuple[int, int, str] | None  # of a symbolic link: inode, change time, target
-
-    @classmethod
-    def of(cls, spec: str, serial_number: str) -> _Identity:
-        return cls(spec, serial_number, _link(spec))
 
 
 class SerialSource:
@@ -58,7 +46,7 @@ class SerialSource:
         self._adopt(open_port(device, line), line)
         self._pty = is_pty(device)
         self._adapter = describe_port(device, line)
-        self._identity = _Identity.of(device, self._adapter.serial_number)
+        self._identity = PortIdentity.of(device)
         self._retry_at = 0
 
     # -- the source contract -----------------------------------------------------------------------------------
@@ -212,7 +200,7 @@ class SerialSource:
         if found.line != self.line:  # changed while the port was being looked for
             self.reconfigure(self.line)
         self.device = found.device
-        self._identity = _Identity.of(self._identity.spec, self._identity.serial_number)
+        self._identity = self._identity.renewed()
         return [LineEvent(self._clock.now(), LineEventKind.REPLUGGED, f"{found.device} is back")]
 
 
@@ -225,8 +213,8 @@ class _Found:
     line: LineSettings
 
 
-def _find(identity: _Identity, line: LineSettings) -> _Found | None:
-    device = find_again(identity)
+def _find(identity: PortIdentity, line: LineSettings) -> _Found | None:
+    device = identity.find()
     return None if device is None else _Found(device, open_port(device, line), line)
 
 
@@ -237,24 +225,6 @@ def open_port(device: str, line: LineSettings) -> ListeningPort:
         return open_listening(device, line)
     except (OSError, ValueError) as error:
         raise PortError(explain(device, line, error)) from error
-
-
-def find_again(identity: _Identity) -> str | None:
-    """Where a port that was unplugged is now: the same USB serial number, else the same path; None while absent."""
-    if identity.serial_number:
-        from serial.tools import list_ports as tools
-
-        for port in tools.comports():
-            if port.serial_number == identity.serial_number:
-                # a stable link that the user named stays the name
-                same = os.path.realpath(identity.spec) == os.path.realpath(port.device)
-                return identity.spec if same else str(port.device)
-        return None
-    if not os.path.exists(identity.spec) and os.name == "posix":
-        return None
-    if is_pty(identity.spec) and (identity.link is None or _link(identity.spec) == identity.link):
-        return None
-    return identity.spec
 
 
 def refuse_unfit(device: str) -> None:
@@ -319,11 +289,3 @@ def _group(device: str) -> str:
         return grp.getgrgid(os.stat(device).st_gid).gr_name
     except (ImportError, KeyError, OSError):
         return "dialout"
-
-
-def _link(spec: str) -> tuple[int, int, str] | None:
-    try:
-        found = os.lstat(spec)
-        return found.st_ino, found.st_ctime_ns, os.readlink(spec)
-    except OSError:
-        return None

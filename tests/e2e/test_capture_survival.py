@@ -130,8 +130,10 @@ while True:
 """
 
 
-@pytest.mark.parametrize("how", ["kill -9", "Ctrl-C", "terminal closed"])
-@pytest.mark.parametrize("end", [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize(
+    ("how", "end"),
+    [("kill -9", signal.SIGTERM), ("Ctrl-C", signal.SIGINT), ("terminal closed", signal.SIGTERM)],
+)
 def test_the_recording_outlives_the_main_process(bus, tmp_path, how, end) -> None:
     file = tmp_path / "night.mcap"
     main = subprocess.Popen(

@@ -224,6 +224,7 @@ def test_a_capture_as_a_bus(tmp_path, collect) -> None:
     file = tmp_path / "poll.cap.txt"
     file.write_text("#!sniff-capture 1\n# line: 19200,8E1\n# start: 2026-03-01T10:00:00Z\n+0 01 02\n+30 03\n+5 04\n")
     link = CaptureLink.start([SourceSpec(str(file), LINE)])
+    assert link.session(0).started == 1_772_359_200_000_000_000
     messages = []
     while link.ended is None:
         messages += link.receive(1)

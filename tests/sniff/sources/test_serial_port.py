@@ -253,21 +253,6 @@ def test_a_link_made_anew_is_followed(pty, tmp_path, monkeypatch) -> None:
     os.close(master)
 
 
-def test_a_usb_adapter_is_found_by_its_serial_number(monkeypatch) -> None:
-    from types import SimpleNamespace
-
-    import serial.tools.list_ports as tools
-
-    here = [
-        SimpleNamespace(device="/dev/ttyUSB3", serial_number="A1"),
-        SimpleNamespace(device="/dev/ttyUSB0", serial_number="B2"),
-    ]
-    monkeypatch.setattr(tools, "comports", lambda: here)
-    found = serial_port.find_again(serial_port._Identity("/dev/ttyUSB0", "A1", None))
-    assert found == "/dev/ttyUSB3"
-    assert serial_port.find_again(serial_port._Identity("/dev/ttyUSB0", "C3", None)) is None
-
-
 # -- what a person sees ----------------------------------------------------------------------------------------
 
 
