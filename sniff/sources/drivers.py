@@ -62,8 +62,8 @@ DRIVERS: dict[str, Driver] = {
             4 * NS_PER_MS,
             "assumed for cdc_acm",
         ),
-        Driver("8250", ALL, "per octet", 1 * NS_PER_MS, "FIFO of 16 and 1 ms of scheduling", 16, usb=False),
-        Driver("pl011", ALL, "per octet", 1 * NS_PER_MS, "FIFO of 16 and 1 ms of scheduling", 16, usb=False),
+        Driver("8250", ALL, "per octet", 1 * NS_PER_MS, "FIFO timeout of 4 characters + 1 ms of scheduling", 4, usb=False),
+        Driver("pl011", ALL, "per octet", 1 * NS_PER_MS, "FIFO timeout of 4 characters + 1 ms of scheduling", 4, usb=False),
         Driver(
             "pty",
             (),
