@@ -64,7 +64,7 @@ CONFIRMED: dict[int, str] = {
     22: "list-of-remote-vt-session-identifiers {Unsigned}",
     23: "vt-session-identifier Unsigned, vt-new-data OctetString, vt-data-flag Unsigned",
     24: "[0] pseudo-random-number Unsigned, [1]? expected-invoke-id Unsigned, [2]? operator-name CharacterString, "
-    "[3]? operator-password CharacterString, [4]? start-encyphered-session Boolean",
+    "[3]? operator-password CharacterString, [4]? start-enciphered-session Boolean",
     25: "requesting-device-identifier ObjectIdentifier, requesting-device-address DeviceAddress, "
     "remote-device-identifier ObjectIdentifier, remote-device-address DeviceAddress",
     26: _TARGET + ", ? range Range",

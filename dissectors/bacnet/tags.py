@@ -74,7 +74,9 @@ def header_at(octets: bytes, at: int) -> TagHeader | str:
     context, low = bool(first & 8), first & 7
     if context and low >= 6:
         return TagHeader(number, True, "opening" if low == 6 else "closing", at, at, low)
-    if not context and number == BOOLEAN and low < 5:
+    if not context and number == BOOLEAN:
+        if low >= 5:
+            return f"value code {low} in a Boolean"
         return TagHeader(number, False, "primitive", at, at, low)
     length = low
     if low == 5:
@@ -116,7 +118,7 @@ def read(octets: bytes, begin: int = 0) -> Tree:
             level = outer
         else:
             content = octets[header.begin : header.end]
-            if not header.context and header.number == BOOLEAN and header.value < 5:
+            if not header.context and header.number == BOOLEAN:
                 content = bytes((header.value,))
             level.append(Tag(header.number, header.context, content, None, at, header.end))
         at = header.end
