@@ -78,6 +78,14 @@ def test_modbus_ascii_is_no_n2(lines, pause):
     assert good(listen(N2Framer(timing), parts, timing, pause)) == []
 
 
+def test_a_modbus_ascii_line_with_a_pause_before_an_a_is_no_answer():
+    # 1 s between the characters of a line is allowed there; its rest happens to sum up like an N2 answer
+    events = listen(N2Framer(Timing()), [b":0103", b"A4064\r\n"], Timing(), 300 * MS)
+    assert not any(isinstance(e, Frame) for e in events)
+    events = listen(N2Framer(Timing()), [b":0103", b"A4064\r\n"], Timing(), 1100 * MS)
+    assert good(events) == [b"A4064\r"]
+
+
 @relaxed
 @given(st.lists(st.sampled_from(N2_FRAMES), min_size=1, max_size=12), st.sampled_from([0, 20 * MS, 1500 * MS]))
 def test_n2_is_no_modbus_ascii(frames, pause):
