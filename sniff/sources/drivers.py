@@ -27,7 +27,6 @@ class Driver:
     hold: int
     hold_from: str
     hold_chars: int = 0
-    usb: bool = True
 
 
 DRIVERS: dict[str, Driver] = {
@@ -62,15 +61,14 @@ DRIVERS: dict[str, Driver] = {
             4 * NS_PER_MS,
             "assumed for cdc_acm",
         ),
-        Driver("8250", ALL, "per octet", 1 * NS_PER_MS, "FIFO timeout of 4 characters + 1 ms of scheduling", 4, usb=False),
-        Driver("pl011", ALL, "per octet", 1 * NS_PER_MS, "FIFO timeout of 4 characters + 1 ms of scheduling", 4, usb=False),
+        Driver("8250", ALL, "per octet", 1 * NS_PER_MS, "FIFO timeout of 4 characters + 1 ms of scheduling", 4),
+        Driver("pl011", ALL, "per octet", 1 * NS_PER_MS, "FIFO timeout of 4 characters + 1 ms of scheduling", 4),
         Driver(
             "pty",
             (),
             "a pseudo-terminal has no line, so no line errors",
             3 * NS_PER_MS,
             "one scheduler slice of the host",
-            usb=False,
         ),
     )
 }
