@@ -84,6 +84,8 @@ class SnifferApp(App[None]):
 
     def poll(self) -> None:
         """Take what the feed has and show it."""
+        if not self.screen_stack:  # the app is ending
+            return
         changed = self.feed.poll()
         self.status = self.feed.status()
         if self.status.ended and not self._told_end:
@@ -112,7 +114,6 @@ class SnifferApp(App[None]):
         screen = self.shown
         if screen is None or not screen.is_mounted or not screen.work():
             self._worker.pause()
-        self._draw_header()
 
     def _draw_header(self) -> None:
         for header in self.screen.query(StatusHeader):

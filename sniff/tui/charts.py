@@ -13,7 +13,9 @@ def sparkline(values: Sequence[float], top: float) -> str:
     if top <= 0:
         return BARS[0] * len(values)
     steps = len(BARS) - 1
-    return "".join(BARS[0 if value <= 0 else min(steps, max(1, round(value / top * steps)))] for value in values)
+    return "".join(
+        BARS[0 if value <= 0 else min(steps, max(1, round(min(1.0, value / top) * steps)))] for value in values
+    )
 
 
 def bar(share: float, width: int) -> str:
@@ -23,10 +25,3 @@ def bar(share: float, width: int) -> str:
         eighths = max(1, eighths)
     whole, part = divmod(eighths, 8)
     return ("█" * whole + (_PARTS[part] if part else "")).ljust(width)
-
-
-def peak(values: Sequence[float], groups: int) -> list[float]:
-    """The values in at most `groups` groups, the largest of each: a short burst stays visible."""
-    if len(values) <= groups or groups < 1:
-        return list(values)
-    return [max(values[len(values) * i // groups : len(values) * (i + 1) // groups]) for i in range(groups)]

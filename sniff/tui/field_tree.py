@@ -44,18 +44,22 @@ class FieldTree(Tree[Field], inherit_bindings=False):
         self.auto_expand = False
         self._path: tuple[str, ...] = ()
 
-    def show(self, fields: tuple[Field, ...]) -> None:
-        """Show the fields of another frame."""
+    def show(self, fields: tuple[Field, ...]) -> Field | None:
+        """Show the fields of another frame; gives the field that the cursor kept, None when it is not there."""
         path = self._path
         self.clear()
         for field in fields:
             self._add(self.root, field)
         self.root.expand()
+        _ = self.last_line  # builds the lines: before, no node knows its own
         kept = self._find(path)
-        if kept is not None:
-            self.move_cursor(kept)
-            self.scroll_to_node(kept, animate=False)
-        self._path = path
+        here = kept or (self.root.children[0] if self.root.children else None)
+        if here is not None:
+            with self.prevent(Tree.NodeHighlighted):
+                self.move_cursor(here)
+            self.scroll_to_node(here, animate=False)
+        self._path = path  # also when this frame has no such field: the next may have it
+        return None if kept is None else kept.data
 
     def _add(self, parent: TreeNode[Field], field: Field) -> None:
         if field.children:
@@ -89,6 +93,7 @@ class FieldTree(Tree[Field], inherit_bindings=False):
         while parent is not None:
             parent.expand()
             parent = parent.parent
+        _ = self.last_line  # as above, after unfolding
         with self.prevent(Tree.NodeHighlighted):
             self.move_cursor(best)
         self._path = _path(best)

@@ -7,8 +7,9 @@ claimed.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from dissectors.frame import Frame, Role
@@ -17,6 +18,8 @@ from sniff.tui.plain import plain
 
 DEEPEST = 20
 """Layers and nested packets deeper than this are not shown; no honest frame has them."""
+
+HEX_PAIRS = re.compile(rb"(?:[0-9A-Fa-f]{2}){2,}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,9 +44,32 @@ class Field:
 def fields_of(dissector: Dissector, frame: Frame, role: Role) -> tuple[Field, ...]:
     """The layers of a frame; the dissector's flat fields, without spans, where its packet fails. Never raises."""
     try:
-        return tuple(_layers(dissector.packet(frame, role), frame.octets, 0, len(frame.octets), 0))
+        packet = dissector.packet(frame, role)
+        found = tuple(_layers(packet, frame.octets, 0, len(frame.octets), 0))
+        pairs = HEX_PAIRS.search(frame.octets)
+        if pairs is None or any(_placed(field) for field in found):
+            return found
+        octets = bytes.fromhex(pairs[0].decode("ascii"))
+        return _spelled(tuple(_layers(packet, octets, 0, len(octets), 0)), pairs.start())
     except Exception as error:  # a dissector from anywhere meets octets from anywhere
         return (Field("packet", plain(f"not readable as a packet: {error}")), *_flat(dissector, frame, role))
+
+
+def _placed(field: Field) -> bool:
+    return field.begin is not None or any(_placed(child) for child in field.children)
+
+
+def _spelled(fields: tuple[Field, ...], shift: int) -> tuple[Field, ...]:
+    """The same for a packet that was read from octets written as pairs of hex digits (Modbus ASCII)."""
+    return tuple(
+        replace(
+            field,
+            begin=None if field.begin is None else shift + 2 * field.begin,
+            end=None if field.end is None else shift + 2 * field.end,
+            children=_spelled(field.children, shift),
+        )
+        for field in fields
+    )
 
 
 def _flat(dissector: Dissector, frame: Frame, role: Role) -> tuple[Field, ...]:
@@ -93,7 +119,8 @@ class _Walk:
             if hasattr(description, "fld") and "Trailer" in "".join(
                 base.__name__ for base in type(description).__mro__
             ):
-                yield self._trailer(description, value)
+                if value is not None:  # absent in this frame
+                    yield self._trailer(description, value)
                 continue
             before = built
             built = description.addfield(self.layer, built, value)
@@ -117,7 +144,7 @@ class _Walk:
         return Field(plain(description.name), _text(description, self.layer, value), *span)
 
     def _field(self, description: Any, value: Any, first: int, last: int) -> Field:
-        span = (None, None) if self.lost else (first, last)
+        span = (None, None) if self.lost or first == last else (first, last)
         name = plain(description.name)
         packets = [item for item in (value if isinstance(value, list) else [value]) if hasattr(item, "fields_desc")]
         if packets:
@@ -161,4 +188,4 @@ def _text(description: Any, layer: Any, value: Any) -> str:
 
 
 def _without_spans(fields: tuple[Field, ...]) -> tuple[Field, ...]:
-    return tuple(Field(field.name, field.value, None, None, _without_spans(field.children)) for field in fields)
+    return tuple(replace(field, begin=None, end=None, children=_without_spans(field.children)) for field in fields)

@@ -122,8 +122,11 @@ class FramesScreen(ListingScreen):
         if row is None:
             return
         self._detail = (row.no, self.store.transaction(row))
-        self.query_one(HexPane).show(row.event.octets, row.event.marks)
-        self.query_one(FieldTree).show(tree_of(self.store, row))
+        octets = self.query_one(HexPane)
+        octets.show(row.event.octets, row.event.marks)
+        kept = self.query_one(FieldTree).show(tree_of(self.store, row))
+        if kept is not None:
+            octets.select(kept.begin, kept.end, kept.name)
 
     # -- keys --------------------------------------------------------------------------------------------------
 

@@ -1,0 +1,197 @@
+"""`/`: live validity in words, bit by bit over any number of rows, verdicts that come later."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from dissectors.tracker import Verdict
+from sniff.tui.prompt import Prompt
+from sniff.tui.viewing import Viewing
+
+
+async def filter_by(see: Any, text: str) -> None:
+    await see.press("slash")
+    await see.type(text)
+    await see.press("enter")
+
+
+def shown(see: Any) -> list[int]:
+    return [see.main.index[line] for line in range(len(see.main.index))]
+
+
+def test_validity_is_said_while_typing(look: Any, busy_bus: Any) -> None:
+    async def script(see: Any) -> None:
+        said = []
+        await see.press("slash")
+        assert "empty: everything is shown" in see.text()
+        for text in ("dst", " =", "=", " 1"):
+            await see.type(text)
+            said.append(see.lines()[-2 if "valid" in see.lines()[-2] else -3].split(":")[0])
+        assert said == ["valid", "invalid", "invalid", "valid"]
+        assert len(see.main.index) == 13  # nothing is filtered before enter
+        await see.press("enter")
+        assert shown(see) == [1, 9, 11]
+        assert "filter: dst == 1" in see.lines()[2]
+        assert "3 of 13 frames" in see.lines()[2]
+
+    look(busy_bus.store, script)
+
+
+def test_an_invalid_filter_is_not_taken(look: Any, busy_bus: Any) -> None:
+    async def script(see: Any) -> None:
+        await filter_by(see, "dst === 1")
+        assert see.app.screen.query_one(Prompt).is_open
+        assert "invalid: " in see.text()
+        assert "column" in see.text()
+        await see.press("escape")
+        assert see.app.viewing.filter == ""
+        assert len(see.main.index) == 13
+        assert see.app.focused is see.main
+
+    look(busy_bus.store, script)
+
+
+def test_escape_removes_the_filter(look: Any, busy_bus: Any) -> None:
+    async def script(see: Any) -> None:
+        await filter_by(see, "noise")
+        assert shown(see) == [5]
+        assert see.main.cursor == 5
+        await see.press("escape")
+        assert len(see.main.index) == 13
+        assert see.main.cursor == 5
+        assert "filter:" not in see.text()
+
+    look(busy_bus.store, script)
+
+
+def test_keys_typed_into_the_filter_do_nothing_else(look: Any, busy_bus: Any) -> None:
+    async def script(see: Any) -> None:
+        await see.press("slash")
+        await see.type("q2 f?e")
+        assert see.app.current_mode == "frames"
+        assert not see.app.viewing.frozen
+        assert see.app.screen.query_one(Prompt).query_one("Input").value == "q2 f?e"
+        assert "/ filter" not in see.lines()[-1]
+
+    look(busy_bus.store, script)
+
+
+def test_completion(look: Any, busy_bus: Any) -> None:
+    async def script(see: Any) -> None:
+        await see.press("slash")
+        await see.type("ok && verd")
+        await see.press("tab")
+        assert see.app.screen.query_one(Prompt).query_one("Input").value == "ok && verdict"
+
+    look(busy_bus.store, script)
+
+
+def test_nothing_passes(look: Any, busy_bus: Any) -> None:
+    async def script(see: Any) -> None:
+        await filter_by(see, "dst == 99")
+        assert "no frame passes the filter" in see.text()
+        await see.press("down", "e", "x", "m", "end", "enter", "escape", "escape")
+        assert len(see.main.index) == 13
+
+    look(busy_bus.store, script)
+
+
+def test_hidden_errors_and_partners_are_not_jumped_to(look: Any, busy_bus: Any) -> None:
+    async def script(see: Any) -> None:
+        await filter_by(see, "dst == 3 || dst == 1")
+        await see.press("home", "e")
+        assert see.main.cursor == 6
+        await see.press("e")
+        assert see.main.cursor == 9
+        await see.press("x")
+        assert see.main.cursor == 9
+        assert "frame 10 is hidden by the filter or no longer in memory" in see.notices()
+
+    look(busy_bus.store, script)
+
+
+def test_new_rows_are_filtered_as_they_come(look: Any, busy_bus: Any) -> None:
+    async def script(see: Any) -> None:
+        await filter_by(see, "dst == 2")
+        assert shown(see) == [3, 13]
+        busy_bus.ask(1)
+        busy_bus.ask(2)
+        await see.poll()
+        assert shown(see) == [3, 13, 16]
+
+    look(busy_bus.store, script)
+
+
+def test_a_verdict_that_comes_later_brings_its_rows(look: Any, make_bus: Any) -> None:
+    bus = make_bus()
+    bus.ask(1)
+    bus.ask(1, None)  # row 3, open
+
+    async def script(see: Any) -> None:
+        await filter_by(see, "verdict == no-response")
+        assert shown(see) == []
+        request = bus.store.by_no(3)
+        from dissectors.tracker import Transaction
+        from sniff.engine import Output
+
+        closed = Transaction(2, 1, "read", 3, None, Verdict.NO_RESPONSE, request.event.start, request.event.end)
+        bus.store.add(Output((), (closed,)))
+        await see.poll()
+        assert shown(see) == [3]
+
+    look(bus.store, script)
+
+
+def test_a_filter_while_frozen_stays_below_the_freeze(look: Any, busy_bus: Any) -> None:
+    async def script(see: Any) -> None:
+        await see.press("space")
+        busy_bus.ask(1)
+        await see.poll()
+        await filter_by(see, "dst == 1")
+        assert shown(see) == [1, 9, 11]
+        await see.press("space")
+        assert shown(see) == [1, 9, 11, 14]
+
+    look(busy_bus.store, script)
+
+
+def test_transactions_are_filtered_by_their_frames(look: Any, busy_bus: Any) -> None:
+    async def script(see: Any) -> None:
+        await filter_by(see, "!ok")
+        assert shown(see) == [4]
+        assert "1 of 6 transactions" in see.text()
+        await see.press("1")
+        assert "filter: !ok" in see.text()
+
+    look(busy_bus.store, script, start="transactions")
+
+
+@pytest.mark.parametrize("start", ["frames", "transactions"])
+def test_the_filter_searches_from_the_cursor_outwards(look: Any, make_bus: Any, start: str) -> None:
+    bus = make_bus()
+    for station in range(3000):
+        bus.ask(station % 5 + 1)
+
+    async def script(see: Any) -> None:
+        await see.press("end")
+        tested: list[int] = []
+        real = Viewing.accepts_row
+
+        def counting(viewing: Viewing, no: int) -> bool:
+            tested.append(no)
+            return real(viewing, no)
+
+        Viewing.accepts_row = counting  # type: ignore[method-assign]
+        try:
+            see.app.filter("dst == 3")
+            assert len(tested) < 600  # one step, not all 6000
+            assert min(tested) > 5000  # and that near the cursor
+            await see.settle()
+        finally:
+            Viewing.accepts_row = real  # type: ignore[method-assign]
+        assert see.main.index.pending == 0
+        assert len(see.main.index) == 600
+
+    look(bus.store, script, start=start)

@@ -1,0 +1,297 @@
+"""Screen 1: the keys do what they say, list, tree and hex are linked, and it looks as it should."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from sniff.tui.field_tree import FieldTree
+from sniff.tui.hex_pane import HexPane
+
+SIZES = {"80x24": (80, 24), "160x50": (160, 50)}
+
+
+@pytest.mark.parametrize("name", SIZES)
+def test_picture(look: Any, golden: Any, busy_bus: Any, name: str) -> None:
+    async def script(see: Any) -> None:
+        await see.press("8", "1", "end", "up", "up", "up", "up", "up")  # frame 8, damaged, with a line error
+        golden(f"frames-{name}", see.text())
+        text = see.text()
+        assert "None" not in text
+        assert "{" not in text
+        assert all(len(line) <= SIZES[name][0] for line in see.lines())
+
+    look(busy_bus.store, script, SIZES[name], live=True, recording="/tmp/x.mcap")
+
+
+def test_moving(look: Any, busy_bus: Any) -> None:
+    async def script(see: Any) -> None:
+        cursors = []
+        for key in ("home", "down", "j", "up", "k", "pagedown", "end", "g", "G", "pageup"):
+            await see.press(key)
+            cursors.append(see.main.cursor)
+        assert cursors == [1, 2, 3, 2, 1, 12, 13, 1, 13, 2]
+
+    look(busy_bus.store, script)
+
+
+def test_the_cursor_and_its_partner_are_marked_by_characters(look: Any, busy_bus: Any) -> None:
+    async def script(see: Any) -> None:
+        await see.press("home")
+        rows = see.lines()[3:6]
+        assert rows[0].startswith(">")
+        assert rows[1].startswith("=")
+        assert rows[2].startswith(" ")
+
+    look(busy_bus.store, script)
+
+
+def test_errors_forth_and_back(look: Any, busy_bus: Any) -> None:
+    async def script(see: Any) -> None:
+        await see.press("home")
+        found = []
+        for key in ("e", "e", "e", "e", "e", "e", "E", "E", "E", "E", "E"):
+            await see.press(key)
+            found.append(see.main.cursor)
+        assert found == [5, 6, 7, 8, 9, 9, 8, 7, 6, 5, 5]
+        assert see.notices() == ["no error after this row", "no error before this row"]
+
+    look(busy_bus.store, script)
+
+
+def test_partner(look: Any, busy_bus: Any) -> None:
+    async def script(see: Any) -> None:
+        await see.press("home", "x")
+        assert see.main.cursor == 2
+        await see.press("x")
+        assert see.main.cursor == 1
+        await see.press("e", "e", "x")  # no answer: nothing to jump to
+        assert see.main.cursor == 6
+        assert see.notices() == ["no partner: no-response"]
+
+    look(busy_bus.store, script)
+
+
+def test_marks(look: Any, busy_bus: Any) -> None:
+    async def script(see: Any) -> None:
+        await see.press("home", "m", "down", "down", "m", "down", "apostrophe")
+        assert see.main.cursor == 1
+        await see.press("apostrophe")
+        assert see.main.cursor == 3
+        assert see.lines()[3][1] == see.lines()[5][1] == "*"
+        await see.press("m", "apostrophe", "apostrophe")
+        assert see.main.cursor == 1
+        assert see.app.viewing.marks == [1]
+
+    look(busy_bus.store, script)
+
+
+def test_time_modes(look: Any, busy_bus: Any) -> None:
+    async def script(see: Any) -> None:
+        await see.press("home")
+        shown = []
+        for _ in range(4):
+            shown.append(see.lines()[5].split()[1])
+            await see.press("t")
+        assert shown[0] == shown[3] == "10:00:00.034"
+        assert shown[1] == "+0.034502"
+        assert shown[2] == "+0.023437"
+
+    look(busy_bus.store, script)
+
+
+def test_delta_is_to_the_row_shown_before(look: Any, busy_bus: Any) -> None:
+    async def script(see: Any) -> None:
+        await see.press("t", "t", "slash")
+        await see.type("dst==1")
+        await see.press("enter", "home")
+        first, second = (see.main.cells(number, line) for line, number in enumerate([1, 9]))
+        assert first["time"].text == "+0.000000"
+        gap = busy_bus.store.by_no(9).event.start - busy_bus.store.by_no(1).event.start
+        assert float(second["time"].text) == pytest.approx(gap / 1e9, abs=1e-6)
+
+    look(busy_bus.store, script)
+
+
+def test_freeze_holds_the_view_and_counts(look: Any, busy_bus: Any) -> None:
+    async def script(see: Any) -> None:
+        await see.press("space")
+        before = see.lines()[2:14]
+        for _ in range(5):
+            busy_bus.ask(1)
+        await see.poll()
+        assert see.lines()[2:14] == before
+        assert "FROZEN +10" in see.lines()[0]
+        await see.press("space")
+        assert see.main.cursor == 23
+        assert "FOLLOW" in see.lines()[0]
+        assert see.feed.store is busy_bus.store
+
+    look(busy_bus.store, script, live=True)
+
+
+def test_following_ends_with_a_move_and_begins_with_f(look: Any, busy_bus: Any) -> None:
+    async def script(see: Any) -> None:
+        busy_bus.ask(1)
+        await see.poll()
+        assert see.main.cursor == 15
+        await see.press("up")
+        busy_bus.ask(1)
+        await see.poll()
+        assert see.main.cursor == 14
+        assert "FOLLOW" not in see.lines()[0]
+        await see.press("f")
+        assert see.main.cursor == 17
+        busy_bus.ask(1)
+        await see.poll()
+        assert see.main.cursor == 19
+
+    look(busy_bus.store, script, live=True)
+
+
+def test_a_file_is_not_followed(look: Any, busy_bus: Any) -> None:
+    async def script(see: Any) -> None:
+        assert see.main.cursor == 1
+        busy_bus.ask(1)
+        await see.poll()
+        assert see.main.cursor == 1
+
+    look(busy_bus.store, script)
+
+
+def test_go_to(look: Any, busy_bus: Any) -> None:
+    async def script(see: Any) -> None:
+        await see.press("colon")
+        await see.type("11")
+        await see.press("enter")
+        assert see.main.cursor == 11
+        await see.press("colon")
+        await see.type("10:00:00.1")
+        await see.press("enter")
+        assert see.main.cursor == 6
+        await see.press("colon")
+        await see.type("x")
+        await see.press("enter")
+        assert "invalid: expected a row number" in see.text()
+        await see.press("escape")
+        assert see.main.cursor == 6
+        assert see.app.focused is see.main
+
+    look(busy_bus.store, script)
+
+
+def test_fields_select_their_octets(look: Any, busy_bus: Any) -> None:
+    async def script(see: Any) -> None:
+        await see.press("home", "enter")
+        tree, octets = see.app.screen.query_one(FieldTree), see.app.screen.query_one(HexPane)
+        assert see.app.focused is tree
+        assert octets.octets == bytes([1, 3, 0, 7, 99])
+        spans = []
+        for _ in range(4):
+            await see.press("down")
+            spans.append((octets.field_name, octets.span))
+        assert spans == [("station", (0, 1)), ("function", (1, 2)), ("register", (2, 4)), ("sum", (4, 5))]
+        await see.press("up")
+        assert "octets 2–3 of 5: register" in see.text()
+
+    look(busy_bus.store, script)
+
+
+def test_octets_select_their_field(look: Any, busy_bus: Any) -> None:
+    async def script(see: Any) -> None:
+        await see.press("home", "tab", "tab")
+        tree, octets = see.app.screen.query_one(FieldTree), see.app.screen.query_one(HexPane)
+        assert see.app.focused is octets
+        names = []
+        for key in ("right", "right", "right", "right", "right", "left", "home"):
+            await see.press(key)
+            names.append((octets.cursor, tree.cursor_node.data.name))
+        assert names == [
+            (1, "function"),
+            (2, "register"),
+            (3, "register"),
+            (4, "sum"),
+            (4, "sum"),
+            (3, "register"),
+            (0, "station"),
+        ]
+        await see.press("escape")
+        assert see.app.focused is see.main
+
+    look(busy_bus.store, script)
+
+
+def test_the_selected_octets_are_in_reverse_video(look: Any, busy_bus: Any) -> None:
+    async def script(see: Any) -> None:
+        await see.press("home", "enter", "down", "down", "down")
+        octets = see.app.screen.query_one(HexPane)
+        reverse = [segment.text for segment in octets.render_line(1) if segment.style.reverse]
+        assert "".join(reverse) == "00 07.."
+
+    look(busy_bus.store, script)
+
+
+def test_the_tree_keeps_its_field_from_frame_to_frame(look: Any, busy_bus: Any) -> None:
+    async def script(see: Any) -> None:
+        tree = see.app.screen.query_one(FieldTree)
+        await see.press("home", "enter", "down", "down", "down")
+        await see.press("escape", "down", "down")
+        assert see.main.cursor == 3
+        assert tree.cursor_node.data.name == "register"
+
+    look(busy_bus.store, script)
+
+
+def test_line_errors_are_letters_and_words(look: Any, busy_bus: Any) -> None:
+    async def script(see: Any) -> None:
+        await see.press("colon", "8", "enter")
+        assert "04 03 12E34 56 4D" in see.text()
+        assert "octet 2: parity or framing" in see.text()
+        await see.press("colon", "5", "enter")
+        assert "00BFF" in see.text()
+        assert "octet 0: break" in see.text()
+        assert any("~B" in line for line in see.lines())
+
+    look(busy_bus.store, script)
+
+
+def test_zoom_and_copy(look: Any, busy_bus: Any) -> None:
+    async def script(see: Any) -> None:
+        await see.press("home", "tab", "tab", "z")
+        assert see.app.screen.maximized is see.app.screen.query_one(HexPane)
+        await see.press("z")
+        assert see.app.screen.maximized is None
+        await see.press("y")
+        assert see.app.clipboard == "01 03 00 07 63"
+
+    look(busy_bus.store, script)
+
+
+def test_rows_dropped_from_memory_leave_the_view_where_it_is(look: Any, make_bus: Any) -> None:
+    bus = make_bus(keep=200)
+    for _ in range(100):
+        bus.ask(1)
+
+    async def script(see: Any) -> None:
+        await see.press("end")
+        before = see.lines()[3:13]
+        for _ in range(20):
+            bus.ask(2)
+        await see.poll()
+        assert bus.store.first_no > 1
+        assert see.main.cursor == 200
+        assert [line.split()[0] for line in before] == [line.split()[0] for line in see.lines()[3:13]]
+        await see.press("home")
+        assert see.main.cursor == bus.store.first_no
+
+    look(bus.store, script)
+
+
+def test_an_empty_bus_says_so(look: Any, make_bus: Any) -> None:
+    async def script(see: Any) -> None:
+        assert "no frames yet" in see.text()
+        await see.press("e", "x", "m", "apostrophe", "enter", "down", "end", "y", "2", "enter", "e", "3", "enter", "8")
+        assert "nothing happened to the line" in see.text()
+
+    look(make_bus().store, script)

@@ -1,0 +1,62 @@
+"""The first line of the header: everything in 80 columns, the port gives way."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from rich.cells import cell_len
+
+from sniff.tui.feed import FeedStatus
+from sniff.tui.header import record_state, status_line
+from sniff.tui.viewing import Viewing
+
+LIVE = FeedStatus("/dev/ttyUSB0", "19200,8E1", "modbus-rtu", "/tmp/x.mcap", 12_345_678, live=True)
+
+
+def line(status: FeedStatus, viewing: Viewing, width: int = 80) -> str:
+    return "".join(text for text, _ in status_line(status, viewing.store, viewing, width))
+
+
+def test_everything_is_there(busy_bus: Any) -> None:
+    text = line(LIVE, Viewing(busy_bus.store, follow=True))
+    assert text == "/dev/ttyUSB0  19200,8E1  modbus-rtu  load 16%  err 5  REC  12.3 MB  FOLLOW"
+
+
+def test_frozen_says_how_many_rows_came(busy_bus: Any) -> None:
+    viewing = Viewing(busy_bus.store, follow=True)
+    viewing.freeze(True)
+    busy_bus.ask(1)
+    assert line(LIVE, viewing).endswith("FROZEN +2")
+    assert "FOLLOW" not in line(LIVE, viewing)
+
+
+@pytest.mark.parametrize(
+    ("status", "state"),
+    [
+        (LIVE, "REC"),
+        (FeedStatus("p", "l", "n2", live=True), "NOT REC"),
+        (FeedStatus("f.mcap", "l", "n2"), "FILE"),
+        (FeedStatus("p", "l", "n2", "/x", live=True, ended="unplugged"), "ENDED"),
+    ],
+)
+def test_record_state(status: FeedStatus, state: str) -> None:
+    assert record_state(status) == state
+
+
+@pytest.mark.parametrize("width", [40, 60, 80, 120])
+@pytest.mark.parametrize(
+    "port",
+    ["/dev/ttyUSB0", "socket://192.168.100.200:4001", "/home/somebody/captures/2026/boiler.mcap", "", "\x1b[2J日本"],
+)
+def test_the_port_gives_way(busy_bus: Any, width: int, port: str) -> None:
+    viewing = Viewing(busy_bus.store)
+    viewing.freeze(True)
+    busy_bus.store.error_total = 123_456
+    status = FeedStatus(port, "115200,8N1", "modbus-ascii", "/x", 999_000_000, 17, live=True)
+    text = line(status, viewing, width)
+    assert text.isprintable()
+    for piece in ("115200,8N1", "modbus-ascii", "load ", "err 123456", "REC", "999 MB", "LOST 17", "FROZEN +0"):
+        assert piece in text
+    if width >= 80:
+        assert cell_len(text) <= width

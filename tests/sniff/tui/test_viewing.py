@@ -1,0 +1,64 @@
+"""Freeze, marks and filter apart from any screen."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from sniff.analysis.filtering import FilterError
+from sniff.tui.viewing import Viewing
+
+
+def test_freeze_stops_the_view_and_counts(busy_bus: Any) -> None:
+    viewing = Viewing(busy_bus.store)
+    viewing.freeze(True)
+    shown = (viewing.last_row, viewing.last_closed)
+    busy_bus.ask(1)
+    busy_bus.noise()
+    assert (viewing.last_row, viewing.last_closed) == shown == (13, 6)
+    assert viewing.came_since == 3
+    viewing.freeze(False)
+    assert (viewing.last_row, viewing.last_closed, viewing.came_since) == (16, 7, 0)
+
+
+def test_marks_go_round(busy_bus: Any) -> None:
+    viewing = Viewing(busy_bus.store)
+    assert viewing.next_mark() is None
+    assert viewing.toggle_mark(9)
+    assert viewing.toggle_mark(3)
+    viewing.row = 3
+    assert viewing.next_mark() == 9
+    viewing.row = 9
+    assert viewing.next_mark() == 3
+    assert not viewing.toggle_mark(3)
+    assert viewing.next_mark() == 9
+
+
+def test_marks_of_dropped_rows_are_passed_over(make_bus: Any) -> None:
+    bus = make_bus(keep=20)
+    bus.ask(1)
+    viewing = Viewing(bus.store)
+    viewing.toggle_mark(1)
+    for _ in range(20):
+        bus.ask(1)
+    assert bus.store.first_no > 1
+    assert viewing.next_mark() is None
+
+
+def test_filter_on_rows_and_transactions(busy_bus: Any) -> None:
+    viewing = Viewing(busy_bus.store)
+    viewing.set_filter("verdict == no-response || noise")
+    assert [no for no in range(1, 14) if viewing.accepts_row(no)] == [5, 6]
+    assert [no for no in range(1, 8) if viewing.accepts_closed(no)] == [3]
+    assert not viewing.accepts_row(99)
+    assert not viewing.accepts_closed(99)
+
+
+def test_a_bad_filter_changes_nothing(busy_bus: Any) -> None:
+    viewing = Viewing(busy_bus.store)
+    viewing.set_filter(" dst == 1 ")
+    version = viewing.filter_version
+    with pytest.raises(FilterError):
+        viewing.set_filter("dst ==")
+    assert (viewing.filter, viewing.filter_version) == ("dst == 1", version)
