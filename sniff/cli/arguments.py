@@ -82,3 +82,8 @@ def colour() -> bool:
     import os
 
     return sys.stdout.isatty() and "NO_COLOR" not in os.environ
+
+
+def on_terminal() -> bool:
+    """Whether there is a whole terminal for the terminal UI, which draws through standard error."""
+    return sys.stdin.isatty() and sys.stdout.isatty() and sys.stderr.isatty()

@@ -37,7 +37,7 @@ def run(args: argparse.Namespace) -> int:
         plan = scenario(args.protocol or "modbus-rtu", args.seed, not args.clean, args.line)
     except UnknownScenario as error:
         raise Failure(f"demo: {error}", USAGE) from None
-    on_terminal = sys.stdout.isatty() and sys.stdin.isatty() and not args.json and not args.lines
+    on_terminal = arguments.on_terminal() and not args.json and not args.lines
     duration = args.duration or (None if on_terminal else DEFAULT_DURATION)
     print(f"sniff485: virtual bus, {plan.line}: {plan.text}", file=sys.stderr)
     try:

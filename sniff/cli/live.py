@@ -5,7 +5,6 @@ folder unless --no-record; says the file's name at the end. Where output is no t
 from __future__ import annotations
 
 import argparse
-import sys
 
 from sniff.capture.config import RecordSpec
 from sniff.cli import USAGE, Failure, arguments, listening
@@ -35,7 +34,7 @@ def run(args: argparse.Namespace) -> int:
 
 def show(live: LiveBus, as_json: bool, as_lines: bool) -> int:
     """The terminal UI on a terminal; else frames as lines and a summary."""
-    if not as_json and not as_lines and sys.stdout.isatty() and sys.stdin.isatty():
+    if not as_json and not as_lines and arguments.on_terminal():
         from sniff.cli.feeds import LiveFeed
         from sniff.tui import run as run_tui
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 
 from sniff.cli import USAGE, Failure, arguments
 
@@ -17,7 +16,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Show captures in the terminal UI."""
     captures = [(path, arguments.open_capture(path)) for path in args.files]
-    if not (sys.stdout.isatty() and sys.stdin.isatty()):
+    if not arguments.on_terminal():
         raise Failure("open needs a terminal; use `sniff485 show` for text", USAGE)
     from sniff.cli.feeds import FileFeed
     from sniff.tui import run as run_tui
