@@ -57,11 +57,16 @@ def target_of(args: argparse.Namespace) -> Target:
 def start(source: SourceSpec, record: RecordSpec | None, duration: float | None = None) -> LiveBus:
     """Start the capture process. Ends with exit code 4 for the port, 3 for the file."""
     try:
-        return LiveBus(CaptureLink.start([source], record, duration))
+        link = CaptureLink.start([source], record, duration)
     except PortError as error:
         raise Failure(str(error), PORT_TROUBLE) from None
     except CaptureError as error:
         raise Failure(str(error), UNREADABLE) from None
+    try:
+        return LiveBus(link)
+    except BaseException:
+        link.stop()  # a capture outlives its starter unless it is told to end
+        raise
 
 
 def new_recording(bus: str) -> str:
