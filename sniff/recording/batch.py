@@ -14,10 +14,16 @@ import struct
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import accumulate, pairwise
+from typing import TYPE_CHECKING
 
 from dissectors.frame import Chunk, LineError, Mark
 from sniff.recording.topics import LINE, RAW
 from sniff.session import Item, LineEvent, LineEventKind
+
+if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
 
 MOST_CHUNKS = 256
 MOST_TIME = 500_000_000  # ns
@@ -68,18 +74,19 @@ class Batcher:
 
         A chunk over `MOST_CHUNK` (no read returns that much) becomes several of the same time.
         """
-        if len(chunk.octets) > MOST_CHUNK:
+        octets = chunk.octets
+        if len(octets) > MOST_CHUNK:
             return [message for part in _cut(chunk) for message in self.add(part)]
-        if not chunk.octets:
+        if not octets:
             return []
-        time = min(max(chunk.time, -_I64), _I64 - 1)
-        given = [] if self._fits(time) else self.close()
-        for start in range(0, len(chunk.octets), LONGEST):
-            if start:
-                self._line(time, {"kind": CONTINUED, "chunk": self.next})
-            self._entry(time, chunk.octets[start : start + LONGEST])
+        time = chunk.time if -_I64 <= chunk.time < _I64 else min(max(chunk.time, -_I64), _I64 - 1)
+        given = self.close() if self._times and not self._fits(time) else []
+        self._entry(time, octets[:LONGEST])
+        for start in range(LONGEST, len(octets), LONGEST):
+            self._line(time, {"kind": CONTINUED, "chunk": self.next})
+            self._entry(time, octets[start : start + LONGEST])
         for mark in chunk.marks:
-            self._mark(time, mark, len(chunk.octets))
+            self._mark(time, mark, len(octets))
         return given
 
     def add_event(self, event: LineEvent) -> None:
@@ -120,8 +127,6 @@ class Batcher:
 
     def _fits(self, time: int) -> bool:
         """Whether a chunk of that time may join the batch: none is earlier than the one before it."""
-        if not self._times:
-            return True
         return (
             len(self._times) < MOST_CHUNKS
             and self._held < MOST_OCTETS
@@ -199,15 +204,43 @@ class Batch:
         batch = cls(count, start, data)
         return batch if sum(sum(lengths) for _, lengths in batch._columns()) == body else None
 
+    @property
+    def octets(self) -> bytes:
+        """The octets of all entries."""
+        return self.data[_HEAD.size + 6 * self.count :]
+
+    def times(self) -> npt.NDArray[np.int64]:
+        """ns since the epoch, of each entry."""
+        import numpy as np
+
+        return self.start + np.frombuffer(self.data, "<u4", self.count, _HEAD.size).astype(np.int64)
+
+    def lengths(self) -> npt.NDArray[np.uint16]:
+        """Octets of each entry."""
+        import numpy as np
+
+        return np.frombuffer(self.data, "<u2", self.count, _HEAD.size + 4 * self.count)
+
     def entries(self) -> Iterator[tuple[int, bytes]]:
         """Time (ns) and octets of each entry."""
-        data = self.data
+        for times, octets in self._entries():
+            yield from zip(times, octets, strict=True)
+
+    def chunks(self) -> Iterator[Chunk]:
+        """The entries as chunks without marks; empty ones (a foreign file's) left out."""
+        for times, octets in self._entries():
+            if all(octets):
+                yield from map(Chunk, times, octets)
+            else:
+                yield from (Chunk(time, some) for time, some in zip(times, octets, strict=True) if some)
+
+    def _entries(self) -> Iterator[tuple[list[int], list[bytes]]]:
+        data, start = self.data, self.start
         at = _HEAD.size + 6 * self.count
-        start = self.start
         for steps, lengths in self._columns():
-            for step, length in zip(steps, lengths, strict=True):
-                yield start + step, data[at : at + length]
-                at += length
+            ends = list(accumulate(lengths, initial=at))
+            yield [start + step for step in steps], [data[first:end] for first, end in pairwise(ends)]
+            at = ends[-1]
 
     def _columns(self) -> Iterator[tuple[tuple[int, ...], tuple[int, ...]]]:
         steps = _HEAD.size
@@ -235,16 +268,15 @@ class Joiner:
         self._marks: dict[int, list[Mark]] = {}
         self._continued: set[int] = set()
         self._events: deque[tuple[int, LineEvent]] = deque()
-        self._pending = 0
+        self._order: deque[int] = deque()  # numbers of entries that marks and continuations wait for
 
     def line(self, log_time: int, data: bytes) -> None:
         """Take a /line message; total."""
         parsed = _parse(data)
-        if parsed is None or self._pending >= _MOST_PENDING:
+        if parsed is None or len(self._order) + len(self._events) >= _MOST_PENDING:
             self.strange += 1
             return
         kind, number, record = parsed
-        self._pending += 1
         if kind in _EVENT_KINDS:
             time = _integer(record.get("time_ns"), log_time)
             text = record.get("text")
@@ -254,11 +286,13 @@ class Joiner:
             self._events.append((number, event))
         elif kind == CONTINUED:
             self._continued.add(number)
+            self._order.append(number)
         else:
             error = mark_error(kind)
             if error is None:
                 self.strange += 1  # a later version may know more kinds
             else:
+                self._order.append(number)
                 self._marks.setdefault(number, []).append(Mark(_integer(record.get("offset"), 0), error))
 
     def raw(self, sequence: int, batch: Batch) -> Iterator[Item]:
@@ -269,16 +303,14 @@ class Joiner:
             yield from self._before(number - many)
             text = f"{many} read{'s' if many != 1 else ''} missing from the recording"
             yield LineEvent(batch.start, LineEventKind.DROPPED, text, -1)
-        if self._pending:
+        if self._order or self._events:
             yield from self._joined(number, batch)
         else:
-            for time, octets in batch.entries():
-                if octets:
-                    yield Chunk(time, octets)
+            yield from batch.chunks()
 
     def skip(self, sequence: int, batch: Batch) -> None:
         """Take a /raw message for its numbering only."""
-        if self._pending:
+        if self._order or self._events:
             for _ in self.raw(sequence, batch):
                 pass
         else:
@@ -337,12 +369,11 @@ class Joiner:
             yield self._events.popleft()[1]
 
     def _forget(self, number: int) -> None:
-        """Drop what belongs to entries that have passed."""
-        self._continued = {later for later in self._continued if later >= number}
-        late = [earlier for earlier in self._marks if earlier < number]
-        for earlier in late:
-            self.strange += len(self._marks.pop(earlier))
-        self._pending = len(self._continued) + len(self._events) + sum(map(len, self._marks.values()))
+        """Drop what belongs to entries that have passed, in the order in which it came."""
+        while self._order and self._order[0] < number:
+            late = self._order.popleft()
+            self._continued.discard(late)
+            self.strange += len(self._marks.pop(late, ()))
 
 
 def _parse(data: bytes) -> tuple[str, int, dict[str, object]] | None:

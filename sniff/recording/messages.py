@@ -30,17 +30,20 @@ class Channel:
 
 
 class MessagePass:
-    """`stream` stands after the file's magic. `since`: chunks that end before that time (ns) are not read.
+    """`since`: chunks that end before that time (ns) are not read. `start`: offset of the chunk to begin with, None
+    for the beginning of the file.
 
     `last`: time of the last chunk read from the bus that was found. `jumped`: set when a chunk of the file was not
     read because of `since`.
     """
 
-    def __init__(self, stream: BinaryIO, report: scan.Report, since: int | None = None) -> None:
+    def __init__(
+        self, stream: BinaryIO, report: scan.Report, since: int | None = None, start: int | None = None
+    ) -> None:
         self.report = report
         self.last: int | None = None
         self.jumped = False
-        self._records = scan.records(stream, report, since)
+        self._records = scan.records(stream, report, since, start)
         self._schemas: dict[int, tuple[str, bytes]] = {}
         # known before the file says so: the chunk that says so may be damaged
         self.channels = {number: Channel(topic) for number, (topic, _) in enumerate(FIXED_CHANNELS, 1)}

@@ -24,9 +24,6 @@ from sniff.recording.messages import MessagePass
 from sniff.recording.topics import FRAMES, LINE, PART_RECORD, PROFILE, RAW, SESSION_RECORD, VERSION
 from sniff.session import Completeness, Item, Session
 
-MOST_SAID = 5
-"""Damaged places that `completeness` names one by one."""
-
 
 def read(path: str | Path) -> McapCapture:
     """Open a recording. Raises CaptureError."""
@@ -48,6 +45,7 @@ class McapCapture:
         self._known_first = False
         self._completeness: Completeness | None = None
         self._holes = False
+        self._index = scan.ChunkIndex()
         try:
             self._read_start()
         except OSError as error:
@@ -73,7 +71,10 @@ class McapCapture:
                 elif topic == RAW and (batch := one.batch(head, data)) is not None:
                     if one.jumped:
                         joiner.next, one.jumped = None, False
-                    yield from joiner.raw(head[1], batch)
+                    if since is not None and head[2] < since:
+                        joiner.skip(head[1], batch)
+                    else:
+                        yield from joiner.raw(head[1], batch)
             yield from joiner.close()
             if since is None:
                 self._note(one, joiner)
@@ -128,11 +129,11 @@ class McapCapture:
 
     @contextmanager
     def _pass(self, since: int | None = None) -> Iterator[MessagePass]:
-        """The file from after its magic. Raises CaptureError."""
+        """The messages of the file. Raises CaptureError."""
         with open_capture(self.path) as stream:
             try:
-                stream.seek(len(scan.MAGIC))
-                yield MessagePass(stream, scan.Report(os.fstat(stream.fileno()).st_size), since)
+                start = None if since is None else self._index.find(since)
+                yield MessagePass(stream, scan.Report(os.fstat(stream.fileno()).st_size), since, start)
             except OSError as error:
                 raise explain(self.path, error) from None
 
@@ -140,7 +141,8 @@ class McapCapture:
         return Joiner(self.first_chunk if since is None and self._known_first else None)
 
     def _note(self, one: MessagePass, joiner: Joiner) -> Completeness:
-        """Keep what a whole pass found."""
+        """Keep what a whole pass found, and where the chunks are, for later jumps."""
+        self._index = one.report.chunks
         self._completeness = _judge(one, joiner)
         self._holes = bool(joiner.missing or joiner.backward)
         return self._completeness
@@ -219,9 +221,9 @@ def _judge(one: MessagePass, joiner: Joiner) -> Completeness:
         said.append(f"cut at octet {report.end} of {report.size}, or still being written; {when}")
         if report.size > report.end:
             said.append(f"{report.size - report.end} octets after it lost")
-    said.extend(report.problems[:MOST_SAID])
-    if len(report.problems) > MOST_SAID:
-        said.append(f"{len(report.problems) - MOST_SAID} more such places")
+    said.extend(report.problems)
+    if report.places > len(report.problems):
+        said.append(f"{report.places - len(report.problems)} more such places")
     if report.skipped:
         said.append(f"{report.skipped} octets of the file passed over")
     for count, words in (

@@ -12,6 +12,8 @@ from __future__ import annotations
 
 import struct
 import zlib
+from array import array
+from bisect import bisect_left
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from io import BytesIO
@@ -27,13 +29,31 @@ PRIVATE_OPCODES = 0x80
 
 MOST_RECORD = 80 << 20  # octets of a record that is read whole
 MOST_CHUNK = 64 << 20  # octets of a chunk unpacked; usual writers make 1 to 8 MiB
-MOST_PROBLEMS = 100
+MOST_PROBLEMS = 5  # that are kept in words
 
 _RECORD = struct.Struct("<BQ")
 _CHUNK = struct.Struct("<QQQIi")  # first and last time, size and check sum unpacked, length of the compression's name
 _ZSTD = b"\x04\x00\x00\x00zstd"
 _ZSTD_AT = _RECORD.size + 28  # of that in a chunk record
 _BLOCK = 1 << 20
+
+
+class ChunkIndex:
+    """Where the chunks of a file are, in its order, with the latest message time (ns) up to the end of each."""
+
+    def __init__(self) -> None:
+        self.offsets = array("q")
+        self.latest = array("Q")
+
+    def add(self, offset: int, end: int) -> None:
+        """Take the next chunk; `end`: the latest time in it."""
+        self.offsets.append(offset)
+        self.latest.append(max(end, self.latest[-1]) if self.latest else end)
+
+    def find(self, since: int) -> int | None:
+        """Offset of the first chunk that has something at or after a time, or of the last; None without a chunk."""
+        at = bisect_left(self.latest, since)
+        return self.offsets[min(at, len(self.offsets) - 1)] if self.offsets else None
 
 
 @dataclass(slots=True)
@@ -43,12 +63,15 @@ class Report:
     size: int
     end: int = 0
     footer: bool = False
-    problems: list[str] = field(default_factory=list)
+    problems: list[str] = field(default_factory=list)  # in words, the first of them
+    places: int = 0  # how many there are
     skipped: int = 0  # octets before `end` that could not be read
+    chunks: ChunkIndex = field(default_factory=lambda: ChunkIndex())
 
     def problem(self, text: str, octets: int = 0) -> None:
         """Write down something that could not be read, and how many octets were passed over."""
         self.skipped += octets
+        self.places += 1
         if len(self.problems) < MOST_PROBLEMS:
             self.problems.append(text)
 
@@ -62,15 +85,16 @@ class Record:
     body: bytes | None
 
 
-def records(stream: BinaryIO, report: Report, since: int | None = None) -> Iterator[Record]:
-    """The records of a file from its beginning, `stream` standing after the magic.
+def records(stream: BinaryIO, report: Report, since: int | None = None, start: int | None = None) -> Iterator[Record]:
+    """The records of a file, from its beginning or from a chunk at `start`.
 
     `since`: chunks whose messages all are earlier (ns) are passed over without being read; the check over the whole
     file is then not made.
     """
-    position = len(MAGIC)
+    position = len(MAGIC) if start is None else start
+    stream.seek(position)
     check = zlib.crc32(MAGIC)
-    whole = since is None
+    whole = since is None and start is None
     anchor = position  # after the last chunk whose sizes agree: what lies beyond may have been misread
     while True:
         head = stream.read(_RECORD.size)
@@ -101,12 +125,12 @@ def records(stream: BinaryIO, report: Report, since: int | None = None) -> Itera
             _summary(stream, report)
             return
         if opcode == CHUNK and since is not None and length >= _CHUNK.size:
-            start = stream.read(16)
-            if struct.unpack("<QQ", start)[1] < since:
+            times = stream.read(16)
+            if len(times) == 16 and struct.unpack("<QQ", times)[1] < since:
                 stream.seek(length - 16, 1)
                 body: bytes | None = None
             else:
-                body = start + stream.read(length - 16)
+                body = times + stream.read(length - 16)
         elif length <= MOST_RECORD:
             body = stream.read(length)
         else:
@@ -116,9 +140,10 @@ def records(stream: BinaryIO, report: Report, since: int | None = None) -> Itera
         if whole and body is not None:
             check = zlib.crc32(body, zlib.crc32(head, check))
         yield Record(opcode, position, body)
-        position += _RECORD.size + length
+        record_at, position = position, position + _RECORD.size + length
         report.end = position
         if opcode == CHUNK and body is not None and _sizes_agree(body):
+            report.chunks.add(record_at, struct.unpack_from("<Q", body, 8)[0])
             anchor = position
 
 
@@ -136,7 +161,9 @@ def _next_chunk(stream: BinaryIO, position: int, size: int) -> int | None:
     stream.seek(position)
     window = b""
     base = position
-    while block := stream.read(_BLOCK):
+    size_read = 4096  # small at first: a file with a million damaged places costs no gigabytes of reading
+    while block := stream.read(size_read):
+        size_read = min(2 * size_read, _BLOCK)
         window += block
         at = window.find(_ZSTD)
         while at >= 0:

@@ -101,7 +101,7 @@ def test_cut_at_every_octet(tmp_path: Path, small: tuple[bytes, list[Item], list
     octets, items, sizes = small
     path = tmp_path / "a.mcap"
     path.write_bytes(octets)
-    for length in range(len(octets) - 1, -1, -1):
+    for length in reversed(places(octets)):
         os.truncate(path, length)
         capture = opened(path)
         flushed = sum(size <= length for size in sizes) * A_CHUNK
@@ -118,12 +118,18 @@ def test_cut_at_every_octet(tmp_path: Path, small: tuple[bytes, list[Item], list
             assert read(path).completeness() == told, "the quick look says something else"
 
 
+def places(octets: bytes) -> list[int]:
+    """Every octet up to the summary, and every fifth of it: there it is the same over and over."""
+    data_end = octets.index(struct.pack("<BQ", scan.DATA_END, 4)) + 13
+    return [*range(data_end + 9), *range(data_end + 9, len(octets) - 40, 5), *range(len(octets) - 40, len(octets))]
+
+
 def test_any_octet_changed(tmp_path: Path, small: tuple[bytes, list[Item], list[int]]) -> None:
     octets, items, _ = small
     path = tmp_path / "a.mcap"
     path.write_bytes(octets)
     with path.open("r+b", buffering=0) as file:
-        for offset in range(len(octets)):
+        for offset in places(octets):
             file.seek(offset)
             file.write(bytes([octets[offset] ^ (0xFF if offset % 2 else 0x01)]))
             capture = opened(path)
@@ -316,3 +322,25 @@ def test_a_newer_layout_is_refused(tmp_path: Path, start: bytes) -> None:
 def test_the_check_of_a_chunk_is_what_mcap_says(start: bytes) -> None:
     good = message_record(1, 0, b"")
     assert scan.unpack_chunk(chunk_record(b"", good, len(good), zlib.crc32(good))[9:]) == good
+
+
+def test_marks_for_entries_that_never_come(tmp_path: Path, start: bytes) -> None:
+    """They are bounded in memory, and cost no more with every batch."""
+    line = b"".join(
+        message_record(2, 0, b'{"kind":"parity","offset":0,"chunk":%d}' % (10**12 + n)) for n in range(120_000)
+    )
+    raw = b"".join(message_record(1, n, struct.pack("<IqIH", 1, BASE, 0, 1) + b"x") for n in range(5000))
+    capture = written(tmp_path / "a.mcap", start + line + raw)
+    assert list(capture.items()) == [Chunk(BASE, b"x")] * 5000
+    assert "20000 messages on /line" in capture.completeness().text
+
+
+def test_many_damaged_places(tmp_path: Path, small: tuple[bytes, list[Item], list[int]]) -> None:
+    octets, _, _ = small
+    at = octets.index(b"\x04\0\0\0zstd") - 37
+    one = octets[at : at + 9 + struct.unpack_from("<Q", octets, at + 1)[0]]
+    capture = written(tmp_path / "a.mcap", octets[:at] + (one + b"\xff" * 20) * 300)
+    assert len(list(capture.items())) > 300 * A_CHUNK - 10
+    told = capture.completeness()
+    assert "295 more such places" in told.text
+    assert "batches numbered backwards" in told.text

@@ -178,9 +178,17 @@ def test_from_a_time_on(tmp_path: Path) -> None:
     recorder.close()
     capture = read(tmp_path / "a.mcap")
     assert isinstance(capture, McapCapture)
-    for since in (0, BASE, BASE + 1, BASE + 9_999_999_999, BASE + 10_000_000_000, BASE + 19_990_000_000, BASE * 2):
+    moments = (0, BASE, BASE + 1, BASE + 9_999_999_999, BASE + 10_000_000_000, BASE + 19_990_000_000, BASE * 2)
+    for since in (*moments, None, *moments):  # after a whole pass it knows where the chunks are
+        if since is None:
+            assert capture.completeness().whole
+            continue
         assert list(capture.items(since)) == [item for item in items if item.time >= since]
-        entries = [entry for batch in capture.batches(since) for entry in batch.entries()]
+        batches = list(capture.batches(since))
+        entries = [entry for batch in batches for entry in batch.entries()]
+        assert [time for batch in batches for time in batch.times().tolist()] == [time for time, _ in entries]
+        assert [size for batch in batches for size in batch.lengths().tolist()] == [len(some) for _, some in entries]
+        assert b"".join(batch.octets for batch in batches) == b"".join(some for _, some in entries)
         due = [(item.time, item.octets) for item in items if isinstance(item, Chunk) and item.time >= since]
         assert entries[len(entries) - len(due) :] == due
         assert len(entries) - len(due) < 256
