@@ -9,7 +9,7 @@ Everything behind this file walks the same octets whichever envelope they came i
 from __future__ import annotations
 
 from binascii import Error as HexError
-from binascii import unhexlify
+from binascii import hexlify, unhexlify
 
 from dissectors.checksums import crc16_modbus, lrc
 from dissectors.frame import Check, Damage, Frame
@@ -85,3 +85,23 @@ def ascii_check(frame: Frame) -> tuple[int, int] | None:
 def adu(frame: Frame) -> bytes:
     """Unit and PDU of a frame of either kind, without check."""
     return ascii_adu(frame) if frame.protocol == ASCII_NAME else rtu_adu(frame)
+
+
+def seal_rtu(octets: bytes) -> bytes:
+    """The RTU frame of unit and PDU."""
+    return octets + crc16_modbus(octets).to_bytes(2, "little")
+
+
+def seal_ascii(octets: bytes) -> bytes:
+    """The ASCII frame of unit and PDU, closed by CR LF."""
+    return b":" + hexlify(octets + bytes((lrc(octets),))).upper() + b"\r\n"
+
+
+def unseal(octets: bytes, is_ascii: bool) -> bytes | None:
+    """Unit and PDU of exactly one good frame, as a station takes it off the line; None of anything else. Total."""
+    if not is_ascii:
+        return octets[:-2] if len(octets) >= 4 and crc16_modbus(octets) == 0 else None
+    start, pairs, end = hex_pairs(octets)
+    inside = unhexlify(pairs.translate(_PARITY_BIT))
+    whole = start and end.startswith(b"\r") and len(end) == 2 and len(inside) >= 3
+    return inside[:-1] if whole and lrc(inside) == 0 else None

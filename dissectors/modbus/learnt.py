@@ -91,17 +91,7 @@ class Learnt:
 
     def too_soon(self, silence: int) -> int:
         """The gap below which a frame after an answer is not the master's next request; `silence` while unlearnt."""
-        return max(silence, min(self._pauses) * 4 // 5) if len(self._pauses) >= 4 else silence
-
-    def misses_request(self, unit: int, write: bool, gap: int, request: int) -> bool:
-        """Whether `gap` since the last frame holds a pause, a request of `request` ns and a response time, and no
-        pause alone: so the request between was not seen. False while unlearnt.
-        """
-        limit, fastest = self.response_limit(unit, write), self.fastest(unit)
-        if limit is None or fastest is None or len(self._pauses) < 8:
-            return False
-        shortest, longest = min(self._pauses) * 4 // 5, max(self._pauses) * 6 // 5 + self._tolerance
-        return gap > longest and shortest + request + fastest // 2 <= gap <= longest + request + limit
+        return max(silence, min(self._pauses) // 2) if len(self._pauses) >= 4 else silence
 
     def _patience(self) -> int:
         return (self._timeout or 0) * 4 // 5

@@ -30,6 +30,8 @@ from dissectors.tracker import Placement, Tracked, Transaction, Verdict
 GIVE_UP = 5 * NS_PER_S
 """An unanswered request is closed after 5 s of nothing while the master's timeout is unlearnt."""
 
+_IMPATIENT = "the master went on long before its timeout: the answer may have been missed at this tap"
+_PERHAPS_ANSWER = "the master went on long before its timeout: perhaps an answer whose request was missed at this tap"
 _REQUEST_OCTETS = 8  # of the commonest request, RTU
 _GARBLE = 3  # so many octets of noise in place of an answer are a damaged answer
 _QUIET_NOISE = frozenset((Reason.ZEROS, Reason.BREAK, Reason.PAD))
@@ -110,6 +112,9 @@ class ModbusTracker:
         if before is not None:
             if before.octets == seen.octets and not (before.fault or before.silent):
                 request.attempt, request.of = before.attempt + 1, before.of or before.tx
+            waited = before.gap(seen.frame.start)
+            if before.remark is None and self.timeout is not None and waited < self.timeout // 2:
+                before.remark = _IMPATIENT if before.sure else _PERHAPS_ANSWER
             self._close_open()
         self._note_mode(request)
         if request.unit == BROADCAST and not fault:
@@ -160,17 +165,13 @@ class ModbusTracker:
         return self._request(seen, sure=False)
 
     def _either_unasked(self, seen: Seen) -> Placement:
-        """No request is open: a new one, unless it comes too soon for that, or only a missed one explains its time."""
+        """No request is open: a new one, unless it comes too soon for that."""
         last = self._last
         gap = 0 if self._last_end is None else max(0, seen.frame.start - self._last_end)
         if last is not None and last.octets == seen.octets and gap < self.learnt.too_soon(self._silence):
             if last.answered:
                 return self._answer_apart(seen, Verdict.ANSWERED_TWICE, last)
             return self._echo(seen)
-        length = len(seen.frame.octets) * self._timing.char
-        writes = Exchange(0, seen, False).writes
-        if self._last_was_answer and self.learnt.misses_request(seen.octets[0], writes, gap, length):
-            return self._answer_apart(seen, Verdict.UNSOLICITED)
         return self._request(seen, sure=False)
 
     def _damaged(self, seen: Seen) -> Placement:
