@@ -23,6 +23,7 @@ from dissectors.line import LineSettings
 from sniff.simulation import hub
 from sniff.simulation.faults import Fault
 from sniff.simulation.hub import NO_STATIONS, Plan, Report
+from sniff.simulation.ports import HAS_PTY, Port
 from sniff.simulation.scenarios import Scenario
 from sniff.simulation.wire import Factory, Sent
 
@@ -115,20 +116,30 @@ class VirtualBus:
         whatever the bus's line is.
         Raises OSError where the system has no pseudo-terminals (use `connect`), or where the link cannot be made.
         """
-        return str(self._ask("attach", name, False, echo, answers, link))
+        return str(self._ask("attach", "pty", link, Port(name, False, echo, answers)))
 
     def tap(self, name: str = "tap", link: str = "") -> str:
-        """Put a listener on the bus; give the path of its pseudo-terminal. What it writes is counted, not sent."""
-        return str(self._ask("attach", name, True, False, False, link))
+        """Put a listener on the bus; give what a program opens. What it writes is counted, not sent.
+
+        That is the path of a pseudo-terminal (or `link`, a symbolic link to it), or, where the system has none, the
+        URL of a gateway.
+        """
+        if not HAS_PTY:
+            return self.gateway(name)
+        return str(self._ask("attach", "pty", link, Port(name, True)))
+
+    def gateway(self, name: str = "gateway") -> str:
+        """Put a listener on the bus that is reached over the network; give its URL ("socket://127.0.0.1:40001")."""
+        return str(self._ask("attach", "gateway", "", Port(name, True)))
 
     def connect(self, name: str, echo: bool = False, answers: bool = False) -> MemoryPort:
         """Put a party on the bus without a pseudo-terminal."""
-        self._ask("connect", name, False, echo, answers)
+        self._ask("attach", "memory", "", Port(name, False, echo, answers))
         return MemoryPort(self, name)
 
     def memory_tap(self, name: str = "memory-tap") -> MemoryPort:
         """Put a listener on the bus without a pseudo-terminal; it gets line errors too."""
-        self._ask("connect", name, True, False, False)
+        self._ask("attach", "memory", "", Port(name, True))
         return MemoryPort(self, name)
 
     def detach(self, name: str) -> None:

@@ -15,12 +15,11 @@ import contextlib
 import os
 import select
 import signal
-import sys
 import time
 from bisect import bisect_right
 from collections import Counter, deque
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
 
 from dissectors.frame import Chunk, Mark
@@ -28,13 +27,13 @@ from dissectors.line import LineSettings, Timing
 from sniff.capture.priority import raise_priority
 from sniff.simulation.faults import Fault
 from sniff.simulation.line_mix import Received
+from sniff.simulation.ports import HAS_PTY, GatewayPort, MemoryPort, Port, PtyPort
 from sniff.simulation.wire import Burst, Factory, Sent, Wire
 
 TOLERANCE = 200_000
 TRUTHS = 200_000  # transmissions remembered
-UNREAD = 1 << 20  # octets that a memory port keeps for a reader that does not come
+POLL_EVERY = 0.002  # s between looks at the control connection where it cannot be waited for
 NO_STATIONS: Factory = tuple
-HAS_PTY = os.name == "posix" and sys.platform not in ("emscripten", "wasi")
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,56 +70,6 @@ class Report:
     slipped: int
     latest: int
     priority: str
-
-
-@dataclass(slots=True)
-class Port:
-    """A place on the bus: a pseudo-terminal (`master` ≥ 0), or memory."""
-
-    name: str
-    tap: bool
-    echo: bool = False
-    answers: bool = False
-    master: int = -1
-    slave: int = -1
-    link: str = ""
-    written: int = 0
-    delivered: int = 0
-    unread: int = 0
-    waiting: deque[Chunk] = field(default_factory=deque)
-    held: int = 0
-
-    def put(self, chunk: Chunk) -> None:
-        """Give octets to the listener; what it has no room for is counted."""
-        if self.master >= 0:
-            try:
-                done = os.write(self.master, chunk.octets)
-            except BlockingIOError:
-                done = 0
-        else:
-            done = len(chunk.octets) if self.held < UNREAD else 0
-            if done:
-                self.waiting.append(chunk)
-                self.held += done
-        self.delivered += done
-        self.unread += len(chunk.octets) - done
-
-    def take(self) -> list[Chunk]:
-        """What waits in memory."""
-        chunks = list(self.waiting)
-        self.waiting.clear()
-        self.held = 0
-        return chunks
-
-    def close(self) -> None:
-        """Give the pseudo-terminal back; whoever has it open sees it hang up."""
-        if self.link:
-            with contextlib.suppress(OSError):
-                os.unlink(self.link)
-        for descriptor in (self.master, self.slave):
-            if descriptor >= 0:
-                os.close(descriptor)
-        self.master = self.slave = -1
 
 
 class Hub:
@@ -213,25 +162,27 @@ class Hub:
             self._truths.append(replace(sent, start=sent.start + origin, end=sent.end + origin))
 
     def _wait(self, due: int | None) -> None:
+        """Until `due`, or until somebody outside has octets or a request."""
         timeout = None if due is None else max(0.0, (due - self._now()) / 1e9)
-        masters = {port.master: port for port in self._ports.values() if port.master >= 0}
-        if not masters:  # also where `select` knows sockets only
+        ports = {descriptor: port for port in self._ports.values() for descriptor in port.descriptors()}
+        if not ports:
             if self._control.poll(timeout):
                 self._obey()
             return
-        control = self._control.fileno()
-        for descriptor in select.select([control, *masters], [], [], timeout)[0]:
-            if descriptor == control:
+        control = [self._control.fileno()]
+        if os.name == "nt":  # `select` knows sockets only
+            control, timeout = [], min(POLL_EVERY, POLL_EVERY if timeout is None else timeout)
+        for descriptor in select.select([*control, *ports], [], [], timeout)[0]:
+            if descriptor in control:
                 self._obey()
             else:
-                self._accept(masters[descriptor])
-
-    def _accept(self, port: Port) -> None:
-        """Octets that a party wrote into its pseudo-terminal."""
-        with contextlib.suppress(OSError):
-            self._put_on_line(port, os.read(port.master, 65536))
+                self._put_on_line(ports[descriptor], ports[descriptor].take(descriptor))
+        if not control and self._control.poll(0):
+            self._obey()
 
     def _put_on_line(self, port: Port, octets: bytes) -> None:
+        if not octets:
+            return
         port.written += len(octets)
         if port.tap:
             self._tap_octets += len(octets)
@@ -262,26 +213,22 @@ class Hub:
         """End the process."""
         self._running = False
 
-    def do_attach(self, name: str, tap: bool, echo: bool, answers: bool, link: str) -> str:
-        """Make a pseudo-terminal for a party or a tap; give the path to open."""
-        self._free(name)
-        port = Port(name, tap, echo, answers)
-        port.master, port.slave = _raw_pty()
-        path = os.ttyname(port.slave)
-        if link:
-            try:
-                os.symlink(path, link)
-            except OSError:
-                port.close()
-                raise
-            port.link = link
-        self._ports[name] = port
-        return link or path
+    def do_attach(self, kind: str, link: str, port: Port) -> str:
+        """Take a party or a tap on the bus; give what a program opens.
 
-    def do_connect(self, name: str, tap: bool, echo: bool, answers: bool) -> None:
-        """Make a port in memory."""
-        self._free(name)
-        self._ports[name] = Port(name, tap, echo, answers)
+        `kind`: "pty", "gateway" or "memory". `link`: a symbolic link for a pseudo-terminal, empty for none.
+        """
+        if port.name in self._ports:
+            raise ValueError(f"port {port.name!r} is on the bus already")
+        who = (port.name, port.tap, port.echo, port.answers)
+        if kind == "pty" and not HAS_PTY:
+            raise OSError("this system has no pseudo-terminals; use a gateway or a port in memory")
+        if kind == "pty":
+            port = PtyPort(*who, link=link).open()
+        else:
+            port = GatewayPort(*who).open() if kind == "gateway" else MemoryPort(*who)
+        self._ports[port.name] = port
+        return port.address
 
     def do_detach(self, name: str) -> None:
         """Take a port off the bus."""
@@ -289,7 +236,8 @@ class Hub:
 
     def do_read(self, name: str) -> list[Chunk]:
         """What a memory port has got since the last call."""
-        return self._ports[name].take()
+        port = self._ports[name]
+        return port.fetch() if isinstance(port, MemoryPort) else []
 
     def do_write(self, name: str, octets: bytes) -> None:
         """Octets from a memory port."""
@@ -321,26 +269,6 @@ class Hub:
             latest=self._latest,
             priority=self._priority,
         )
-
-    def _free(self, name: str) -> None:
-        if name in self._ports:
-            raise ValueError(f"port {name!r} is on the bus already")
-
-
-def _raw_pty() -> tuple[int, int]:
-    """Master and slave of a new pseudo-terminal that passes octets as they are. Raises OSError where there is none.
-
-    The slave stays open here, so that its settings survive and the master never reads end of file.
-    """
-    if not HAS_PTY:
-        raise OSError("this system has no pseudo-terminals; use a port in memory")
-    import pty
-    import tty
-
-    master, slave = pty.openpty()
-    tty.setraw(slave)
-    os.set_blocking(master, False)
-    return master, slave
 
 
 def main(plan: Plan, control: Connection) -> None:

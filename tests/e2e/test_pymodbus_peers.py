@@ -28,7 +28,7 @@ from sniff.capture.wire import Received
 from sniff.engine import Engine, Row
 from sniff.simulation.bus import VirtualBus
 from sniff.simulation.faults import LateResponse, LostResponse
-from sniff.simulation.hub import HAS_PTY
+from sniff.simulation.ports import HAS_PTY
 from sniff.simulation.wire import Sent
 
 pytestmark = pytest.mark.skipif(not HAS_PTY, reason="this system has no pseudo-terminals")

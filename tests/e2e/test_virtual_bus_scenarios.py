@@ -15,7 +15,7 @@ from sniff.capture.wire import Received
 from sniff.engine import Engine, Row
 from sniff.simulation import scenarios
 from sniff.simulation.bus import VirtualBus
-from sniff.simulation.hub import HAS_PTY
+from sniff.simulation.ports import HAS_PTY
 from sniff.simulation.scenarios import Scenario, scenario
 from sniff.simulation.wire import Sent
 

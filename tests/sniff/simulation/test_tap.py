@@ -6,7 +6,7 @@ from dataclasses import replace
 from itertools import pairwise
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dissectors.frame import Chunk, LineError
@@ -45,6 +45,7 @@ def chunks_of(items: list[object]) -> list[Chunk]:
     return [item for item in items if isinstance(item, Chunk)]
 
 
+@settings(deadline=None)
 @given(sendings, models, st.integers(0, 3))
 def test_every_octet_is_read_after_its_end_and_within_the_latency(
     sends: list[tuple[int, bytes]], model: TapModel, seed: int
@@ -70,6 +71,7 @@ def _nominal(chunks: list[Chunk]) -> list[int]:
     ]
 
 
+@settings(deadline=None)
 @given(sendings, st.sampled_from([EXACT, OCTETS, UART]))
 def test_marks_stay_at_their_octets(sends: list[tuple[int, bytes]], model: TapModel) -> None:
     model = replace(model, ambiguous=False)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dissectors.frame import LineError, Place
@@ -99,6 +99,7 @@ def test_a_clean_bus_carries_questions_and_answers_at_line_speed() -> None:
     assert len(bursts) in (40, 41, 42)
 
 
+@settings(deadline=None)
 @given(
     st.binary(min_size=1, max_size=40), st.sampled_from(["19200,8E1", "9600,8N1", "9600,7E1", "300,8O2", "115200,8M1"])
 )
@@ -110,6 +111,7 @@ def test_bits_and_arithmetic_agree_for_a_transmission_that_is_alone(octets: byte
     assert received.marks == ()
 
 
+@settings(deadline=None)
 @given(st.binary(min_size=1, max_size=20), st.data())
 def test_bits_and_arithmetic_agree_on_flipped_bits(octets: bytes, data: st.DataObject) -> None:
     flips = data.draw(st.dictionaries(st.integers(0, len(octets) - 1), st.integers(1, 511), max_size=3))
@@ -131,6 +133,7 @@ class Flip:
         return (sent.hit(self.name, flips=self.flips),)
 
 
+@settings(deadline=None)
 @given(st.binary(min_size=4, max_size=30), st.binary(min_size=4, max_size=30), st.integers(1, 3 * CHAR))
 def test_a_collision_spares_what_came_before_it_and_is_told(first: bytes, second: bytes, after: int) -> None:
     wire = Wire(LINE)
@@ -145,6 +148,7 @@ def test_a_collision_spares_what_came_before_it_and_is_told(first: bytes, second
     assert list(burst.ends) == sorted(burst.ends)
 
 
+@settings(deadline=None)
 @given(
     st.lists(st.tuples(st.integers(0, 20 * MS), st.sampled_from("abc"), st.binary(min_size=1, max_size=9)), max_size=12)
 )
