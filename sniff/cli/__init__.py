@@ -12,6 +12,7 @@ from importlib import import_module
 from types import ModuleType
 
 from sniff import __version__
+from sniff.formats import CaptureError
 
 COMMANDS: dict[str, str] = {
     "ports": "serial ports: adapter, driver, latency, what line errors they can report, who holds them",
@@ -53,6 +54,10 @@ def main(argv: list[str] | None = None) -> int:
     except Failure as failure:
         print(f"sniff485: {failure}", file=sys.stderr)
         return failure.code
+    except CaptureError as error:  # a file that turned out to be damaged while it was read
+        sys.stdout.flush()
+        print(f"sniff485: {error}", file=sys.stderr)
+        return UNREADABLE
     except KeyboardInterrupt:
         return INTERRUPTED
     except BrokenPipeError:  # the reader of our output went away (`| head`)

@@ -63,7 +63,11 @@ WRITERS: dict[str, str] = {
 
 
 def read(path: str | Path) -> Capture:
-    """Open a capture by its suffix. Raises CaptureError."""
+    """Open a capture by its suffix, "-" for standard input. Raises CaptureError."""
+    if str(path) == "-":
+        from sniff.formats import standard_input
+
+        return standard_input.read()
     found: Capture = _find(READERS, Path(path))(Path(path))
     return found
 

@@ -117,7 +117,9 @@ class PcapWriter:
         for record in self._maker.close():
             self._put(record)
         if self._left_out:
-            self.losses.append(f"{self._left_out} octets that are no whole frame were left out")
+            what = "1 octet that is" if self._left_out == 1 else f"{self._left_out} octets that are"
+            was = "was" if self._left_out == 1 else "were"
+            self.losses.append(f"{what} no whole frame {was} left out")
             self._left_out = 0
         self._file.close()
 

@@ -1,0 +1,127 @@
+"""`show`: lines, JSON as promised, fields, filters, and errors with a way out."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+KEYS = [
+    "no", "t", "start_ns", "end_ns", "proto", "src", "dst", "role", "kind", "ok", "error", "found", "noise_before",
+    "tx", "verdict", "latency_ms", "text", "hex",
+]  # fmt: skip
+
+
+def test_json_has_the_promised_keys_in_order(poll: Path, sniff485: Callable) -> None:
+    ran = sniff485("show", "--json", poll)
+    rows = [json.loads(line) for line in ran.out.splitlines()]
+    assert ran.code == 0
+    assert all(list(row) == KEYS for row in rows)
+    first = rows[0]
+    assert first["text"] == "1 ← read holding 0x0000 ×2"
+    assert (first["src"], first["dst"], first["role"], first["kind"]) == (None, 1, "request", "read-holding-registers")
+    assert (first["verdict"], first["tx"], first["ok"], first["error"]) == ("answered", 1, True, None)
+    assert first["end_ns"] == 0
+    assert first["t"].startswith("2026-03-01T09:59:59.9954")
+    assert rows[1]["latency_ms"] == pytest.approx(8.2 - 9 * 11 / 19.2, abs=1e-4)
+    assert first["latency_ms"] == rows[1]["latency_ms"]
+
+
+def test_the_hex_of_all_lines_is_every_octet(poll: Path, sniff485: Callable) -> None:
+    from sniff.formats import read
+
+    rows = [json.loads(line) for line in sniff485("show", "--json", poll).out.splitlines()]
+    octets = b"".join(item.octets for item in read(poll).items() if hasattr(item, "octets"))
+    assert "".join(row["hex"] for row in rows) == octets.hex()
+    noise = [row for row in rows if row["kind"] == "noise"]
+    assert [row["proto"] for row in noise] == [None]
+
+
+def test_verdicts_survive(poll: Path, sniff485: Callable) -> None:
+    rows = [json.loads(line) for line in sniff485("show", "--json", poll).out.splitlines()]
+    assert [row["verdict"] for row in rows][:6] == [
+        "answered", "answered", None, "no-response", "exception", "exception",
+    ]  # fmt: skip
+    assert rows[6]["ok"] is False
+    assert "CRC" in rows[6]["error"]
+
+
+def test_a_filter_chooses(poll: Path, sniff485: Callable) -> None:
+    out = sniff485("show", poll, "-Y", "verdict == no-response").out
+    assert out.count("\n") == 1
+    assert "2 ← read holding" in out
+
+
+def test_fields_by_wiresharks_names(poll: Path, sniff485: Callable) -> None:
+    out = sniff485(
+        "show",
+        poll,
+        "-Y",
+        "ok && role == response",
+        "-T",
+        "fields",
+        "-e",
+        "mbrtu.unit_id",
+        "-e",
+        "modbus.regval_uint16",
+        "-e",
+        "modbus.exception_code",
+    ).out
+    assert out.splitlines() == ["1\t215,26\t", "1\t\t2"]
+
+
+def test_fields_in_json(poll: Path, sniff485: Callable) -> None:
+    first = json.loads(sniff485("show", "--json", "--fields", poll).out.splitlines()[0])
+    assert first["fields"]["modbus.func_code"] == 3
+    assert first["fields"]["tx.latency_low_ms"] <= first["fields"]["tx.latency_ms"]
+
+
+def test_tree_and_hex(poll: Path, sniff485: Callable) -> None:
+    out = sniff485("show", poll, "-V", "-x", "-c", 2).out
+    assert "0000  01 03 00 00 00 02 c4 0b" in out
+    assert "unit" in out
+    assert "None" not in out.replace("= None", "")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "said"),
+    [
+        (["show", "no-such.mcap"], 3, "no-such.mcap"),
+        (["show", "no-such.xyz"], 2, "unknown suffix"),
+        (["show", "{poll}", "-Y", "dts == 3"], 2, "unknown name 'dts'"),
+        (["show", "{poll}", "-p", "modbusrtu"], 2, "modbus-rtu"),
+        (["show", "{poll}", "-s", "fast"], 2, "19200,8E1"),
+        (["show", "{poll}", "-T", "fields"], 2, "-e"),
+        (["show", "{text}"], 3, "not an MCAP"),
+        (["show", "{folder}"], 3, "directory"),
+        (["show", "{broken}"], 3, "broken.cap.txt:2"),
+    ],
+)
+def test_an_error_is_one_line_with_a_way_out(
+    arguments: list[str], code: int, said: str, poll: Path, tmp_path: Path, sniff485: Callable
+) -> None:
+    text, folder, broken = tmp_path / "text.mcap", tmp_path / "folder.mcap", tmp_path / "broken.cap.txt"
+    text.write_text("hello, this is no recording\n")
+    folder.mkdir()
+    broken.write_text("#!sniff-capture 1\n+0 01 0G\n")
+    names = {"poll": poll, "text": text, "folder": folder, "broken": broken}
+    ran = sniff485(*(argument.format(**names) for argument in arguments))
+    assert ran.code == code
+    assert said.lower() in ran.err.lower()
+    assert "Traceback" not in ran.err
+    if code == 3:
+        assert ran.err.count("\n") == 1
+
+
+def test_standard_input(poll: Path, sniff485: Callable, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    import io
+    from types import SimpleNamespace
+
+    whole = sniff485("show", poll).out
+    mcap = tmp_path / "poll.mcap"
+    assert sniff485("convert", poll, mcap).code == 0
+    for path in (poll, mcap):
+        monkeypatch.setattr("sys.stdin", SimpleNamespace(buffer=io.BytesIO(path.read_bytes()), isatty=lambda: False))
+        assert sniff485("show", "-").out == whole
