@@ -113,21 +113,28 @@ class OctetWindow:
         count = len(chunk.octets)
         if not count:
             return
-        index = len(self.octets)
-        first_end = chunk.time - (count - 1) * self._char
-        if self._last_end is None:  # nothing is known of the time before the first octet of a capture
-            gap, floor = UNKNOWN_SILENCE, first_end - self._char
+        octets, char = self.octets, self._char
+        index = len(octets)
+        first_end = chunk.time - (count - 1) * char
+        floor = self._last_end
+        if floor is None:  # nothing is known of the time before the first octet of a capture
+            gap, floor = UNKNOWN_SILENCE, first_end - char
         else:
-            floor = self._last_end
-            gap = max(0, first_end - self._char - floor)
-        slack = min(self._latency, gap + self._last_slack)
-        self._runs.append(_Run(index, first_end, floor, gap, self._last_slack, slack))
-        self.octets += chunk.octets
-        for mark in chunk.marks:
-            if 0 <= mark.offset < count:
-                at = index + mark.offset
-                self._marks[at] = self._marks[at] | mark.error if at in self._marks else mark.error
-        self._last_end = max(floor, first_end + (count - 1) * self._char)
+            gap = first_end - char - floor
+            if gap < 0:
+                gap = 0
+        room = self._last_slack
+        slack = gap + room
+        if slack > self._latency:
+            slack = self._latency
+        self._runs.append(_Run(index, first_end, floor, gap, room, slack))
+        octets += chunk.octets
+        if chunk.marks:
+            for mark in chunk.marks:
+                if 0 <= mark.offset < count:
+                    at = index + mark.offset
+                    self._marks[at] = self._marks[at] | mark.error if at in self._marks else mark.error
+        self._last_end = chunk.time if chunk.time > floor else floor
         self._last_slack = slack
 
     def least_silence_before(self, chunk: Chunk) -> int | None:
@@ -177,16 +184,26 @@ class OctetWindow:
 
     def take(self, count: int) -> Taken:
         """Remove and give the first `count` octets (1 … len)."""
-        start, end = self.start(0), self.end(count - 1)
-        slack = self._run(count - 1).slack
+        runs, char = self._runs, self._char
+        first = runs[0]
+        start = first.first_end - char
+        if start < first.floor:
+            start = first.floor
+        last = first if len(runs) == 1 else self._run(count - 1)
+        end = last.first_end + (count - 1 - last.index) * char
+        if end < last.floor:
+            end = last.floor
         octets = bytes(self.octets[:count])
         del self.octets[:count]
         marks: tuple[Mark, ...] = ()
         if self._marks:
             marks = tuple(Mark(i, e) for i, e in sorted(self._marks.items()) if i < count)
             self._marks = {i - count: e for i, e in self._marks.items() if i >= count}
-        self._drop_runs(count)
-        return Taken(octets, start, end, slack, marks)
+        if self.octets:
+            self._drop_runs(count)
+        else:
+            runs.clear()
+        return Taken(octets, start, end, last.slack, marks)
 
     def _drop_runs(self, count: int) -> None:
         kept: list[_Run] = []

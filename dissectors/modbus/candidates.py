@@ -81,6 +81,11 @@ _UNTOLD: Final = Reading(MORE, True, True)
 _EXCEPTION = (Reading(EXCEPTION_LENGTH, False, True),)
 
 
+_REQUESTS: Final = tuple(Reading(length, True, False) for length in range(MAX_FRAME + 1))
+_RESPONSES: Final = tuple(Reading(length, False, True) for length in range(MAX_FRAME + 1))
+_EITHER: Final = tuple((Reading(length, True, True),) for length in range(MAX_FRAME + 1))
+
+
 def readings(octets: Octets, start: int, end: int) -> tuple[Reading, ...]:
     """The predicted lengths of a frame that begins at `start`, shorter first; looks at [start, end) only."""
     if end - start < 2:
@@ -94,15 +99,14 @@ def readings(octets: Octets, start: int, end: int) -> tuple[Reading, ...]:
     asked = function.request.length(octets, start, end)
     answered = function.response.length(octets, start, end)
     if asked == answered:
-        return (Reading(asked, True, True),) if asked >= MORE else ()
-    found = []
-    if asked >= MORE:
-        found.append(Reading(asked, True, False))
-    if answered >= MORE:
-        found.append(Reading(answered, False, True))
-    if len(found) == 2 and asked > answered:
-        found.reverse()
-    return tuple(found)
+        return _EITHER[asked] if asked >= MORE else ()
+    if answered < MORE:
+        return (_REQUESTS[asked],)
+    if asked < MORE:
+        return (_RESPONSES[answered],)
+    if asked < answered:
+        return _REQUESTS[asked], _RESPONSES[answered]
+    return _RESPONSES[answered], _REQUESTS[asked]
 
 
 def octet_bits(octets: Octets, start: int, reading: Reading) -> int:

@@ -40,7 +40,7 @@ from dissectors.modbus.candidates import (
 )
 from dissectors.modbus.expectation import Expected, expectation
 from dissectors.modbus.functions import BROADCAST, FUNCTIONS, MAX_FRAME, MAX_UNIT, MORE, is_open_length
-from dissectors.modbus.remains import Side, injury, noise_place, noise_reason, predicted, zeros_at_start
+from dissectors.modbus.remains import Injury, Side, injury, noise_place, noise_reason, predicted, zeros_at_start
 from dissectors.modbus.segmentation import (
     ADJACENT,
     HEARD,
@@ -85,6 +85,8 @@ class RtuFramer:
         self._expected: Expected | None = None
         self._before = Side.SILENCE  # what was given last, directly before the window
         self._good_before = False  # … and it was a good frame
+        self._start: int | None = None  # evidence that a frame begins with the window; None until it is asked for
+        self._start_proved = False
         self._skipped = 0
         self._out: list[Event] = []
 
@@ -136,47 +138,51 @@ class RtuFramer:
 
     def _settle(self, *, hold: bool, proved: bool) -> None:
         """Give everything: silence (or the end of the capture) follows. With `hold`, keep a tail that may go on."""
-        window = self._window
-        self._end, self._end_proved = len(window), proved
-        while len(window) and self._take_head(len(window), hope=hold):
+        octets = self._window.octets
+        self._end, self._end_proved = len(octets), proved
+        if octets and not self._cuts and self._take_whole(octets):
+            self._end = None
+            self._next = _FIRST
+            return
+        while octets and self._in_step() and self._take_head(readings(octets, 0, len(octets)), len(octets), hold):
             pass
-        if len(window):
-            path, agreed = self._segment(len(window))
+        if octets:
+            path, agreed = self._segment(len(octets))
             for candidate in agreed if hold else path:
                 self._take_candidate(candidate)
-            if hold and len(window):
+            if octets and hold:
                 if self._may_go_on():
-                    self._cuts.append(self._finder.base + len(window))
+                    self._cuts.append(self._finder.base + len(octets))
                     self._end = None
-                    self._next = max(_FIRST, len(window) + 1)
+                    self._next = max(_FIRST, len(octets) + 1)
                     return
                 for candidate in path[len(agreed) :]:
                     self._take_candidate(candidate)
-            if len(window):
-                self._take_rest(len(window), Side.SILENCE)
+            if octets:
+                self._take_rest(len(octets), Side.SILENCE)
         self._end = None
         self._next = _FIRST
 
     def _look(self, count: int) -> None:
         """Look at the first `count` octets of a window that goes on: commit what is certain, choose the next look."""
         base = self._finder.base
-        in_step = self._in_step()
-        if in_step and self._take_head(count, hope=True):
-            self._next = max(_FIRST, count - (self._finder.base - base))
+        found = readings(self._window.octets, 0, count) if self._in_step() else ()
+        if found and self._take_head(found, count, True):
+            self._next = max(_FIRST, count - self._finder.base + base)
             return
-        waits = [r.length for r in self._readings(count) if not MORE < r.length < count] if in_step else []
-        if not waits or count > _FIRST:
+        wait = WINDOW + 1  # until the shortest reading of the head that is still open is complete
+        for length, _, _ in found:
+            if length >= count or length == MORE:
+                wait = min(wait, length + 1 if length != MORE else WINDOW)
+        if wait > WINDOW or count > _FIRST:
             for candidate in self._segment(count - 1)[1]:
                 self._take_candidate(candidate)
             if self._finder.base == base and count >= WINDOW:
                 self._take_rest(count - MAX_FRAME, Side.NOISE)
             if self._finder.base > base:
-                self._next = max(_FIRST, count - (self._finder.base - base))
+                self._next = max(_FIRST, count - self._finder.base + base)
                 return
-        if waits:
-            self._next = min(min((n + 1 for n in waits if n > MORE), default=WINDOW), count + _PATIENT_STEP, WINDOW)
-        else:
-            self._next = min(count + _STEP, WINDOW)
+        self._next = min(wait, count + (_STEP if wait > WINDOW else _PATIENT_STEP), WINDOW)
 
     def _may_go_on(self) -> bool:
         """Whether the window, before a silence, looks like the first part of a frame that a late read cut."""
@@ -192,26 +198,42 @@ class RtuFramer:
             return False  # complete, and damaged
         if unit == BROADCAST and not FUNCTIONS[octets[1]].writes if octets[1] in FUNCTIONS else False:
             return False
-        lengths = [r.length for r in self._readings(count)]
+        lengths = [r.length for r in readings(octets, 0, count)]
         return count not in lengths and any(n == MORE or n > count for n in lengths)
 
     # --- what to decide --------------------------------------------------------------------------------------------
-
-    def _readings(self, count: int) -> tuple[Reading, ...]:
-        return readings(self._window.octets, 0, count)
 
     def _in_step(self) -> bool:
         """Whether the window begins where a frame may begin."""
         return self._good_before or self._start_bits() == PROVED
 
-    def _take_head(self, count: int, *, hope: bool) -> bool:
-        """Take the frame that the window begins with, if a reading of it is good and none still open is better."""
-        if not self._in_step():
+    def _take_whole(self, octets: bytearray) -> bool:
+        """Take the window as one frame if it has silence on both sides, a predicted length and a good CRC.
+
+        This is what a healthy bus on a good adapter gives; the general way would find the same, more slowly.
+        """
+        count = len(octets)
+        if not octets[-1] or count > MAX_FRAME or self._start_bits() != PROVED:
             return False
+        whole = bytes(octets)
+        if crc16_modbus(whole):
+            return False
+        for length, request, response in readings(whole, 0, count):
+            if length == count:
+                self._take_frame(count, request, response)
+                return True
+        return False
+
+    def _take_head(self, found: tuple[Reading, ...], count: int, hope: bool) -> bool:
+        """Take the frame that the window begins with, if a reading of it is good and none still open is better.
+
+        `found`: the readings of the head; `hope`: whether those that are not complete count.
+        """
         octets, expected, end = self._window.octets, self._expected, self._end
         best: Reading | None = None
-        best_worth, hoped_worth = -1, -1
-        for reading in readings(octets, 0, count):
+        best_worth = -1
+        hopes = None
+        for reading in found:
             length = reading.length
             if MORE < length < count or length == end:
                 stretch = bytes(octets[:length])
@@ -225,17 +247,23 @@ class RtuFramer:
                 worth = self._worth(bits, length)
                 if worth > best_worth:
                     best, best_worth = reading, worth
-            elif hope:
-                if length == MORE:
-                    length = count + 1
-                bits = CRC_BITS + octet_hope(octets, 0, reading)
-                if expected is not None:
-                    bits += expected.hope(octets, 0, length)
-                hoped_worth = max(hoped_worth, self._worth(bits, length))
-        if best is None or (hoped_worth > best_worth and best.length != end):
+            else:
+                hopes = reading  # of two readings only the longer can be the one that is open
+        if best is None:
+            return False
+        if hope and hopes is not None and best.length != end and self._hope(hopes, count) > best_worth:
             return False
         self._take_frame(best.length, best.request, best.response)
         return True
+
+    def _hope(self, reading: Reading, count: int) -> int:
+        """What the head may be worth once it is complete."""
+        octets = self._window.octets
+        length = reading.length if reading.length != MORE else count + 1
+        bits = CRC_BITS + octet_hope(octets, 0, reading)
+        if self._expected is not None:
+            bits += self._expected.hope(octets, 0, length)
+        return self._worth(bits, length)
 
     def _worth(self, bits: int, length: int) -> int:
         """Worth of a frame at the head of the window, by the rules of segmentation.py."""
@@ -287,10 +315,14 @@ class RtuFramer:
 
     def _start_bits(self) -> int:
         """Evidence that a frame begins with the window; the begin of the capture is as good as silence."""
-        least, most = self._window.silence(0)
-        if least >= self._t35 or most >= UNKNOWN_SILENCE:
-            return PROVED
-        return LIKELY if least >= self._t15 else 0
+        if self._start is None:
+            least, most = self._window.silence(0)
+            self._start_proved = least >= self._t35
+            if self._start_proved or most >= UNKNOWN_SILENCE:
+                self._start = PROVED
+            else:
+                self._start = LIKELY if least >= self._t15 else 0
+        return self._start
 
     # --- giving out ------------------------------------------------------------------------------------------------
 
@@ -302,19 +334,24 @@ class RtuFramer:
 
     def _take_frame(self, count: int, request: bool, response: bool) -> None:
         """Give the first `count` octets as a frame with a good CRC."""
-        stretch = bytes(self._window.octets[:count])
-        damage, expected = None, None
-        if request or response:
-            if not is_open_length(stretch):
-                expected = count
-        else:  # its length contradicts its octets; its CRC does not
-            expected = predicted([r.length for r in readings(stretch, 0, count) if r.length != MORE], count)
+        found = self._found(count)
+        octets, start, end, slack, marks = self._window.take(count)
+        damage: Damage | None = None
+        expected: int | None = count
+        if not (request or response):  # its length contradicts its octets; its CRC does not
+            expected = predicted([r.length for r in readings(octets, 0, count) if r.length != MORE], count)
             if expected is not None and expected != count:
                 damage = Damage.SHORT if count < expected else Damage.LONG
-        self._take(count, Check.GOOD, damage, expected)
-        self._expected = expectation(self._expected, stretch, request, response)
-        self._units.add(stretch[0])
+        elif is_open_length(octets):
+            expected = None
+        self._out.append(
+            Frame("modbus-rtu", octets, start, end, Check.GOOD, found, damage, expected, self._skipped, slack, marks)
+        )
+        self._skipped = 0
+        self._taken(count, Side.FRAME)
         self._good_before = True
+        self._expected = expectation(self._expected, octets, request, response)
+        self._units.add(octets[0])
 
     def _take_rest(self, count: int, after: Side) -> None:
         """Give the first `count` octets as what no frame covers, in pieces between proved silences."""
@@ -333,12 +370,12 @@ class RtuFramer:
                 if zeros == count:
                     return
                 before, stretch, count = Side.NOISE, stretch[zeros:], count - zeros
-        hurt = injury(stretch, before, after, stretch[0] in self._units, self._expected)
+        heard = stretch[0] in self._units if self._units else None
+        hurt = injury(stretch, before, after, heard, self._expected)
         if hurt is None:
             self._take_noise(count, before, after, None)
         else:
-            check = Check.ABSENT if hurt.damage is Damage.SHORT else Check.BAD
-            self._take(count, check, hurt.damage, hurt.expected)
+            self._take_damaged(count, hurt)
 
     def _take_noise(self, count: int, before: Side, after: Side, reason: Reason | None) -> None:
         place = self._place(count, before, after)
@@ -349,29 +386,36 @@ class RtuFramer:
         self._skipped += count
         self._out.append(Noise(taken.octets, taken.start, taken.end, place, reason, taken.marks))
 
-    def _take(self, count: int, check: Check, damage: Damage | None, expected: int | None) -> None:
+    def _take_damaged(self, count: int, hurt: Injury) -> None:
         found = self._found(count)
         octets, start, end, slack, marks = self._window.take(count)
-        self._taken(count, Side.FRAME)
-        skipped, self._skipped = self._skipped, 0
+        check = Check.ABSENT if hurt.damage is Damage.SHORT else Check.BAD
         self._out.append(
-            Frame(self.protocol, octets, start, end, check, found, damage, expected, skipped, slack, marks)
+            Frame(
+                "modbus-rtu", octets, start, end, check, found, hurt.damage, hurt.expected, self._skipped, slack, marks
+            )
         )
+        self._skipped = 0
+        self._taken(count, Side.FRAME)
 
     def _taken(self, count: int, kind: Side) -> None:
         self._finder.drop(count)
-        self._before, self._good_before = kind, False
+        self._before, self._good_before, self._start = kind, False, None
         if self._end is not None:
             self._end -= count
         if self._cuts:
             self._cuts = [cut for cut in self._cuts if cut > self._finder.base]
 
     def _found(self, count: int) -> Found:
-        window, base = self._window, self._finder.base
-        if self._cuts and self.inside(base, base + count):
-            return Found.JOINED
-        ends = self._end == count
-        if window.silence(0)[0] >= self._t35 and ((ends and self._end_proved) or base + count in self._cuts):
+        window, base, ends = self._window, self._finder.base, self._end == count
+        self._start_bits()
+        if self._cuts:
+            if self.inside(base, base + count):
+                return Found.JOINED
+            end_proved = (ends and self._end_proved) or base + count in self._cuts
+        else:
+            end_proved = ends and self._end_proved
+        if end_proved and self._start_proved:
             return Found.GAP
         touched = window.gap(0) < self._t15 or (not ends and window.gap(count) < self._t15)
         return Found.SPLIT if touched else Found.LENGTH

@@ -19,6 +19,9 @@ from dissectors.modbus.functions import (
 )
 
 
+_COMMON = frozenset({0x01, 0x02, 0x03, 0x04, 0x05, 0x06, 0x0F, 0x10})
+
+
 class Side(Enum):
     """What stands beside a stretch, without proved silence between (SILENCE: with it)."""
 
@@ -34,11 +37,14 @@ class Injury(NamedTuple):
     damage: Damage
 
 
-def injury(octets: bytes, before: Side, after: Side, heard: bool, expected: Expected | None) -> Injury | None:
+def injury(octets: bytes, before: Side, after: Side, heard: bool | None, expected: Expected | None) -> Injury | None:
     """The damaged frame that a stretch without a good one is; None when it is noise.
 
-    It must begin where a frame may begin, with a station and a known function, and end where a frame may end.
-    `heard`: good frames named the station that its first octet names. `expected`: the open request.
+    It must begin where a frame may begin, with a station and a known function, and end where a frame may end. From a
+    station that was never heard it must have a predicted length too: one random burst in eight begins plausibly, and
+    would put stations on the bus that are not there.
+    `heard`: whether good frames named the station that its first octet names; None when no good frame came yet.
+    `expected`: the open request.
     """
     count = len(octets)
     if before is Side.NOISE or after is Side.NOISE or not 2 <= count <= MAX_FRAME:
@@ -56,8 +62,10 @@ def injury(octets: bytes, before: Side, after: Side, heard: bool, expected: Expe
     if count < MIN_FRAME and not answers:
         return None
     fits = count in lengths or (answers and awaited is not None and count == awaited.length)
-    if not fits and not heard and not (before is Side.SILENCE and after is Side.SILENCE):
-        return None
+    if not fits and not heard:
+        alone = heard is None and before is Side.SILENCE and after is Side.SILENCE
+        if not (alone and code & ~EXCEPTION_BIT in _COMMON):
+            return None
     if fits:
         return Injury(count, Damage.CHECK)
     right = awaited.length if answers and awaited is not None and not code & EXCEPTION_BIT else None

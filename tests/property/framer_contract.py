@@ -80,9 +80,12 @@ def rubbish(good_frames: st.SearchStrategy[bytes]) -> st.SearchStrategy[bytes]:
 
 @st.composite
 def wires(draw: st.DrawFn, timing: Timing, good_frames: st.SearchStrategy[bytes]) -> list[Wired]:
-    """A stretch of bus: frames and rubbish, gaps of every size, line errors here and there."""
-    stuff = st.one_of(good_frames, rubbish(good_frames))
-    pieces = draw(st.lists(st.tuples(gaps(timing), stuff), max_size=8))
+    """A stretch of bus: frames and rubbish, gaps of every size, line errors here and there; or a healthy poll with
+    gaps that are only just proved, or not."""
+    rough = st.tuples(gaps(timing), st.one_of(good_frames, rubbish(good_frames)))
+    wait = timing.t35 + timing.char
+    steady = st.tuples(st.sampled_from([wait, wait, 3 * timing.latency + 8 * wait]), good_frames)
+    pieces = draw(st.one_of(st.lists(rough, max_size=8), st.lists(steady, min_size=3, max_size=6)))
     now, wire = EPOCH, []
     for gap, octets in pieces:
         now += gap
