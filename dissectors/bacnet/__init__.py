@@ -5,14 +5,32 @@ from __future__ import annotations
 from typing import Any
 
 from dissectors.bacnet.fields import fields
+from dissectors.bacnet.findings import MstpFindings, judge
 from dissectors.bacnet.framing import MstpFramer
 from dissectors.bacnet.header import peek
+from dissectors.bacnet.ring import Ring
+from dissectors.bacnet.ring_observer import RingObserver
+from dissectors.bacnet.rules import RULES
+from dissectors.bacnet.segmentation import Reassembler
 from dissectors.bacnet.summary import text
 from dissectors.bacnet.tracker import MstpTracker
 from dissectors.frame import Frame, Role
 from dissectors.registry import Dissector
 
-__all__ = ["MSTP", "MstpFramer", "MstpTracker", "fields", "packet", "peek", "text"]
+__all__ = [
+    "MSTP",
+    "MstpFindings",
+    "MstpFramer",
+    "MstpTracker",
+    "Reassembler",
+    "Ring",
+    "RingObserver",
+    "fields",
+    "judge",
+    "packet",
+    "peek",
+    "text",
+]
 
 
 def packet(frame: Frame, role: Role) -> Any:
@@ -32,4 +50,11 @@ MSTP = Dissector(
     fields=fields,
     packet=packet,
     default_line="38400,8N1",
+    extras={
+        "findings": MstpFindings,  # (timing): see(no, event, header, placement), settle(transaction), findings(), ring()
+        "rules": RULES,  # code → Rule
+        "ring": RingObserver,  # (timing): see(no, event, header), ring()
+        "judge": judge,  # Ring → findings
+        "reassembler": Reassembler,  # (): add(no, frame) → Gathered | None
+    },
 )

@@ -1,0 +1,255 @@
+"""What the rules say of a ring. `judge` is pure: a Ring in, findings out; `MstpFindings` feeds it from the live bus."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from dissectors.bacnet.limits import N_POLL, T_REPLY_DELAY, T_USAGE_DELAY
+from dissectors.bacnet.ring import Happened, Node, Ring, What
+from dissectors.bacnet.ring_observer import RingObserver
+from dissectors.bacnet.rules import RULES
+from dissectors.findings import EVIDENCE_MAX, Finding, Severity, found
+from dissectors.frame import Event, Header
+from dissectors.line import Timing
+from dissectors.tracker import Placement, Transaction
+
+_MS = 1_000_000
+SLOW_ROUND = 2_000 * _MS
+LATE_SHARE = 0.01
+"""Share of slow uses of the token from which on a station is named."""
+
+POLLS_SHARE = 0.1
+POSTPONED_SHARE = 0.1
+DAMAGED_SHARE = 0.001
+DAMAGED_OF_ONE_SHARE = 0.01
+NOISE_SHARE = 0.005
+LEAST_FRAMES = 20
+
+_SIMPLE: tuple[tuple[str, What, int, str], ...] = (
+    ("MS102", What.RETRY, 1, "token repeated {times}"),
+    ("MS105", What.REJOINED, 1, "answered a Poll For Master {times} though it had been in the ring"),
+    ("MS107", What.SELF_TOKEN, 1, "passed the token to itself {times}"),
+    ("MS301", What.NO_REPLY, 1, "a request stayed without an answer {times}"),
+    ("MS304", What.BROADCAST_REQUEST, 1, "sent a broadcast that expects a reply {times}"),
+    ("MS404", What.ILLEGAL, 1, "sent a forbidden address or length {times}"),
+)
+"""Rules that only count: code, kind of event, from how many on, what was seen."""
+
+_TIMED: tuple[tuple[str, What, int, str], ...] = (
+    ("MS202", What.LATE_POLL_REPLY, T_USAGE_DELAY, "answered a poll late {times}, up to {most}"),
+    ("MS302", What.LATE_REPLY, T_REPLY_DELAY, "answered late {times}, up to {most}"),
+)
+"""Rules that name the longest time."""
+
+
+def judge(ring: Ring) -> tuple[Finding, ...]:
+    """All findings about a ring, the gravest first."""
+    made = [*_tokens(ring), *_counted(ring), *_times(ring), *_polls(ring), *_answers(ring), *_damage(ring)]
+    made += _duplicates(ring)
+    return tuple(sorted(made, key=lambda finding: (-finding.severity, finding.code, finding.subject)))
+
+
+def _tokens(ring: Ring) -> Iterable[Finding]:
+    for (what, mac), happened in ring.happened.items():
+        if what is What.LOST_TOKEN:
+            subject = "bus" if mac is None else _station(mac)
+            longest = max((event.value or 0 for event in happened.events), default=0)
+            makers = sorted({event.other for event in happened.events if event.other is not None})
+            held = "the holder is not known" if mac is None else f"station {mac} had it"
+            seen = (
+                f"the token was lost {_times_word(happened.count)}; {held}; silence up to {_ms(longest)}; "
+                f"begun anew by {_list(makers)}"
+            )
+            yield _of("MS101", subject, seen, happened)
+        elif what is What.LEFT and mac is not None and ring.of(What.REJOINED, mac).last <= happened.last:
+            node = ring.nodes.get(mac)
+            if node is not None and node.last <= happened.last:
+                seen = "did not use its token, was passed over, and has been silent since"
+                yield _of("MS106", _station(mac), seen, happened)
+    stray = [happened for (what, _), happened in ring.happened.items() if what is What.TWO_TOKENS]
+    total = sum(happened.count for happened in stray)
+    if total >= 2:
+        together = stray[0]
+        for happened in stray[1:]:
+            together = together.merge(happened)
+        who = sorted({event.mac for event in together.events if event.mac is not None})
+        seen = f"stations {_list(who)} sent {_times_word(total)} while another one had the token"
+        yield _of("MS104", "bus", seen, together)
+    for mac in ring.masters:
+        loop = ring.nodes[mac].loop
+        slow = loop.percentile(0.95)
+        if slow is not None and loop.count >= LEAST_FRAMES and slow > SLOW_ROUND:
+            yield _plain("MS108", ring, _station(mac), f"95 of 100 rounds took up to {_ms(slow)}")
+    for mac, node in ring.nodes.items():
+        if node.polls_sent >= LEAST_FRAMES and not node.tokens_sent and not node.tokens_received:
+            yield _plain("MS109", ring, _station(mac), f"{node.polls_sent} polls for masters and not one token")
+
+
+def _counted(ring: Ring) -> Iterable[Finding]:
+    for code, kind, least, words in _SIMPLE:
+        for (what, mac), happened in ring.happened.items():
+            if what is kind and happened.count >= least:
+                severity = None
+                node = ring.nodes.get(mac) if mac is not None else None
+                if code == "MS102" and (happened.count == 1 or _share(happened.count, node) < LATE_SHARE):
+                    severity = Severity.NOTE
+                seen = words.format(times=_times_word(happened.count))
+                yield _of(code, _pair(happened, mac), seen, happened, severity)
+
+
+def _share(count: int, node: Node | None) -> float:
+    return count / max(1, node.tokens_received if node is not None else 0)
+
+
+def _times(ring: Ring) -> Iterable[Finding]:
+    for code, kind, limit, words in _TIMED:
+        if not ring.measurable(limit):
+            continue
+        for (what, mac), happened in ring.happened.items():
+            if what is kind:
+                most = max((event.value or 0 for event in happened.events), default=0)
+                seen = words.format(times=_times_word(happened.count), most=_ms(most))
+                yield _of(code, _pair(happened, mac), seen, happened)
+    if not ring.measurable(T_USAGE_DELAY):
+        return
+    for mac, node in ring.nodes.items():
+        late = ring.of(What.LATE_USE, mac)
+        if node.use.count >= LEAST_FRAMES and late.count >= max(2, LATE_SHARE * node.use.count):
+            seen = (
+                f"used the token later than {_ms(T_USAGE_DELAY)} {_times_word(late.count)} of {node.use.count}; "
+                f"median {_ms(node.use.percentile(0.5))}, longest {_ms(node.use.most)}"
+            )
+            yield _of("MS103", _station(mac), seen, late)
+
+
+def _polls(ring: Ring) -> Iterable[Finding]:
+    advice = {int(words.split()[1]): words for words in ring.advice()}
+    for mac, node in ring.nodes.items():
+        tokens = node.tokens_received
+        if node.polls_sent < LEAST_FRAMES or not tokens or node.polls_sent <= POLLS_SHARE * tokens:
+            continue
+        seen = (
+            f"{node.polls_sent} polls to {tokens} tokens (one in {N_POLL} is usual), {node.polls_unanswered} of them "
+            f"unanswered, up to address {node.highest_polled}; "
+            f"all unanswered polls take {ring.poll_waste_share:.0%} of the time"
+        )
+        if mac in advice:
+            seen += "; " + advice[mac]
+        yield _plain("MS201", ring, _station(mac), seen, node.polls_sent)
+
+
+def _answers(ring: Ring) -> Iterable[Finding]:
+    for mac, node in ring.nodes.items():
+        if node.postponed >= 5 and node.postponed > POSTPONED_SHARE * node.requests_received:
+            seen = f"{node.postponed} of {node.requests_received} requests answered with Reply Postponed"
+            if node.service.count:
+                seen += f"; the real answers took {_ms(node.service.percentile(0.5))}, up to {_ms(node.service.most)}"
+            yield _plain("MS303", ring, _station(mac), seen, node.postponed)
+
+
+def _damage(ring: Ring) -> Iterable[Finding]:
+    damaged = ring.header_errors + ring.data_errors + ring.cut
+    if damaged >= 3 and damaged > DAMAGED_SHARE * ring.frames:
+        seen = (
+            f"{damaged} of {ring.frames} frames: {ring.header_errors} with a wrong header CRC, "
+            f"{ring.data_errors} with a wrong data CRC, {ring.cut} cut off"
+        )
+        yield _plain("MS401", ring, "bus", seen, damaged)
+    for mac, node in ring.nodes.items():
+        sent = node.data_sent + node.tokens_sent + node.damaged
+        if node.damaged >= 3 and node.damaged > DAMAGED_OF_ONE_SHARE * sent:
+            yield _plain(
+                "MS402", ring, _station(mac), f"{node.damaged} of its {sent} frames have a wrong data CRC", node.damaged
+            )
+    if ring.noise >= 20 and ring.noise > NOISE_SHARE * (ring.octets + ring.noise):
+        seen = f"{ring.noise} octets of {ring.octets + ring.noise} belong to no frame"
+        yield _plain("MS403", ring, "bus", seen, ring.noise)
+
+
+def _duplicates(ring: Ring) -> Iterable[Finding]:
+    for mac in sorted({mac for _, mac in ring.happened if mac is not None}):
+        second = ring.of(What.SECOND_DEVICE, mac)
+        stray = ring.of(What.TWO_TOKENS, mac)
+        collided = ring.of(What.COLLIDED_REPLY, mac)
+        reasons, evidence = [], Happened()
+        if second.count:
+            devices = ring.nodes[mac].devices if mac in ring.nodes else ()
+            reasons.append(f"I-Am of devices {_list(devices)} from this address")
+            evidence = evidence.merge(second)
+        if stray.count > 2:
+            reasons.append(f"sent {_times_word(stray.count)} without the token")
+            evidence = evidence.merge(stray)
+        if collided.count > 2:
+            reasons.append(f"damaged octets in place of its answer {_times_word(collided.count)}")
+            evidence = evidence.merge(collided)
+        if second.count or (stray.count > 2 and collided.count > 2):
+            yield _of("MS501", _station(mac), "; ".join(reasons), evidence)
+        elif reasons:
+            yield _of("MS501", _station(mac), "; ".join(reasons), evidence, Severity.WARNING)
+
+
+def _of(code: str, subject: str, seen: str, happened: Happened, severity: Severity | None = None) -> Finding:
+    evidence = tuple(dict.fromkeys(event.no for event in happened.events))[:EVIDENCE_MAX]
+    return found(
+        RULES[code],
+        subject,
+        seen,
+        first=happened.first,
+        last=happened.last,
+        count=happened.count,
+        evidence=evidence,
+        severity=severity,
+    )
+
+
+def _plain(code: str, ring: Ring, subject: str, seen: str, count: int = 1) -> Finding:
+    return found(RULES[code], subject, seen, first=ring.first or 0, last=ring.last or 0, count=count)
+
+
+def _station(mac: int) -> str:
+    return f"MAC {mac}"
+
+
+def _pair(happened: Happened, mac: int | None) -> str:
+    others = {event.other for event in happened.events}
+    if mac is None:
+        return "bus"
+    if len(others) == 1 and (other := others.pop()) is not None:
+        return f"{other} → {mac}"
+    return _station(mac)
+
+
+def _times_word(count: int) -> str:
+    return "once" if count == 1 else f"{count} times"
+
+
+def _ms(duration: int | None) -> str:
+    return (
+        "?" if duration is None else f"{duration / _MS:.3g} ms" if duration < 1000 * _MS else f"{duration / 1e9:.2f} s"
+    )
+
+
+def _list(numbers: Iterable[int]) -> str:
+    return ", ".join(str(number) for number in numbers) or "nobody"
+
+
+class MstpFindings:
+    """Fed row by row; gives findings at any time."""
+
+    def __init__(self, timing: Timing) -> None:
+        self._observer = RingObserver(timing)
+
+    def see(self, no: int, event: Event, header: Header | None, placement: Placement | None = None) -> None:
+        """Take the next row: event, its header and placement (None for noise)."""
+        self._observer.see(no, event, header)
+
+    def settle(self, transaction: Transaction) -> None:
+        """Take a transaction that closed; the ring model has its own view of them."""
+
+    def ring(self) -> Ring:
+        """The ring so far."""
+        return self._observer.ring()
+
+    def findings(self) -> tuple[Finding, ...]:
+        """All findings so far, the gravest first."""
+        return judge(self._observer.ring())

@@ -1,0 +1,307 @@
+"""The token ring as a value: who passes to whom, how long each takes, what goes wrong. Two of them add up.
+
+`RingObserver` (ring_observer.py) makes it from the frames. Times in ns. Memory is bounded: distributions, counts and
+the first EVENTS_MAX events of each kind. What the adapter's timing cannot tell is not judged: see `Ring.measurable`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+from types import MappingProxyType
+from typing import Any
+
+from dissectors.bacnet.durations import Durations
+from dissectors.bacnet.limits import MAX_MASTER, T_REPLY_DELAY, T_USAGE_DELAY, TURNAROUND_BITS
+from dissectors.line import Timing
+
+EVENTS_MAX = 32
+
+
+class What(Enum):
+    """Kinds of events on a ring."""
+
+    LOST_TOKEN = "lost token"  # silence of 500 ms and more, then somebody began anew
+    RETRY = "token repeated"
+    TWO_TOKENS = "sent without having the token"
+    REJOINED = "answered a poll though already in the ring"
+    LEFT = "gave no sign when given the token"
+    SECOND_DEVICE = "another device instance under the same address"
+    COLLIDED_REPLY = "damaged octets in place of an answer"
+    LATE_USE = "late to use the token"
+    LATE_REPLY = "late to answer"
+    NO_REPLY = "no answer"
+    LATE_POLL_REPLY = "late to answer a poll"
+    ILLEGAL = "an address or length that the standard forbids"
+    BROADCAST_REQUEST = "a broadcast that asks for a reply"
+    SELF_TOKEN = "passed the token to itself"
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """What happened at `time`, in frame `no`, about `mac`; `other` is a second party, `value` ns or a number."""
+
+    what: What
+    time: int
+    no: int
+    mac: int | None
+    other: int | None = None
+    value: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Happened:
+    """All events of one kind about one station: how many, when, and the first EVENTS_MAX of them."""
+
+    count: int = 0
+    first: int = 0
+    last: int = 0
+    events: tuple[Event, ...] = ()
+
+    def add(self, event: Event) -> Happened:
+        """One more."""
+        events = (*self.events, event) if len(self.events) < EVENTS_MAX else self.events
+        first = event.time if not self.count else min(self.first, event.time)
+        return Happened(self.count + 1, first, max(self.last, event.time) if self.count else event.time, events)
+
+    def merge(self, other: Happened) -> Happened:
+        """Both together."""
+        if not self.count or not other.count:
+            return self if self.count else other
+        return Happened(
+            self.count + other.count,
+            min(self.first, other.first),
+            max(self.last, other.last),
+            (self.events + other.events)[:EVENTS_MAX],
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Node:
+    """One address. Counts of frames that it sent (`…_sent`) or was sent.
+
+    `use`: end of a token to it … its first frame. `loop`: from token to token. `reply`: request to its answer.
+    `service`: request to the answer after it had postponed. `poll_reply`: poll to its answer. `holds`: data frames a
+    token → how often. `highest_polled`: highest address that it ever polled.
+    """
+
+    tokens_received: int = 0
+    tokens_sent: int = 0
+    polls_sent: int = 0
+    polls_unanswered: int = 0
+    polls_received: int = 0
+    poll_replies_sent: int = 0
+    requests_sent: int = 0
+    requests_received: int = 0
+    data_sent: int = 0
+    postponed: int = 0
+    replies: int = 0
+    damaged: int = 0
+    octets: int = 0
+    highest_polled: int = -1
+    first: int = 0
+    last: int = 0
+    last_token: int = 0
+    use: Durations = field(default_factory=Durations)
+    loop: Durations = field(default_factory=Durations)
+    reply: Durations = field(default_factory=Durations)
+    service: Durations = field(default_factory=Durations)
+    poll_reply: Durations = field(default_factory=Durations)
+    holds: Mapping[int, int] = field(default_factory=lambda: MappingProxyType({}))
+    devices: tuple[int, ...] = ()
+
+    @property
+    def is_master(self) -> bool:
+        """Whether it ever passed a token, polled, or answered a poll."""
+        return bool(self.tokens_sent or self.polls_sent or self.poll_replies_sent)
+
+    @property
+    def most_in_a_hold(self) -> int:
+        """Most data frames on one token (its Max_Info_Frames is at least that)."""
+        return max(self.holds, default=0)
+
+    def merge(self, other: Node) -> Node:
+        """Both together."""
+        holds = dict(self.holds)
+        for frames, count in other.holds.items():
+            holds[frames] = holds.get(frames, 0) + count
+        merged: dict[str, Any] = {name: getattr(self, name) + getattr(other, name) for name in _SUMS}
+        merged |= {name: getattr(self, name).merge(getattr(other, name)) for name in _DISTRIBUTIONS}
+        return Node(
+            **merged,
+            highest_polled=max(self.highest_polled, other.highest_polled),
+            first=min(self.first, other.first),
+            last=max(self.last, other.last),
+            last_token=max(self.last_token, other.last_token),
+            holds=MappingProxyType(holds),
+            devices=tuple(dict.fromkeys(self.devices + other.devices))[:EVENTS_MAX],
+        )
+
+
+_SUMS = (
+    "tokens_received",
+    "tokens_sent",
+    "polls_sent",
+    "polls_unanswered",
+    "polls_received",
+    "poll_replies_sent",
+    "requests_sent",
+    "requests_received",
+    "data_sent",
+    "postponed",
+    "replies",
+    "damaged",
+    "octets",
+)
+_DISTRIBUTIONS = ("use", "loop", "reply", "service", "poll_reply")
+
+
+@dataclass(frozen=True, slots=True)
+class Edge:
+    """Tokens from one station to another, and how many of them were repeats."""
+
+    tokens: int = 0
+    retries: int = 0
+    last: int = 0
+
+    def merge(self, other: Edge) -> Edge:
+        """Both together."""
+        return Edge(self.tokens + other.tokens, self.retries + other.retries, max(self.last, other.last))
+
+
+@dataclass(frozen=True, slots=True)
+class Ring:
+    """What a stretch of MS/TP bus showed.
+
+    `frames`, `octets`, `noise` (octets), `header_errors`, `data_errors`, `cut`: counts.
+    `poll_waste`: time spent on polls that nobody answered, waiting included. `happened`: events by kind and station.
+    """
+
+    timing: Timing = field(default_factory=Timing)
+    first: int | None = None
+    last: int | None = None
+    frames: int = 0
+    octets: int = 0
+    noise: int = 0
+    header_errors: int = 0
+    data_errors: int = 0
+    cut: int = 0
+    poll_waste: int = 0
+    nodes: Mapping[int, Node] = field(default_factory=lambda: MappingProxyType({}))
+    edges: Mapping[tuple[int, int], Edge] = field(default_factory=lambda: MappingProxyType({}))
+    happened: Mapping[tuple[What, int | None], Happened] = field(default_factory=lambda: MappingProxyType({}))
+
+    @property
+    def span(self) -> int:
+        """From the first octet to the last, ns."""
+        return 0 if self.first is None or self.last is None else self.last - self.first
+
+    @property
+    def busy(self) -> int:
+        """Line time of all octets, ns."""
+        return (self.octets + self.noise) * self.timing.char
+
+    @property
+    def load(self) -> float:
+        """Share of the time that octets were on the line, 0 … 1."""
+        return min(1.0, self.busy / self.span) if self.span else 0.0
+
+    @property
+    def poll_waste_share(self) -> float:
+        """Share of the time that unanswered polls took, 0 … 1."""
+        return min(1.0, self.poll_waste / self.span) if self.span else 0.0
+
+    def measurable(self, limit: int) -> bool:
+        """Whether the adapter's timing can judge a limit of that many ns."""
+        return 2 * self.timing.latency <= limit
+
+    @property
+    def limits(self) -> Mapping[str, bool]:
+        """Which of the standard's limits this capture can judge."""
+        return {
+            "token use": self.measurable(T_USAGE_DELAY),
+            "reply": self.measurable(T_REPLY_DELAY),
+            "poll reply": self.measurable(T_USAGE_DELAY),
+        }
+
+    @property
+    def masters(self) -> tuple[int, ...]:
+        """Addresses that take part in the ring, ascending."""
+        return tuple(sorted(mac for mac, node in self.nodes.items() if node.tokens_sent))
+
+    @property
+    def order(self) -> tuple[int, ...]:
+        """The ring in the order of the token, from its lowest address on; what the newest tokens show."""
+        newest: dict[int, tuple[int, int]] = {}
+        for (source, destination), edge in self.edges.items():
+            if source not in newest or edge.last > newest[source][0]:
+                newest[source] = (edge.last, destination)
+        best: tuple[int, ...] = ()
+        for start in sorted(newest):
+            walk = [start]
+            while walk[-1] in newest and newest[walk[-1]][1] not in walk:
+                walk.append(newest[walk[-1]][1])
+            closes = walk[-1] in newest and newest[walk[-1]][1] == start
+            if closes and len(walk) > len(best):
+                best = tuple(walk)
+        return best
+
+    @property
+    def predicted_loop(self) -> int | None:
+        """How long an idle round takes: a token, the turnaround and the median use time of each station, ns."""
+        order = self.order
+        if not order:
+            return None
+        token = 8 * self.timing.char
+        least = self.timing.line.bits(TURNAROUND_BITS)
+        return sum(token + max(least, self.nodes[mac].use.percentile(0.5) or 0) for mac in order if mac in self.nodes)
+
+    @property
+    def needed_max_master(self) -> int | None:
+        """The lowest Max_Master that still reaches every master seen."""
+        masters = [mac for mac, node in self.nodes.items() if node.is_master]
+        return max(masters, default=None)
+
+    def advice(self) -> tuple[str, ...]:
+        """What could be set better, in words; empty when nothing is wasted."""
+        needed, words = self.needed_max_master, []
+        for mac in self.masters:
+            node = self.nodes[mac]
+            if needed is not None and node.polls_unanswered and needed < node.highest_polled <= MAX_MASTER:
+                words.append(f"station {mac} polls up to {node.highest_polled}: Max_Master {needed} would do")
+        return tuple(words)
+
+    def of(self, what: What, mac: int | None = None) -> Happened:
+        """Events of a kind about a station."""
+        return self.happened.get((what, mac), Happened())
+
+    def merge(self, other: Ring) -> Ring:
+        """Both stretches together; either may be empty. The timing is the first one's unless the second is worse."""
+        nodes = dict(self.nodes)
+        for mac, node in other.nodes.items():
+            nodes[mac] = nodes[mac].merge(node) if mac in nodes else node
+        edges = dict(self.edges)
+        for pair, edge in other.edges.items():
+            edges[pair] = edges[pair].merge(edge) if pair in edges else edge
+        happened = dict(self.happened)
+        for key, events in other.happened.items():
+            happened[key] = happened[key].merge(events) if key in happened else events
+        firsts = [v for v in (self.first, other.first) if v is not None]
+        lasts = [v for v in (self.last, other.last) if v is not None]
+        worse = other.timing if not self.frames or other.timing.latency > self.timing.latency else self.timing
+        return Ring(
+            self.timing if not other.frames else worse,
+            min(firsts, default=None),
+            max(lasts, default=None),
+            self.frames + other.frames,
+            self.octets + other.octets,
+            self.noise + other.noise,
+            self.header_errors + other.header_errors,
+            self.data_errors + other.data_errors,
+            self.cut + other.cut,
+            self.poll_waste + other.poll_waste,
+            MappingProxyType(nodes),
+            MappingProxyType(edges),
+            MappingProxyType(happened),
+        )
