@@ -2,12 +2,19 @@
 
 A rule is catalogued once (`Rule`); a finding is one frozen value that names its rule by code. The codes carry the
 protocol: MB… Modbus, N2… Metasys N2, MS… MS/TP, LN… the line itself.
+
+A protocol brings its rules as `Dissector.extras["findings"]`, a function Timing → `Judge`, and their catalogue as
+`Dissector.extras["rules"]`, a mapping code → `Rule`.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
+from typing import Protocol
+
+from dissectors.frame import Event, Header
+from dissectors.tracker import Placement, Transaction
 
 EVIDENCE_MAX = 16
 """Most frame numbers that a finding carries."""
@@ -62,6 +69,57 @@ class Finding:
     seen: str
     means: str
     next: str
+
+
+class Judge(Protocol):
+    """The rules of one protocol at work on one bus. Total: any events, any times; memory is bounded.
+
+    `see` and `settle` are called in the order of the wire, for all rows and all transactions that closed. The same
+    calls give the same findings. Nothing is judged that `Timing.latency` does not allow to be known.
+    """
+
+    def see(self, no: int, event: Event, header: Header | None, placement: Placement | None) -> None:
+        """Take the next row: its number, event, header and placement (both None for noise)."""
+        ...
+
+    def settle(self, transaction: Transaction) -> None:
+        """Take a transaction that closed."""
+        ...
+
+    def findings(self) -> tuple[Finding, ...]:
+        """All findings so far; may be asked at any time."""
+        ...
+
+
+@dataclass(slots=True)
+class Tally:
+    """How often, when (ns) and in which frames one thing was seen; the first EVIDENCE_MAX frames are kept."""
+
+    count: int = 0
+    first: int = 0
+    last: int = 0
+    evidence: list[int] = field(default_factory=list)
+
+    def add(self, time: int, *frames: int | None) -> None:
+        """Count one more at `time`."""
+        self.first = min(self.first, time) if self.count else time
+        self.last = max(self.last, time) if self.count else time
+        self.count += 1
+        if len(self.evidence) < EVIDENCE_MAX:
+            self.evidence.extend(no for no in frames if no is not None and no not in self.evidence)
+
+    def found(self, rule: Rule, subject: str, seen: str, severity: Severity | None = None) -> Finding:
+        """The finding that this adds up to."""
+        return found(
+            rule,
+            subject,
+            seen,
+            first=self.first,
+            last=self.last,
+            count=self.count,
+            evidence=tuple(sorted(self.evidence)),
+            severity=severity,
+        )
 
 
 def found(

@@ -37,6 +37,8 @@ class Dissector:
     `fields(frame, role)`: Wireshark field names (ours where it has none) to int, float or str, in frame order.
     `packet(frame, role)`: the scapy packet, imported on first use; never raises, keeps what does not parse as Raw.
     `default_line`: what such a bus normally runs ("19200,8E1").
+    `extras`: what only some protocols have: "findings", a function Timing → `dissectors.findings.Judge`, and "rules",
+    its catalogue, code → `dissectors.findings.Rule`.
     """
 
     name: str
