@@ -39,8 +39,9 @@ class VirtualBus:
 
     `stations`: makes the simulated parties; a module-level function or a partial of one, called in the bus's process.
     `faults` strike every transmission in their order, repeatable by `seed`. `gap`: ns of silence that the protocol
-    wants before a frame (told to stations as `quiet`). `slice`: ns, how finely octets of a burst are handed out.
-    `paused`: the clock stands, and no octet moves, until `begin` is called.
+    wants before a frame: stations are told whether it was kept (`quiet`), and parties outside are made to keep it,
+    because a program answers in less than that and no device does. `slice`: ns, how finely octets of a burst are
+    handed out. `paused`: the clock stands, and no octet moves, until `begin` is called.
     """
 
     def __init__(

@@ -188,7 +188,11 @@ class Hub:
             self._tap_octets += len(octets)
             self._tap_first = (self._tap_first + octets)[:64]
         elif self._origin is not None:
-            self._wire.send(port.name, self._now(), octets, port.answers, self._linger)
+            now = self._now()
+            silent = self._wire.silent_since(now)
+            if silent is not None and port.name not in self._wire.senders():
+                now = max(now, silent + self._plan.gap)  # a driver outside keeps to the silence that a device owes
+            self._wire.send(port.name, now, octets, port.answers, self._linger)
 
     def _obey(self) -> None:
         """One request of the other side, one reply: ("ok", value) or ("error", text)."""

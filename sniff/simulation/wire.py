@@ -143,6 +143,12 @@ class Wire:
         """From now on these faults strike."""
         self._faults = [(fault, Random(f"{self._seed} {place} {fault.name}")) for place, fault in enumerate(faults)]
 
+    def silent_since(self, now: int) -> int | None:
+        """When the last transmission ended (ns); None while there is one."""
+        if not self._current:
+            return self._quiet_since
+        return self._current_end if self._current_end <= now else None
+
     def senders(self) -> frozenset[str]:
         """Who takes part in the burst now on the line."""
         return frozenset(sent.party for sent in self._current)

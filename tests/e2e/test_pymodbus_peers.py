@@ -84,7 +84,8 @@ class Conversation:
     @contextmanager
     def on_bus(self) -> Iterator[VirtualBus]:
         """Bus, capture process, server and client; at the end everything has been received."""
-        with VirtualBus(self.line) as bus:
+        gap = Timing(self.line).t35 if self.framing == "rtu" else 0
+        with VirtualBus(self.line, gap=gap) as bus:
             client_port, server_port = bus.attach("client"), bus.attach("server", answers=True)
             with CaptureLink.start([SourceSpec(bus.tap(), self.line, self.protocol)]) as link:
                 with server_on(server_port, self.framing, self.line.baud):

@@ -20,7 +20,7 @@ from dissectors.simulated import Send
 from sniff.simulation.bus import BusFailed, VirtualBus
 from sniff.simulation.faults import Break, LostResponse, MarkParity
 from sniff.simulation.ports import HAS_PTY
-from sniff.simulation.wire import Party
+from sniff.simulation.wire import Party, Sent
 
 LINE = LineSettings.parse("38400,8E1")
 pytestmark = pytest.mark.skipif(not HAS_PTY, reason="this system has no pseudo-terminals")
@@ -152,6 +152,20 @@ def test_octets_that_a_tap_writes_are_counted_and_reach_nobody(bus: VirtualBus, 
     assert report.tap_first.startswith(b"\x01\x02\x03")
     assert client.read(1, patience=0.05) == b""
     assert {one.party for one in bus.truth()} <= {"client"}
+
+
+def test_parties_outside_keep_the_silence_that_the_protocol_wants(open_pty: type[Pty]) -> None:
+    gap = 30_000_000
+    with VirtualBus(LINE, gap=gap) as bus:
+        client, server = open_pty(bus.attach("client")), open_pty(bus.attach("server"))
+        client.write(b"question")
+        assert server.read(8) == b"question"
+        server.write(b"answer")
+        assert client.read(6) == b"answer"
+        truths: list[Sent] = []
+        while len(truths) < 2:
+            truths += bus.truth()
+        assert truths[1].start - truths[0].end >= gap
 
 
 def test_a_party_hears_itself_only_with_echo(bus: VirtualBus, open_pty: type[Pty]) -> None:
