@@ -40,8 +40,6 @@ class SnifferApp(App[None]):
     ENABLE_COMMAND_PALETTE = True
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("space", "freeze", "freeze", tooltip="freeze the view, or let it go on; the capture never stops"),
-        Binding("f", "follow", "follow", tooltip="follow the newest row, or stay"),
-        Binding("t", "time", "time", tooltip="time as absolute, relative to the first row, or since the row before"),
         Binding("question_mark", "help", "help", tooltip="this page"),
         Binding("q", "go_back", "back", tooltip="go back to the screen before; quit at the first one"),
         *(
@@ -186,6 +184,7 @@ class SnifferApp(App[None]):
         """Put the cursor of the frame list on a row and show it."""
         self.viewing.follow = False
         self.viewing.row = no
+        self.viewing.row_from = None
         self.action_switch("frames")
 
     def on_prompt_answered(self, message: Prompt.Answered) -> None:

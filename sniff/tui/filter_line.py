@@ -22,5 +22,5 @@ class FilterLine(Static):
         state = f", {index.pending} to be searched" if index.pending else ""
         text = Text(f"filter: {plain(viewing.filter)}", no_wrap=True, overflow="ellipsis")
         tail = f"{len(index)} of {whole} {things}{state} · esc removes it "
-        text.truncate(max(20, self.size.width - len(tail) - 2), overflow="ellipsis", pad=True)
+        text.truncate(max(20, self.app.size.width - len(tail) - 2), overflow="ellipsis", pad=True)
         self.update(text.append("  ").append(tail))

@@ -68,6 +68,10 @@ class FrameList(LineList):
             latency=max(10, latency_width(self.store.session.adapter.latency)),
         )
 
+    def row_of(self, number: int) -> int | None:
+        """The row itself."""
+        return number
+
     def edge(self, number: int) -> Cell:
         """Cursor or partner, and the user's mark."""
         here = ">" if number == self.cursor else "=" if number == self._partner() else " "

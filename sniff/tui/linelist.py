@@ -84,6 +84,10 @@ class LineList(ScrollView, can_focus=True, inherit_bindings=False):
         """Two characters before the first column."""
         return Cell("> " if number == self.cursor else "  ")
 
+    def row_of(self, number: int) -> int | None:
+        """The row of the store that a number stands for."""
+        raise NotImplementedError
+
     def empty_text(self) -> str:
         """What to say when there is no line."""
         return "nothing yet"
@@ -152,6 +156,8 @@ class LineList(ScrollView, can_focus=True, inherit_bindings=False):
 
     def _set_cursor(self, number: int, by_user: bool) -> None:
         self.cursor = number
+        self.viewing.row = self.row_of(number) or self.viewing.row
+        self.viewing.row_from = self
         self.refresh()
         self.post_message(self.Moved(self, number, by_user))
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dissectors.tracker import Transaction, Verdict
-from sniff.store import Store
+from sniff.store import BAD_VERDICTS, Store
 from sniff.tui.columns import Cell, Column, lay_out
 from sniff.tui.linelist import LineList
 from sniff.tui.plain import plain
 from sniff.tui.times import TimeMode, clock, seconds
-from sniff.tui.verdicts import STYLE, latency_cell, latency_width, verdict_cell
+from sniff.tui.verdicts import latency_cell, latency_width, verdict_cell
 from sniff.tui.viewing import Viewing
 
 COLUMNS = (
@@ -42,10 +42,15 @@ class TransactionList(LineList):
             latency=max(10, latency_width(self.store.session.adapter.latency)),
         )
 
+    def row_of(self, number: int) -> int | None:
+        """Its request, or its response where no request was seen."""
+        transaction = self.store.closed_by_no(number)
+        return None if transaction is None else transaction.request or transaction.response
+
     def edge(self, number: int) -> Cell:
         """Cursor, and trouble."""
         transaction = self.store.closed_by_no(number)
-        bad = transaction is not None and STYLE.get(transaction.verdict) == "bad"
+        bad = transaction is not None and transaction.verdict in BAD_VERDICTS
         return Cell((">" if number == self.cursor else " ") + ("!" if bad else " "), "bad" if bad else "")
 
     def cells(self, number: int, line: int) -> dict[str, Cell]:

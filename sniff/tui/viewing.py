@@ -18,6 +18,7 @@ class Viewing:
     follow: bool = False
     time_mode: TimeMode = TimeMode.ABSOLUTE
     row: int = 0  # number of the row under the cursor, 0 before there is one
+    row_from: object = None  # the list whose cursor it is; other lists go there when they are shown
     filter: str = ""
     accepts: Predicate | None = None
     filter_version: int = 0  # changes with the filter, so that lists know when to begin anew

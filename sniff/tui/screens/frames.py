@@ -10,6 +10,8 @@ from textual.containers import Horizontal
 from textual.timer import Timer
 
 from dissectors.frame import Frame
+from dissectors.tracker import Transaction
+from sniff.engine import Row
 from sniff.tui import places
 from sniff.tui.field_tree import FieldTree
 from sniff.tui.filter_line import FilterLine
@@ -46,7 +48,7 @@ class FramesScreen(ListingScreen):
 
     def __init__(self) -> None:
         super().__init__()
-        self._detail: tuple[int, object] | None = None  # row and transaction that tree and hex show
+        self._detail: tuple[Row, Transaction | None] | None = None  # what tree and hex show
         self._detail_timer: Timer | None = None
 
     def compose_view(self) -> ComposeResult:
@@ -65,9 +67,9 @@ class FramesScreen(ListingScreen):
         """Rows in memory, up to the freeze."""
         return self.store.first_no, self.viewing.last_row
 
-    def place(self) -> int:
+    def place(self) -> int | None:
         """The row itself."""
-        return self.viewing.row
+        return self.viewing.row or None
 
     def touched(self, closed: int) -> tuple[int, ...]:
         """Request and response."""
@@ -79,15 +81,12 @@ class FramesScreen(ListingScreen):
     def draw(self) -> None:
         """List first; details when the cursor rests."""
         super().draw()
-        if self.viewing.row and self.viewing.row != self.lines.cursor and not self.viewing.follow:
-            self.lines.go_to(self.viewing.row, by_user=False)
         self._plan_detail()
 
     # -- list, tree and hex linked -----------------------------------------------------------------------------
 
     def on_line_list_moved(self, message: LineList.Moved) -> None:
         """Another row."""
-        self.viewing.row = message.number
         self._plan_detail()
 
     def on_line_list_chosen(self, message: LineList.Chosen) -> None:
@@ -106,10 +105,17 @@ class FramesScreen(ListingScreen):
         begin, end, name = (None, None, "") if field is None else (field.begin, field.end, field.name)
         self.query_one(HexPane).select(begin, end, name, cursor=message.offset)
 
+    def _row(self) -> Row | None:
+        """The row under the cursor; None when nothing is shown."""
+        lines = self.lines
+        return self.store.by_no(lines.cursor) if lines.cursor in lines.index else None
+
+    def _state(self) -> tuple[Row, Transaction | None] | None:
+        row = self._row()
+        return None if row is None else (row, self.store.transaction(row))
+
     def _plan_detail(self) -> None:
-        row = self.store.by_no(self.lines.cursor)
-        wanted = None if row is None else (row.no, self.store.transaction(row))
-        if wanted == self._detail or self._detail_timer is not None:
+        if self._state() == self._detail or self._detail_timer is not None:
             return
         delay = FOLLOWING_SECONDS if self.viewing.follow and not self.viewing.frozen else DETAIL_SECONDS
         self._detail_timer = self.set_timer(delay, self._show_detail)
@@ -118,13 +124,15 @@ class FramesScreen(ListingScreen):
         if self._detail_timer is not None:
             self._detail_timer.stop()
             self._detail_timer = None
-        row = self.store.by_no(self.lines.cursor)
-        if row is None:
+        self._detail = self._state()
+        octets, tree = self.query_one(HexPane), self.query_one(FieldTree)
+        if self._detail is None:
+            octets.show(b"", ())
+            tree.show(())
             return
-        self._detail = (row.no, self.store.transaction(row))
-        octets = self.query_one(HexPane)
+        row = self._detail[0]
         octets.show(row.event.octets, row.event.marks)
-        kept = self.query_one(FieldTree).show(tree_of(self.store, row))
+        kept = tree.show(tree_of(self.store, row))
         if kept is not None:
             octets.select(kept.begin, kept.end, kept.name)
 
@@ -146,7 +154,7 @@ class FramesScreen(ListingScreen):
 
     def action_partner(self) -> None:
         """From request to response and back."""
-        row = self.store.by_no(self.lines.cursor)
+        row = self._row()
         partner = None if row is None else self.store.partner(row)
         if partner is None:
             transaction = None if row is None else self.store.transaction(row)
@@ -158,8 +166,9 @@ class FramesScreen(ListingScreen):
 
     def action_mark(self) -> None:
         """Mark the row or take its mark away."""
-        if self.lines.cursor:
-            self.viewing.toggle_mark(self.lines.cursor)
+        row = self._row()
+        if row is not None:
+            self.viewing.toggle_mark(row.no)
             self.lines.refresh()
 
     def action_next_mark(self) -> None:
@@ -199,7 +208,7 @@ class FramesScreen(ListingScreen):
 
     def action_copy(self) -> None:
         """Octets to the clipboard of the terminal (OSC 52)."""
-        row = self.store.by_no(self.lines.cursor)
+        row = self._row()
         if row is not None:
             self.app.copy_to_clipboard(row.event.octets.hex(" ").upper())
             kind = "frame" if isinstance(row.event, Frame) else "noise"

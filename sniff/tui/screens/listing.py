@@ -25,6 +25,8 @@ class ListingScreen(ViewScreen):
     THINGS: ClassVar[str] = "rows"
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("slash", "filter", "filter", tooltip="filter: show only what an expression accepts"),
+        Binding("f", "app.follow", "follow", tooltip="follow the newest row, or stay"),
+        Binding("t", "app.time", "time", tooltip="time of day, since the first row, or since the row before"),
         Binding("escape", "leave", "clear", tooltip="back to the list; there: remove the filter", show=False),
         Binding("e", "error(1)", "error", tooltip="next error"),
         Binding("E", "error(-1)", "error", tooltip="error before"),
@@ -48,24 +50,28 @@ class ListingScreen(ViewScreen):
         """First and last number there is to show."""
         raise NotImplementedError
 
-    def place(self) -> int:
-        """The number for the row under the shared cursor."""
+    def place(self) -> int | None:
+        """The number for the row under the shared cursor; None when this list has none for it."""
         raise NotImplementedError
 
     # -- keeping up --------------------------------------------------------------------------------------------
 
     def draw(self) -> None:
-        """Take new bounds and filter."""
+        """Take new bounds and filter, and the cursor when another list moved it."""
         lines, viewing = self.lines, self.viewing
         first, last = self.bounds()
+        place = self.place() if viewing.row_from is not lines and not viewing.follow else None
+        viewing.row_from = lines
         if self._filter_version != viewing.filter_version:
             self._filter_version = viewing.filter_version
-            anchor = min(max(self.place() or last, first), last + 1)
+            anchor = min(max(place or lines.cursor or last, first), last + 1)
             index = Index(self.test if viewing.filter else None, anchor)
             index.bound(first, last)
             index.step(SLICE_ROWS)
             lines.use_index(index)
         lines.bring_up(first, last)
+        if place is not None:
+            lines.go_to(place, by_user=False)
         self._retest_closed()
         self.query_one(FilterLine).show(viewing, lines.index, self.THINGS)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from textual.app import ComposeResult
 
-from dissectors.tracker import Transaction
 from sniff.store import BAD_VERDICTS
 from sniff.tui.filter_line import FilterLine
 from sniff.tui.linelist import LineList
@@ -34,38 +33,18 @@ class TransactionsScreen(ListingScreen):
         """Closed transactions in memory, up to the freeze."""
         return self.store.dropped_transactions + 1, self.viewing.last_closed
 
-    def place(self) -> int:
+    def place(self) -> int | None:
         """The transaction of the row under the shared cursor."""
         row = self.store.by_no(self.viewing.row)
-        if row is None or row.placement is None:
-            return self.lines.cursor
-        return self.store.closed_number(row.placement.tx) or self.lines.cursor
-
-    def on_screen_resume(self) -> None:
-        """Begin where the frame list was."""
-        place = self.place()
-        if place and not self.viewing.follow:
-            self.lines.go_to(place, by_user=False)
-
-    def on_line_list_moved(self, message: LineList.Moved) -> None:
-        """The shared cursor comes along."""
-        shown = self._frame_of(self.store.closed_by_no(message.number))
-        if shown is not None:
-            self.viewing.row = shown
+        return None if row is None or row.placement is None else self.store.closed_number(row.placement.tx)
 
     def on_line_list_chosen(self, message: LineList.Chosen) -> None:
         """Show its frames."""
-        shown = self._frame_of(self.store.closed_by_no(message.number))
+        shown = self.lines.row_of(message.number)
         if shown is None or self.store.by_no(shown) is None:
             self.notify("its frames are no longer in memory", timeout=2)
         else:
             self.app.show_row(shown)
-
-    @staticmethod
-    def _frame_of(transaction: Transaction | None) -> int | None:
-        if transaction is None:
-            return None
-        return transaction.request if transaction.request is not None else transaction.response
 
     def action_error(self, direction: int) -> None:
         """Next or previous transaction that went wrong and that is shown."""

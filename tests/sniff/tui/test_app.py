@@ -1,0 +1,222 @@
+"""What keys do on every screen, going back, quitting, help, palette, themes, status."""
+
+from __future__ import annotations
+
+import sys
+from typing import Any
+
+import pytest
+from textual.widgets import Static
+
+from sniff.tui import run
+from sniff.tui.feed import FeedStatus, StoreFeed
+from sniff.tui.help import HelpScreen
+from sniff.tui.keybar import explanation, working_keys
+from sniff.tui.palette import ActionCommands
+from sniff.tui.screens import SCREENS, load
+from sniff.tui.screens.base import ViewScreen
+
+
+@pytest.mark.parametrize("entry", SCREENS, ids=lambda entry: entry.name)
+def test_every_screen_of_the_table_is_there(look: Any, busy_bus: Any, entry: Any) -> None:
+    screen = load(entry)
+    assert issubclass(screen, ViewScreen)
+    assert entry.title == screen.TITLE
+
+    async def script(see: Any) -> None:
+        await see.press(entry.key)
+        assert see.app.current_mode == entry.name
+        assert f"[{entry.key} {entry.title}]" in see.lines()[1]
+        for other in SCREENS:
+            assert f"{other.key} {other.title}" in see.lines()[1]
+        assert see.app.focused is see.main
+        assert "? help" in see.lines()[-1]
+        assert "q back" in see.lines()[-1]
+
+    look(busy_bus.store, script)
+
+
+def test_an_unknown_start_screen_is_refused(busy_bus: Any) -> None:
+    from sniff.tui.app import SnifferApp
+
+    with pytest.raises(ValueError, match="expected one of frames, transactions"):
+        SnifferApp(StoreFeed(busy_bus.store), "nothing")
+
+
+def test_back_walks_the_screens_and_then_quits(look: Any, busy_bus: Any) -> None:
+    async def script(see: Any) -> None:
+        await see.press("2", "3", "8", "2")
+        assert see.app.visited == ["frames", "transactions"]
+        await see.press("q")
+        assert see.app.current_mode == "frames"
+        assert see.app.is_running
+        await see.press("q")
+        assert see.app._exit
+
+    look(busy_bus.store, script)
+
+
+def test_quitting_a_recording_takes_two(look: Any, busy_bus: Any) -> None:
+    async def script(see: Any) -> None:
+        await see.press("q")
+        assert not see.app._exit
+        assert see.notices() == ["recording to /tmp/x.mcap; q again stops it and quits"]
+        await see.press("q")
+        assert see.app._exit
+
+    look(busy_bus.store, script, live=True, recording="/tmp/x.mcap")
+
+
+def test_watching_without_recording_quits_at_once(look: Any, busy_bus: Any) -> None:
+    async def script(see: Any) -> None:
+        await see.press("q")
+        assert see.app._exit
+
+    look(busy_bus.store, script, live=True)
+
+
+def test_help_lists_every_key_that_works_here(look: Any, busy_bus: Any) -> None:
+    async def script(see: Any) -> None:
+        for screen in ("1", "2", "3", "8"):
+            await see.press(screen)
+            keys = working_keys(see.app.screen)
+            await see.press("question_mark")
+            assert isinstance(see.app.screen, HelpScreen)
+            console = see.app.console
+            shown = "\n".join(
+                "".join(segment.text for segment in line)
+                for static in see.app.screen.query(Static)
+                for line in console.render_lines(static.content, console.options.update(width=100))
+            )
+            for name, active in keys:
+                assert name in shown
+                assert explanation(active) in shown
+            await see.press("escape")
+            assert isinstance(see.app.screen, ViewScreen)
+
+    look(busy_bus.store, script, (100, 60))
+
+
+def test_help_fits_a_small_screen(look: Any, golden: Any, busy_bus: Any) -> None:
+    async def script(see: Any) -> None:
+        await see.press("question_mark")
+        golden("help-80x24", see.text())
+        await see.press("q")
+        assert see.app.current_mode == "frames"
+
+    look(busy_bus.store, script)
+
+
+def test_the_palette_lists_every_action_and_does_it(look: Any, busy_bus: Any) -> None:
+    async def script(see: Any) -> None:
+        provider = ActionCommands(see.app.screen)
+        found = [hit async for hit in provider.discover()]
+        assert {hit.display for hit in found} == {explanation(active) for _, active in working_keys(see.app.screen)}
+        await next(hit for hit in found if "freeze" in str(hit.display)).command()
+        assert see.app.viewing.frozen
+        hits = [hit async for hit in provider.search("next mark")]
+        assert hits
+        await see.press("ctrl+p")
+        assert "Search" in see.text()
+
+    look(busy_bus.store, script)
+
+
+def test_every_key_is_explained() -> None:
+    for entry in SCREENS:
+        for binding in load(entry).BINDINGS:
+            assert binding.description
+            assert binding.tooltip or not binding.show
+
+
+def test_themes(look: Any, busy_bus: Any) -> None:
+    async def script(see: Any) -> None:
+        assert see.app.current_theme.dark
+        dark = see.text()
+        await see.press("T")
+        assert not see.app.current_theme.dark
+        assert see.text() == dark
+
+    look(busy_bus.store, script)
+
+
+def test_the_end_is_told_once_and_stays_in_the_header(look: Any, busy_bus: Any) -> None:
+    async def script(see: Any) -> None:
+        see.feed.current = FeedStatus("/dev/ttyUSB0", "19200,8E1", "toy", "/x", 10, live=True, ended="un[b]plugged\x1b")
+        await see.poll()
+        await see.poll()
+        assert see.notices() == ["un[b]plugged\\x1b"]
+        assert "ENDED" in see.lines()[0]
+
+    look(busy_bus.store, script, live=True)
+
+
+@pytest.mark.parametrize("size", [(40, 10), (20, 5), (80, 24), (250, 80)])
+def test_any_size_of_terminal(look: Any, busy_bus: Any, size: tuple[int, int]) -> None:
+    async def script(see: Any) -> None:
+        await see.press("2", "3", "8", "1", "end", "enter", "question_mark", "escape", "slash", "escape", "pageup")
+        assert len(see.lines()) == size[1]
+
+    look(busy_bus.store, script, size)
+
+
+def test_resizing_keeps_the_cursor_in_sight(look: Any, busy_bus: Any) -> None:
+    for _ in range(100):
+        busy_bus.ask(1)
+
+    async def script(see: Any) -> None:
+        await see.press("end")
+        await see.pilot.resize_terminal(120, 12)
+        await see.settle()
+        assert any(line.startswith(">") for line in see.lines())
+        await see.pilot.resize_terminal(70, 40)
+        await see.settle()
+        assert any(line.startswith(">") for line in see.lines())
+
+    look(busy_bus.store, script)
+
+
+def test_mouse(look: Any, busy_bus: Any) -> None:
+    async def script(see: Any) -> None:
+        await see.press("home")
+        await see.pilot.click("#main", offset=(20, 4))
+        await see.settle()
+        assert see.main.cursor == 4
+        await see.pilot.click("KeyBar", offset=(12, 0))  # "space freeze"
+        await see.settle()
+        assert see.app.viewing.frozen
+        await see.pilot.click("HexPane", offset=(5 + 3 * 2, 1))
+        await see.settle()
+        assert "octet 2 of 6" in see.text()
+
+    look(busy_bus.store, script)
+
+
+def test_run_closes_the_feed_and_says_where_the_file_is(
+    busy_bus: Any, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from sniff.tui.app import SnifferApp
+
+    monkeypatch.setattr(SnifferApp, "run", lambda app: None)
+    feed = StoreFeed(busy_bus.store, FeedStatus("/dev/ttyUSB0", "19200,8E1", "toy", "/tmp/a\x1b.mcap", live=True))
+    run(feed)
+    assert feed.closed
+    assert capsys.readouterr().out == "recorded to /tmp/a\\x1b.mcap\n"
+
+    def crash(app: Any) -> None:
+        raise RuntimeError("broken")
+
+    monkeypatch.setattr(SnifferApp, "run", crash)
+    feed = StoreFeed(busy_bus.store)
+    with pytest.raises(RuntimeError):
+        run(feed)
+    assert feed.closed
+
+
+def test_importing_the_package_loads_no_textual() -> None:
+    import subprocess
+
+    code = (
+        "import sys, sniff.tui, sniff.tui.feed; sys.exit(any(m in sys.modules for m in ('textual', 'scapy', 'rich')))"
+    )
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -1,0 +1,235 @@
+"""Transactions, nodes, line."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from textual.widgets import DataTable
+
+from dissectors.frame import LineError, Mark
+from dissectors.tracker import Verdict
+from sniff.session import LineEvent, LineEventKind
+
+SIZES = {"80x24": (80, 24), "160x50": (160, 50)}
+MS = 1_000_000
+
+
+@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("name", ["transactions", "nodes", "line"])
+def test_pictures(look: Any, golden: Any, busy_bus: Any, name: str, size: str) -> None:
+    busy_bus.store.add_line_event(LineEvent(busy_bus.now, LineEventKind.UNPLUGGED, "gone"))
+
+    async def script(see: Any) -> None:
+        golden(f"{name}-{size}", see.text())
+        assert "None" not in see.text()
+        assert all(len(line) <= SIZES[size][0] for line in see.lines())
+
+    look(busy_bus.store, script, SIZES[size], name)
+
+
+# -- transactions ----------------------------------------------------------------------------------------------------
+
+
+def test_transactions_follow_errors_and_open(look: Any, busy_bus: Any) -> None:
+    async def script(see: Any) -> None:
+        await see.press("home", "e")
+        assert see.main.cursor == 3
+        await see.press("e", "e", "e")
+        assert see.main.cursor == 5
+        assert see.notices() == ["no trouble after this one"]
+        await see.press("E", "enter")
+        assert see.app.current_mode == "frames"
+        assert see.main.cursor == 7
+        await see.press("q")
+        assert see.app.current_mode == "transactions"
+        assert see.main.cursor == 4
+
+    look(busy_bus.store, script, start="transactions")
+
+
+def test_both_lists_share_their_cursor(look: Any, busy_bus: Any) -> None:
+    async def script(see: Any) -> None:
+        await see.press("home", "e", "e", "e", "e", "2")  # row 8: transaction 4
+        assert see.main.cursor == 4
+        await see.press("down", "1")
+        assert see.main.cursor == 9
+
+    look(busy_bus.store, script)
+
+
+def test_transactions_that_close_while_looking(look: Any, busy_bus: Any) -> None:
+    async def script(see: Any) -> None:
+        assert see.main.cursor == 6
+        busy_bus.ask(1, Verdict.LATE, of=2)
+        await see.poll()
+        assert see.main.cursor == 7
+        assert "late" in see.text()
+        assert "of tx 2" in see.text()
+
+    look(busy_bus.store, script, start="transactions", live=True)
+
+
+# -- nodes -----------------------------------------------------------------------------------------------------------
+
+
+def cells(see: Any, station: int) -> list[str]:
+    return [cell.plain for cell in see.main.get_row(str(station))]
+
+
+def test_nodes_count_by_station(look: Any, busy_bus: Any) -> None:
+    async def script(see: Any) -> None:
+        #                            sent recv asked  answ.   none  exc.  dam.
+        assert cells(see, 1)[:8] == ["1", "3", "3", "3", "100.0%", "0", "!1", "0"]
+        assert cells(see, 3)[:8] == ["3", "0", "1", "1", "0.0%", "!1", "0", "0"]
+        assert cells(see, 4)[:8] == ["4", "1", "1", "1", "0.0%", "0", "0", "!1"]
+        assert cells(see, 3)[8:] == ["–", "–", "–"]
+        assert cells(see, 2)[8:] == ["38.0 ms", "38.0 ms", "38.0 ms"]
+
+    look(busy_bus.store, script, start="nodes")
+
+
+def test_enter_shows_the_frames_of_a_station(look: Any, busy_bus: Any) -> None:
+    async def script(see: Any) -> None:
+        await see.press("home", "down", "enter")
+        assert see.app.current_mode == "frames"
+        assert see.app.viewing.filter == "addr == 2"
+        assert [see.main.index[line] for line in range(len(see.main.index))] == [3, 4, 13]
+        await see.press("q")
+        assert see.app.current_mode == "nodes"
+
+    look(busy_bus.store, script, start="nodes")
+
+
+def test_sorting(look: Any, busy_bus: Any) -> None:
+    async def script(see: Any) -> None:
+        orders = []
+        for _ in range(5):
+            orders.append("".join(str(key.value) for key in see.main.rows))
+            await see.press("s")
+        assert orders == ["1234", "3412", "2143", "4123", "1234"]
+        assert "sorted by least answered" in see.text()
+
+    look(busy_bus.store, script, start="nodes")
+
+
+def test_nodes_keep_up_and_freeze(look: Any, busy_bus: Any) -> None:
+    async def script(see: Any) -> None:
+        await see.press("home", "down")
+        busy_bus.ask(9)
+        busy_bus.ask(1)
+        await see.poll()
+        assert cells(see, 1)[3] == "4"
+        assert cells(see, 9)[3] == "1"
+        assert see.main.cursor_row == 1
+        await see.press("space")
+        busy_bus.ask(1)
+        await see.poll()
+        assert cells(see, 1)[3] == "4"
+        await see.press("space")
+        assert cells(see, 1)[3] == "5"
+
+    look(busy_bus.store, script, start="nodes")
+
+
+def test_one_failure_in_many_is_not_rounded_away(look: Any, make_bus: Any) -> None:
+    bus = make_bus()
+    for _ in range(5000):
+        bus.ask(1)
+    bus.ask(1, Verdict.NO_RESPONSE)
+
+    async def script(see: Any) -> None:
+        assert cells(see, 1)[4] == "99.9%"
+
+    look(bus.store, script, start="nodes")
+
+
+def test_a_table_writes_only_what_changed(look: Any, busy_bus: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    async def script(see: Any) -> None:
+        written: list[Any] = []
+        monkeypatch.setattr(DataTable, "update_cell", lambda table, key, *rest, **more: written.append(key))
+        busy_bus.ask(1)
+        await see.poll()
+        assert set(written) == {"1"}
+
+    look(busy_bus.store, script, start="nodes")
+
+
+# -- line ------------------------------------------------------------------------------------------------------------
+
+
+def test_zero_that_means_unknown_is_said(look: Any, make_bus: Any) -> None:
+    for reports, said in (
+        (None, ["nobody knows", "parity unknown", "overrun unknown"]),
+        ((), ["no line errors at all", "framing unknown", "break unknown"]),
+        (("parity",), ["parity 0", "framing unknown"]),
+    ):
+        bus = make_bus(reports=reports)
+        bus.ask(1)
+
+        async def script(see: Any, said: list[str] = said) -> None:
+            for words in said:
+                assert words in see.text()
+
+        look(bus.store, script, start="line")
+
+
+def test_line_errors_are_counted_by_what_was_reported(look: Any, make_bus: Any) -> None:
+    bus = make_bus(reports=("parity", "framing", "break", "overrun"))
+    both = LineError.PARITY | LineError.FRAMING
+    bus.noise(
+        b"abcdef",
+        (Mark(0, LineError.PARITY), Mark(1, both), Mark(2, LineError.BREAK), Mark(3, LineError.OVERRUN | both)),
+    )
+
+    async def script(see: Any) -> None:
+        assert "parity or framing 2 · parity 1 · framing 0 · break 1 · overrun 1" in see.text()
+
+    look(bus.store, script, (120, 40), "line")
+
+
+def test_silences_fall_into_their_ranges(look: Any, make_bus: Any) -> None:
+    bus = make_bus(latency=0)
+    for _ in range(3):
+        bus.ask(1, latency=7)  # 7 ms within, 20 ms after
+
+    async def script(see: Any) -> None:
+        lines = {line.split("ms")[0].strip(): line.split() for line in see.lines() if " … " in line}
+        assert lines["5 … 10"][-2:] == ["3", "60.0%"]
+        assert lines["20 … 50"][-2:] == ["2", "40.0%"]
+        assert "5 times" in see.text()
+        assert "±" not in see.text()
+
+    look(bus.store, script, start="line")
+
+
+def test_line_says_how_the_capture_fares(look: Any, busy_bus: Any) -> None:
+    async def script(see: Any) -> None:
+        text = " ".join(see.text().split())
+        assert "recorded to /tmp/x.mcap, 2.0 kB · priority real-time · 4 lost · ended: unplugged" in text
+        assert "holds octets back up to 16.0 ms (latency timer)" in text
+
+    look(
+        busy_bus.store,
+        script,
+        start="line",
+        live=True,
+        recording="/tmp/x.mcap",
+        file_size=2000,
+        priority="real-time",
+        dropped=4,
+        ended="unplugged",
+    )
+
+
+def test_line_events_the_newest_first(look: Any, busy_bus: Any) -> None:
+    store = busy_bus.store
+    store.add_line_event(LineEvent(busy_bus.now, LineEventKind.DROPPED, "", -1))
+    store.add_line_event(LineEvent(busy_bus.now + 5 * MS, LineEventKind.NOTE, "[red]\x1b[2Jx"))
+
+    async def script(see: Any) -> None:
+        text = see.text()
+        assert text.index("note: [red]\\x1b[2Jx") < text.index("dropped (how many is unknown)")
+        assert "\x1b" not in text
+
+    look(store, script, (100, 40), "line")
