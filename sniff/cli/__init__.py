@@ -21,7 +21,7 @@ COMMANDS: dict[str, str] = {
     "open": "terminal UI on captures",
     "show": "frames of captures, one line each, or JSON, tree, hex, fields",
     "info": "what is in a capture: times, counts, nodes, settings, completeness",
-    "stats": "tables: nodes, transactions, latency, load",
+    "stats": "tables: nodes, transactions, latency, load, ring",
     "convert": "one capture format into another, by suffix",
     "config": "where the configured buses and their values come from",
     "demo": "a virtual RS-485 bus with simulated drives, through the real capture path",

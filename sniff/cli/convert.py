@@ -17,6 +17,14 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("source", metavar="IN", help="capture to read")
     parser.add_argument("target", metavar="OUT", help="capture to write")
     arguments.add_line(parser)
+    parser.add_argument(
+        "--link-type",
+        type=int,
+        choices=[147, 165, 250, 252],
+        help="pcap, pcapng: 252 exported PDU (default for Modbus RTU; opens in Wireshark as it is), 147 bare RTU "
+        "(needs a DLT_USER entry for mbrtu), 250 RTAC serial with line errors (Decode As: RTAC Serial → Modbus RTU), "
+        "165 MS/TP",
+    )
     parser.add_argument("-f", "--force", action="store_true", help="overwrite OUT")
 
 
@@ -29,10 +37,11 @@ def run(args: argparse.Namespace) -> int:
         raise Failure(f"{target}: exists; add --force to overwrite it", USAGE)
     if args.source != "-" and target.exists() and Path(args.source).samefile(target):
         raise Failure(f"{target}: is the capture to read; name another file", USAGE)
+    options = {"link-type": str(args.link_type)} if args.link_type is not None else None
     chunks = octets = 0
     progress = _Progress(args.source)
     try:
-        with create(target, session) as writer:
+        with create(target, session, options) as writer:
             for item in source.items():
                 writer.write(item)
                 if isinstance(item, Chunk):

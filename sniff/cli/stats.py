@@ -1,5 +1,5 @@
 """Tables: nodes (each station), transactions (by kind and verdict), latency (each station's response times), load (by
-second or --every). Response times are uncertain by what the adapter may hold back: see `info`.
+second or --every), ring (MS/TP). Response times are uncertain by what the adapter may hold back: see `info`.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ from sniff.analysis.histogram import Histogram
 from sniff.analysis.load import Second
 from sniff.analysis.nodes import Node
 from sniff.analysis.summary import Summary
-from sniff.cli import arguments, tables
+from sniff.cli import USAGE, Failure, arguments, tables
 from sniff.cli.rows import iso
 from sniff.cli.tables import Cell
 from sniff.engine import Output
-from sniff.reading import outputs
+from sniff.reading import dissector_for, outputs
 
-TABLES = ("nodes", "transactions", "latency", "load")
+TABLES = ("nodes", "transactions", "latency", "load", "ring")
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -37,6 +37,12 @@ def run(args: argparse.Namespace) -> int:
     """Print one table."""
     capture = arguments.open_capture(args.file)
     session = arguments.settings_of(args, capture.session)
+    if args.table == "ring":
+        if "ring" not in dissector_for(session).extras:
+            raise Failure(f"ring: {session.protocol} passes no token; this table is for mstp", USAGE)
+        from sniff.cli import ring
+
+        return ring.show(capture, session, args.style)
     summary = Summary(session.line)
     kinds: Counter[tuple[str, str]] = Counter()
     for output in outputs(capture.items(), session):
