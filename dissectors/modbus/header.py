@@ -81,11 +81,11 @@ def _peek(protocol: str, octets: bytes, frame: Frame, error: str | None, expecte
         role = _role(function, octets, size, expected)
         if role is Role.UNKNOWN and ok:
             error = f"{size} octets fit neither request nor response"
+    if unit == BROADCAST and role in (Role.REQUEST, Role.EITHER):
+        role = Role.BROADCAST
     address, count = _address_count(code, role, octets, size if frame.check is Check.ABSENT else size - 2)
     if role is Role.RESPONSE:
         return Header(protocol, unit, None, role, kind, code, address, count, ok, error)
-    if unit == BROADCAST and role in (Role.REQUEST, Role.EITHER):
-        role = Role.BROADCAST
     return Header(protocol, None, unit, role, kind, code, address, count, ok, error)
 
 
@@ -155,7 +155,7 @@ def _damage(frame: Frame, check_words: str, check: tuple[int, int] | None) -> st
     there = len(frame.octets)
     if frame.damage is Damage.SHORT or frame.damage is Damage.LONG:
         least = f", {frame.expected} expected" if frame.expected is not None else ""
-        return f"{frame.damage.value}: {there} octets{least}"
+        return f"{frame.damage.value}: {there} octet{'s' if there != 1 else ''}{least}"
     if frame.damage in _DAMAGE:
         return _DAMAGE[frame.damage]
     if frame.check is Check.BAD and check is not None:

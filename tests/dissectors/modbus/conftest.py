@@ -18,12 +18,14 @@ from dissectors.tracker import Placement, Transaction
 
 CAPTURES = Path(__file__).parents[3] / "../shared/captures"
 MS = 1_000_000
+_7_BITS = bytes(value & 0x7F for value in range(256))
+_CHARACTERS = set(b":0123456789ABCDEFabcdef\r\n;")
 
 
 def make_frame(octets: bytes, start: int = 0, end: int | None = None, slack: int = 0) -> Frame:
     """A frame around octets as they were on the wire; its check is computed, and a wrong one is damage."""
     end = start + len(octets) * 573_000 if end is None else end
-    is_ascii = octets[:1] == b":"
+    is_ascii = octets[:1] == b":" and set(octets.translate(_7_BITS)) <= _CHARACTERS
     good = unseal(octets, True) is not None if is_ascii else crc16_modbus(octets) == 0
     return Frame(
         "modbus-ascii" if is_ascii else "modbus-rtu",

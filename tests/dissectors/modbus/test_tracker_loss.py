@@ -83,7 +83,7 @@ def play(paper_bus, exchanges, missing=None):
     return placed, found
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(exchanges=traffic(), data=st.data())
 def test_a_missed_frame_inverts_nothing(paper_bus, exchanges, data):
     missing = data.draw(st.integers(36, 2 * len(exchanges) - 1), label="missing frame")
@@ -102,7 +102,7 @@ def test_a_missed_frame_inverts_nothing(paper_bus, exchanges, data):
         assert found[frames].verdict.value in allowed
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(exchanges=traffic())
 def test_a_clean_bus_is_read_as_it_is(paper_bus, exchanges):
     placed, found = play(paper_bus, exchanges)
