@@ -167,6 +167,18 @@ def test_every_transmission_stands_in_one_burst_and_bursts_do_not_overlap(sends:
             assert burst.octets == burst.sent[0].octets
 
 
+def test_a_driver_sends_one_thing_after_the_other() -> None:
+    wire = Wire(LINE)
+    wire.send("a", 0, b"first")
+    wire.send("a", CHAR, b"second")
+    wire.send("a", 0, b"third")
+    assert [(burst.start, burst.octets) for burst in wire.run(10**12)] == [
+        (0, b"first"),
+        (5 * CHAR, b"third"),
+        (10 * CHAR, b"second"),
+    ]
+
+
 def test_what_comes_through_a_collision_is_not_called_damaged() -> None:
     wire = Wire(LINE)
     wire.send("a", 0, b"\x00\x00")
