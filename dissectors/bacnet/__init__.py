@@ -51,7 +51,7 @@ MSTP = Dissector(
     packet=packet,
     default_line="38400,8N1",
     extras={
-        "findings": MstpFindings,  # (timing): see(no, event, header, placement), settle(transaction), findings(), ring()
+        "findings": MstpFindings,  # (timing): see(no, event, header, placement), settle(tx), findings(), ring()
         "rules": RULES,  # code → Rule
         "ring": RingObserver,  # (timing): see(no, event, header), ring()
         "judge": judge,  # Ring → findings

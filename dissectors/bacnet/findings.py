@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from dissectors.bacnet.limits import N_POLL, T_REPLY_DELAY, T_USAGE_DELAY
+from dissectors.bacnet.limits import MAX_MASTER, N_POLL, T_REPLY_DELAY, T_USAGE_DELAY
 from dissectors.bacnet.ring import Happened, Node, Ring, What
 from dissectors.bacnet.ring_observer import RingObserver
 from dissectors.bacnet.rules import RULES
@@ -24,6 +24,8 @@ DAMAGED_SHARE = 0.001
 DAMAGED_OF_ONE_SHARE = 0.01
 NOISE_SHARE = 0.005
 LEAST_FRAMES = 20
+ALONE_POLLS = 2 * MAX_MASTER
+"""A first search for a successor takes at most MAX_MASTER polls."""
 
 _SIMPLE: tuple[tuple[str, What, int, str], ...] = (
     ("MS102", What.RETRY, 1, "token repeated {times}"),
@@ -81,7 +83,7 @@ def _tokens(ring: Ring) -> Iterable[Finding]:
         if slow is not None and loop.count >= LEAST_FRAMES and slow > SLOW_ROUND:
             yield _plain("MS108", ring, _station(mac), f"95 of 100 rounds took up to {_ms(slow)}")
     for mac, node in ring.nodes.items():
-        if node.polls_sent >= LEAST_FRAMES and not node.tokens_sent and not node.tokens_received:
+        if node.polls_sent > ALONE_POLLS and not node.tokens_sent and not node.tokens_received:
             yield _plain("MS109", ring, _station(mac), f"{node.polls_sent} polls for masters and not one token")
 
 
@@ -126,16 +128,17 @@ def _polls(ring: Ring) -> Iterable[Finding]:
     advice = {int(words.split()[1]): words for words in ring.advice()}
     for mac, node in ring.nodes.items():
         tokens = node.tokens_received
-        if node.polls_sent < LEAST_FRAMES or not tokens or node.polls_sent <= POLLS_SHARE * tokens:
+        polls = node.polls_sent - node.polls_before_token
+        if polls < LEAST_FRAMES or not tokens or polls <= POLLS_SHARE * tokens:
             continue
         seen = (
-            f"{node.polls_sent} polls to {tokens} tokens (one in {N_POLL} is usual), {node.polls_unanswered} of them "
+            f"{polls} polls to {tokens} tokens (one in {N_POLL} is usual), {node.polls_unanswered} of them "
             f"unanswered, up to address {node.highest_polled}; "
             f"all unanswered polls take {ring.poll_waste_share:.0%} of the time"
         )
         if mac in advice:
             seen += "; " + advice[mac]
-        yield _plain("MS201", ring, _station(mac), seen, node.polls_sent)
+        yield _plain("MS201", ring, _station(mac), seen, polls)
 
 
 def _answers(ring: Ring) -> Iterable[Finding]:

@@ -181,7 +181,7 @@ class RingObserver:
         self._check_addresses(no, frame, frame_type, source, destination)
         if frame_type == _POLL_REPLY:
             node.count("poll_replies_sent")
-            if "tokens_sent" in node.counts:
+            if "tokens_sent" in node.counts and "tokens_received" in node.counts:
                 self._note(What.REJOINED, frame.start, no, source, destination)
         elif frame_type == _POSTPONED:
             node.count("postponed")
@@ -193,6 +193,8 @@ class RingObserver:
             self._pass_token(no, frame, source, destination, node)
         elif frame_type == _POLL:
             node.count("polls_sent")
+            if "tokens_sent" not in node.counts:
+                node.count("polls_before_token")
             if destination <= MAX_MASTER:
                 node.highest_polled = max(node.highest_polled, destination)
             self._asked = _Asked(frame_type, source, destination, frame, no)
