@@ -85,6 +85,7 @@ class ModbusServer:
     `functions`: those it knows; others are refused with code 1. `delay`: ns from the end of a request to its answer.
     `codes`: exception codes it uses instead of the standard's, by function and standard code ({(3, 2): 0x52}).
     `longest`: octets of the longest RTU frame it takes or sends; a request beyond is refused with code 3.
+    `loopback_only`: of the diagnostics it knows sub-function 0000 alone.
     """
 
     def __init__(
@@ -100,6 +101,7 @@ class ModbusServer:
         functions: frozenset[int] = frozenset((1, 2, 3, 4, 5, 6, 7, 8, 11, 15, 16, 17, 22, 23, 43)),
         codes: Mapping[tuple[int, int], int] | None = None,
         longest: int = 256,
+        loopback_only: bool = False,
         server_id: bytes = b"sim\xff",
         identification: Mapping[int, bytes] | None = None,
     ) -> None:
@@ -111,6 +113,7 @@ class ModbusServer:
         self.functions = functions
         self.codes = dict(codes or {})
         self.longest = longest
+        self.loopback_only = loopback_only
         self.server_id = server_id
         self.identification = dict(identification or {0: b"sniff485", 1: b"simulated", 2: b"1"})
         self.listening_only = False
@@ -177,20 +180,22 @@ class ModbusServer:
             data = serve(self, request)
         except (struct.error, IndexError):  # shorter than the function needs
             raise Refused(ILLEGAL_VALUE) from None
-        if len(data) + 3 > self.longest:
-            raise Refused(ILLEGAL_VALUE)
         return data
 
     def _read_bits(self, request: bytes) -> bytes:
         code, start, quantity = struct.unpack_from(">BHH", request, 1)
-        _within(quantity, MAX_READ_BITS)
+        _within(quantity, self._most(MAX_READ_BITS, per_octet=8))
         bits = [self.banks[code].read(address) for address in _addresses(start, quantity)]
         packed = sum(1 << i for i, bit in enumerate(bits) if bit).to_bytes((quantity + 7) // 8, "little")
         return bytes((code, len(packed))) + packed
 
+    def _most(self, standard: int, per_octet: int = 1) -> int:
+        """How many items fit into the longest answer, at 5 octets around the data."""
+        return min(standard, (self.longest - 5) * per_octet)
+
     def _read_registers(self, request: bytes) -> bytes:
         code, start, quantity = struct.unpack_from(">BHH", request, 1)
-        _within(quantity, MAX_READ_REGISTERS)
+        _within(2 * quantity, self._most(2 * MAX_READ_REGISTERS))
         values = [self.banks[code].read(address) & 0xFFFF for address in _addresses(start, quantity)]
         return struct.pack(f">BB{quantity}H", code, 2 * quantity, *values)
 
@@ -229,7 +234,7 @@ class ModbusServer:
 
     def _read_write(self, request: bytes) -> bytes:
         start, quantity, to, written, count = struct.unpack_from(">HHHHB", request, 2)
-        _within(quantity, MAX_READ_REGISTERS)
+        _within(2 * quantity, self._most(2 * MAX_READ_REGISTERS))
         _within(written, MAX_READ_WRITE_REGISTERS)
         self._store(to, written, count, request[11:])
         values = [self.holding.read(address) & 0xFFFF for address in _addresses(start, quantity)]
@@ -247,6 +252,8 @@ class ModbusServer:
         counters[0x0F] = self.unanswered
         if sub == DIAGNOSTIC_LOOPBACK:
             return request[1:]
+        if self.loopback_only:
+            raise Refused(ILLEGAL_VALUE)
         if sub in counters:
             return struct.pack(">BHH", 8, sub, counters[sub] & 0xFFFF)
         if sub == 0x01:

@@ -98,7 +98,7 @@ class Drive:
         if self.output == 0:
             return 0
         accelerating = self.running and round(self.output) != self.set_point
-        return round(12 + self.output / 150 + 15 * accelerating)
+        return round(12 + self.output / 150 + 30 * accelerating)
 
 
 Read = Callable[[Drive], int]
@@ -230,6 +230,7 @@ class SimulatedE510(ModbusServer):
             functions=frozenset((3, 6, 8, 16)),
             codes=_EXAMPLE_CODES if examples else None,
             longest=LONGEST_FRAME,
+            loopback_only=True,
         )
 
     def hear(self, now: int, octets: bytes, quiet: bool) -> tuple[Send, ...]:
