@@ -196,10 +196,11 @@ def whole_stretch(octets: Octets, at: int, end: int, start: int) -> Candidate | 
     while len(stretch) > MIN_FRAME and not stretch[-1] and not crc16_modbus(stretch[:-1]):
         stretch = stretch[:-1]
     code = stretch[1]
-    if code & EXCEPTION_BIT and len(stretch) != EXCEPTION_LENGTH:
-        return None
-    if code not in FUNCTIONS and not _NOT_TEXT.search(stretch):
-        return None
+    if code & ~EXCEPTION_BIT not in FUNCTIONS:
+        if code & EXCEPTION_BIT and len(stretch) != EXCEPTION_LENGTH:
+            return None
+        if not _NOT_TEXT.search(stretch):
+            return None
     open_ended = is_open_length(stretch)
     return Candidate(start, len(stretch), WHOLE_STRETCH, stretch[0], open_ended, open_ended, stretch)
 

@@ -148,7 +148,9 @@ class RtuFramer:
             pass
         if octets:
             path, agreed = self._segment(len(octets))
-            for candidate in agreed if hold else path:
+            if not hold or (path and path[-1].end == self._finder.base + len(octets)):
+                agreed = path  # a good frame that ends with the silence waits for nothing
+            for candidate in agreed:
                 self._take_candidate(candidate)
             if octets and hold:
                 if self._may_go_on():
@@ -374,6 +376,9 @@ class RtuFramer:
         hurt = injury(stretch, before, after, heard, self._expected)
         if hurt is None:
             self._take_noise(count, before, after, None)
+        elif not crc16_modbus(stretch):  # too weak to be found in a run of octets, but nothing else is beside it
+            fits = [r for r in readings(stretch, 0, count) if r.length == count]
+            self._take_frame(count, any(r.request for r in fits), any(r.response for r in fits))
         else:
             self._take_damaged(count, hurt)
 
