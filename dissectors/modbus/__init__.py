@@ -1,18 +1,32 @@
-"""Modbus over a serial line, RTU and ASCII. README.md draws the frames."""
+"""Modbus over serial line, RTU and ASCII: one PDU in two envelopes. README.md draws the frames."""
 
 from __future__ import annotations
 
 from typing import Any
 
 from dissectors.frame import Frame, Role
-from dissectors.framer import Framer
 from dissectors.line import Timing
+from dissectors.modbus.adu import ASCII_NAME, RTU_NAME
+from dissectors.modbus.ascii_framing import AsciiFramer
 from dissectors.modbus.fields import fields
 from dissectors.modbus.framing import RtuFramer
 from dissectors.modbus.header import peek_ascii, peek_rtu
 from dissectors.modbus.text import text
 from dissectors.modbus.tracker import ModbusTracker
 from dissectors.registry import Dissector
+
+__all__ = [
+    "ASCII",
+    "RTU",
+    "AsciiFramer",
+    "ModbusTracker",
+    "RtuFramer",
+    "fields",
+    "packet",
+    "peek_ascii",
+    "peek_rtu",
+    "text",
+]
 
 
 def packet(frame: Frame, role: Role) -> Any:
@@ -22,15 +36,13 @@ def packet(frame: Frame, role: Role) -> Any:
     return dissect(frame, role)
 
 
-def ascii_framer(timing: Timing) -> Framer:
-    """A new Modbus ASCII framer."""
-    from dissectors.modbus.ascii_framing import AsciiFramer
-
-    return AsciiFramer(timing)
+def ascii_tracker(timing: Timing) -> ModbusTracker:
+    """The tracker of an ASCII line, where no rule of silence delays an answer: one character is time enough."""
+    return ModbusTracker(timing, silence=timing.char)
 
 
 RTU = Dissector(
-    name="modbus-rtu",
+    name=RTU_NAME,
     title="Modbus RTU",
     framer=RtuFramer,
     peek=peek_rtu,
@@ -40,12 +52,13 @@ RTU = Dissector(
     packet=packet,
     default_line="19200,8E1",
 )
+
 ASCII = Dissector(
-    name="modbus-ascii",
+    name=ASCII_NAME,
     title="Modbus ASCII",
-    framer=ascii_framer,
+    framer=AsciiFramer,
     peek=peek_ascii,
-    tracker=ModbusTracker,
+    tracker=ascii_tracker,
     text=text,
     fields=fields,
     packet=packet,
