@@ -21,6 +21,7 @@ from hypothesis import strategies as st
 from dissectors.frame import Check, Chunk, Event, Frame, LineError, Mark, Noise
 from dissectors.framer import Framer
 from dissectors.line import LineSettings, Timing
+from tests.bus_delivery import drive
 
 MS = 1_000_000
 EPOCH = 1_767_225_600 * 1_000_000_000
@@ -143,14 +144,6 @@ def cut(chunk: Chunk, at: Iterable[int], char: int) -> list[Chunk]:
         marks = tuple(Mark(m.offset - begin, m.error) for m in chunk.marks if begin <= m.offset < end)
         pieces.append(Chunk(chunk.time - (count - end) * char, chunk.octets[begin:end], marks))
     return pieces
-
-
-def drive(framer: Framer, chunks: Iterable[Chunk]) -> list[Event]:
-    """All events of a whole capture."""
-    events: list[Event] = []
-    for chunk in chunks:
-        events += framer.feed(chunk)
-    return events + framer.close()
 
 
 # --- what must hold of the events of any capture ----------------------------------------------------------------------
