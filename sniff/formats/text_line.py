@@ -36,7 +36,7 @@ MARKS = {"P": LineError.PARITY, "F": LineError.FRAMING, "B": LineError.BREAK, "O
 LATEST = (1 << 63) - 1  # ns; what the other formats can hold
 
 _DELAY = re.compile(r"([+~-])([0-9]{1,15})(?:\.([0-9]{1,6}))?(?![0-9.])")
-_OCTETS = re.compile(r"(?:[0-9A-Fa-f]{2})+(?![0-9A-Za-z])")
+_OCTETS = re.compile(r"[0-9A-Fa-f]{2}(?:[ \t]*[0-9A-Fa-f]{2})*(?![0-9A-Za-z])")
 _QUOTED = re.compile(r'"((?:[ !#-\[\]-~]|\\[\\"rn]|\\x[0-9A-Fa-f]{2})+)"')
 _ESCAPE = re.compile(r"\\(x..|.)")
 _MARK = re.compile(r"!([PFBOpfbo]+)(?![0-9A-Za-z])")

@@ -25,6 +25,7 @@ SESSION = Session("/dev/ttyUSB0", LineSettings(19200, 8, "E", 1), "modbus-rtu", 
 ITEMS: list[Item] = [
     *(Chunk(BASE + number * 7_000_000, bytes([number % 256]) * (1 + number % 9)) for number in range(1000)),
     LineEvent(BASE + 7_000_000_000, LineEventKind.UNPLUGGED, "gone"),
+    *(Chunk(BASE + 7_000_000_000 + number * 100_000, b"burst") for number in range(600)),
     Chunk(BASE + 8_000_000_000, b"\x01\x02", (Mark(0, LineError.PARITY | LineError.FRAMING), Mark(1, LineError.BREAK))),
 ]
 
@@ -75,8 +76,8 @@ def test_the_stock_reader_reads_it(path: Path) -> None:
     assert entries == [(item.time, item.octets) for item in ITEMS if isinstance(item, Chunk)]
     assert lines == [
         {"kind": "unplugged", "chunk": 1000, "text": "gone"},
-        {"kind": "parity+framing", "chunk": 1000, "offset": 0},
-        {"kind": "break", "chunk": 1000, "offset": 1},
+        {"kind": "parity+framing", "chunk": 1600, "offset": 0},
+        {"kind": "break", "chunk": 1600, "offset": 1},
     ]
 
 
@@ -192,6 +193,21 @@ def test_from_a_time_on(tmp_path: Path) -> None:
         due = [(item.time, item.octets) for item in items if isinstance(item, Chunk) and item.time >= since]
         assert entries[len(entries) - len(due) :] == due
         assert len(entries) - len(due) < 256
+
+
+def test_from_a_time_on_with_a_clock_that_ran_backwards(tmp_path: Path) -> None:
+    """What was not read is not a hole."""
+    recorder = Recorder(tmp_path / "a.mcap", SESSION)
+    steps = [*range(10), *range(-20, -10), *range(10, 20)]
+    chunks = [Chunk(BASE + step * 10**9, b"%d" % step) for step in steps]
+    for chunk in chunks:
+        recorder.chunk(chunk)
+    recorder.close()
+    capture = read(tmp_path / "a.mcap")
+    assert isinstance(capture, McapCapture)
+    for _ in range(2):
+        assert list(capture.items(BASE)) == [chunk for chunk in chunks if chunk.time >= BASE]
+        assert capture.completeness().whole
 
 
 def test_recover(tmp_path: Path, path: Path) -> None:
