@@ -8,6 +8,7 @@ from dissectors.bacnet.fields import fields
 from dissectors.bacnet.findings import MstpFindings, judge
 from dissectors.bacnet.framing import MstpFramer
 from dissectors.bacnet.header import peek
+from dissectors.bacnet.readings import readings
 from dissectors.bacnet.ring import Ring
 from dissectors.bacnet.ring_observer import RingObserver
 from dissectors.bacnet.rules import RULES
@@ -55,6 +56,7 @@ MSTP = Dissector(
         "rules": RULES,  # code → Rule
         "ring": RingObserver,  # (timing): see(no, event, header), ring()
         "judge": judge,  # Ring → findings
+        "readings": readings,
         "reassembler": Reassembler,  # (): add(no, frame) → Gathered | None
     },
 )

@@ -1,0 +1,137 @@
+"""What BACnet exchanges tell: properties with their values. Reads, writes and changes of value; unsegmented ones."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator
+from typing import Any
+
+from dissectors.bacnet import message as messages
+from dissectors.bacnet.apdu import PduType
+from dissectors.bacnet.message import Message
+from dissectors.bacnet.values import BitString, Double, Enumerated, ObjectId, Record, show
+from dissectors.frame import Frame
+from dissectors.readings import How, Reading
+
+_PRESENT_VALUE = 85
+_READ, _READ_MULTIPLE, _WRITE, _WRITE_MULTIPLE = 12, 14, 15, 16
+_CONFIRMED_COV, _UNCONFIRMED_COV = 1, 2
+
+
+def readings(request: Frame | None, response: Frame | None) -> tuple[Reading, ...]:
+    """See `dissectors.readings.Readings`."""
+    if request is None or not request.ok:
+        return ()
+    asked = messages.read(request)
+    if asked is None or asked.apdu is None:
+        return ()
+    if response is None:
+        return tuple(_told(asked))
+    answer = messages.read(response) if response.ok else None
+    if answer is None or answer.apdu is None:
+        return ()
+    if answer.apdu.type == PduType.SIMPLE_ACK:
+        return tuple(_told(asked))
+    if answer.apdu.type == PduType.COMPLEX_ACK:
+        return tuple(_told(answer))
+    return ()
+
+
+def _told(message: Message) -> Iterator[Reading]:
+    """What one frame tells by itself; total: a parameter that is not there ends it."""
+    apdu = message.apdu
+    if apdu is None or apdu.segmented:
+        return
+    tell = _TELLERS.get((apdu.type, apdu.service or 0))
+    if tell is None:
+        return
+    decoded = messages.decode_parameters(apdu, message.parameters)
+    if decoded is None or decoded.error is not None:
+        return
+    whose = message.destination if apdu.service in (_WRITE, _WRITE_MULTIPLE) else message.source
+    try:
+        for thing, record, value, how in tell(decoded.record):
+            reading = _reading(thing, record, value, how, whose)
+            if reading is not None:
+                yield reading
+    except (KeyError, TypeError, ValueError, AttributeError):
+        return
+
+
+Item = tuple[ObjectId, Record, Any, How]
+
+
+def _property(how: How) -> Any:
+    def tell(record: Record) -> Iterator[Item]:
+        yield record["object-identifier"], record, record["property-value"], how
+
+    return tell
+
+
+def _read_multiple(record: Record) -> Iterator[Item]:
+    for result in record["list-of-read-access-results"]:
+        for item in result.get("list-of-results", ()):
+            ((kind, value),) = item["read-result"].entries
+            if kind == "property-value":
+                yield result["object-identifier"], item, value, How.READ
+
+
+def _write_multiple(record: Record) -> Iterator[Item]:
+    for spec in record["list-of-write-access-specs"]:
+        for item in spec["list-of-properties"]:
+            yield spec["object-identifier"], item, item["value"], How.WRITE
+
+
+def _change(record: Record) -> Iterator[Item]:
+    for item in record["list-of-values"]:
+        yield record["monitored-object-identifier"], item, item["value"], How.REPORT
+
+
+_TELLERS: dict[tuple[int, int], Any] = {
+    (PduType.COMPLEX_ACK, _READ): _property(How.READ),
+    (PduType.COMPLEX_ACK, _READ_MULTIPLE): _read_multiple,
+    (PduType.CONFIRMED_REQUEST, _WRITE): _property(How.WRITE),
+    (PduType.CONFIRMED_REQUEST, _WRITE_MULTIPLE): _write_multiple,
+    (PduType.CONFIRMED_REQUEST, _CONFIRMED_COV): _change,
+    (PduType.UNCONFIRMED_REQUEST, _UNCONFIRMED_COV): _change,
+}
+
+
+def _reading(thing: ObjectId, record: Record, value: Any, how: How, station: int | None) -> Reading | None:
+    space, _, number = str(thing).partition(",")
+    which = record["property-identifier"]
+    index = record.get("property-array-index")
+    part = "" if which.value == _PRESENT_VALUE else str(which) + (f".{index}" if index is not None else "")
+    raw, shown = _shown(value)
+    if shown is None:
+        return None
+    return Reading(space, int(number), raw, shown, how, part, station=station)
+
+
+def _shown(value: Any) -> tuple[int | None, int | float | str | None]:
+    """A value as (bits, number or text)."""
+    if isinstance(value, Enumerated):
+        return value.value, value.value
+    if isinstance(value, bool | int):
+        return int(value) & 0xFFFF_FFFF_FFFF_FFFF, int(value)
+    if isinstance(value, Double):
+        return int.from_bytes(struct.pack(">d", value), "big"), float(value)
+    if isinstance(value, float):
+        return int.from_bytes(struct.pack(">f", value), "big"), _shortest(value)
+    if isinstance(value, str):
+        return None, value
+    if isinstance(value, BitString | ObjectId):
+        return None, show(value)
+    return None, None
+
+
+def _shortest(value: float) -> float:
+    """The shortest decimal that means the same single: 59.9 and not 59.9000015."""
+    for digits in (6, 7, 8):
+        rounded = float(f"{value:.{digits}g}")
+        try:
+            if struct.pack(">f", rounded) == struct.pack(">f", value):
+                return rounded
+        except OverflowError:
+            break
+    return value

@@ -1,0 +1,79 @@
+"""What N2 exchanges tell: objects with their values.
+
+A binary object answers its status octet; that bit 6 of it is the state no public source confirms, so such a reading is
+not sure. Reports of changes are tentative altogether.
+"""
+
+from __future__ import annotations
+
+import struct
+
+from dissectors.frame import Frame
+from dissectors.n2.commands import Command, parse_command
+from dissectors.n2.interpretation import Interpretation, Record, interpret
+from dissectors.n2.objects import REGIONS, Encoding, attribute_name, region_name
+from dissectors.readings import How, Reading
+
+_STATE_BIT = 6
+_BINARY = (2, 4)
+
+
+def readings(request: Frame | None, response: Frame | None) -> tuple[Reading, ...]:
+    """See `dissectors.readings.Readings`."""
+    if request is None or not request.ok or request.octets[:1] != b">":
+        return ()
+    command = parse_command(request.octets)
+    if response is None:
+        return _commanded(command)
+    if not response.ok or response.octets[:1] != b"A":
+        return ()
+    told = interpret(request, response)
+    if told.error is not None:
+        return ()
+    if told.written:
+        return _commanded(command)
+    if told.kind == "read-attribute":
+        return _read(told)
+    return tuple(map(_change, told.records))
+
+
+def _change(record: Record) -> Reading:
+    raw: int = record.status
+    value: int | float = record.status >> _STATE_BIT & 1
+    if record.value is not None:
+        raw, value = _raw(record.value), record.value
+    return Reading(region_name(record.region), record.object, raw, value, How.REPORT, sure=False)
+
+
+def _commanded(command: Command) -> tuple[Reading, ...]:
+    """The value that a write or override carries."""
+    value = command.value
+    if value is None or command.region is None or command.object is None:
+        return ()
+    part = _part(command.region, command.attribute)
+    return (Reading(region_name(command.region), command.object, _raw(value), value, How.WRITE, part),)
+
+
+def _read(told: Interpretation) -> tuple[Reading, ...]:
+    if told.value is None or told.region is None or told.object is None:
+        return ()
+    part, value = _part(told.region, told.attribute), told.value
+    space = region_name(told.region)
+    if told.region in _BINARY and not part and isinstance(value, int):
+        return (Reading(space, told.object, value, value >> _STATE_BIT & 1, How.READ, sure=False),)
+    return (Reading(space, told.object, _raw(value), value, How.READ, part),)
+
+
+def _part(region: int, attribute: int | None) -> str:
+    """Empty for the value itself, else the attribute's name."""
+    known = REGIONS.get(region)
+    if attribute is None or (known is not None and attribute == known.current):
+        return ""
+    return attribute_name(region, attribute).split(",")[0].replace(" ", "-") or f"attribute-{attribute}"
+
+
+def _raw(value: int | float) -> int:
+    """The bits as they were on the wire."""
+    if isinstance(value, float):
+        return int.from_bytes(struct.pack(">f", value), "big")
+    return value & (1 << 4 * Encoding.INTEGER.width) - 1

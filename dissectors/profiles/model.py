@@ -1,0 +1,219 @@
+"""What a device is, as data: identity, register and object maps, limits, the maker's words for errors. Frozen values.
+
+A profile is made from a TOML document (`parsing.parse`); nothing here reads a file. Places are those of the wire: an
+offset between the manual's numbers and the wire is already applied. README.md has the format.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+
+
+class Kind(Enum):
+    """How the bits of an entry are read. `size`: bits, 0 for what carries its own size."""
+
+    U16 = "u16"
+    S16 = "s16"
+    U32 = "u32"
+    S32 = "s32"
+    F32 = "f32"
+    BIT = "bit"
+    REAL = "real"  # a number that the protocol itself encodes (N2, BACnet)
+    TEXT = "text"
+
+    @property
+    def registers(self) -> int:
+        """How many consecutive registers it takes."""
+        return 2 if self in (Kind.U32, Kind.S32, Kind.F32) else 1
+
+
+class Access(Enum):
+    """What a master may do."""
+
+    READ = "r"
+    WRITE = "w"
+    BOTH = "rw"
+
+    @property
+    def writable(self) -> bool:
+        return self is not Access.READ
+
+
+class Role(Enum):
+    """What an entry is for, where that matters to a rule."""
+
+    VALUE = "value"
+    COMMAND = "command"  # tells the device what to do
+    FAULT = "fault"  # the device has stopped because of it
+    ALARM = "alarm"  # the device warns
+
+
+@dataclass(frozen=True, slots=True)
+class Bit:
+    """One bit of a register. `on`, `off`: what 1 and 0 say in words; empty: nothing worth saying."""
+
+    number: int
+    name: str
+    on: str
+    off: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """Several bits of a register that are one number: bits `low` … `high`, `states` its values in words."""
+
+    low: int
+    high: int
+    name: str
+    states: Mapping[int, str]
+
+    def of(self, raw: int) -> int:
+        """The number that these bits make."""
+        return raw >> self.low & (1 << self.high - self.low + 1) - 1
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """One register or object.
+
+    `space`, `address`: its place on the wire ("holding" 0x2524, "AI" 10, "analog-input" 4). `number`: the place as the
+    manual writes it. `name`: of the point, the same for the same thing in every protocol of the device; `title`: for
+    people. value = raw · `scale` + `offset`, in `unit`, within `low` … `high` (None: not said). `states_from`: the
+    entry whose states these are. `codes`: how many
+    codes the manual lists, with those that it leaves empty. `doubt`: why its meaning is not certain, in words.
+    """
+
+    space: str
+    address: int
+    number: str
+    name: str
+    title: str
+    kind: Kind = Kind.U16
+    swapped: bool = False  # low register first
+    little: bool = False  # low octet of a register first
+    scale: float = 1.0
+    offset: float = 0.0
+    unit: str = ""
+    low: float | None = None
+    high: float | None = None
+    access: Access = Access.BOTH
+    role: Role = Role.VALUE
+    reserved: bool = False
+    states: Mapping[int, str] = field(default_factory=dict)
+    states_from: str = ""
+    codes: int = 0
+    bits: tuple[Bit, ...] = ()
+    parts: tuple[Part, ...] = ()
+    doubt: str = ""
+
+    @property
+    def decimals(self) -> int:
+        """Digits after the point that the scale makes."""
+        text = f"{self.scale:.9f}".rstrip("0")
+        return len(text.partition(".")[2])
+
+
+@dataclass(frozen=True, slots=True)
+class Sign:
+    """What a device of this kind answers at a place: for guessing. `value` None: it answers at all."""
+
+    space: str
+    address: int
+    part: str = ""
+    value: int | float | str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What the device promises or cannot take; None: not said. `frame`: octets; `response`: ns."""
+
+    frame: int | None = None
+    response: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Profile:
+    """Everything known of one kind of device.
+
+    `noun`: what a person calls it ("drive"). `protocols`: registry names. `exceptions`: exception and error codes by
+    family ("modbus", "n2") in the maker's words. `properties`: BACnet property → object types that have it.
+    `constants`: BACnet device property → its value. `absent`: parameters that the manual lists without a register.
+    `reserved`: spans of registers (first, last, on the wire) that the maker keeps for itself.
+    """
+
+    name: str
+    title: str
+    vendor: str
+    models: tuple[str, ...]
+    noun: str
+    protocols: tuple[str, ...]
+    entries: tuple[Entry, ...]
+    limits: Limits = field(default_factory=Limits)
+    exceptions: Mapping[str, Mapping[int, str]] = field(default_factory=dict)
+    signs: tuple[Sign, ...] = ()
+    properties: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    constants: Mapping[str, str | int] = field(default_factory=dict)
+    absent: tuple[str, ...] = ()
+    reserved: tuple[tuple[int, int], ...] = ()
+    source: str = ""
+    origin: str = ""
+    _places: Mapping[tuple[str, int], Entry] = field(init=False, repr=False, compare=False, hash=False)
+
+    def __post_init__(self) -> None:
+        places = {
+            (entry.space, entry.address + step): entry
+            for entry in self.entries
+            for step in range(entry.kind.registers if entry.space in ("holding", "input") else 1)
+        }
+        object.__setattr__(self, "_places", places)
+
+    def at(self, space: str, address: int) -> Entry | None:
+        """The entry that covers a place; None when the profile has none."""
+        return self._places.get((space, address))
+
+    def is_reserved(self, space: str, address: int) -> bool:
+        """Whether the maker keeps a register for itself."""
+        entry = self.at(space, address)
+        if entry is not None:
+            return entry.reserved
+        return space in ("holding", "input") and any(first <= address <= last for first, last in self.reserved)
+
+    def in_space(self, *spaces: str) -> Iterator[Entry]:
+        """The entries of some tables, in the order of the profile."""
+        return (entry for entry in self.entries if entry.space in spaces)
+
+    def exception(self, family: str, code: int) -> str:
+        """The maker's words for an exception code; empty when there are none."""
+        return self.exceptions.get(family, {}).get(code, "")
+
+
+@dataclass(frozen=True, slots=True)
+class Devices:
+    """Which station is which device. `default`: for every station without a profile of its own."""
+
+    by_address: Mapping[int, Profile] = field(default_factory=dict)
+    default: Profile | None = None
+
+    def at(self, address: int | None) -> Profile | None:
+        """The profile of a station."""
+        if address is None:
+            return self.default
+        return self.by_address.get(address, self.default)
+
+    def __bool__(self) -> bool:
+        return bool(self.by_address) or self.default is not None
+
+    @property
+    def profiles(self) -> tuple[Profile, ...]:
+        """All profiles in force, each once."""
+        found = {profile.name: profile for profile in self.by_address.values()}
+        if self.default is not None:
+            found.setdefault(self.default.name, self.default)
+        return tuple(found.values())
+
+    def text(self) -> str:
+        """As on the command line: "1=teco-e510,*=teco-f510"."""
+        words = [f"{address}={profile.name}" for address, profile in sorted(self.by_address.items())]
+        return ",".join([*words, *([f"*={self.default.name}"] if self.default else [])])

@@ -1,0 +1,37 @@
+"""The profiles that come with the package: their documents are package data, read like a module is imported."""
+
+from __future__ import annotations
+
+import tomllib
+from functools import cache
+from importlib.resources import files
+
+from dissectors.profiles.checked import ProfileError
+from dissectors.profiles.model import Profile
+from dissectors.profiles.parsing import parse
+
+SUFFIX = ".toml"
+
+
+def names() -> tuple[str, ...]:
+    """Names of the packaged profiles, ascending."""
+    found = (item.name for item in files("dissectors.profiles").iterdir() if item.name.endswith(SUFFIX))
+    return tuple(sorted(name.removesuffix(SUFFIX) for name in found))
+
+
+@cache
+def packaged(name: str) -> Profile:
+    """A packaged profile. Raises LookupError for no such name, ProfileError for a broken document."""
+    if name not in names():
+        raise LookupError(f"no packaged profile {name!r}; there are {', '.join(names())}")
+    text = files("dissectors.profiles").joinpath(name + SUFFIX).read_text(encoding="utf-8")
+    return parse_text(text, name + SUFFIX)
+
+
+def parse_text(text: str, origin: str) -> Profile:
+    """The profile in the text of a TOML document. Raises ProfileError."""
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ProfileError(f"{origin}: {error}") from None
+    return parse(data, origin)

@@ -1,0 +1,288 @@
+"""A profile out of a TOML document. README.md describes the format; every mistake is a ProfileError with its key."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from dissectors.profiles.checked import ProfileError, Table
+from dissectors.profiles.model import Access, Bit, Entry, Kind, Limits, Part, Profile, Role, Sign
+
+MILLISECOND = 1_000_000
+REGISTER_TABLES = ("holding", "input")
+BIT_TABLES = ("coil", "discrete")
+N2_REGIONS = ("AI", "BI", "AO", "BO", "ADF", "ADI", "BD")
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.+-]*")
+
+
+def parse(data: Mapping[str, Any], origin: str) -> Profile:
+    """The profile of a document; `origin` is what errors call the file. Raises ProfileError."""
+    top = Table(origin, "", data)
+    name = _name(top, "name")
+    modbus, n2, bacnet = top.table("modbus"), top.table("n2"), top.table("bacnet")
+    registers, absent = _modbus(modbus)
+    exceptions = {"modbus": _words(modbus, "exceptions"), "n2": _words(n2, "errors")}
+    objects = [_object(table, _n2_place(table), n2=True) for table in n2.tables("object")]
+    objects += [_object(table, _bacnet_place(table)) for table in bacnet.tables("object")]
+    limits = top.table("limits")
+    profile = Profile(
+        name=name,
+        title=top.text("title"),
+        vendor=top.text("vendor", ""),
+        models=top.texts("models", ()),
+        noun=top.text("noun", "device"),
+        protocols=top.texts("protocols"),
+        entries=_with_shared_states(origin, (*registers, *objects)),
+        limits=_limits(limits),
+        exceptions=exceptions,
+        signs=tuple(_sign(table, modbus) for table in top.tables("sign")),
+        properties=_properties(bacnet.table("properties")),
+        constants=_constants(bacnet.table("device")),
+        absent=absent,
+        reserved=_reserved(modbus),
+        source=top.text("source", ""),
+        origin=origin,
+    )
+    for table in (top, modbus, n2, bacnet, limits):
+        table.finish()
+    _check(profile)
+    return profile
+
+
+# --- Modbus ----------------------------------------------------------------------------------------------------------
+
+
+def _modbus(modbus: Table) -> tuple[list[Entry], tuple[str, ...]]:
+    """Registers first, then the parameters that no register describes; and the parameters without a register."""
+    offset = modbus.whole("address-offset", 0)
+    tables = modbus.texts("tables", ("holding",))
+    entries: list[Entry] = []
+    for table in modbus.tables("register"):
+        entries += [_register(table, space, offset, modbus) for space in tables]
+    described = {entry.address for entry in entries}
+    absent: list[str] = []
+    for table in modbus.tables("parameters"):
+        more, missing = _parameters(table, offset, tables)
+        entries += [entry for entry in more if entry.address not in described]
+        absent += missing
+    unknown = set(tables) - {*REGISTER_TABLES, *BIT_TABLES}
+    if unknown:
+        raise modbus.error("tables", f"{', '.join(unknown)}: expected holding, input, coil or discrete")
+    return entries, tuple(absent)
+
+
+def _register(table: Table, space: str, offset: int, modbus: Table) -> Entry:
+    address = table.whole("address")
+    wire = address + offset
+    if not 0 <= wire <= 0xFFFF:
+        raise table.error("address", f"{address} with offset {offset}: expected 0 … 65535 on the wire")
+    return _entry(table, space, wire, f"{address:04X}h", modbus)
+
+
+def _reserved(modbus: Table) -> tuple[tuple[int, int], ...]:
+    """Spans [first, last] of registers that nobody may write, as on the wire."""
+    offset, spans = modbus.whole("address-offset", 0), []
+    for table in modbus.tables("reserved"):
+        first, last = table.whole("first") + offset, table.whole("last") + offset
+        table.finish()
+        if not 0 <= first <= last <= 0xFFFF:
+            raise table.error("last", "expected first … last within 0 … 65535")
+        spans.append((first, last))
+    return tuple(spans)
+
+
+def _parameters(table: Table, offset: int, tables: tuple[str, ...]) -> tuple[list[Entry], list[str]]:
+    """A group of parameters whose register is `base` plus the parameter's number."""
+    prefix, base, digits = table.text("prefix"), table.whole("base"), table.whole("digits", 2)
+    title = table.text("title", "parameter")
+    access = Access(table.choice("access", [access.value for access in Access], "rw"))
+    present, absent = table.numbers("present"), table.numbers("absent")
+    elsewhere = {number: _whole(table, f"elsewhere.{number}", at) for number, at in table.numbered("elsewhere").items()}
+    titles = {number: str(words) for number, words in table.numbered("titles").items()}
+    for number in {*titles, *elsewhere} - {*present, *absent}:
+        raise table.error(f"titles.{number}", "is no parameter of this group")
+    if set(present) & set(absent):
+        raise table.error("absent", "has a number that is also present")
+    table.finish()
+    entries = []
+    for number in present:
+        address = elsewhere.get(number, base + number)
+        if not 0 <= address + offset <= 0xFFFF:
+            raise table.error("base", f"register {address} does not exist")
+        name = f"{prefix}{number:0{digits}d}"
+        words = titles.get(number, f"{title} {name}")
+        entries += [Entry(space, address + offset, f"{address:04X}h", name, words, access=access) for space in tables]
+    return entries, [f"{prefix}{number:0{digits}d}" for number in absent]
+
+
+# --- objects ---------------------------------------------------------------------------------------------------------
+
+
+def _n2_place(table: Table) -> tuple[str, int]:
+    space, _, number = table.text("object").partition(" ")
+    if space not in N2_REGIONS or not number.isdigit() or int(number) > 255:
+        raise table.error("object", f'expected "AI 1": one of {", ".join(N2_REGIONS)} and 0 … 255')
+    return space, int(number)
+
+
+def _bacnet_place(table: Table) -> tuple[str, int]:
+    space, _, number = table.text("object").partition(" ")
+    if not re.fullmatch(r"[a-z][a-z-]*", space) or not number.isdigit() or int(number) > 0x3FFFFF:
+        raise table.error("object", 'expected "analog-input 0": object type and instance')
+    return space, int(number)
+
+
+def _object(table: Table, place: tuple[str, int], n2: bool = False) -> Entry:
+    space, address = place
+    binary = space in ("BI", "BO") or space.startswith("binary-")
+    return _entry(table, space, address, f"{space} {address}", None, Kind.BIT if binary else Kind.REAL)
+
+
+# --- what registers and objects share --------------------------------------------------------------------------------
+
+
+def _entry(table: Table, space: str, address: int, number: str, modbus: Table | None, usual: Kind = Kind.U16) -> Entry:
+    orders = ("high-first", "low-first")
+    word_order = modbus.choice("word-order", orders, "high-first") if modbus else "high-first"
+    octet_order = modbus.choice("octet-order", orders, "high-first") if modbus else "high-first"
+    reserved = table.flag("reserved")
+    name = _name(table, "name") if not reserved or "name" in table else f"reserved.{number.replace(' ', '-')}"
+    low, high = table.pair("range")
+    states = {code: str(words) for code, words in table.numbered("states").items()}
+    empty = table.numbers("reserved-codes")
+    if set(states) & set(empty):
+        raise table.error("reserved-codes", "has a code that is also in states")
+    entry = Entry(
+        space=space,
+        address=address,
+        number=number,
+        name=name,
+        title=table.text("title", "reserved" if reserved else name.replace("-", " ")),
+        kind=Kind(table.choice("type", [kind.value for kind in Kind], usual.value)),
+        swapped=table.choice("word-order", orders, word_order) == "low-first",
+        little=table.choice("octet-order", orders, octet_order) == "low-first",
+        scale=table.number("scale", 1.0),
+        offset=table.number("offset", 0.0),
+        unit=table.text("unit", ""),
+        low=low,
+        high=high,
+        access=Access(table.choice("access", [access.value for access in Access], "rw")),
+        role=Role(table.choice("role", [role.value for role in Role], "value")),
+        reserved=reserved,
+        states=states,
+        codes=len(states) + len(empty),
+        bits=tuple(_bit(table, number, value) for number, value in sorted(table.numbered("bits").items())),
+        parts=tuple(_part(part) for part in table.tables("part")),
+        states_from=table.text("states-from", ""),
+        doubt=table.text("doubt", ""),
+    )
+    table.finish()
+    return entry
+
+
+def _bit(table: Table, number: int, value: Any) -> Bit:
+    """ "S1" (named and said so), or ["run", "run", "stop"]: name, words for 1, words for 0."""
+    if not 0 <= number <= 31:
+        raise table.error(f"bits.{number}", "expected a bit number 0 … 31")
+    if isinstance(value, str):
+        return Bit(number, _slug(value), value)
+    if isinstance(value, list) and len(value) in (2, 3) and all(isinstance(item, str) for item in value):
+        return Bit(number, *value)
+    raise table.error(f"bits.{number}", f'expected "name" or ["name", "on", "off"], not {value!r}')
+
+
+def _part(table: Table) -> Part:
+    low, high = table.pair("bits")
+    if low is None or high is None or not 0 <= low <= high <= 31:
+        raise table.error("bits", "expected [lowest, highest] within 0 … 31")
+    states = {code: str(words) for code, words in table.numbered("states").items()}
+    part = Part(int(low), int(high), _name(table, "name"), states)
+    table.finish()
+    return part
+
+
+def _with_shared_states(origin: str, entries: tuple[Entry, ...]) -> tuple[Entry, ...]:
+    """Entries with `states-from` get the states of the entry of that name."""
+    by_name = {entry.name: entry.states for entry in entries if entry.states}
+    for entry in entries:
+        if entry.states_from and entry.states_from not in by_name:
+            raise ProfileError(f"{origin}: {entry.number}: states-from: no entry {entry.states_from!r} with states")
+    return tuple(replace(e, states=by_name[e.states_from]) if e.states_from else e for e in entries)
+
+
+# --- the rest of a profile -------------------------------------------------------------------------------------------
+
+
+def _limits(table: Table) -> Limits:
+    frame = table.whole("frame") if "frame" in table else None
+    response = table.number("response-ms") if "response-ms" in table else None
+    if (frame is not None and frame < 1) or (response is not None and response <= 0):
+        raise table.error("", "expected numbers above 0")
+    return Limits(frame, None if response is None else int(response * MILLISECOND))
+
+
+def _sign(table: Table, modbus: Table) -> Sign:
+    if "register" in table:
+        space, address = "holding", table.whole("register") + modbus.whole("address-offset", 0)
+    else:
+        word, _, number = table.text("object").partition(" ")
+        space, address = word, int(number) if number.isdigit() else -1
+    value = table.data.get("value")
+    if "value" in table and not isinstance(value, int | float | str):
+        raise table.error("value", f"expected a number or a text, not {value!r}")
+    sign = Sign(space, address, table.text("part", ""), value)
+    table.finish()
+    return sign
+
+
+def _properties(table: Table) -> dict[str, tuple[str, ...]]:
+    return {key: table.texts(key) for key in table.data}
+
+
+def _constants(table: Table) -> dict[str, str | int]:
+    return {key: table.whole(key) if isinstance(value, int) else table.text(key) for key, value in table.data.items()}
+
+
+def _words(table: Table, key: str) -> dict[int, str]:
+    return {code: str(words) for code, words in table.numbered(key).items()}
+
+
+def _check(profile: Profile) -> None:
+    """What concerns several entries: a place is described once, a name means one thing."""
+    places: dict[tuple[str, int], Entry] = {}
+    names: dict[tuple[str, str], Entry] = {}
+    units: dict[str, Entry] = {}
+    for entry in profile.entries:
+        steps = entry.kind.registers if entry.space in REGISTER_TABLES else 1
+        for place in ((entry.space, entry.address + step) for step in range(steps)):
+            other = places.setdefault(place, entry)
+            if other is not entry:
+                raise ProfileError(f"{profile.origin}: {entry.number}: is already {other.name!r} ({other.number})")
+        other = names.setdefault((entry.space, entry.name), entry)
+        if other is not entry:
+            raise ProfileError(f"{profile.origin}: {entry.number}: name {entry.name!r} is taken by {other.number}")
+        other = units.setdefault(entry.name, entry)
+        if other.unit != entry.unit:
+            raise ProfileError(
+                f"{profile.origin}: {entry.number}: {entry.name!r} in {entry.unit or 'no unit'!r}, "
+                f"but {other.number} has it in {other.unit or 'no unit'!r}"
+            )
+
+
+def _name(table: Table, key: str) -> str:
+    name = table.text(key)
+    if not _NAME.fullmatch(name):
+        raise table.error(key, f"{name!r}: expected letters, digits, dots and hyphens")
+    return name
+
+
+def _slug(words: str) -> str:
+    return re.sub(r"[^a-z0-9]+", "-", words.lower()).strip("-") or "bit"
+
+
+def _whole(table: Table, key: str, value: Any) -> int:
+    if not isinstance(value, int) or isinstance(value, bool):
+        raise table.error(key, f"expected a whole number, not {value!r}")
+    return value

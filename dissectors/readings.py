@@ -1,0 +1,46 @@
+"""What an exchange says of the things inside a station: readings, before anybody knows which device that is.
+
+Each protocol takes its own exchanges apart (`extras["readings"]` of its Dissector); profiles give the readings names
+and units. A reading is what was on the wire, no more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+
+from dissectors.frame import Frame
+
+
+class How(Enum):
+    """How a value came over the line."""
+
+    READ = "read"  # a station answered a question
+    WRITE = "write"  # a master gave it to a station
+    REPORT = "report"  # a station told it by itself (change of state)
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """One thing that an exchange told.
+
+    `station`: whose thing it is; None when that is the station of the transaction. `space`: which table of the station
+    ("holding", "AI", "analog-input"); `address`: the place in it, as on the wire; `part`: the attribute or property,
+    empty for the value itself. `raw`: the bits as they were on the wire, unsigned; None for text. `sure`: False where
+    no public source confirms the layout.
+    """
+
+    space: str
+    address: int
+    raw: int | None
+    value: int | float | str
+    how: How
+    part: str = ""
+    sure: bool = True
+    station: int | None = None
+
+
+Readings = Callable[[Frame | None, Frame | None], tuple[Reading, ...]]
+"""(request, response) → readings; total. Without the response: what the request itself tells (a write, a report);
+with it, what is confirmed: nothing after an exception."""
