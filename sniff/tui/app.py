@@ -115,7 +115,7 @@ class SnifferApp(App[None]):
 
     def _draw_header(self) -> None:
         for header in self.screen.query(StatusHeader):
-            header.refresh()
+            header.bring_up()
 
     # -- what keys do everywhere -------------------------------------------------------------------------------
 

@@ -1,34 +1,50 @@
-"""The tree of the selected frame's fields."""
+"""The tree of the selected frame's fields. Draws only visible lines: it is new for every frame that is looked at."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import ClassVar
 
-from rich.text import Text
+from rich.segment import Segment
+from textual import events
 from textual.binding import Binding, BindingType
+from textual.geometry import Size
 from textual.message import Message
-from textual.widgets import Tree
-from textual.widgets.tree import TreeNode
+from textual.scroll_view import ScrollView
+from textual.strip import Strip
 
 from sniff.tui.spans import Field
 
-CLOSED = frozenset({"frame", "transaction", "noise"})
+FOLDED = (("frame",), ("transaction",), ("noise",))
 """What is known besides the packet begins folded: its first line says the most."""
 
+Path = tuple[str, ...]
 
-class FieldTree(Tree[Field], inherit_bindings=False):
-    """Moving in it picks a field; keeps its place when the next frame has the same field."""
+
+@dataclass(frozen=True, slots=True)
+class _Line:
+    field: Field
+    path: Path  # names from the layer down to the field
+
+    @property
+    def depth(self) -> int:
+        return len(self.path) - 1
+
+
+class FieldTree(ScrollView, can_focus=True, inherit_bindings=False):
+    """Moving in it picks a field; place and folds stay when the next frame has the same fields."""
 
     BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("up,k", "cursor_up", "line up", show=False),
-        Binding("down,j", "cursor_down", "line down", show=False),
-        Binding("pageup", "page_up", "page up", show=False),
-        Binding("pagedown", "page_down", "page down", show=False),
-        Binding("home,g", "scroll_home", "first line", show=False),
-        Binding("end,G", "scroll_end", "last line", show=False),
-        Binding("enter", "toggle_node", "fold", tooltip="fold or unfold the part under the cursor"),
-        Binding("left", "cursor_parent", "parent", tooltip="to the part that holds this one", show=False),
+        Binding("up,k", "move(-1)", "line up", show=False),
+        Binding("down,j", "move(1)", "line down", show=False),
+        Binding("pageup", "page(-1)", "page up", show=False),
+        Binding("pagedown", "page(1)", "page down", show=False),
+        Binding("home,g", "move(-65536)", "first line", show=False),
+        Binding("end,G", "move(65536)", "last line", show=False),
+        Binding("enter", "fold", "fold", tooltip="fold or unfold the part under the cursor"),
+        Binding("left,h", "parent", "parent", tooltip="to the part that holds this one", show=False),
     ]
+    COMPONENT_CLASSES: ClassVar[set[str]] = {"field-tree--name", "field-tree--cursor", "field-tree--here"}
 
     class Picked(Message):
         """The user moved to a field."""
@@ -38,88 +54,133 @@ class FieldTree(Tree[Field], inherit_bindings=False):
             self.field = field
 
     def __init__(self, *, id: str | None = None) -> None:
-        super().__init__("", id=id)
-        self.show_root = False
-        self.guide_depth = 2
-        self.auto_expand = False
-        self._path: tuple[str, ...] = ()
+        super().__init__(id=id)
+        self.fields: tuple[Field, ...] = ()
+        self.folded: set[Path] = set(FOLDED)
+        self.cursor = 0
+        self._lines: list[_Line] = []
+        self._wanted: Path = ()  # where the user was last; kept over frames that have no such field
+
+    @property
+    def picked(self) -> Field | None:
+        """The field under the cursor."""
+        return self._lines[self.cursor].field if self.cursor < len(self._lines) else None
 
     def show(self, fields: tuple[Field, ...]) -> Field | None:
         """Show the fields of another frame; gives the field that the cursor kept, None when it is not there."""
-        path = self._path
-        self.clear()
-        for field in fields:
-            self._add(self.root, field)
-        self.root.expand()
-        _ = self.last_line  # builds the lines: before, no node knows its own
-        kept = self._find(path)
-        here = kept or (self.root.children[0] if self.root.children else None)
-        if here is not None:
-            with self.prevent(Tree.NodeHighlighted):
-                self.move_cursor(here)
-            self.scroll_to_node(here, animate=False)
-        self._path = path  # also when this frame has no such field: the next may have it
-        return None if kept is None else kept.data
-
-    def _add(self, parent: TreeNode[Field], field: Field) -> None:
-        if field.children:
-            node = parent.add(_label(field), field, expand=field.name not in CLOSED)
-            for child in field.children:
-                self._add(node, child)
-        else:
-            parent.add_leaf(_label(field), field)
-
-    def _find(self, path: tuple[str, ...]) -> TreeNode[Field] | None:
-        node: TreeNode[Field] = self.root
-        for name in path:
-            found = next((child for child in node.children if child.data is not None and child.data.name == name), None)
-            if found is None:
-                return None
-            node = found
-        return None if node is self.root else node
+        self.fields = fields
+        self._flatten()
+        kept = self._line_of(self._wanted)
+        self.cursor = kept or 0
+        self._show_cursor()
+        return None if kept is None else self._lines[kept].field
 
     def pick_octet(self, offset: int) -> Field | None:
         """Move to the smallest field that holds an octet, unfolding what holds it; None when no field does."""
-        best: TreeNode[Field] | None = None
-        waiting = list(self.root.children)
-        while waiting:
-            node = waiting.pop()
-            if node.data is not None and offset in node.data and (best is None or _size(node) <= _size(best)):
-                best = node
-            waiting.extend(node.children)
-        if best is None:
+        found = _smallest(self.fields, offset, ())
+        if found is None:
             return None
-        parent = best.parent
-        while parent is not None:
-            parent.expand()
-            parent = parent.parent
-        _ = self.last_line  # as above, after unfolding
-        with self.prevent(Tree.NodeHighlighted):
-            self.move_cursor(best)
-        self._path = _path(best)
-        self.scroll_to_node(best, animate=False)
-        return best.data
+        self.folded -= {found.path[:depth] for depth in range(1, len(found.path))}
+        self._flatten()
+        self._wanted = found.path
+        self.cursor = self._line_of(found.path) or 0
+        self._show_cursor()
+        return found.field
 
-    def on_tree_node_highlighted(self, event: Tree.NodeHighlighted[Field]) -> None:
-        """Tell which field the cursor is on."""
-        event.stop()
-        if event.node.data is not None and self.has_focus:
-            self._path = _path(event.node)
-            self.post_message(self.Picked(event.node.data))
+    def _flatten(self) -> None:
+        self._lines = []
+        self._unfold(self.fields, ())
+        self.cursor = min(self.cursor, max(0, len(self._lines) - 1))
+        self.virtual_size = Size(0, len(self._lines))
+        self.refresh()
+
+    def _unfold(self, fields: tuple[Field, ...], above: Path) -> None:
+        for field in fields:
+            path = (*above, field.name)
+            self._lines.append(_Line(field, path))
+            if field.children and path not in self.folded:
+                self._unfold(field.children, path)
+
+    def _line_of(self, path: Path) -> int | None:
+        return next((number for number, line in enumerate(self._lines) if line.path == path), None) if path else None
+
+    # -- moving ------------------------------------------------------------------------------------------------
+
+    def action_move(self, by: int) -> None:
+        """Move by lines."""
+        if not self._lines:
+            return
+        self.cursor = min(max(0, self.cursor + by), len(self._lines) - 1)
+        line = self._lines[self.cursor]
+        self._wanted = line.path
+        self._show_cursor()
+        self.post_message(self.Picked(line.field))
+
+    def action_page(self, by: int) -> None:
+        """Move by pages."""
+        self.action_move(by * max(1, self.scrollable_content_region.height))
+
+    def action_fold(self) -> None:
+        """Fold or unfold the part under the cursor."""
+        if self._lines and self._lines[self.cursor].field.children:
+            self.folded ^= {self._lines[self.cursor].path}
+            self._flatten()
+
+    def action_parent(self) -> None:
+        """To the part that holds this one."""
+        if self._lines:
+            above = self._line_of(self._lines[self.cursor].path[:-1])
+            if above is not None:
+                self.action_move(above - self.cursor)
+
+    def on_click(self, event: events.Click) -> None:
+        """Pick a line; at its arrow, fold it."""
+        line = self.scroll_offset.y + event.y
+        if line < len(self._lines):
+            self.action_move(line - self.cursor)
+            if event.x <= 2 * self._lines[line].depth + 1:
+                self.action_fold()
+
+    def on_resize(self) -> None:
+        """Keep the cursor in sight."""
+        self._show_cursor()
+
+    def _show_cursor(self) -> None:
+        top, height = self.scroll_offset.y, max(1, self.scrollable_content_region.height)
+        if not top <= self.cursor < top + height:
+            wanted = self.cursor if self.cursor < top else self.cursor - height + 1
+            self.scroll_to(y=wanted, animate=False, force=True)
+        self.refresh()
+
+    # -- drawing -----------------------------------------------------------------------------------------------
+
+    def render_line(self, y: int) -> Strip:
+        """Arrow, name, value."""
+        width, base = self.scrollable_content_region.width, self.rich_style
+        number = self.scroll_offset.y + y
+        if number >= len(self._lines):
+            return Strip.blank(width, base)
+        line = self._lines[number]
+        if number == self.cursor:
+            base += self.get_component_rich_style(f"field-tree--{'cursor' if self.has_focus else 'here'}", partial=True)
+        name = base + self.get_component_rich_style("field-tree--name", partial=True)
+        arrow = " " if not line.field.children else "▶" if line.path in self.folded else "▼"
+        segments = [Segment(f"{'  ' * line.depth}{arrow} ", base), Segment(line.field.name, name)]
+        if line.field.value:
+            segments.append(Segment(f": {line.field.value}", base))
+        return Strip(segments).adjust_cell_length(width, base)
 
 
-def _size(node: TreeNode[Field]) -> int:
-    field = node.data
-    return 0 if field is None or field.begin is None or field.end is None else field.end - field.begin
+def _smallest(fields: tuple[Field, ...], offset: int, above: Path) -> _Line | None:
+    best: _Line | None = None
+    for field in fields:
+        path = (*above, field.name)
+        inner = _smallest(field.children, offset, path) if field.children else None
+        found = inner or (_Line(field, path) if offset in field else None)
+        if found is not None and (best is None or _size(found.field) <= _size(best.field)):
+            best = found
+    return best
 
 
-def _path(node: TreeNode[Field]) -> tuple[str, ...]:
-    names: list[str] = []
-    while node.parent is not None and node.data is not None:
-        names.append(node.data.name)
-        node = node.parent
-    return tuple(reversed(names))
-
-
-def _label(field: Field) -> Text:
-    return Text.assemble((field.name, "bold"), f": {field.value}" if field.value else "")
+def _size(field: Field) -> int:
+    return 0 if field.begin is None or field.end is None else field.end - field.begin

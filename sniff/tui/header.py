@@ -68,29 +68,43 @@ class StatusHeader(Widget):
     def __init__(self, here: str) -> None:
         super().__init__()
         self.here = here  # name of the screen it stands on
+        self._pieces: list[tuple[str, str]] = []
+
+    def bring_up(self) -> None:
+        """Draw again if anything changed."""
+        pieces = status_line(self.app.status, self.app.store, self.app.viewing, self.size.width)
+        if pieces != self._pieces:
+            self._pieces = pieces
+            self.refresh()
+
+    def on_resize(self) -> None:
+        """Other width, other words."""
+        self.bring_up()
 
     def render(self) -> Text:
         """Both lines."""
         width = self.size.width
-        app = self.app
         text = Text(no_wrap=True, overflow="crop", end="")
-        for piece, style in status_line(app.status, app.store, app.viewing, width):
+        for piece, style in self._pieces:
             text.append(piece, self._style(style) if style else "")
-        text.append("\n")
-        text.append_text(self._second_line(width))
-        return text
+        text.truncate(width, overflow="ellipsis")
+        tabs = self._tabs(width)
+        tabs.truncate(width, overflow="ellipsis")
+        return text.append("\n").append_text(tabs)
 
-    def _second_line(self, width: int) -> Text:
-        tabs = Text(end="")
-        for key, title in self.app.tabs:
-            here = title == self.here
-            label = f"[{key} {title}]" if here else f" {key} {title} "
-            tabs.append(label, self._style("here" if here else "dim"))
-        note = self.screen.note() if hasattr(self.screen, "note") else ""
-        room = width - tabs.cell_len - 1
-        if room > 3 and note:
-            tabs.append(" " + fit(plain(note), room, right=True), self._style("dim"))
-        return tabs
+    def _tabs(self, width: int) -> Text:
+        tabs = [(f"{key} {title}", title == self.here) for key, title in self.app.tabs]
+        if sum(len(label) + 2 for label, _ in tabs) <= width:
+            labels = [f"[{label}]" if here else f" {label} " for label, here in tabs]
+        else:  # closer together, then the numbers alone
+            labels = [f"[{label}]" if here else label for label, here in tabs]
+            if sum(map(len, labels)) + len(labels) - 1 > width:
+                labels = [f"[{label}]" if here else label.split()[0] for label, here in tabs]
+            labels = [label + " " for label in labels]
+        text = Text(end="")
+        for label, (_, here) in zip(labels, tabs, strict=True):
+            text.append(label, self._style("here" if here else "dim"))
+        return text
 
     def _style(self, name: str):
         return self.get_component_rich_style(f"status-header--{name}", partial=True)

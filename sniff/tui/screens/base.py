@@ -48,10 +48,6 @@ class ViewScreen(Screen[None]):
         """Do a small piece of pending work (some ms); whether more is left."""
         return False
 
-    def note(self) -> str:
-        """Some words for the right end of the header."""
-        return ""
-
     @property
     def viewing(self) -> Viewing:
         """How the user looks at things."""

@@ -251,8 +251,10 @@ Script = Callable[[Looking], Awaitable[None]]
 
 
 @pytest.fixture
-def look() -> Callable[..., SnifferApp]:
+def look(monkeypatch: pytest.MonkeyPatch) -> Callable[..., SnifferApp]:
     """`look(store, script, size=…, start=…, **status)` runs the app over a store and the script with it."""
+    monkeypatch.setattr("sniff.tui.screens.frames.DETAIL_SECONDS", 0.001)  # nobody holds a key down here
+    monkeypatch.setattr("sniff.tui.screens.frames.FOLLOWING_SECONDS", 0.001)
 
     def run(
         store: Store, script: Script, size: tuple[int, int] = (80, 24), start: str = "frames", **status: Any

@@ -60,3 +60,22 @@ def test_the_port_gives_way(busy_bus: Any, width: int, port: str) -> None:
         assert piece in text
     if width >= 80:
         assert cell_len(text) <= width
+
+
+@pytest.mark.parametrize(
+    ("width", "tabs"),
+    [
+        (120, " 1 Frames  2 Transactions  3 Nodes  4 Points  5 Findings  6 Timeline  7 Ring [8 Line]"),
+        (80, "1 Frames 2 Transactions 3 Nodes 4 Points 5 Findings 6 Timeline 7 Ring [8 Line]"),
+        (40, "1 2 3 4 5 6 7 [8 Line]"),
+    ],
+)
+def test_eight_screens_fit(look: Any, busy_bus: Any, width: int, tabs: str) -> None:
+    names = ("Frames", "Transactions", "Nodes", "Points", "Findings", "Timeline", "Ring", "Line")
+
+    async def script(see: Any) -> None:
+        see.app.tabs = tuple((str(key), name) for key, name in enumerate(names, 1))
+        await see.press("8")
+        assert see.lines()[1] == tabs
+
+    look(busy_bus.store, script, (width, 24))

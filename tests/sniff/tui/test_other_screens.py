@@ -11,21 +11,7 @@ from dissectors.frame import LineError, Mark
 from dissectors.tracker import Verdict
 from sniff.session import LineEvent, LineEventKind
 
-SIZES = {"80x24": (80, 24), "160x50": (160, 50)}
 MS = 1_000_000
-
-
-@pytest.mark.parametrize("size", SIZES)
-@pytest.mark.parametrize("name", ["transactions", "nodes", "line"])
-def test_pictures(look: Any, golden: Any, busy_bus: Any, name: str, size: str) -> None:
-    busy_bus.store.add_line_event(LineEvent(busy_bus.now, LineEventKind.UNPLUGGED, "gone"))
-
-    async def script(see: Any) -> None:
-        golden(f"{name}-{size}", see.text())
-        assert "None" not in see.text()
-        assert all(len(line) <= SIZES[size][0] for line in see.lines())
-
-    look(busy_bus.store, script, SIZES[size], name)
 
 
 # -- transactions ----------------------------------------------------------------------------------------------------

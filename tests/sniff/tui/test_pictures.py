@@ -1,0 +1,39 @@
+"""What the screens look like, as text beside this file, and what must never be in them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from sniff.session import LineEvent, LineEventKind
+
+SIZES = {"80x24": (80, 24), "160x50": (160, 50)}
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_pictures(look: Any, golden: Any, busy_bus: Any, size: str) -> None:
+    """`UPDATE_GOLDEN=1 pytest …` writes them anew; read the difference before you commit it."""
+    busy_bus.store.add_line_event(LineEvent(busy_bus.now, LineEventKind.UNPLUGGED, "gone"))
+
+    async def script(see: Any) -> None:
+        def compare(name: str) -> None:
+            golden(f"{name}-{size}", see.text())
+            assert "None" not in see.text()
+            assert "{" not in see.text()
+            assert all(len(line) <= SIZES[size][0] for line in see.lines())
+
+        await see.press("colon", "8", "enter")  # damaged, with a line error
+        compare("frames")
+        await see.press("enter", "down", "down")
+        compare("fields")
+        await see.press("2")
+        compare("transactions")
+        await see.press("3")
+        compare("nodes")
+        await see.press("8")
+        compare("line")
+        await see.press("question_mark")
+        compare("help")
+
+    look(busy_bus.store, script, SIZES[size], live=True, recording="/tmp/x.mcap")
