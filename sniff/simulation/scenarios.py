@@ -17,6 +17,7 @@ from sniff.session import Item, Session
 from sniff.simulation.faults import (
     BitFlips,
     Break,
+    CutShort,
     EarlyRelease,
     Fault,
     LateResponse,
@@ -72,7 +73,7 @@ def scenario(name: str, seed: int = 0, faults: bool = True, line: LineSettings |
     if entry is None:
         raise UnknownScenario(f"scenario {name!r}: expected one of {', '.join(SCENARIOS)}")
     usual, make = entry
-    made = make(line or LineSettings.parse(usual))
+    made = make(line or LineSettings.parse(usual), faults)
     return replace(made, name=name, seed=seed, faults=made.faults if faults else ())
 
 
@@ -152,7 +153,7 @@ def _modbus_parties(line: LineSettings, is_ascii: bool, busy: bool) -> list[Part
     return [Party("master", master, answers=False), *drives]
 
 
-def _modbus(protocol: str, busy: bool, line: LineSettings) -> Scenario:
+def _modbus(protocol: str, busy: bool, line: LineSettings, faults: bool) -> Scenario:
     is_ascii = protocol == "modbus-ascii"
     return Scenario(
         name=protocol,
@@ -200,7 +201,7 @@ def _n2_parties(line: LineSettings) -> list[Party]:
     ]
 
 
-def _n2(line: LineSettings) -> Scenario:
+def _n2(line: LineSettings, faults: bool) -> Scenario:
     return Scenario(
         name="n2",
         protocol="n2",
@@ -218,10 +219,50 @@ def _n2(line: LineSettings) -> Scenario:
     )
 
 
-SCENARIOS: Mapping[str, tuple[str, Callable[[LineSettings], Scenario]]] = {
+# ---- BACnet MS/TP: a ring of four masters
+
+
+def _mstp_parties(line: LineSettings, faults: bool) -> list[Party]:
+    from dissectors.bacnet.f510 import f510
+    from dissectors.bacnet.simulated import Faults, Node, Poller
+
+    timing = Timing(line)
+    drive, fan = 5, 9
+    readings = [(mac, f"analog-input,{number}", "present-value") for number in (4, 5, 0, 3) for mac in (drive, fan)]
+    controller = Poller([*readings, (drive, "device,5", "object-name"), (fan, "analog-input,99", "present-value")])
+    logger = Poller([(drive, "analog-output,0", "present-value"), (fan, "analog-output,0", "present-value")])
+    forgetful = Faults(loses_token_every=700, postpones=True) if faults else Faults(postpones=True)
+    nodes = {
+        "controller": Node(1, timing, controller, max_master=31, max_info_frames=2),
+        "logger": Node(2, timing, logger, max_master=31),
+        "drive": Node(drive, timing, f510(drive), max_master=127),
+        "fan": Node(fan, timing, f510(fan, name="fan"), max_master=31, faults=forgetful),
+    }
+    return [Party(name, node, answers=False) for name, node in nodes.items()]
+
+
+def _mstp(line: LineSettings, faults: bool) -> Scenario:
+    return Scenario(
+        name="mstp",
+        protocol="mstp",
+        line=line,
+        stations=partial(_mstp_parties, line, faults),
+        faults=(
+            BitFlips(2e-5),
+            CutShort(0.0005),
+            NoiseInGaps(0.002, places=(Place.AFTER,)),
+            Break(0.0002),
+        ),
+        devices=dict.fromkeys((5, 9), "teco-f510"),
+        text="four masters, two of them TECO F510 drives; the drive at 9 drops the token now and then",
+    )
+
+
+SCENARIOS: Mapping[str, tuple[str, Callable[[LineSettings, bool], Scenario]]] = {
     "modbus-rtu": ("19200,8E1", partial(_modbus, "modbus-rtu", False)),
     "modbus-ascii": ("19200,7E1", partial(_modbus, "modbus-ascii", False)),
     "modbus-rtu-busy": ("115200,8E1", partial(_modbus, "modbus-rtu", True)),
     "n2": ("9600,8N1", _n2),
+    "mstp": ("38400,8N1", _mstp),
 }
-"""Usual line settings and maker of each scenario, by name."""
+"""Usual line settings and maker of each scenario, by name. The maker is told whether stations may misbehave, too."""

@@ -60,7 +60,7 @@ def test_every_octet_is_read_after_its_end_and_within_the_latency(
         last += len(chunk.octets)
         assert ends[last - 1] <= chunk.time  # the contract of `Chunk.time`
     collided = any(len(burst.sent) > 1 for burst in bursts)  # then octets may follow each other half a bit too soon
-    shift = LINE.bits(0.5) * max(len(chunk.octets) for chunk in chunks) if collided else 0
+    shift = LINE.bits(1) * max(len(chunk.octets) for chunk in chunks) if collided else 0
     for nominal, end in zip(_nominal(chunks), ends, strict=True):
         assert end - shift <= nominal <= end + model.latency(LINE)
 
