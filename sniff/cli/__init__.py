@@ -22,6 +22,8 @@ COMMANDS: dict[str, str] = {
     "show": "frames of captures, one line each, or JSON, tree, hex, fields",
     "info": "what is in a capture: times, counts, nodes, settings, completeness",
     "stats": "tables: nodes, transactions, latency, load, ring",
+    "check": "what is wrong with a bus, where, and what to do next: findings with evidence",
+    "rule": "explain the rules behind the findings of check, or list them",
     "convert": "one capture format into another, by suffix",
     "config": "where the configured buses and their values come from",
     "demo": "a virtual RS-485 bus with simulated drives, through the real capture path",

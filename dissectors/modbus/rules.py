@@ -1,0 +1,268 @@
+"""The rules of Modbus: what each measures, against which limit, what it means and what to check next.
+
+MB0xx answers that fail, MB1xx time, MB2xx addresses and masters, MB3xx gaps between octets and frames, MB4xx facts.
+"""
+
+from __future__ import annotations
+
+from dissectors.findings import Rule, Severity
+
+_ALL = (
+    Rule(
+        "MB001",
+        Severity.ERROR,
+        "never answers",
+        "Requests to a station that nothing ever followed: no answer, no damaged answer, not one octet. "
+        "At least two requests.",
+        "no station at this address: off, set to another address or baud rate, or cut off",
+        "its supply, address switch and baud rate; if it is gone, take it out of the master's list",
+    ),
+    Rule(
+        "MB002",
+        Severity.WARNING,
+        "answers missing",
+        "Requests that no octet followed before the master went on, to a station that answers others. A single one, or "
+        "fewer than 1 in 100 and at most two a minute, is only noted. ",
+        "requests or answers get lost: a loose wire, a missing ground, a station too busy to answer",
+        "whether requests or answers are damaged at the same times; the station's terminals and supply",
+    ),
+    Rule(
+        "MB003",
+        Severity.ERROR,
+        "fell silent",
+        "A station that used to answer left at least its last five requests without an answer, to the end.",
+        "the station was switched off, crashed or lost its connection at that time",
+        "what happened at the time of the last answer; supply, fuse and connector of the station",
+    ),
+    Rule(
+        "MB004",
+        Severity.WARNING,
+        "one request is never answered",
+        "A station answers other requests but never this one (function and first register), asked three times or more.",
+        "the station drops what it does not support instead of answering with an exception",
+        "the device's register map; take the request out of the master's list",
+    ),
+    Rule(
+        "MB005",
+        Severity.WARNING,
+        "damaged answers",
+        "Answers with a wrong check or length, or octets in place of an answer that are no frame. Counted at the "
+        "station that was asked. A single one, or fewer than 1 in 100 and at most two a minute, is only noted.",
+        "noise on this station's drop: a long stub, a bad connector, its driver",
+        "termination and bias; this station's connector and stub; its distance from power cables",
+    ),
+    Rule(
+        "MB006",
+        Severity.WARNING,
+        "last octet of answers damaged",
+        "At least three answers of a station that are right but for their last octet, or end one octet early, and they "
+        "are most of its damaged answers. In RTU the low octet of the CRC is right and the high one wrong.",
+        "the station releases its driver before the last octet is out",
+        "its turnaround or transmit-delay setting; with a converter, the timer that switches direction",
+    ),
+    Rule(
+        "MB007",
+        Severity.WARNING,
+        "damage to all stations",
+        "Damaged answers of two stations or more, at least two each, at rates that do not differ by chance alone.",
+        "a cause common to all: termination, bias, ground, cable, or noise near the master",
+        "120 Ω at both ends only, one bias, the shield grounded once; then halve the line to find the place",
+    ),
+    Rule(
+        "MB008",
+        Severity.WARNING,
+        "exception",
+        "A station answers with an exception code. Codes 1 … 11 have the meanings of Modbus Application Protocol "
+        "V1.1b3, clause 7; others are the vendor's.",
+        "the station heard the request well and refuses it; the code says why",
+        "the code, the register and the count, against the device's manual",
+    ),
+    Rule(
+        "MB009",
+        Severity.WARNING,
+        "damaged requests",
+        "Requests that arrive damaged at this tap. A station ignores such a request, so it also goes unanswered.",
+        "noise near the master or the tap, a second master, or a driver of the master that switches too late",
+        "the master's connection, termination there, and whether a second master is on the bus",
+    ),
+    Rule(
+        "MB010",
+        Severity.WARNING,
+        "answer does not fit the request",
+        "A good frame in answer whose count, address or copy is not what was asked for.",
+        "a fault in the device, an answer to another request, or two stations with this address",
+        "the frames named; the device's firmware",
+    ),
+    Rule(
+        "MB101",
+        Severity.WARNING,
+        "slow station",
+        "Response times, less all that the adapter may have added, above 70 in 100 of the master's timeout as seen on "
+        "the bus, or above 500 ms while no timeout is known. At least three and 1 in 100 of its answers.",
+        "a busy station, a gateway behind it, or a response delay set too high",
+        "the station's response-delay setting and load; a longer timeout in the master",
+    ),
+    Rule(
+        "MB102",
+        Severity.WARNING,
+        "response time drifts",
+        "The median response time of the last quarter of the answers is over half as long again as that of the first "
+        "quarter, and over 5 ms longer, by the bounds that the adapter leaves; it rose from quarter to quarter.",
+        "a station that gets busier or fills up, and will run into the timeout",
+        "its load and log; restart it and see whether the time falls back",
+    ),
+    Rule(
+        "MB103",
+        Severity.WARNING,
+        "answers after the master gave up",
+        "Good answers that come after the master's timeout, often into the next request.",
+        "the master's timeout is too short for this station",
+        "raise the master's response timeout above the times seen here",
+    ),
+    Rule(
+        "MB104",
+        Severity.NOTE,
+        "repeats",
+        "Requests to a station that answers, sent again because the first try got no good answer, and the time that "
+        "passed from each failed try to the next. A warning when it is over 2 in 100 of the time.",
+        "each lost or damaged frame costs a whole timeout",
+        "the cause of the losses first; then a shorter timeout, well above the slowest answer",
+    ),
+    Rule(
+        "MB105",
+        Severity.NOTE,
+        "time spent on absent stations",
+        "Share of the time in which the master waited for stations that never answered anything. A warning above 5 in "
+        "100.",
+        "every poll of an absent station costs a timeout, and its repeats too; all others are read less often",
+        "take absent stations out of the poll list, or let the master ask them seldom",
+    ),
+    Rule(
+        "MB201",
+        Severity.ERROR,
+        "answered twice",
+        "A second answer from the same address directly after the first, to a request that was sent once. A single one "
+        "is a warning.",
+        "two stations have the same address, the second one slower",
+        "switch the station off and see whether something still answers; give one another address",
+    ),
+    Rule(
+        "MB202",
+        Severity.ERROR,
+        "two stations seem to have one address",
+        "At least three answers from one station, and 1 in 4 of its answers, that carry more octets than the answer "
+        "asked for or octets with framing errors inside, while answers of other stations are not so damaged.",
+        "two stations with this address talk over each other; or that station's driver is faulty",
+        "switch the station off and see whether something still answers",
+    ),
+    Rule(
+        "MB203",
+        Severity.ERROR,
+        "two masters",
+        "Requests that come while another one waits for a station that is alive, sooner than that station can answer "
+        "or than any timeout seen. At least three.",
+        "two masters on one bus, or a commissioning tool left connected",
+        "find the second master; a bus has one, use a gateway or multiplexer for more",
+    ),
+    Rule(
+        "MB204",
+        Severity.WARNING,
+        "answer to a broadcast",
+        "A frame within 90 ms after a broadcast, from a station or with address 0; nobody may answer address 0 "
+        "(Modbus over Serial Line V1.02, 2.1).",
+        "a station with a faulty protocol stack; with several, their answers collide",
+        "the frames named; the device's firmware; write to each station separately",
+    ),
+    Rule(
+        "MB205",
+        Severity.NOTE,
+        "address outside the standard",
+        "A good frame to or from address 248 … 255; the standard reserves them (Modbus over Serial Line V1.02, 2.2).",
+        "some devices allow them; some masters do not",
+        "give the station an address of 1 … 247 if anything else has trouble with it",
+    ),
+    Rule(
+        "MB206",
+        Severity.WARNING,
+        "answered from another address",
+        "Requests to one address that a station with another address answers. At least two.",
+        "devices that always answer so, or a wrong address in the master's list",
+        "if the master takes these answers, nothing; else the address in its list",
+    ),
+    Rule(
+        "MB207",
+        Severity.NOTE,
+        "answers that nobody asked for",
+        "Answers without a request before them. A warning from three on and 1 in 100 of all answers.",
+        "requests that this tap does not hear, or a second bus coupled in",
+        "whether the tap is at a place where the master is heard well",
+    ),
+    Rule(
+        "MB301",
+        Severity.WARNING,
+        "frames too close together",
+        "Less than 3.5 characters of silence between two good RTU frames (Modbus over Serial Line V1.02, 2.5.1.1; "
+        "1.75 ms above 19200 Bd), even by the longest reading that the adapter leaves. At least three.",
+        "strict receivers take the two for one frame and drop both",
+        "the response delay of the station, or the pause of the master",
+    ),
+    Rule(
+        "MB302",
+        Severity.WARNING,
+        "pauses inside frames",
+        "More than 1.5 characters of silence inside an RTU frame (Modbus over Serial Line V1.02, 2.5.1.1), even by the "
+        "shortest reading that the adapter leaves. At least three.",
+        "a sender that cannot keep its transmitter fed: an interrupted program, a USB adapter, a radio link",
+        "strict receivers drop such frames; use a sender with a FIFO or a lower baud rate",
+    ),
+    Rule(
+        "MB303",
+        Severity.INFO,
+        "gaps cannot be judged with this adapter",
+        "Gaps of 1.5 and 3.5 characters are judged only where the adapter's delay is shorter than they are.",
+        "MB301 and MB302 found nothing because they could not look",
+        "lower the adapter's latency timer, or use a port of the computer itself",
+    ),
+    Rule(
+        "MB401",
+        Severity.INFO,
+        "poll cycle",
+        "Time from one request to the same request again, of the request that was sent most often.",
+        "how old a value in the master can be",
+        "nothing, if that is fresh enough",
+    ),
+)
+
+RULES: dict[str, Rule] = {rule.code: rule for rule in _ALL}
+"""The catalogue, by code."""
+
+EXCEPTIONS: dict[int, tuple[Severity, str, str]] = {
+    1: (
+        Severity.WARNING,
+        "the device does not have this function",
+        "the functions in its manual; take the request out of the master's list",
+    ),
+    2: (
+        Severity.WARNING,
+        "a register that the device does not have, or a block that runs over the end of its map",
+        "the first register and the count; maps in manuals often count from 1, the wire from 0",
+    ),
+    3: (
+        Severity.WARNING,
+        "a value or count that the device does not accept",
+        "the value written, or the number of registers asked for at once",
+    ),
+    4: (Severity.ERROR, "the device failed while it did what was asked", "the device's fault memory"),
+    5: (Severity.NOTE, "the device takes long for this and will finish later", "whether the master asks again later"),
+    6: (Severity.NOTE, "the device is busy", "how often; let the master ask less often"),
+    8: (Severity.ERROR, "the device found its memory damaged", "replace the device's memory or the device"),
+    10: (Severity.WARNING, "a gateway has no path to the target", "the gateway's routes and port settings"),
+    11: (Severity.WARNING, "the device behind a gateway does not answer", "that device: supply, address, wiring"),
+}
+"""Exception code → severity, what it is consistent with, what to check next."""
+
+VENDOR_EXCEPTION = (
+    Severity.WARNING,
+    "a refusal with a code of the vendor's own",
+    "the code in the device's manual",
+)

@@ -1,0 +1,171 @@
+"""What the rules remember of a station, and of the times on the bus; bounded, without judgement."""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from dissectors.findings import Tally
+from dissectors.tracker import Interval
+
+KEYS_KEPT = 512
+"""Most different requests, or exceptions, of a station that are counted apart."""
+
+_BLOCKS = 64
+
+Key = tuple[str, int | None]
+"""A request as a poll list has it: kind and first register."""
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """Medians of some response times in a row, ns: by the shortest, the nominal and the longest reading."""
+
+    low: int
+    nominal: int
+    high: int
+
+
+@dataclass(slots=True)
+class ResponseTimes:
+    """Response times in the order they came, as medians of blocks; when there are too many blocks, pairs are joined."""
+
+    count: int = 0
+    longest: int = 0  # by the shortest reading, ns
+    blocks: list[Block] = field(default_factory=list)
+    _size: int = 8
+    _latest: list[Interval] = field(default_factory=list)
+
+    def add(self, latency: Interval) -> None:
+        """Take the next one."""
+        self.count += 1
+        self.longest = max(self.longest, latency.low)
+        self._latest.append(latency)
+        if len(self._latest) < self._size:
+            return
+        self.blocks.append(_block(self._latest))
+        self._latest.clear()
+        if len(self.blocks) == _BLOCKS:
+            pairs = zip(self.blocks[::2], self.blocks[1::2], strict=True)
+            self.blocks = [_mean(earlier, later) for earlier, later in pairs]
+            self._size *= 2
+
+    def median(self) -> Block | None:
+        """Over all of them; None without any."""
+        if self.blocks:
+            return _of_blocks(self.blocks)
+        return _block(self._latest) if self._latest else None
+
+    def quarters(self) -> tuple[Block, ...]:
+        """Medians of the four quarters, in order; empty while there is too little to compare."""
+        size = len(self.blocks) // 4
+        if size < 2:
+            return ()
+        return tuple(_of_blocks(self.blocks[len(self.blocks) * k // 4 :][:size]) for k in range(4))
+
+
+def middle(values: Sequence[int]) -> int:
+    """The median of at least one value."""
+    return sorted(values)[len(values) // 2]
+
+
+def _block(latencies: Sequence[Interval]) -> Block:
+    return Block(
+        middle([latency.low for latency in latencies]),
+        middle([latency.nominal for latency in latencies]),
+        middle([latency.high for latency in latencies]),
+    )
+
+
+def _of_blocks(blocks: Sequence[Block]) -> Block:
+    return Block(
+        middle([block.low for block in blocks]),
+        middle([block.nominal for block in blocks]),
+        middle([block.high for block in blocks]),
+    )
+
+
+def _mean(earlier: Block, later: Block) -> Block:
+    return Block(
+        (earlier.low + later.low) // 2, (earlier.nominal + later.nominal) // 2, (earlier.high + later.high) // 2
+    )
+
+
+@dataclass(slots=True)
+class Requested:
+    """One kind of request to a station: how often it was asked for the first time, and what came of all tries."""
+
+    turns: int = 0
+    tries: int = 0
+    missing: Tally = field(default_factory=Tally)
+
+
+@dataclass(slots=True)
+class Station:
+    """One station. `missing`: no octet followed. `silent`: those since its last sign of life."""
+
+    asked: int = 0
+    answered: int = 0
+    missing: Tally = field(default_factory=Tally)
+    silent: Tally = field(default_factory=Tally)
+    damaged: Tally = field(default_factory=Tally)
+    cut: int = 0  # of the damaged answers: ended early
+    last_octet: Tally = field(default_factory=Tally)  # only the last octet is wrong
+    talked_over: Tally = field(default_factory=Tally)  # too long, or framing errors inside
+    garbled: int = 0  # octets in place of an answer that are no frame at all
+    unfit: Tally = field(default_factory=Tally)
+    unfit_words: Counter[str] = field(default_factory=Counter)
+    slow: Tally = field(default_factory=Tally)
+    late: Tally = field(default_factory=Tally)
+    twice: Tally = field(default_factory=Tally)
+    repeats: Tally = field(default_factory=Tally)
+    repeats_cost: int = 0  # ns
+    waited: int = 0  # ns, that the master spent on requests that nothing followed
+    last_start: int = 0  # of its newest request
+    last_heard: int | None = None
+    reserved: Tally = field(default_factory=Tally)  # frames when its address is outside the standard
+    times: ResponseTimes = field(default_factory=ResponseTimes)
+    requests: dict[Key, Requested] = field(default_factory=dict)
+    exceptions: dict[tuple[Key, int], Tally] = field(default_factory=dict)
+
+    def request(self, key: Key) -> Requested:
+        """The record of one kind of request; beyond KEYS_KEPT kinds, one for all others."""
+        if key not in self.requests and len(self.requests) >= KEYS_KEPT:
+            key = ("other requests", None)
+        return self.requests.setdefault(key, Requested())
+
+    def exception(self, key: Key, code: int) -> Tally:
+        """The record of one exception to one kind of request; beyond KEYS_KEPT, one for all others."""
+        if (key, code) not in self.exceptions and len(self.exceptions) >= KEYS_KEPT:
+            key = ("other requests", None)
+        return self.exceptions.setdefault((key, code), Tally())
+
+    def heard(self, time: int) -> None:
+        """Something came from it."""
+        self.last_heard = time
+        self.silent = Tally()
+
+
+@dataclass(slots=True)
+class Cycles:
+    """Time from a request to the same request again, of the most frequent ones."""
+
+    _last: dict[bytes, int] = field(default_factory=dict)
+    _periods: dict[bytes, deque[int]] = field(default_factory=dict)
+
+    def add(self, octets: bytes, start: int) -> None:
+        """Take a request that is no repeat of an unanswered one."""
+        before = self._last.get(octets)
+        if before is None and len(self._last) >= KEYS_KEPT:
+            return
+        self._last[octets] = start
+        if before is not None and start > before:
+            self._periods.setdefault(octets, deque(maxlen=256)).append(start - before)
+
+    def usual(self) -> tuple[bytes, list[int]] | None:
+        """The request with the most periods, and those in ascending order; None where nothing repeats."""
+        if not self._periods:
+            return None
+        octets, periods = max(self._periods.items(), key=lambda pair: len(pair[1]))
+        return octets, sorted(periods)

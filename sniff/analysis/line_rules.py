@@ -1,0 +1,155 @@
+"""The rules of the line itself, whatever protocol runs on it: what each measures, what it means, what to check next.
+
+LN0xx what this capture can tell, LN1xx octets that arrive wrong, LN2xx octets that nobody should have sent.
+Where noise lies tells its cause; the table behind it was collected from reports of users and is worded as
+"consistent with", never as proof.
+"""
+
+from __future__ import annotations
+
+from dissectors.findings import Rule, Severity
+
+_WIRING = "termination at both ends and nowhere else, one fail-safe bias, A and B, ground"
+
+_ALL = (
+    Rule(
+        "LN001",
+        Severity.INFO,
+        "what this capture can tell",
+        "Which line errors the adapter reports, and how long it may hold an octet back. No report is no proof of a "
+        "clean line where the adapter cannot report.",
+        "rules that need more than that stay silent",
+        "for exact times and line errors use a port of the computer itself, or an adapter with a 1 ms latency timer",
+    ),
+    Rule(
+        "LN002",
+        Severity.WARNING,
+        "nothing heard",
+        "Not one octet in the whole capture.",
+        "a silent bus, an adapter on the wrong pair, or A and B swapped on an adapter that then sees a steady break",
+        "whether the master runs; the two wires; the ground; then listen longer",
+    ),
+    Rule(
+        "LN003",
+        Severity.ERROR,
+        "hardly anything is a frame",
+        "Under 3 in 10 octets belong to a good frame, of at least 60 octets. All other rules are left out then: they "
+        "would judge rubbish.",
+        "wrong baud rate, wrong parity, wrong protocol, or A and B swapped",
+        "the settings of the line (-s) and the protocol (-p); then A and B",
+    ),
+    Rule(
+        "LN004",
+        Severity.ERROR,
+        "parity set differently from the bus",
+        "Over 1 in 10 octets with a parity or framing error, while at least 8 in 10 octets are in good frames.",
+        "the port listens with another parity than the bus has; frames get through by their check alone",
+        "the parity of the bus (8E1, 8O1, 8N1, 8N2), and set it with -s",
+    ),
+    Rule(
+        "LN005",
+        Severity.WARNING,
+        "octets lost by this computer",
+        "Octets that the capture lost because the computer did not keep up. What follows such a hole looks like faults "
+        "of the bus and is not.",
+        "a computer that is too busy, or a full disk",
+        "what else runs; real-time priority for the capture; another disk",
+    ),
+    Rule(
+        "LN006",
+        Severity.WARNING,
+        "adapter unplugged",
+        "The serial adapter went away and, mostly, came back.",
+        "a loose plug, a hub without enough power, or disturbance on the USB cable",
+        "another cable or port, a powered hub, an isolated adapter",
+    ),
+    Rule(
+        "LN007",
+        Severity.NOTE,
+        "clock stepped",
+        "The wall clock of the computer was set against its monotonic clock. Intervals are not affected.",
+        "time synchronisation after a start without network",
+        "nothing; only compare wall times across the step with care",
+    ),
+    Rule(
+        "LN101",
+        Severity.WARNING,
+        "parity or framing errors",
+        "Octets of frames that the adapter marked, counted at the station that sent the frame (a master's frames at "
+        "the master). A single one, or fewer than 1 frame in 100 and at most two a minute, is only noted. Where one "
+        "flag covers a whole packet, only damaged frames count.",
+        "noise while this station sends, weak levels from it, or two that send at once",
+        "this station's connector, stub and ground; " + _WIRING,
+    ),
+    Rule(
+        "LN102",
+        Severity.WARNING,
+        "line errors without a place",
+        "Errors that the driver counted without saying at which octet.",
+        "noise, or a wrong parity setting",
+        _WIRING,
+    ),
+    Rule(
+        "LN103",
+        Severity.WARNING,
+        "breaks",
+        "The line was held low for longer than a character. A single one is only noted.",
+        "no fail-safe bias while nobody drives the line, A and B swapped at one device, or a short circuit",
+        "bias resistors at one place of the line; A and B of devices added last",
+    ),
+    Rule(
+        "LN104",
+        Severity.WARNING,
+        "octets lost in the adapter",
+        "The adapter reported overruns: octets came faster than they were fetched from it.",
+        "an adapter or computer that is too slow for this baud rate; the bus itself may be in order",
+        "another adapter; fewer programs on the computer; a UART with a FIFO",
+    ),
+    Rule(
+        "LN201",
+        Severity.WARNING,
+        "stray octets before frames",
+        "One to three octets that are no frame directly before a frame, counted at the station that sent the frame. A "
+        "single one, or fewer than 1 frame in 100 and at most two a minute, is only noted.",
+        "the driver is switched on too late or the line floats until then; weak bias",
+        "the turnaround of that station; bias; its converter's direction control",
+    ),
+    Rule(
+        "LN202",
+        Severity.WARNING,
+        "stray octets after frames",
+        "One to three octets that are no frame directly after a frame, counted at the station that sent the frame; "
+        "limits as in LN201.",
+        "the driver lets go too late or the line falls when it does; weak bias",
+        "bias; the turnaround of that station; its converter's direction control",
+    ),
+    Rule(
+        "LN203",
+        Severity.WARNING,
+        "stray octets in silence",
+        "One to three octets that are no frame, with silence on both sides. A single one, or fewer than 1 to 100 "
+        "frames and at most two a minute, is only noted.",
+        "the line floats when nobody drives it: no or weak fail-safe bias; or noise coupled in",
+        "bias at one place of the line; the cable's way along power lines and motors",
+    ),
+    Rule(
+        "LN204",
+        Severity.WARNING,
+        "octets that are no frame",
+        "Stretches of four octets or more that are no frame, 1 in 50 octets or more of all. A smaller share is only "
+        "noted.",
+        "damaged frames beyond recognition, another protocol on the same line, or a device with another baud rate",
+        "what the stretches have in common: their place, time and first octets",
+    ),
+    Rule(
+        "LN205",
+        Severity.NOTE,
+        "echo",
+        "An exact copy of a request directly behind it. A warning from 1 in 10 requests on.",
+        "a repeater or converter that gives back what it hears, or an adapter that hears itself",
+        "the echo setting of the master's adapter or of the converter; it halves the time left on the bus",
+    ),
+)
+
+LINE_RULES: dict[str, Rule] = {rule.code: rule for rule in _ALL}
+"""The catalogue, by code."""

@@ -1,0 +1,158 @@
+"""What is wrong with a bus, where, and what to do next. `sniff485 rule CODE` explains a rule. Severities: info, note,
+warning, error; exit code 1 when a finding is at or above --fail-on. A port is listened to for --duration.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from array import array
+from pathlib import Path
+
+from dissectors.findings import Finding, Severity
+from dissectors.registry import Dissector
+from sniff.analysis.health import Health, bus_health, station_health
+from sniff.analysis.judging import Judging
+from sniff.analysis.summary import Summary
+from sniff.cli import USAGE, Failure, arguments, check_output
+from sniff.cli.check_output import Checked
+from sniff.engine import Output
+from sniff.formats import READERS
+from sniff.reading import dissector_for, outputs
+from sniff.session import LineEvent, Session
+
+DEFAULT_DURATION = 30.0
+SEVERITIES = tuple(severity.label for severity in Severity)
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Options of `check`."""
+    parser.add_argument("sources", nargs="+", metavar="FILE|PORT", help="captures, or one port or configured bus")
+    arguments.add_line(parser)
+    parser.add_argument("--format", choices=("text", "json", "junit"), default="text", help="default: text")
+    parser.add_argument("--json", action="store_const", const="json", dest="format", help="one JSON object a finding")
+    parser.add_argument(
+        "--fail-on",
+        choices=(*SEVERITIES, "never"),
+        default="warning",
+        metavar="SEVERITY",
+        help="exit with 1 at this severity or above (default warning; never: always 0)",
+    )
+    parser.add_argument("--only", action="append", default=[], metavar="CODE", help="only these codes or prefixes")
+    parser.add_argument("--ignore", action="append", default=[], metavar="CODE", help="without these codes or prefixes")
+    parser.add_argument(
+        "--duration", type=arguments.duration, metavar="TIME", help="a port: how long to listen (default 30 s)"
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Check every source in turn."""
+    for code in _words(args.only) + _words(args.ignore):
+        _require_known(code)
+    fail_on = None if args.fail_on == "never" else Severity[args.fail_on.upper()]
+    checked = [_select(_check(source, args), args) for source in args.sources]
+    colour = arguments.colour()
+    {
+        "text": lambda: check_output.write_text(checked, colour),
+        "json": lambda: check_output.write_json(checked),
+        "junit": lambda: check_output.write_junit(checked, Severity.WARNING if fail_on is None else fail_on),
+    }[args.format]()
+    failing = fail_on is not None and any(f.severity >= fail_on for one in checked for f in one.findings)
+    return int(failing)
+
+
+def _check(source: str, args: argparse.Namespace) -> Checked:
+    if source == "-" or source.lower().endswith(tuple(READERS)) or Path(source).is_file():
+        capture = arguments.open_capture(source)
+        session = arguments.settings_of(args, capture.session)
+        run_of = Checking(session, dissector_for(session))
+        for item in outputs(capture.items(), session):
+            run_of.take(item)
+        complete = capture.completeness()
+        return run_of.result(source, "" if complete.whole else complete.text)
+    if len(args.sources) > 1:
+        raise Failure(f"{source}: a port is checked alone; files end in {', '.join(READERS)}", USAGE)
+    return _listen(source, args)
+
+
+def _listen(port: str, args: argparse.Namespace) -> Checked:
+    import time
+
+    from sniff.cli import listening
+
+    args.port = port
+    target = listening.target_of(args)
+    duration = args.duration or DEFAULT_DURATION
+    print(f"sniff485: listening to {port} for {duration:g} s", file=sys.stderr)
+    live = listening.start(target.source, None)
+    run_of = Checking(live.session, live.dissector)
+    until = time.monotonic() + duration
+    with listening.until_interrupted() as caught:
+        while live.ended is None:
+            over = caught or time.monotonic() >= until
+            for item in live.stop() if over else live.poll(0.1):
+                run_of.take(item)
+    note = "" if live.ended.clean else live.ended.reason
+    return run_of.result(port, note)
+
+
+class Checking:
+    """One source on its way through the rules."""
+
+    def __init__(self, session: Session, dissector: Dissector) -> None:
+        self.session = session
+        self.dissector = dissector
+        self.judging = Judging(session, dissector)
+        self.summary = Summary(session.line)
+        self._starts = array("q")  # of each row, so that evidence can be given its time
+
+    def take(self, item: object) -> None:
+        """Take what came; anything but outputs and line events is of no interest here."""
+        if isinstance(item, Output):
+            self.judging.add(item)
+            self.summary.add(item)
+            self._starts.extend(row.event.start for row in item.rows)
+        elif isinstance(item, LineEvent):
+            self.judging.add_line_event(item)
+            self.summary.add_line_event(item)
+
+    def result(self, source: str, note: str) -> Checked:
+        """What was found."""
+        findings = self.judging.findings()
+        stations: dict[int, Health] = {}
+        for node in self.summary.nodes.present():
+            health = station_health(node)
+            if health is not None:
+                stations[node.address] = health
+        return Checked(
+            source=source,
+            session=self.session,
+            note=note,
+            seconds=self.summary.seconds,
+            frames=self.summary.frames,
+            findings=findings,
+            health=bus_health(self.summary, findings),
+            stations=stations,
+            starts=self._starts,
+        )
+
+
+def _select(checked: Checked, args: argparse.Namespace) -> Checked:
+    only, ignore = _words(args.only), _words(args.ignore)
+
+    def wanted(finding: Finding) -> bool:
+        code = finding.code.upper()
+        return (not only or code.startswith(only)) and not (ignore and code.startswith(ignore))
+
+    return checked.with_findings(tuple(finding for finding in checked.findings if wanted(finding)))
+
+
+def _words(values: list[str]) -> tuple[str, ...]:
+    return tuple(word.strip().upper() for value in values for word in value.split(",") if word.strip())
+
+
+def _require_known(prefix: str) -> None:
+    from sniff.analysis.judging import all_rules
+
+    if not any(code.startswith(prefix) for code in all_rules()):
+        raise Failure(f"{prefix}: no rule has that code or prefix; `sniff485 rule` lists them", USAGE)

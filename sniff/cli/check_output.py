@@ -1,0 +1,238 @@
+"""What `check` prints: text for people, JSON Lines for programs, JUnit XML for build servers."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import sys
+import textwrap
+from array import array
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from xml.sax.saxutils import escape, quoteattr
+
+from dissectors.findings import Finding, Rule, Severity
+from dissectors.line import NS_PER_S
+from sniff.analysis.health import Health
+from sniff.analysis.judging import rules_of
+from sniff.analysis.line_rules import LINE_RULES
+from sniff.cli.rows import iso
+from sniff.reading import dissector_for
+from sniff.session import Session
+
+EVIDENCE_SHOWN = 5
+_INDENT = " " * 9
+_COLOURS = {Severity.ERROR: "31;1", Severity.WARNING: "33", Severity.NOTE: "36", Severity.INFO: "2"}
+
+
+@dataclass(frozen=True, slots=True)
+class Checked:
+    """What the rules found in one source.
+
+    `note`: why it is not whole. `stations`: health by address. `starts`: begin of each frame by its number − 1, ns.
+    """
+
+    source: str
+    session: Session
+    note: str
+    seconds: float
+    frames: int
+    findings: tuple[Finding, ...]
+    health: Health
+    stations: Mapping[int, Health]
+    starts: array[int]
+
+    def with_findings(self, findings: tuple[Finding, ...]) -> Checked:
+        """The same with a choice of its findings."""
+        return replace(self, findings=findings)
+
+    def start(self, no: int) -> int | None:
+        """When a frame began, ns since the epoch."""
+        return self.starts[no - 1] if 0 < no <= len(self.starts) else None
+
+
+# ---- text
+
+
+def write_text(checked: Sequence[Checked], colour: bool) -> None:
+    """Print for people."""
+    width = min(110, max(60, shutil.get_terminal_size((100, 24)).columns))
+    for number, one in enumerate(checked):
+        if number:
+            print()
+        _write_head(one, width)
+        for finding in one.findings:
+            print()
+            _write_finding(one, finding, width, colour)
+        print()
+        print(_count_words(one.findings))
+
+
+def _write_head(one: Checked, width: int) -> None:
+    session = one.session
+    print(f"{one.source}: {session.protocol}, {session.line}, {_span(one.seconds)}, {one.frames} frames")
+    if one.note:
+        print(f"  incomplete: {one.note}")
+    if one.frames:
+        _paragraph(f"health {one.health}", width, "  ", "    ")
+        for address, health in sorted(one.stations.items()):
+            if health.score < 100:
+                _paragraph(f"station {address}: {health}", width, "    ", "      ")
+        whole = [address for address, health in sorted(one.stations.items()) if health.score == 100]
+        if whole:
+            _paragraph(f"at 100: station{'s' if len(whole) > 1 else ''} {', '.join(map(str, whole))}", width, "    ")
+
+
+def _write_finding(one: Checked, finding: Finding, width: int, colour: bool) -> None:
+    title = _title(one, finding)
+    label = finding.severity.label.upper().ljust(8)
+    if colour:
+        label = f"\x1b[{_COLOURS[finding.severity]}m{label}\x1b[0m"
+    print(f"{label} {finding.subject}: {title}  [{finding.code}]")
+    _paragraph(_sentence(finding.seen), width, _INDENT)
+    for word, text in (("means", finding.means), ("next", finding.next)):
+        if text and finding.severity > Severity.INFO:
+            _paragraph(f"{word + ':':<7}{text}", width, _INDENT, _INDENT + " " * 7)
+    if finding.evidence:
+        _paragraph(_evidence(one, finding), width, _INDENT, _INDENT + " " * 7)
+
+
+def _evidence(one: Checked, finding: Finding) -> str:
+    shown = []
+    for no in finding.evidence[:EVIDENCE_SHOWN]:
+        start = one.start(no)
+        at = f" at {(start - one.session.started) / NS_PER_S:.3f} s" if start is not None else ""
+        shown.append(f"{no}{at}")
+    more = " …" if len(finding.evidence) > EVIDENCE_SHOWN or finding.count > len(finding.evidence) else ""
+    return f"{'rows:' if len(shown) > 1 else 'row:':<7}{', '.join(shown)}{more}"
+
+
+def _paragraph(text: str, width: int, first: str, rest: str | None = None) -> None:
+    lines = textwrap.wrap(
+        text, width, initial_indent=first, subsequent_indent=first if rest is None else rest, break_on_hyphens=False
+    )
+    for line in lines:
+        print(line)
+
+
+def _title(one: Checked, finding: Finding) -> str:
+    rule = LINE_RULES.get(finding.code) or rules_of(dissector_for(one.session)).get(finding.code)
+    return rule.title[:1].lower() + rule.title[1:] if rule is not None else ""
+
+
+def _sentence(text: str) -> str:
+    return text[:1].upper() + text[1:] + ("" if text.endswith(".") else ".")
+
+
+def _count_words(findings: Sequence[Finding]) -> str:
+    counts = Counter(finding.severity for finding in findings)
+    if not counts:
+        return "no findings"
+    plural = {Severity.INFO: "facts", Severity.NOTE: "notes", Severity.WARNING: "warnings", Severity.ERROR: "errors"}
+    parts = [
+        f"{counts[severity]} {plural[severity][: -1 if counts[severity] == 1 else None]}"
+        for severity in sorted(counts, reverse=True)
+    ]
+    return ", ".join(parts) + "; `sniff485 rule CODE` explains one"
+
+
+def _span(seconds: float) -> str:
+    if seconds < 120:
+        return f"{seconds:.1f} s"
+    minutes, rest = divmod(int(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours} h {minutes} min" if hours else f"{minutes} min {rest} s"
+
+
+# ---- JSON Lines
+
+
+def write_json(checked: Sequence[Checked]) -> None:
+    """Print one object a finding; keys and their order are a promise."""
+    for one in checked:
+        for finding in one.findings:
+            print(json.dumps(to_json(one, finding), ensure_ascii=False))
+
+
+def to_json(one: Checked, finding: Finding) -> dict[str, object]:
+    """One finding; times both as ISO 8601 and as ns since the capture's start."""
+    started = one.session.started
+    return {
+        "source": one.source,
+        "code": finding.code,
+        "severity": finding.severity.label,
+        "title": _title(one, finding),
+        "subject": finding.subject,
+        "count": finding.count,
+        "first": iso(finding.first),
+        "last": iso(finding.last),
+        "first_ns": finding.first - started,
+        "last_ns": finding.last - started,
+        "frames": [
+            {"no": no, "start_ns": None if (start := one.start(no)) is None else start - started}
+            for no in finding.evidence
+        ],
+        "seen": finding.seen,
+        "means": finding.means,
+        "next": finding.next,
+    }
+
+
+# ---- JUnit
+
+
+def write_junit(checked: Sequence[Checked], fail_on: Severity) -> None:
+    """Print one test suite a source, one test case a rule: it fails when a finding of it is at or above `fail_on`."""
+    lines = ['<?xml version="1.0" encoding="UTF-8"?>', '<testsuites name="sniff485 check">']
+    for one in checked:
+        lines += _suite(one, fail_on)
+    lines.append("</testsuites>")
+    sys.stdout.write("\n".join(lines) + "\n")
+
+
+def _suite(one: Checked, fail_on: Severity) -> list[str]:
+    rules: dict[str, Rule] = {**LINE_RULES, **rules_of(dissector_for(one.session))}
+    failing = {finding.code for finding in one.findings if finding.severity >= fail_on}
+    head = (
+        f"  <testsuite name={_attribute(one.source)} tests={_attribute(str(len(rules)))} "
+        f'failures={_attribute(str(len(failing)))} errors="0" time={_attribute(f"{one.seconds:.3f}")}>'
+    )
+    lines = [head]
+    for code, rule in sorted(rules.items()):
+        found = [finding for finding in one.findings if finding.code == code]
+        case = f"    <testcase classname={_attribute(one.session.protocol)} name={_attribute(f'{code} {rule.title}')}"
+        if not found:
+            lines.append(case + "/>")
+            continue
+        lines.append(case + ">")
+        bad = [finding for finding in found if finding.severity >= fail_on]
+        if bad:
+            text = "\n".join(_junit_text(one, finding) for finding in bad)
+            lines.append(
+                f"      <failure message={_attribute(f'{bad[0].subject}: {bad[0].seen}')} "
+                f"type={_attribute(bad[0].severity.label)}>{escape(_clean(text))}</failure>"
+            )
+        else:
+            text = "\n".join(_junit_text(one, finding) for finding in found)
+            lines.append(f"      <system-out>{escape(_clean(text))}</system-out>")
+        lines.append("    </testcase>")
+    return [*lines, "  </testsuite>"]
+
+
+def _junit_text(one: Checked, finding: Finding) -> str:
+    evidence = f"\n{_evidence(one, finding)}" if finding.evidence else ""
+    head = f"{finding.severity.label}: {finding.subject}: {_sentence(finding.seen)}"
+    return f"{head}\nmeans: {finding.means}\nnext: {finding.next}{evidence}"
+
+
+def _attribute(text: str) -> str:
+    return quoteattr(_clean(text))
+
+
+def _clean(text: str) -> str:
+    """Without characters that XML 1.0 does not allow."""
+    return "".join(
+        c if c in "\t\n" or (c >= " " and not 0xD800 <= ord(c) <= 0xDFFF and c not in "\ufffe\uffff") else "?"
+        for c in text
+    )

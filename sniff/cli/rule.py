@@ -1,0 +1,65 @@
+"""Without CODE: all rules. LN… the line, MB… Modbus, N2… Metasys N2, MS… MS/TP."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import textwrap
+
+from dissectors.findings import Rule
+from sniff.analysis.judging import all_rules
+from sniff.cli import USAGE, Failure, tables
+
+WIDTH = 88
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Options of `rule`."""
+    parser.add_argument("codes", nargs="*", metavar="CODE", help="a code, or a prefix such as MB1")
+    parser.add_argument("--json", action="store_true", help="one JSON object a rule")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Explain rules, or list them."""
+    rules = all_rules()
+    chosen = dict(sorted(rules.items()))
+    if args.codes:
+        prefixes = tuple(code.strip().upper() for code in args.codes)
+        chosen = {code: rule for code, rule in chosen.items() if code.startswith(prefixes)}
+        missing = [prefix for prefix in prefixes if not any(code.startswith(prefix) for code in chosen)]
+        if missing:
+            raise Failure(f"{missing[0]}: no rule has that code or prefix; `sniff485 rule` lists them", USAGE)
+    if args.json:
+        for rule in chosen.values():
+            print(json.dumps(to_json(rule), ensure_ascii=False))
+    elif not args.codes:
+        tables.write(("code", "severity", "title"), [(r.code, r.severity.label, _title(r)) for r in chosen.values()])
+    else:
+        print("\n\n".join(_explained(rule) for rule in chosen.values()))
+    return 0
+
+
+def to_json(rule: Rule) -> dict[str, str]:
+    """A rule as a flat object."""
+    return {
+        "code": rule.code,
+        "severity": rule.severity.label,
+        "title": rule.title,
+        "explanation": rule.explanation,
+        "means": rule.means,
+        "next": rule.next,
+    }
+
+
+def _explained(rule: Rule) -> str:
+    lines = [f"{rule.code}  {_title(rule)}  ({rule.severity.label} unless said otherwise)", ""]
+    lines += textwrap.wrap(rule.explanation, WIDTH)
+    for word, text in (("consistent with", rule.means), ("check next", rule.next)):
+        if text:
+            head = f"{word}: "
+            lines += ["", *textwrap.wrap(head + text, WIDTH, subsequent_indent=" " * len(head))]
+    return "\n".join(lines)
+
+
+def _title(rule: Rule) -> str:
+    return rule.title[:1].lower() + rule.title[1:]
