@@ -9,8 +9,11 @@ from dissectors.line import Timing
 from dissectors.modbus.adu import ASCII_NAME, RTU_NAME
 from dissectors.modbus.ascii_framing import AsciiFramer
 from dissectors.modbus.fields import fields
+from dissectors.modbus.findings import ModbusFindings
 from dissectors.modbus.framing import RtuFramer
 from dissectors.modbus.header import peek_ascii, peek_rtu
+from dissectors.modbus.readings import readings
+from dissectors.modbus.rules import RULES
 from dissectors.modbus.text import text
 from dissectors.modbus.tracker import ModbusTracker
 from dissectors.registry import Dissector
@@ -51,6 +54,7 @@ RTU = Dissector(
     fields=fields,
     packet=packet,
     default_line="19200,8E1",
+    extras={"findings": ModbusFindings, "rules": RULES, "readings": readings},
 )
 
 ASCII = Dissector(
@@ -63,4 +67,5 @@ ASCII = Dissector(
     fields=fields,
     packet=packet,
     default_line="19200,7E1",
+    extras={"findings": ModbusFindings, "rules": RULES, "readings": readings},
 )
