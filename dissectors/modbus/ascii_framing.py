@@ -23,8 +23,7 @@ from dissectors.checksums import sum8
 from dissectors.frame import Check, Chunk, Damage, Event, Found, Frame, LineError, Noise, Reason
 from dissectors.framer import UNKNOWN_SILENCE, OctetWindow
 from dissectors.line import NS_PER_S, Timing
-from dissectors.modbus.candidates import readings
-from dissectors.modbus.functions import DIAGNOSTIC_DELIMITER, MORE, ascii_length
+from dissectors.modbus.functions import DIAGNOSTIC_DELIMITER, ascii_length
 from dissectors.modbus.remains import Side, noise_place, predicted
 
 MAX_CHARACTERS: Final = 513
@@ -282,10 +281,9 @@ def _judge(body: bytes, formed: bool) -> tuple[Check, Damage | None, int | None]
     if len(body) < 3:
         return Check.ABSENT, Damage.SHORT, None
     own = len(body) + 1
-    lengths = [length for length, _, _ in readings(body, 0, len(body)) if length != MORE]
-    right = own if own in lengths else predicted(lengths, own)
+    right = predicted(body + b"\0")  # as long as the RTU frame, which has one octet more of check
     if not sum8(body):
-        return Check.GOOD, None, own if own in lengths else None
+        return Check.GOOD, None, own if right == own else None
     if right is None or right == own:
         return Check.BAD, Damage.CHECK, right
     return Check.BAD, Damage.SHORT if own < right else Damage.LONG, right

@@ -39,7 +39,7 @@ from dissectors.modbus.candidates import (
     zeros_follow_good,
 )
 from dissectors.modbus.expectation import Expected, expectation
-from dissectors.modbus.functions import BROADCAST, FUNCTIONS, MAX_FRAME, MAX_UNIT, MORE, is_open_length
+from dissectors.modbus.functions import BROADCAST, EXCEPTION_BIT, FUNCTIONS, MAX_FRAME, MAX_UNIT, MORE, is_open_length
 from dissectors.modbus.remains import Injury, Side, injury, noise_place, noise_reason, predicted, zeros_at_start
 from dissectors.modbus.segmentation import (
     ADJACENT,
@@ -196,11 +196,14 @@ class RtuFramer:
         if count == 1:
             return BROADCAST < unit <= MAX_UNIT or unit in self._units
         awaited = self._expected
-        if awaited is not None and awaited.unit == unit and awaited.length == count:
-            return False  # complete, and damaged
-        if unit == BROADCAST and not FUNCTIONS[octets[1]].writes if octets[1] in FUNCTIONS else False:
-            return False
+        if awaited is not None and awaited.unit == unit and awaited.length is not None:
+            if awaited.length == count:
+                return False  # complete, and damaged
+            if octets[1] == awaited.function and count < awaited.length:
+                return True
         lengths = [r.length for r in readings(octets, 0, count)]
+        if unit == BROADCAST and lengths and not FUNCTIONS[octets[1] & ~EXCEPTION_BIT].writes:
+            return False
         return count not in lengths and any(n == MORE or n > count for n in lengths)
 
     # --- what to decide --------------------------------------------------------------------------------------------
@@ -341,7 +344,7 @@ class RtuFramer:
         damage: Damage | None = None
         expected: int | None = count
         if not (request or response):  # its length contradicts its octets; its CRC does not
-            expected = predicted([r.length for r in readings(octets, 0, count) if r.length != MORE], count)
+            expected = predicted(octets)
             if expected is not None and expected != count:
                 damage = Damage.SHORT if count < expected else Damage.LONG
         elif is_open_length(octets):
@@ -358,9 +361,11 @@ class RtuFramer:
     def _take_rest(self, count: int, after: Side) -> None:
         """Give the first `count` octets as what no frame covers, in pieces between proved silences."""
         base = self._finder.base
-        for cut in [c for c in self._cuts if base < c < base + count]:
+        for cut in [c for c in self._cuts if base < c <= base + count]:
             self._take_piece(cut - self._finder.base, Side.SILENCE)
-        self._take_piece(base + count - self._finder.base, after)
+        left = base + count - self._finder.base
+        if left:
+            self._take_piece(left, after)
 
     def _take_piece(self, count: int, after: Side) -> None:
         before = self._side_before()

@@ -6,7 +6,7 @@ from enum import Enum, auto
 from typing import NamedTuple
 
 from dissectors.frame import Damage, LineError, Mark, Place, Reason
-from dissectors.modbus.candidates import readings
+from dissectors.modbus.candidates import SHORT_FRAME, octet_bits, readings
 from dissectors.modbus.expectation import Expected
 from dissectors.modbus.functions import (
     BROADCAST,
@@ -69,14 +69,21 @@ def injury(octets: bytes, before: Side, after: Side, heard: bool | None, expecte
         return Injury(count, Damage.CHECK)
     right = awaited.length if answers and awaited is not None and not code & EXCEPTION_BIT else None
     if right is None:
-        right = predicted(lengths, count)
+        right = predicted(octets)
     if right is None or count < right:
         return Injury(right, Damage.SHORT)
     return Injury(right, Damage.LONG)
 
 
-def predicted(lengths: list[int], count: int) -> int | None:
-    """Which of the predicted lengths a frame of `count` octets missed: the next longer one, else the longest."""
+def predicted(octets: bytes) -> int | None:
+    """Which predicted length octets missed that are longer or shorter: the next longer one, else the longest.
+
+    A length at which the octets would look ill formed counts only when there is no other.
+    """
+    count = len(octets)
+    told = [r for r in readings(octets, 0, count) if r.length != MORE]
+    fair = [r.length for r in told if r.length > count or octet_bits(octets, 0, r) >= SHORT_FRAME]
+    lengths = fair or [r.length for r in told]
     return min((n for n in lengths if n >= count), default=max(lengths, default=None))
 
 
