@@ -23,6 +23,7 @@ POSTPONED_SHARE = 0.1
 DAMAGED_SHARE = 0.001
 DAMAGED_OF_ONE_SHARE = 0.01
 NOISE_SHARE = 0.005
+COLLIDED_SHARE = 0.2
 LEAST_FRAMES = 20
 ALONE_POLLS = 2 * MAX_MASTER
 """A first search for a successor takes at most MAX_MASTER polls."""
@@ -47,7 +48,9 @@ _TIMED: tuple[tuple[str, What, int, str], ...] = (
 def judge(ring: Ring) -> tuple[Finding, ...]:
     """All findings about a ring, the gravest first."""
     made = [*_tokens(ring), *_counted(ring), *_times(ring), *_polls(ring), *_answers(ring), *_damage(ring)]
-    made += _duplicates(ring)
+    shared = list(_duplicates(ring))
+    sure = [finding for finding in shared if finding.severity is Severity.ERROR]
+    made += sure or shared  # one that is sure explains the damage at the others
     return tuple(sorted(made, key=lambda finding: (-finding.severity, finding.code, finding.subject)))
 
 
@@ -170,6 +173,7 @@ def _damage(ring: Ring) -> Iterable[Finding]:
 
 
 def _duplicates(ring: Ring) -> Iterable[Finding]:
+    hasty = {mac: happened for (what, mac), happened in ring.happened.items() if what is What.TOO_SOON}
     for mac in sorted({mac for _, mac in ring.happened if mac is not None}):
         second = ring.of(What.SECOND_DEVICE, mac)
         stray = ring.of(What.TWO_TOKENS, mac)
@@ -182,10 +186,19 @@ def _duplicates(ring: Ring) -> Iterable[Finding]:
         if stray.count > 2:
             reasons.append(f"sent {_times_word(stray.count)} without the token")
             evidence = evidence.merge(stray)
-        if collided.count > 2:
+        node = ring.nodes.get(mac, Node())
+        chances = node.tokens_received + node.requests_received + node.polls_received
+        often = collided.count > 2 and collided.count > COLLIDED_SHARE * chances
+        if often:
             reasons.append(f"damaged octets in place of its answer {_times_word(collided.count)}")
             evidence = evidence.merge(collided)
-        if second.count or (stray.count > 2 and collided.count > 2):
+        # where several stations seem hasty, the times are to blame
+        alone = list(hasty) == [mac] and ring.measurable(T_USAGE_DELAY)
+        soon = hasty[mac] if alone else Happened()
+        if soon.count > 2:
+            reasons.append(f"sent again {_times_word(soon.count)} before its own poll could be answered")
+            evidence = evidence.merge(soon)
+        if second.count or soon.count > 2 or (stray.count > 2 and often):
             yield _of("MS501", _station(mac), "; ".join(reasons), evidence)
         elif reasons:
             yield _of("MS501", _station(mac), "; ".join(reasons), evidence, Severity.WARNING)

@@ -17,6 +17,9 @@ from dissectors.bacnet.limits import MAX_MASTER, T_REPLY_DELAY, T_USAGE_DELAY, T
 from dissectors.line import Timing
 
 EVENTS_MAX = 32
+IMPOSSIBLE_SHARE = 0.01
+COARSE_LIMIT = 100_000_000
+"""Limits from here on can be judged with coarse times too (systems that stamp every 16 ms)."""
 
 
 class What(Enum):
@@ -29,6 +32,7 @@ class What(Enum):
     LEFT = "gave no sign when given the token"
     SECOND_DEVICE = "another device instance under the same address"
     COLLIDED_REPLY = "damaged octets in place of an answer"
+    TOO_SOON = "sent again before its own poll could be answered"
     LATE_USE = "late to use the token"
     LATE_REPLY = "late to answer"
     NO_REPLY = "no answer"
@@ -178,7 +182,8 @@ class Ring:
     """What a stretch of MS/TP bus showed.
 
     `frames`, `octets`, `noise` (octets), `header_errors`, `data_errors`, `cut`: counts.
-    `poll_waste`: time spent on polls that nobody answered, waiting included. `happened`: events by kind and station.
+    `poll_waste`: time spent on polls that nobody answered, waiting included. `impossible`: frames that followed the one
+    before sooner than any driver can (Tturnaround). `happened`: events by kind and station.
     """
 
     timing: Timing = field(default_factory=Timing)
@@ -191,6 +196,7 @@ class Ring:
     data_errors: int = 0
     cut: int = 0
     poll_waste: int = 0
+    impossible: int = 0
     nodes: Mapping[int, Node] = field(default_factory=lambda: MappingProxyType({}))
     edges: Mapping[tuple[int, int], Edge] = field(default_factory=lambda: MappingProxyType({}))
     happened: Mapping[tuple[What, int | None], Happened] = field(default_factory=lambda: MappingProxyType({}))
@@ -216,8 +222,13 @@ class Ring:
         return min(1.0, self.poll_waste / self.span) if self.span else 0.0
 
     def measurable(self, limit: int) -> bool:
-        """Whether the adapter's timing can judge a limit of that many ns."""
-        return 2 * self.timing.latency <= limit
+        """Whether the capture's times can judge a limit of that many ns."""
+        return 2 * self.timing.latency <= limit and not (self.coarse and limit < COARSE_LIMIT)
+
+    @property
+    def coarse(self) -> bool:
+        """Whether the times are coarser than the adapter's latency says: too many impossible gaps."""
+        return self.impossible > IMPOSSIBLE_SHARE * self.frames
 
     @property
     def limits(self) -> Mapping[str, bool]:
@@ -304,6 +315,7 @@ class Ring:
             self.data_errors + other.data_errors,
             self.cut + other.cut,
             self.poll_waste + other.poll_waste,
+            self.impossible + other.impossible,
             MappingProxyType(nodes),
             MappingProxyType(edges),
             MappingProxyType(happened),

@@ -23,6 +23,7 @@ from dissectors.bacnet.limits import (
     T_REPLY_DELAY,
     T_USAGE_DELAY,
     T_USAGE_TIMEOUT,
+    TURNAROUND_BITS,
 )
 from dissectors.bacnet.ring import EVENTS_MAX, Edge, Event, Happened, Node, Ring, What
 from dissectors.bacnet.values import ObjectId
@@ -55,6 +56,7 @@ class _Node:
     poll_reply: DurationTally = field(default_factory=DurationTally)
     holds: dict[int, int] = field(default_factory=dict)
     devices: list[int] = field(default_factory=list)
+    gone: bool = False  # it was passed over
 
     def count(self, name: str) -> None:
         self.counts[name] = self.counts.get(name, 0) + 1
@@ -99,7 +101,8 @@ class RingObserver:
         self._last: int | None = None
         self._frames = self._octets = self._noise = 0
         self._header_errors = self._data_errors = self._cut = 0
-        self._poll_waste = 0
+        self._poll_waste = self._impossible = 0
+        self._least_gap = timing.line.bits(TURNAROUND_BITS) // 2
         self._holder: int | None = None  # None: not known
         self._passed_by: int | None = None  # who passed the token to the holder, while the holder has not used it
         self._token: Frame | None = None  # that token, while unused
@@ -122,6 +125,7 @@ class RingObserver:
     def _see(self, no: int, event: FramerEvent, header: Header | None) -> None:
         if isinstance(event, Noise) or header is None:
             self._noise += len(event.octets)
+            self._see_collision(no, event)
             self._doubt = True
             return
         self._frames += 1
@@ -148,6 +152,7 @@ class RingObserver:
             self._data_errors,
             self._cut,
             self._poll_waste,
+            self._impossible,
             MappingProxyType({mac: node.value() for mac, node in sorted(self._nodes.items())}),
             MappingProxyType(dict(self._edges)),
             MappingProxyType(dict(self._happened)),
@@ -164,16 +169,31 @@ class RingObserver:
             self._cut += 1
         if frame.damage is Damage.CHECK and header.source is not None:
             self._node(header.source, frame).count("damaged")
-        asked = self._asked
-        if asked is not None and asked.frame_type != _TOKEN:
-            self._note(What.COLLIDED_REPLY, frame.start, no, asked.destination, asked.source)
+        self._see_collision(no, frame)
         self._asked = None
         self._doubt = True
+
+    def _see_collision(self, no: int, event: FramerEvent) -> None:
+        """Damaged octets where a station was to answer a request or poll, or to use its token."""
+        asked, token = self._asked, self._token
+        if asked is not None:
+            since, mac, other = asked.frame.end, asked.destination, asked.source
+        elif token is not None and self._holder is not None:
+            since, mac, other = token.end, self._holder, token.octets[4]
+        else:
+            return
+        if event.start - since < T_REPLY_DELAY:
+            self._node(mac, None)
+            self._note(What.COLLIDED_REPLY, event.start, no, mac, other)
+        self._asked = None
 
     # Good frames
 
     def _see_good(self, no: int, frame: Frame, frame_type: int, source: int, destination: int, header: Header) -> None:
         node = self._node(source, frame)
+        before = self._before
+        if before is not None and not self._doubt and self._gap(frame) + before.slack < self._least_gap:
+            self._impossible += 1
         node.counts["octets"] = node.counts.get("octets", 0) + len(frame.octets)
         if self._is_silence(frame):
             self._lose_token(no, frame, source)
@@ -181,8 +201,9 @@ class RingObserver:
         self._check_addresses(no, frame, frame_type, source, destination)
         if frame_type == _POLL_REPLY:
             node.count("poll_replies_sent")
-            if "tokens_sent" in node.counts and "tokens_received" in node.counts:
+            if node.gone:
                 self._note(What.REJOINED, frame.start, no, source, destination)
+                node.gone = False
         elif frame_type == _POSTPONED:
             node.count("postponed")
         if not answers and self._is_late_answer(no, frame, source, destination):
@@ -261,6 +282,9 @@ class RingObserver:
                     )
                 return True
             self._unanswered_poll(frame, asked)
+            soon = frame.start - asked.frame.end + asked.frame.slack < T_USAGE_DELAY // 2
+            if soon and source == asked.source and not self._doubt and 2 * self._timing.latency <= T_USAGE_DELAY:
+                self._note(What.TOO_SOON, frame.start, no, source, asked.destination, frame.start - asked.frame.end)
             return False
         if asked.frame_type == _TEST:
             return back and frame_type == _TEST_REPLY
@@ -326,6 +350,7 @@ class RingObserver:
         if source == self._passed_by:  # nobody used it: it is repeated, or somebody else is looked for
             if self._holder is not None and frame.octets[2] == _POLL:
                 self._note(What.LEFT, frame.start, no, self._holder, source)
+                self._node(self._holder, None).gone = True
             self._holder = source
             self._passed_by = None
             return

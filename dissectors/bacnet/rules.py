@@ -169,8 +169,9 @@ _ALL = (
         "MS501",
         Severity.ERROR,
         "Two stations with one address",
-        "Two devices gave their instance from one address; or an address sent without the token more than twice; or "
-        "polls and requests to one address were answered with damaged octets again and again.",
+        "Two devices gave their instance from one address; or an address sent again before its own poll could be "
+        "answered (8 ms); or it sent without the token more than twice; or damaged octets came again and again where "
+        "it was to answer.",
         "two stations with the same MS/TP address: both answer and both use the token",
         "switch one of the suspects off and see whether the address stays alive",
     ),

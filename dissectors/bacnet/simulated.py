@@ -23,7 +23,7 @@ from dissectors.bacnet.limits import (
     N_POLL,
     N_RETRY_TOKEN,
     T_NO_TOKEN,
-    T_REPLY_TIMEOUT,
+    T_REPLY_TIMEOUT_MAX,
     T_SLOT,
     T_USAGE_TIMEOUT_MAX,
     TURNAROUND_BITS,
@@ -40,20 +40,23 @@ _QUEUE_MAX = 64
 
 @dataclass(frozen=True, slots=True)
 class Faults:
-    """What a node does wrong. `deaf`: hears nothing. `loses_token_every`: swallows each n-th token (0: none).
+    """What a node does wrong.
 
-    `use_delay`, `reply_delay`: ns that it takes before it uses a token or answers. `postpones`: answers requests with
-    Reply Postponed and sends the answer with its next token. `silent`: does not answer requests. `keeps_token`: after
-    each n-th token it sends once more without one (0: never). `damages_every`: one bit of each n-th frame is wrong.
+    `off`: nothing at all. `deaf`: hears nothing, but sends. `loses_token_every`: begins to use each n-th token and dies
+    with it (0: none). `use_delay`, `reply_delay`: ns that it takes before it uses a token or answers. `postpones`:
+    answers requests with Reply Postponed and sends the answer with its next token. `silent`: does not answer requests.
+    `forges_every`: passes a token that it does not have while another one waits, at each n-th poll heard (0: never).
+    `damages_every`: one bit of each n-th frame is wrong.
     """
 
+    off: bool = False
     deaf: bool = False
     loses_token_every: int = 0
     use_delay: int = 0
     reply_delay: int = 0
     postpones: bool = False
     silent: bool = False
-    keeps_token: int = 0
+    forges_every: int = 0
     damages_every: int = 0
 
 
@@ -67,7 +70,8 @@ class _State(Enum):
 class Node:
     """One master on the bus.
 
-    `mac` 0 … 127. `max_info_frames`: data frames a token. `begins_at`: ns, when it is switched on.
+    `mac` 0 … 127. `max_info_frames`: data frames a token. `polls_every`: tokens from poll to poll. `begins_at`: ns,
+    when it is switched on.
     """
 
     def __init__(
@@ -78,6 +82,7 @@ class Node:
         *,
         max_master: int = MAX_MASTER,
         max_info_frames: int = 1,
+        polls_every: int = N_POLL,
         begins_at: int = 0,
         faults: Faults | None = None,
     ) -> None:
@@ -94,12 +99,14 @@ class Node:
         self._state = _State.IDLE
         self._next = mac  # the successor; the own address: not known
         self._polled = mac  # the last address polled
-        self._tokens = N_POLL  # since the last maintenance poll: the first token polls
+        self._polls_every = max(2, polls_every)
+        self._tokens = self._polls_every  # since the last maintenance poll: the first token polls
         self._sole = False
         self._retries = 0
         self._sent = 0  # data frames with this token
         self._asked: int | None = None  # who must answer
         self._held = 0  # tokens ever got
+        self._polls_heard = 0  # for others
         self._made = 0  # frames ever sent
         self._wake_at: int | None = begins_at + T_NO_TOKEN + T_SLOT * mac
         self._busy_until = begins_at
@@ -108,6 +115,9 @@ class Node:
 
     def hear(self, now: int, octets: bytes, quiet: bool) -> tuple[Send, ...]:
         """Take what another party sent."""
+        if self.faults.off:
+            self._rest(now)
+            return ()
         if self.faults.deaf or now < self._busy_until:
             return ()
         sends: list[Send] = []
@@ -122,6 +132,9 @@ class Node:
     def wake(self, now: int) -> tuple[Send, ...]:
         """A time that was waited for has come."""
         if self._wake_at is None or now < self._wake_at:
+            return ()
+        if self.faults.off:
+            self._rest(now)
             return ()
         state = self._state
         if state is _State.IDLE:  # nobody has the token
@@ -159,8 +172,15 @@ class Node:
                 return self._pass_token(now + self._turnaround)
             self._rest(now)
         if destination not in (self.mac, BROADCAST):
-            return []
+            return self._forge(now) if frame_type == FrameType.POLL_FOR_MASTER else []
         return self._respond(now, frame_type, destination, source, octets)
+
+    def _forge(self, now: int) -> list[Send]:
+        self._polls_heard += 1
+        every = self.faults.forges_every
+        if not every or self._polls_heard % every or self._next == self.mac:
+            return []
+        return self._pass_token(now + 4 * self._turnaround)
 
     def _respond(self, now: int, frame_type: int, destination: int, source: int, octets: bytes) -> list[Send]:
         """A frame for this node."""
@@ -199,7 +219,8 @@ class Node:
         faults = self.faults
         if faults.loses_token_every and self._held % faults.loses_token_every == 0:
             self._rest(now)
-            return []
+            poll = frame(FrameType.POLL_FOR_MASTER, self._after(self.mac), self.mac)
+            return [self._send(now + self._turnaround, poll)]
         self._sent = 0
         self._queue.extend(self.application.on_token(now))
         return self._work(now + self._turnaround + faults.use_delay)
@@ -215,27 +236,22 @@ class Node:
             at = self._busy_until
             if expects:
                 self._state, self._asked = _State.ASKING, item.destination
-                self._wake_at = at + T_REPLY_TIMEOUT
+                self._wake_at = at + T_REPLY_TIMEOUT_MAX
                 return sends
             at += self._turnaround
         return sends + self._finish(at)
 
     def _finish(self, at: int) -> list[Send]:
         """Done with the token: poll for a master now and then, else pass it on."""
-        if self._sole and self._next == self.mac:
+        if self._next == self.mac:  # no successor known, or none there
             return self._poll(at, self._after(self._polled))
-        if self._tokens >= N_POLL - 1:
+        if self._tokens >= self._polls_every - 1:
             address = self._after(self._polled)
             if address != self._next:
                 return self._poll(at, address)
             self._polled, self._tokens = self.mac, 0
         self._tokens += 1
-        sends = self._pass_token(at)
-        faults = self.faults
-        if faults.keeps_token and self._held % faults.keeps_token == 0:
-            later = self._busy_until + 4 * self._turnaround
-            sends.append(self._send(later, frame(FrameType.POLL_FOR_MASTER, self._after(self.mac), self.mac)))
-        return sends
+        return self._pass_token(at)
 
     def _after(self, address: int) -> int:
         return (address + 1) % (self._max_master + 1)
