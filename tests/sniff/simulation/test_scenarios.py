@@ -20,6 +20,7 @@ from sniff.simulation.tap import EXACT, FTDI, FTDI_LOW_LATENCY, OCTETS, UART, Ta
 from sniff.simulation.wire import Sent
 
 NAMES = scenarios.names()
+QUICK = {"modbus-rtu-busy": 2, "mstp": 4}  # seconds that show enough of a bus with hundreds of frames in each
 
 
 def sniff(plan: Scenario, seconds: float, tap: TapModel = EXACT) -> tuple[list[Row], list[Transaction]]:
@@ -59,7 +60,7 @@ def parties(plan: Scenario) -> set[str]:
 @pytest.mark.parametrize("name", NAMES)
 def test_on_a_perfect_bus_every_frame_is_found_through_every_adapter(name: str, tap: TapModel) -> None:
     plan = scenario(name, faults=False)
-    seconds = 2 if "busy" in name else 15
+    seconds = QUICK.get(name, 15)
     sent = truth(plan, seconds)
     assert all(one.intact and not one.faults for one in sent)
     rows, _ = sniff(plan, seconds, tap)
@@ -71,7 +72,7 @@ def test_on_a_perfect_bus_every_frame_is_found_through_every_adapter(name: str, 
 @pytest.mark.parametrize("name", NAMES)
 def test_with_faults_the_good_frames_are_those_that_arrived_intact(name: str, tap: TapModel) -> None:
     plan = scenario(name, seed=7)
-    seconds = 5 if "busy" in name else 50
+    seconds = 3 * QUICK.get(name, 15)
     sent = truth(plan, seconds)
     assert sum(bool(one.faults) for one in sent) >= 5, "the scenario shows nothing"
     rows, _ = sniff(plan, seconds, tap)
