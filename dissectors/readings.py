@@ -44,3 +44,6 @@ class Reading:
 Readings = Callable[[Frame | None, Frame | None], tuple[Reading, ...]]
 """(request, response) → readings; total. Without the response: what the request itself tells (a write, a report);
 with it, what is confirmed: nothing after an exception."""
+
+Refusal = Callable[[Frame], tuple[str, int] | None]
+"""frame → the family of its codes ("modbus", "n2") and the code, when it refuses a request (`extras["refusal"]`)."""

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dissectors.frame import Chunk
+from dissectors.profiles import Devices
+from sniff.analysis.points import PointReader, Sample
 from sniff.capture.link import CaptureLink
 from sniff.capture.wire import Ended, Received, Status, Tick
 from sniff.engine import Engine, Output
 from sniff.reading import dissector_for
 from sniff.session import LineEvent
+from sniff.value_channels import ValueChannels
 
 LiveItem = Output | LineEvent | Status | Ended
 
@@ -15,10 +18,11 @@ LiveItem = Output | LineEvent | Status | Ended
 class LiveBus:
     """One bus of a running capture. Not thread-safe; nothing here can hold up the recording.
 
-    `session`: of the bus; `status`: the newest report; `ended`: why it is over, None while it runs.
+    `session`: of the bus; `status`: the newest report; `ended`: why it is over, None while it runs. `points`: takes
+    values out of what was heard; they go back into the recording.
     """
 
-    def __init__(self, link: CaptureLink, bus: int = 0) -> None:
+    def __init__(self, link: CaptureLink, bus: int = 0, devices: Devices | None = None) -> None:
         self.link = link
         self.bus = bus
         self.session = link.session(bus)
@@ -26,6 +30,9 @@ class LiveBus:
         self.engine = Engine(self.dissector, self.session.timing)
         self.status = Status(bus, path=link.paths[bus] if bus < len(link.paths) else "", priority=link.priority)
         self.ended: Ended | None = None
+        self.devices = devices or Devices()
+        self.points = PointReader(self.dissector, self.devices)
+        self._channels = ValueChannels(self.session.bus, self.devices) if link.paths else None
 
     def poll(self, timeout: float = 0.0) -> list[LiveItem]:
         """What has come, in order; waits up to `timeout` seconds. The end closes the engine and comes last."""
@@ -44,7 +51,7 @@ class LiveBus:
     def _take(self, message: Received | Tick | Status | Ended) -> list[LiveItem]:
         if isinstance(message, Ended):
             self.ended = message
-            return [*_some(self.engine.close()), message]
+            return [*self._some(self.engine.close()), message]
         if message.bus != self.bus:
             return []
         if isinstance(message, Status):
@@ -53,11 +60,22 @@ class LiveBus:
         if isinstance(message, Tick):
             deadline = self.engine.deadline()
             due = deadline is not None and message.now >= deadline
-            return _some(self.engine.advance(message.now)) if due or deadline is None else []
+            return self._some(self.engine.advance(message.now)) if due or deadline is None else []
         if isinstance(message.item, Chunk):
-            return _some(self.engine.feed(message.item))
+            return self._some(self.engine.feed(message.item))
         return [message.item]
 
+    def _some(self, output: Output) -> list[LiveItem]:
+        if not output:
+            return []
+        for sample in self.points.add(output):
+            self._record(sample)
+        return [output]
 
-def _some(output: Output) -> list[LiveItem]:
-    return [output] if output else []
+    def _record(self, sample: Sample) -> None:
+        """Send a value back into the file, best effort."""
+        message = self._channels.message(sample) if self._channels is not None else None
+        if message is not None:
+            self.link.derived(
+                self.bus, message.topic, message.schema, message.time, message.time, message.data, message.metadata
+            )

@@ -9,8 +9,10 @@ from dataclasses import dataclass, replace
 from dissectors import registry
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
+from dissectors.profiles import Devices
 from dissectors.registry import Dissector
 from dissectors.tracker import Transaction
+from sniff.analysis.points import PointReader
 from sniff.engine import Engine, Output, Row
 from sniff.session import Item, LineEvent, Session
 
@@ -20,16 +22,19 @@ HELD = 20_000
 
 @dataclass(frozen=True, slots=True)
 class Settled:
-    """A row with the transaction it belongs to (None: noise, or never closed)."""
+    """A row with the transaction it belongs to (None: noise, or never closed), and what it says of its device."""
 
     row: Row
     transaction: Transaction | None
+    words: str = ""
 
 
 class Settling:
     """Holds rows until their transaction has closed, so that each can be shown with its verdict; keeps the order."""
 
-    def __init__(self) -> None:
+    def __init__(self, points: PointReader | None = None) -> None:
+        """`points`, fed before this, says what rows mean to their devices."""
+        self._points = points
         self._rows: deque[Row] = deque()
         self._closed: dict[int, Transaction] = {}
 
@@ -54,7 +59,8 @@ class Settling:
 
     def _pop(self) -> Settled:
         row = self._rows.popleft()
-        return Settled(row, None if row.placement is None else self._closed.get(row.placement.tx))
+        said = "" if self._points is None else self._points.words(row)
+        return Settled(row, None if row.placement is None else self._closed.get(row.placement.tx), said)
 
 
 def with_settings(session: Session, protocol: str | None = None, line: LineSettings | None = None) -> Session:
@@ -75,11 +81,14 @@ def outputs(items: Iterable[Item], session: Session) -> Iterator[Output | LineEv
     yield engine.close()
 
 
-def settled(items: Iterable[Item], session: Session) -> Iterator[Settled]:
-    """Run items through a new engine; give every row with its verdict."""
-    settling = Settling()
+def settled(items: Iterable[Item], session: Session, devices: Devices | None = None) -> Iterator[Settled]:
+    """Run items through a new engine; give every row with its verdict, and in words where its device is known."""
+    points = PointReader(dissector_for(session), devices) if devices else None
+    settling = Settling(points)
     for output in outputs(items, session):
         if isinstance(output, Output):
+            if points is not None:
+                points.add(output)
             yield from settling.add(output)
     yield from settling.flush()
 

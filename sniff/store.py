@@ -9,12 +9,14 @@ from __future__ import annotations
 from bisect import bisect_left, bisect_right
 from collections import Counter
 
-from dissectors.frame import LineError
+from dissectors.frame import Frame, LineError
+from dissectors.profiles import Devices
 from dissectors.registry import Dissector
 from dissectors.tracker import Transaction, Verdict
 from sniff.analysis.histogram import Histogram
 from sniff.analysis.load import Load
 from sniff.analysis.nodes import NodeTable
+from sniff.analysis.points import PointReader, PointTable, words
 from sniff.analysis.wording import describe, is_error
 from sniff.engine import Output, Row
 from sniff.session import LineEvent, Session
@@ -29,7 +31,9 @@ CLOSING_DISORDER = 256
 class Store:
     """Rows in order of the wire; `rows[i].no == first_no + i` always holds."""
 
-    def __init__(self, session: Session, dissector: Dissector, keep: int = KEPT_ROWS) -> None:
+    def __init__(
+        self, session: Session, dissector: Dissector, keep: int = KEPT_ROWS, devices: Devices | None = None
+    ) -> None:
         self.session = session
         self.dissector = dissector
         self.keep = keep
@@ -40,6 +44,9 @@ class Store:
         self.line_events: list[LineEvent] = []
         self.nodes = NodeTable()
         self.load = Load(session.line)
+        self.devices = devices or Devices()
+        self.reader = PointReader(dissector, self.devices)
+        self.points = PointTable()
         self.error_total = 0  # like `errors`, with those that were dropped
         self.marks: Counter[LineError] = Counter()  # octets by the line errors reported on them
         self.gaps = Histogram()  # silence between one row and the next, ns
@@ -67,6 +74,7 @@ class Store:
                 self.error_total += 1
         for transaction in output.transactions:
             self._close(transaction)
+        self.points.add(self.reader.add(output))
         if len(self.rows) > self.keep * 1.1:
             self._drop(len(self.rows) - self.keep)
 
@@ -156,8 +164,18 @@ class Store:
         return transaction.request
 
     def text(self, row: Row) -> str:
-        """One line that says what a row is."""
-        return describe(self.dissector, row)
+        """One line that says what a row is, and what that means to its device."""
+        text = describe(self.dissector, row)
+        if not self.devices:
+            return text
+        asked = self._request_of(row)
+        said = words(self.dissector, self.devices, row, asked)
+        return f"{text} — {said}" if said else text
+
+    def _request_of(self, row: Row) -> Frame | None:
+        transaction = self.transaction(row)
+        asked = self.by_no(transaction.request) if transaction is not None and transaction.request else None
+        return asked.event if asked is not None and isinstance(asked.event, Frame) else None
 
     def next_error(self, no: int) -> int | None:
         """Number of the first error row after `no`, None when there is none."""

@@ -12,7 +12,7 @@ from dissectors.modbus.fields import fields
 from dissectors.modbus.findings import ModbusFindings
 from dissectors.modbus.framing import RtuFramer
 from dissectors.modbus.header import peek_ascii, peek_rtu
-from dissectors.modbus.readings import readings
+from dissectors.modbus.readings import readings, refusal
 from dissectors.modbus.rules import RULES
 from dissectors.modbus.text import text
 from dissectors.modbus.tracker import ModbusTracker
@@ -54,7 +54,7 @@ RTU = Dissector(
     fields=fields,
     packet=packet,
     default_line="19200,8E1",
-    extras={"findings": ModbusFindings, "rules": RULES, "readings": readings},
+    extras={"findings": ModbusFindings, "rules": RULES, "readings": readings, "refusal": refusal},
 )
 
 ASCII = Dissector(
@@ -67,5 +67,5 @@ ASCII = Dissector(
     fields=fields,
     packet=packet,
     default_line="19200,7E1",
-    extras={"findings": ModbusFindings, "rules": RULES, "readings": readings},
+    extras={"findings": ModbusFindings, "rules": RULES, "readings": readings, "refusal": refusal},
 )

@@ -36,6 +36,12 @@ def readings(request: Frame | None, response: Frame | None) -> tuple[Reading, ..
     return _written(asked)
 
 
+def refusal(frame: Frame) -> tuple[str, int] | None:
+    """The exception code of a response; None of any other frame."""
+    octets = adu(frame)
+    return ("modbus", octets[2]) if len(octets) > 2 and octets[1] & EXCEPTION_BIT else None
+
+
 def _written(octets: bytes) -> tuple[Reading, ...]:
     """What a request writes; nothing for one that does not, or whose counts contradict each other."""
     code = octets[1]

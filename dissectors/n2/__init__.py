@@ -10,7 +10,7 @@ from dissectors.n2.findings import RULES, N2Findings
 from dissectors.n2.framing import N2Framer
 from dissectors.n2.header import peek
 from dissectors.n2.interpretation import Interpretation, interpret
-from dissectors.n2.readings import readings
+from dissectors.n2.readings import readings, refusal
 from dissectors.n2.text import text
 from dissectors.n2.tracker import N2Tracker
 from dissectors.registry import Dissector
@@ -47,5 +47,5 @@ N2 = Dissector(
     fields=fields,
     packet=packet,
     default_line="9600,8N1",
-    extras={"findings": N2Findings, "rules": RULES, "interpret": interpret, "readings": readings},
+    extras={"findings": N2Findings, "rules": RULES, "interpret": interpret, "readings": readings, "refusal": refusal},
 )

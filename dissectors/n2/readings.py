@@ -10,8 +10,9 @@ import struct
 
 from dissectors.frame import Frame
 from dissectors.n2.commands import Command, parse_command
+from dissectors.n2.header import error_code
 from dissectors.n2.interpretation import Interpretation, Record, interpret
-from dissectors.n2.objects import REGIONS, Encoding, attribute_name, region_name
+from dissectors.n2.objects import REGIONS, Encoding, attribute_name, is_hex, region_name
 from dissectors.readings import How, Reading
 
 _STATE_BIT = 6
@@ -35,6 +36,14 @@ def readings(request: Frame | None, response: Frame | None) -> tuple[Reading, ..
     if told.kind == "read-attribute":
         return _read(told)
     return tuple(map(_change, told.records))
+
+
+def refusal(frame: Frame) -> tuple[str, int] | None:
+    """The error code after N, 10 whether it came as 10 or 0A; None of any other frame."""
+    code = error_code(frame.octets) if frame.octets[:1] == b"N" else ""
+    if not code or not is_hex(code):
+        return None
+    return "n2", int(code) if code.isdigit() else int(code, 16)
 
 
 def _change(record: Record) -> Reading:

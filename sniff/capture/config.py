@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -13,12 +13,16 @@ from dissectors.line import LineSettings
 
 @dataclass(frozen=True, slots=True)
 class SourceSpec:
-    """One bus to listen to. `spec`: as `open_source` takes it; `protocol`: a registry name; `bus`: its short name."""
+    """One bus to listen to. `spec`: as `open_source` takes it; `protocol`: a registry name; `bus`: its short name.
+
+    `notes`: of the session, for the recording.
+    """
 
     spec: str
     line: LineSettings = field(default_factory=LineSettings)
     protocol: str = "modbus-rtu"
     bus: str = "bus"
+    notes: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +67,13 @@ class CaptureConfig:
     def from_json(cls, value: dict[str, Any]) -> CaptureConfig:
         """Read what `to_json` gave. Raises ValueError, KeyError or TypeError."""
         sources = tuple(
-            SourceSpec(source["spec"], LineSettings.parse(source["line"]), source["protocol"], source["bus"])
+            SourceSpec(
+                source["spec"],
+                LineSettings.parse(source["line"]),
+                source["protocol"],
+                source["bus"],
+                dict(source.get("notes", {})),
+            )
             for source in value["sources"]
         )
         record = value["record"]

@@ -60,7 +60,7 @@ def main() -> int:
 def session_of(spec: SourceSpec, source: Source, clock: Clock) -> Session:
     """What is known of a bus at the start of its capture."""
     started = source.session.started if isinstance(source, CaptureFileSource) else clock.wall
-    return Session(spec.spec, spec.line, spec.protocol, started, spec.bus, source.session_adapter)
+    return Session(spec.spec, spec.line, spec.protocol, started, spec.bus, source.session_adapter, notes=spec.notes)
 
 
 def open_recorders(config: CaptureConfig, sessions: list[Session]) -> list[Recorder]:

@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import sys
+from collections.abc import Mapping
 
 from dissectors import registry
 from dissectors.line import LineSettings
+from dissectors.profiles import Devices, ProfileError
 from sniff.cli import UNREADABLE, USAGE, Failure
 from sniff.formats import Capture, CaptureError, read
 from sniff.session import Session
+
+DEVICES_NOTE = "devices"
+"""Note of a session: its devices, as `Devices.text` writes them."""
+
+MOST_NOTED = 256
 
 
 def add_line(parser: argparse.ArgumentParser) -> None:
@@ -27,6 +35,60 @@ def add_files(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "files", nargs="+", metavar="FILE", help="capture: .mcap, .cap.txt; - for text on standard input"
     )
+
+
+def add_devices(parser: argparse.ArgumentParser) -> None:
+    """-d: which station is which device."""
+    parser.add_argument(
+        "-d",
+        "--device",
+        dest="devices",
+        type=device,
+        action="append",
+        default=[],
+        metavar="ADDRESS=PROFILE",
+        help="a station's device profile, for instance 3=teco-e510; * for every station; repeatable",
+    )
+
+
+def device(token: str) -> tuple[str, str]:
+    """argparse type for -d."""
+    from sniff.profile_files import EVERY, address
+
+    word, equals, name = token.partition("=")
+    try:
+        if not equals or not name:
+            raise ValueError(f"device {token!r}: expected ADDRESS=PROFILE, for instance 3=teco-e510")
+        if word != EVERY:
+            address(word)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+    return word, name
+
+
+def devices_of(args: argparse.Namespace, configured: Mapping[str, str] | None = None) -> Devices:
+    """What -d says, and behind it what is `configured`; ends with exit code 2 for a profile that cannot be used."""
+    from sniff.profile_files import EVERY, UnknownProfile, devices
+
+    said = dict(getattr(args, "devices", ()))
+    behind = {} if EVERY in said else configured or {}
+    try:
+        return devices({**behind, **said})
+    except (UnknownProfile, ProfileError, ValueError) as error:
+        raise Failure(str(error), USAGE) from None
+
+
+def noted_devices(args: argparse.Namespace, session: Session) -> Devices:
+    """What -d says, and behind it what the recording says of itself, as far as such profiles are known here."""
+    from sniff.profile_files import FOREIGN_NAME, UnknownProfile, find
+
+    known: dict[str, str] = {}
+    for token in session.notes.get(DEVICES_NOTE, "").split(",")[:MOST_NOTED]:
+        name = token.partition("=")[2]
+        if FOREIGN_NAME.fullmatch(name):  # somebody else's file must not name a path
+            with contextlib.suppress(UnknownProfile, ProfileError, argparse.ArgumentTypeError):
+                known[device(token)[0]] = find(name).name
+    return devices_of(args, known)
 
 
 def line_settings(token: str) -> LineSettings:

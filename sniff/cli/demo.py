@@ -7,7 +7,6 @@ from __future__ import annotations
 import argparse
 import sys
 
-from dissectors.line import LineSettings
 from sniff.capture.config import RecordSpec, SourceSpec
 from sniff.cli import PORT_TROUBLE, USAGE, Failure, arguments, listening
 from sniff.cli.live import show
@@ -18,6 +17,7 @@ DEFAULT_DURATION = 10.0
 def configure(parser: argparse.ArgumentParser) -> None:
     """Options of `demo`."""
     arguments.add_line(parser)
+    arguments.add_devices(parser)
     parser.add_argument("--seed", type=int, default=485, metavar="N", help="which faults strike when (default 485)")
     parser.add_argument("--clean", action="store_true", help="no faults")
     parser.add_argument("-w", "--write", metavar="FILE", help="record to FILE (.mcap)")
@@ -40,14 +40,11 @@ def run(args: argparse.Namespace) -> int:
     on_terminal = arguments.on_terminal() and not args.json and not args.lines
     duration = args.duration or (None if on_terminal else DEFAULT_DURATION)
     print(f"sniff485: virtual bus, {plan.line}: {plan.text}", file=sys.stderr)
+    devices = arguments.devices_of(args, {str(address): name for address, name in plan.devices.items()})
     try:
         with VirtualBus.from_scenario(plan) as bus:
-            return _listen(bus.tap(), plan.line, plan.protocol, args, duration)
+            source = SourceSpec(bus.tap(), plan.line, plan.protocol, "demo", listening.notes_of(devices))
+            record = RecordSpec(args.write) if args.write else None
+            return show(listening.start(source, record, duration, devices), args.json, args.lines)
     except (BusFailed, OSError) as error:
         raise Failure(f"demo: no virtual bus here: {error}", PORT_TROUBLE) from None
-
-
-def _listen(port: str, line: LineSettings, protocol: str, args: argparse.Namespace, duration: float | None) -> int:
-    record = RecordSpec(args.write) if args.write else None
-    live = listening.start(SourceSpec(port, line, protocol, "demo"), record, duration)
-    return show(live, args.json, args.lines)

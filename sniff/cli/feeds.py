@@ -6,6 +6,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+from dissectors.profiles import Devices
 from sniff.engine import Output
 from sniff.formats import Capture
 from sniff.live import LiveBus
@@ -23,7 +24,7 @@ class LiveFeed:
 
     def __init__(self, live: LiveBus) -> None:
         self.live = live
-        self._store = Store(live.session, live.dissector)
+        self._store = Store(live.session, live.dissector, devices=live.devices)
 
     @property
     def store(self) -> Store:
@@ -64,10 +65,10 @@ class LiveFeed:
 class FileFeed:
     """A capture file, read on in every poll until its end."""
 
-    def __init__(self, path: str, capture: Capture, session: Session) -> None:
+    def __init__(self, path: str, capture: Capture, session: Session, devices: Devices | None = None) -> None:
         self.path = path
         self.capture = capture
-        self._store = Store(session, dissector_for(session))
+        self._store = Store(session, dissector_for(session), devices=devices)
         self._outputs: Iterator[Output | LineEvent] | None = outputs(capture.items(), session)
         try:
             self._size = Path(path).stat().st_size

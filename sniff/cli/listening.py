@@ -9,17 +9,18 @@ import signal
 import sys
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from dissectors import registry
 from dissectors.line import LineSettings
+from dissectors.profiles import Devices
 from sniff.analysis.summary import Summary
 from sniff.analysis.wording import milliseconds
 from sniff.capture.config import RecordSpec, SourceSpec
 from sniff.capture.link import CaptureLink
 from sniff.capture.wire import Ended, Status
-from sniff.cli import PORT_TROUBLE, UNREADABLE, USAGE, Failure, rows
+from sniff.cli import PORT_TROUBLE, UNREADABLE, USAGE, Failure, arguments, rows
 from sniff.config import ConfigError, load
 from sniff.engine import Output
 from sniff.formats import CaptureError
@@ -31,10 +32,11 @@ from sniff.sources import PortError
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """The bus to listen to, and where its recording goes by configuration (None: not said)."""
+    """The bus to listen to, where its recording goes by configuration (None: not said), and who is on it."""
 
     source: SourceSpec
     record: str | None = None
+    devices: Devices = field(default_factory=Devices)
 
 
 def target_of(args: argparse.Namespace) -> Target:
@@ -51,10 +53,19 @@ def target_of(args: argparse.Namespace) -> Target:
         line = LineSettings.parse(registry.get(protocol).default_line)
         print(f"sniff485: no line settings given (-s): assuming {line} for {protocol}", file=sys.stderr)
     name = bus.name if bus is not None else re.sub(r"[^A-Za-z0-9_-]+", "-", Path(port).name).strip("-") or "bus"
-    return Target(SourceSpec(port, line, protocol, name), bus.record if bus is not None else None)
+    devices = arguments.devices_of(args, bus.devices if bus is not None else None)
+    source = SourceSpec(port, line, protocol, name, notes_of(devices))
+    return Target(source, bus.record if bus is not None else None, devices)
 
 
-def start(source: SourceSpec, record: RecordSpec | None, duration: float | None = None) -> LiveBus:
+def notes_of(devices: Devices) -> dict[str, str]:
+    """What a recording says of its devices."""
+    return {arguments.DEVICES_NOTE: devices.text()} if devices else {}
+
+
+def start(
+    source: SourceSpec, record: RecordSpec | None, duration: float | None = None, devices: Devices | None = None
+) -> LiveBus:
     """Start the capture process. Ends with exit code 4 for the port, 3 for the file."""
     try:
         link = CaptureLink.start([source], record, duration)
@@ -63,7 +74,7 @@ def start(source: SourceSpec, record: RecordSpec | None, duration: float | None 
     except CaptureError as error:
         raise Failure(str(error), UNREADABLE) from None
     try:
-        return LiveBus(link)
+        return LiveBus(link, devices=devices)
     except BaseException:
         link.stop()  # a capture outlives its starter unless it is told to end
         raise
@@ -100,7 +111,7 @@ class Printer:
         self.quiet = quiet
         self.colour = colour
         self.summary = Summary(live.session.line)
-        self._settling = Settling()
+        self._settling = Settling(live.points)
 
     def take(self, items: list[Output | LineEvent | Status | Ended]) -> None:
         """Print what has come."""

@@ -15,6 +15,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     """Options of `live`."""
     parser.add_argument("port", metavar="PORT", help="port, gateway, or a configured bus")
     arguments.add_line(parser)
+    arguments.add_devices(parser)
     parser.add_argument("-w", "--write", metavar="FILE", help="recording (.mcap); default: a new name in this folder")
     parser.add_argument("--no-record", action="store_true", help="do not record")
     parser.add_argument("--duration", type=arguments.duration, metavar="TIME", help="stop after: 90, 90s, 5m, 2h")
@@ -28,7 +29,7 @@ def run(args: argparse.Namespace) -> int:
     if args.no_record and args.write:
         raise Failure("--no-record and -w contradict each other", USAGE)
     path = None if args.no_record else args.write or target.record or listening.new_recording(target.source.bus)
-    live = listening.start(target.source, RecordSpec(path) if path else None, args.duration)
+    live = listening.start(target.source, RecordSpec(path) if path else None, args.duration, target.devices)
     return show(live, args.json, args.lines)
 
 

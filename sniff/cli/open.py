@@ -11,6 +11,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     """Options of `open`."""
     arguments.add_files(parser)
     arguments.add_line(parser)
+    arguments.add_devices(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -22,5 +23,6 @@ def run(args: argparse.Namespace) -> int:
     from sniff.tui import run as run_tui
 
     for path, capture in captures:
-        run_tui(FileFeed(path, capture, arguments.settings_of(args, capture.session)))
+        session = arguments.settings_of(args, capture.session)
+        run_tui(FileFeed(path, capture, session, arguments.noted_devices(args, session)))
     return 0

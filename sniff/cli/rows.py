@@ -49,7 +49,7 @@ def to_json(item: Settled, dissector: Dissector, session: Session, with_fields: 
         "tx": placement.tx if placement else None,
         "verdict": transaction.verdict.value if transaction is not None else None,
         "latency_ms": round(latency.nominal / 1e6, 6) if latency is not None else None,
-        "text": describe(dissector, row),
+        "text": _in_words(describe(dissector, row), item),
         "hex": event.octets.hex(),
     }
     if with_fields:
@@ -109,10 +109,16 @@ def text_line(item: Settled, dissector: Dissector, session: Session, colour: boo
     if not isinstance(row.event, Frame):
         shown = row.event.octets[:16].hex(" ").upper()
         text = f"{text}: {shown}{' …' if len(row.event.octets) > 16 else ''}"
+    text = _in_words(text, item)
     line = (
         f"{row.no:>6} {seconds:12.6f} s  {'!' if bad else ' '} {text}{'  [' + '; '.join(notes) + ']' if notes else ''}"
     )
     return f"\x1b[31m{line}\x1b[0m" if colour and bad else line
+
+
+def _in_words(text: str, item: Settled) -> str:
+    """The line with what it says of its device behind it."""
+    return f"{text} — {item.words}" if item.words else text
 
 
 def hex_dump(octets: bytes) -> str:

@@ -23,6 +23,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     """Options of `show`."""
     arguments.add_files(parser)
     arguments.add_line(parser)
+    arguments.add_devices(parser)
     parser.add_argument("--json", action="store_true", help="one JSON object a frame")
     parser.add_argument("--fields", action="store_true", help="with --json: add every field under Wireshark's names")
     parser.add_argument("-V", dest="tree", action="store_true", help="full tree of each frame")
@@ -42,7 +43,8 @@ def run(args: argparse.Namespace) -> int:
         capture = arguments.open_capture(path)
         session = arguments.settings_of(args, capture.session)
         dissector = dissector_for(session)
-        left = _show(args, settled(capture.items(), session), session, dissector, left)
+        devices = arguments.noted_devices(args, session)
+        left = _show(args, settled(capture.items(), session, devices), session, dissector, left)
         complete = capture.completeness()
         if not complete.whole:
             sys.stdout.flush()

@@ -1,0 +1,240 @@
+"""Points: values taken from exchanges, by device and name; the latest of each, and all of them. Pure.
+
+`PointReader` is fed what the engine gives and gives samples; `PointTable` holds the latest of each point with a short
+history, mergeable. A value counts only when its exchange is whole: a request that nobody answered tells nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import OrderedDict, deque
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from typing import cast
+
+from dissectors.frame import Frame, Role
+from dissectors.profiles import Devices, Entry
+from dissectors.profiles.decoding import Quality, Value, decode, say
+from dissectors.readings import How, Readings, Refusal
+from dissectors.registry import Dissector
+from dissectors.tracker import Transaction, Verdict
+from sniff.engine import Output, Row
+
+MOST_OPEN = 20_000
+"""Frames remembered while their transaction is open."""
+
+MOST_ASKED = 512
+"""Requests remembered after their transaction closed, for answers that come late."""
+
+MOST_POINTS = 50_000
+HISTORY = 60
+BROADCAST = 0
+
+ALL = "all"
+"""Name of the device that a broadcast is for."""
+
+_WHOLE = frozenset({Verdict.ANSWERED, Verdict.RETRY})
+_ALONE = frozenset({Verdict.BROADCAST, Verdict.DATA})
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """One value of one point. `time`: ns, end of the frame that carried or confirmed it; `frame`: that which carried
+    it. `device`: the station's address; None for a broadcast.
+    """
+
+    time: int
+    device: int | None
+    value: Value
+    frame: int
+
+    @property
+    def name(self) -> str:
+        """Of the point."""
+        return self.value.name
+
+    @property
+    def station(self) -> str:
+        """The device in words: "5", or "all"."""
+        return ALL if self.device is None else str(self.device)
+
+    @property
+    def finite(self) -> bool:
+        """Whether it is a number that can be written down; False for text, NaN and the infinities."""
+        return not isinstance(self.value.value, str) and math.isfinite(self.value.value)
+
+
+@dataclass(frozen=True, slots=True)
+class _Remembered:
+    no: int
+    frame: Frame
+
+
+class PointReader:
+    """Takes values out of what the engine gives. Bounded memory."""
+
+    def __init__(self, dissector: Dissector, devices: Devices | None = None) -> None:
+        self.devices = devices or Devices()
+        self._dissector = dissector
+        self._readings = cast("Readings | None", dissector.extras.get("readings"))
+        self._frames: OrderedDict[int, Frame] = OrderedDict()
+        self._asked: OrderedDict[int, _Remembered] = OrderedDict()
+
+    def add(self, output: Output) -> list[Sample]:
+        """Take rows and closed transactions; give the samples that these complete, in the order of closing."""
+        if self._readings is None:
+            return []
+        for row in output.rows:
+            if isinstance(row.event, Frame) and row.event.ok:
+                self._frames[row.no] = row.event
+        samples: list[Sample] = []
+        for transaction in output.transactions:
+            samples += self._samples(transaction)
+        while len(self._frames) > MOST_OPEN:
+            self._frames.popitem(last=False)
+        return samples
+
+    def words(self, row: Row) -> str:
+        """What a row says of its device: "drive 1: run, reverse"; empty when no profile knows.
+
+        An answer needs its request: ask when its transaction has closed, not much later.
+        """
+        asked = self._asked.get(row.placement.tx) if row.placement is not None else None
+        return words(self._dissector, self.devices, row, asked.frame if asked is not None else None)
+
+    def _samples(self, transaction: Transaction) -> Iterator[Sample]:
+        request = self._take(transaction.request)
+        response = self._take(transaction.response)
+        if request is not None:
+            self._asked[transaction.id] = request
+            if len(self._asked) > MOST_ASKED:
+                self._asked.popitem(last=False)
+        verdict = transaction.verdict
+        if verdict is Verdict.LATE and transaction.of is not None:
+            request = self._asked.get(transaction.of)
+            if request is not None:
+                self._asked[transaction.id] = request
+        if request is None or self._readings is None:
+            return
+        if verdict in _ALONE:
+            readings, response = self._readings(request.frame, None), None
+        elif response is not None and (verdict in _WHOLE or verdict is Verdict.LATE):
+            readings = self._readings(request.frame, response.frame)
+        else:
+            return
+        if not readings:
+            return
+        station = None if verdict is Verdict.BROADCAST else transaction.station
+        if readings[0].station is not None:
+            station = readings[0].station
+        confirmed = (response or request).frame.end
+        for value in decode(self.devices.at(station), readings):
+            carrier = response if response is not None and value.how is How.READ else request
+            yield Sample(confirmed, station, value, (response or carrier).no if value.how is How.REPORT else carrier.no)
+
+    def _take(self, no: int | None) -> _Remembered | None:
+        frame = self._frames.pop(no, None) if no is not None else None
+        return _Remembered(no, frame) if frame is not None and no is not None else None
+
+
+def words(dissector: Dissector, devices: Devices, row: Row, request: Frame | None) -> str:
+    """What a row says of its device: "drive 1: run, reverse"; empty when no profile knows. An answer needs its
+    `request`."""
+    event, placement = row.event, row.placement
+    take = cast("Readings | None", dissector.extras.get("readings"))
+    if not devices or take is None or placement is None or not isinstance(event, Frame) or not event.ok:
+        return ""
+    if placement.role is Role.RESPONSE:
+        station, readings = placement.source, take(request, event) if request is not None else ()
+        readings = tuple(reading for reading in readings if reading.how is not How.WRITE)
+    else:
+        station, readings = placement.destination, take(event, None)
+        station = None if placement.role is Role.BROADCAST else station
+    if readings and readings[0].station is not None:
+        station = readings[0].station
+    profile = devices.at(station)
+    if profile is None:
+        return ""
+    refusal = cast("Refusal | None", dissector.extras.get("refusal"))
+    refused = refusal(event) if refusal is not None and not readings else None
+    said = say(profile, readings) if refused is None else profile.exception(*refused)
+    who = f"all {profile.noun}s" if station is None else f"{profile.noun} {station}"
+    return f"{who}: {said}" if said else ""
+
+
+@dataclass(slots=True)
+class Point:
+    """The latest of one point. `changed`: ns, when its value last became another one; `history`: (ns, value)."""
+
+    sample: Sample
+    count: int = 0
+    changed: int = 0
+    history: deque[tuple[int, float]] = field(default_factory=lambda: deque(maxlen=HISTORY))
+
+    @property
+    def entry(self) -> Entry | None:
+        """What the profile says of it."""
+        return self.sample.value.entry
+
+    @property
+    def quality(self) -> Quality:
+        """Of the latest sample."""
+        return self.sample.value.quality
+
+    def add(self, sample: Sample) -> None:
+        """Take a later sample."""
+        if self.count and sample.value.value != self.sample.value.value:
+            self.changed = sample.time
+        self.sample = sample
+        self.count += 1
+        if sample.finite and not isinstance(sample.value.value, str):
+            self.history.append((sample.time, float(sample.value.value)))
+
+
+Key = tuple[str, str]
+"""Station and name of a point."""
+
+
+class PointTable:
+    """The latest value of every point, in the order of first sight. `dropped`: samples of points beyond the limit."""
+
+    def __init__(self) -> None:
+        self._points: dict[Key, Point] = {}
+        self.dropped = 0
+        self.version = 0
+
+    def add(self, samples: Iterable[Sample]) -> None:
+        """Take samples in the order of time."""
+        for sample in samples:
+            key = sample.station, sample.name
+            point = self._points.get(key)
+            if point is None:
+                if len(self._points) >= MOST_POINTS:
+                    self.dropped += 1
+                    continue
+                point = self._points[key] = Point(sample)
+            point.add(sample)
+            self.version += 1
+
+    def merge(self, later: PointTable) -> None:
+        """Take a table of a later stretch of the same bus."""
+        for key, point in later._points.items():
+            mine = self._points.setdefault(key, Point(point.sample))
+            if mine.count and point.sample.value.value != mine.sample.value.value and not point.changed:
+                mine.changed = point.history[0][0] if point.history else point.sample.time
+            mine.changed = max(mine.changed, point.changed)
+            mine.count += point.count
+            mine.sample = point.sample
+            mine.history.extend(point.history)
+        self.dropped += later.dropped
+        self.version += later.version + 1
+
+    def __len__(self) -> int:
+        return len(self._points)
+
+    def __iter__(self) -> Iterator[Point]:
+        return iter(self._points.values())
+
+    def get(self, station: str, name: str) -> Point | None:
+        """One point."""
+        return self._points.get((station, name))

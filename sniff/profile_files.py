@@ -1,0 +1,150 @@
+"""Profiles by name: those that come with the package, those of the project and of the user, those of other packages.
+
+    teco-e510             by name: ./profiles and those above it, the user's folder, the package, other packages
+    drives/pump.toml      a file by its path
+
+Other packages give theirs under the entry point group `sniff485.profiles`: the name of the profile to the text of a
+TOML document, or to a path of one.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
+
+from dissectors.profiles import Devices, Profile, ProfileError, packaged, parse_text
+from dissectors.profiles.packaged import SUFFIX, names
+from sniff.config import nearest
+
+GROUP = "sniff485.profiles"
+FOLDER = "profiles"
+LARGEST = 16 << 20
+"""Octets of a profile that are read at most."""
+
+FOREIGN_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]*")
+"""A profile's name as a file from somebody else may give it: never a path."""
+
+EVERY = "*"
+"""The address that stands for every station."""
+
+
+class UnknownProfile(LookupError):
+    """No such profile; the message says which there are."""
+
+
+@dataclass(frozen=True, slots=True)
+class Listed:
+    """A profile that can be had: where it is from, and what it is or why it cannot be used."""
+
+    name: str
+    origin: str
+    profile: Profile | None
+    error: str = ""
+
+
+def find(name: str) -> Profile:
+    """A profile by name or path. Raises UnknownProfile, ProfileError."""
+    if name.endswith(SUFFIX) or os.sep in name:
+        return read(Path(name))
+    for folder in folders():
+        path = folder / (name + SUFFIX)
+        if path.is_file():
+            return read(path)
+    if name in names():
+        return packaged(name)
+    for point in entry_points(group=GROUP):
+        if point.name == name:
+            return _plugged(point)
+    known = tuple(dict.fromkeys(listed.name for listed in available()))
+    raise UnknownProfile(f"profile {name!r}: no such profile{nearest(name, known)}")
+
+
+def read(path: Path) -> Profile:
+    """The profile in a file. Raises ProfileError."""
+    try:
+        if path.stat().st_size > LARGEST:
+            raise ProfileError(f"{path}: over {LARGEST >> 20} MiB is no profile")
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise ProfileError(f"{path}: {error.strerror}") from None
+    except UnicodeDecodeError as error:
+        raise ProfileError(f"{path}: {error}") from None
+    return parse_text(text, str(path))
+
+
+def available() -> Iterator[Listed]:
+    """Every profile that a name finds, in the order of search; broken ones too."""
+    seen: set[str] = set()
+    for folder in folders():
+        for path in sorted(folder.glob(f"*{SUFFIX}")) if folder.is_dir() else ():
+            if path.stem not in seen:
+                seen.add(path.stem)
+                yield _listed(path.stem, str(path), path)
+    for name in names():
+        if name not in seen:
+            seen.add(name)
+            yield _listed(name, "package", None)
+    for point in entry_points(group=GROUP):
+        if point.name not in seen:
+            seen.add(point.name)
+            yield _listed(point.name, f"entry point {point.value}", point)
+
+
+def folders() -> tuple[Path, ...]:
+    """Where profiles of the project and of the user may be, nearest first."""
+    here = Path.cwd()
+    if sys.platform == "win32":
+        user = Path(os.environ.get("APPDATA", Path.home()))
+    else:
+        user = Path(os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config")
+    return (*(folder / FOLDER for folder in (here, *here.parents)), user / "sniff485" / FOLDER)
+
+
+def devices(assigned: Mapping[str, str]) -> Devices:
+    """Profiles by station, from address (or "*") → name. Raises ValueError, UnknownProfile, ProfileError."""
+    by_address: dict[int, Profile] = {}
+    default: Profile | None = None
+    for word, name in assigned.items():
+        profile = find(name)
+        if word.strip() == EVERY:
+            default = profile
+        else:
+            by_address[address(word)] = profile
+    return Devices(by_address, default)
+
+
+def address(word: str) -> int:
+    """A station's address, decimal or 0x…. Raises ValueError."""
+    try:
+        number = int(word, 0)
+    except ValueError:
+        number = -1
+    if not 0 <= number <= 255:
+        raise ValueError(f"device {word!r}: expected an address 0 … 255, or * for every station")
+    return number
+
+
+def _listed(name: str, origin: str, where: Path | EntryPoint | None) -> Listed:
+    try:
+        if where is None:
+            return Listed(name, origin, packaged(name))
+        return Listed(name, origin, read(where) if isinstance(where, Path) else _plugged(where))
+    except ProfileError as error:
+        return Listed(name, origin, None, str(error))
+
+
+def _plugged(point: EntryPoint) -> Profile:
+    try:
+        found = point.load()
+    except Exception as error:  # somebody else's package
+        raise ProfileError(f"entry point {point.value}: {error}") from None
+    if isinstance(found, str) and "\n" in found:
+        return parse_text(found, point.value)
+    if isinstance(found, str | Path):
+        return read(Path(found))
+    raise ProfileError(f"entry point {point.value}: {found!r} is neither a text nor a path")
