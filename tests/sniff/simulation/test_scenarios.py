@@ -15,6 +15,18 @@ from dissectors.tracker import Transaction, Verdict
 from sniff.engine import Engine, Row
 from sniff.session import Session
 from sniff.simulation import scenarios
+from sniff.simulation.faults import (
+    BitFlips,
+    Break,
+    CutShort,
+    DuplicateAddress,
+    EarlyRelease,
+    Echo,
+    LateResponse,
+    LostResponse,
+    MarkParity,
+    NoiseInGaps,
+)
 from sniff.simulation.scenarios import Scenario, UnknownScenario, bursts, scenario, simulate
 from sniff.simulation.tap import EXACT, FTDI, FTDI_LOW_LATENCY, OCTETS, UART, TapModel
 from sniff.simulation.wire import Sent
@@ -80,6 +92,34 @@ def test_with_faults_the_good_frames_are_those_that_arrived_intact(name: str, ta
     strange = found - Counter(readings(plan, [one.octets for one in sent]))
     assert not strange, "a good frame that nobody sent"
     assert (meant - found).total() <= meant.total() // 200
+    octets = b"".join(row.event.octets for row in rows)
+    assert octets == b"".join(burst.octets for burst in bursts(plan, seconds))
+
+
+HARSH = (
+    BitFlips(2e-3),
+    MarkParity(1e-3),
+    EarlyRelease(0.05),
+    CutShort(0.03),
+    LostResponse(0.03),
+    LateResponse(0.03, 320_000_000),
+    DuplicateAddress("drive 2", 12_000_000, 0.05),
+    Echo(("drive 1",), rate=0.05),
+    NoiseInGaps(0.15),
+    Break(0.02),
+)
+
+
+@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("name", NAMES)
+def test_on_a_terrible_bus_nothing_is_made_up_and_hardly_anything_missed(name: str, seed: int) -> None:
+    plan = replace(scenario(name, seed), faults=HARSH)
+    seconds = 2 * QUICK.get(name, 15)
+    sent = truth(plan, seconds)
+    rows, _ = sniff(plan, seconds, replace(FTDI_LOW_LATENCY, cut=0.1, jitter=3_000_000))
+    found, meant = Counter(good(rows)), Counter(intact(sent, parties(plan)))
+    assert not found - Counter(readings(plan, [one.octets for one in sent])), "a good frame that nobody sent"
+    assert (meant - found).total() <= meant.total() // 50
     octets = b"".join(row.event.octets for row in rows)
     assert octets == b"".join(burst.octets for burst in bursts(plan, seconds))
 
