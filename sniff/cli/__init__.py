@@ -25,6 +25,8 @@ COMMANDS: dict[str, str] = {
     "check": "what is wrong with a bus, where, and what to do next: findings with evidence",
     "rule": "explain the rules behind the findings of check, or list them",
     "convert": "one capture format into another, by suffix",
+    "replay": "plays a capture to a pseudo-terminal or a TCP port of this machine",
+    "snapshot": "writes or compares the expectations of captures that are tests",
     "config": "where the configured buses and their values come from",
     "demo": "a virtual RS-485 bus with simulated drives, through the real capture path",
 }

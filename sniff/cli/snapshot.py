@@ -1,0 +1,46 @@
+"""Writes, or with --check compares, FILE.expect.txt beside each capture: frames, transactions, findings. The pytest
+plugin does the same: `pytest --sniff-update`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from sniff.cli import UNREADABLE, Failure, arguments
+from sniff.formats import CaptureError
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Options of `snapshot`."""
+    parser.add_argument("files", nargs="+", metavar="FILE", help="capture")
+    parser.add_argument("--check", action="store_true", help="write nothing; exit code 1 and a diff where one differs")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write or compare expectations."""
+    from sniff.testing import expectation_path, read_capture, render
+    from sniff.testing.expectation import difference
+
+    differing = 0
+    for name in args.files:
+        arguments.open_capture(name)
+        path = Path(name)
+        place = expectation_path(path)
+        found = render(read_capture(path))
+        try:
+            expected = place.read_text(encoding="utf-8") if place.exists() else ""
+            if not args.check and expected != found:
+                place.write_text(found, encoding="utf-8")
+                print(f"{place}: written")
+        except OSError as error:
+            raise Failure(f"{place}: {error.strerror}", UNREADABLE) from None
+        except CaptureError as error:
+            raise Failure(str(error), UNREADABLE) from None
+        if args.check and expected != found:
+            differing += 1
+            print(difference(expected, found, place.name) if expected else f"{place}: no expectation")
+    if differing:
+        print(f"sniff485: {differing} of {len(args.files)} captures differ", file=sys.stderr)
+    return 1 if differing else 0

@@ -1,0 +1,80 @@
+"""One capture read whole: what a test asks about it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from dissectors.frame import Frame
+from dissectors.registry import Dissector
+from dissectors.tracker import Transaction
+from sniff.analysis.summary import Summary
+from sniff.engine import Output, Row
+from sniff.formats import read
+from sniff.reading import Settled, dissector_for, outputs
+from sniff.session import Completeness, LineEvent, Session
+
+
+@dataclass(frozen=True, slots=True)
+class CaptureReading:
+    """Everything that this program finds in a capture.
+
+    `rows`: frames and noise in the order of the wire, each with its transaction. `transactions`: in the order of
+    closing. `nodes`, `counts`: statistics. `findings`, `points`: as `check` and `points` give them.
+    """
+
+    path: Path
+    session: Session
+    dissector: Dissector
+    rows: tuple[Settled, ...]
+    transactions: tuple[Transaction, ...]
+    line_events: tuple[LineEvent, ...]
+    counts: Summary
+    completeness: Completeness
+    findings: tuple[Any, ...] = ()
+
+    @property
+    def frames(self) -> tuple[Row, ...]:
+        """Frames without the noise."""
+        return tuple(item.row for item in self.rows if isinstance(item.row.event, Frame))
+
+    @property
+    def nodes(self) -> dict[int, Any]:
+        """Stations by address (`sniff.analysis.nodes.Node`)."""
+        return {node.address: node for node in self.counts.nodes.present()}
+
+
+def read_capture(path: str | Path) -> CaptureReading:
+    """Read a capture whole. Raises CaptureError, UnknownProtocol."""
+    from sniff.analysis.judging import Judging
+
+    place = Path(path)
+    capture = read(place)
+    session = capture.session
+    dissector = dissector_for(session)
+    counts = Summary(session.line)
+    judge = Judging(session, dissector)
+    rows: list[Row] = []
+    closed: dict[int, Transaction] = {}
+    events: list[LineEvent] = []
+    for output in outputs(capture.items(), session):
+        if not isinstance(output, Output):
+            events.append(output)
+            judge.add_line_event(output)
+            continue
+        counts.add(output)
+        judge.add(output)
+        rows.extend(output.rows)
+        closed.update((transaction.id, transaction) for transaction in output.transactions)
+    return CaptureReading(
+        path=place,
+        session=session,
+        dissector=dissector,
+        rows=tuple(Settled(row, closed.get(row.placement.tx) if row.placement is not None else None) for row in rows),
+        transactions=tuple(closed.values()),
+        line_events=tuple(events),
+        counts=counts,
+        completeness=capture.completeness(),
+        findings=tuple(judge.findings()),
+    )
