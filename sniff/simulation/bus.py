@@ -152,7 +152,10 @@ class VirtualBus:
         self._ask("switch", tuple(faults))
 
     def truth(self) -> list[Sent]:
-        """What was transmitted since the last call, and what became of it; ns on the host's monotonic clock."""
+        """What was transmitted since the last call (at most 200 000), and what became of it.
+
+        Times are ns on the host's monotonic clock.
+        """
         truths: list[Sent] = self._ask("truth")
         return truths
 

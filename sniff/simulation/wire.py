@@ -163,8 +163,8 @@ class Wire:
                 station = self._parties[index].station
                 self._answer(index, station.wake(time))
                 again = station.next_wake()
-                # A station that asks for a time already past is woken once more at the next nanosecond, not for ever.
-                self._wakes[index] = again if again is None or again > time else time + 1
+                # One that asks for a time already past has had its call; it is woken again, but the line goes on.
+                self._wakes[index] = again if again is None or again > time else time + self.line.char
         while self._coming and self._coming[0][0] <= time:
             bursts.extend(self._begin(heappop(self._coming)[2]))
         return bursts
