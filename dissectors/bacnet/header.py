@@ -101,7 +101,8 @@ def _apdu(data: bytes, at: int, frame_type: int, role: Role, kind: str) -> tuple
     if at >= size:
         return kind, role, None, "no APDU"
     first = data[at]
-    pdu, segmented = first >> 4, first & 8
+    pdu = first >> 4
+    segmented = pdu in (0, 3) and bool(first & 8)
     if pdu == 0:
         service_at = at + (5 if segmented else 3)
     elif pdu == 3:

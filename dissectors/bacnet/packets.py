@@ -92,6 +92,10 @@ class MSTP(Packet):
                 return s[:HEADER] + data + s[total(length) :]
         return s
 
+    def post_dissect(self, s: bytes) -> bytes:
+        self.raw_packet_cache = None  # the octets of this layer are not contiguous: it is always built anew
+        return s
+
     def post_build(self, pkt: bytes, pay: bytes) -> bytes:
         pad = self.pad or b""
         body = pay[: len(pay) - len(pad)] if pad else pay
@@ -510,6 +514,8 @@ def parameters(pdu_type: int, service: int, values: Mapping[str, Any]) -> Parame
 
 def dissect(octets: bytes) -> Packet:
     """The packet of a frame's octets; total: what does not parse is kept as octets."""
+    if not octets:
+        return Raw(octets)
     try:
         if _is_whole(octets):
             packet = MSTP(octets)

@@ -68,7 +68,10 @@ class Reassembler:
             return None
         place = (key, apdu.type)
         gathering = self._open.get(place)
-        if gathering is None or (apdu.sequence == 0 and gathering.newest < 128):  # 0 again: it is sent anew
+        anew = gathering is not None and apdu.sequence == 0 and gathering.newest < 128
+        if gathering is None or (
+            anew and gathering.pieces.get(0) != message.parameters
+        ):  # not a repeat: another message
             gathering = self._open[place] = _Open(apdu)
         self._open.move_to_end(place)
         while len(self._open) > OPEN_MAX:
