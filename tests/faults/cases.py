@@ -1,0 +1,262 @@
+"""The matrix: what is wrong with each bus, and what a technician should be told. Data."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
+from functools import partial
+from random import Random
+
+from dissectors.frame import Chunk, LineError, Mark, Place
+from dissectors.line import LineSettings
+from dissectors.modbus.simulated_master import read_holding, write_register
+from sniff.session import Item, LineEvent, LineEventKind, Session
+from sniff.simulation.faults import (
+    BitFlips,
+    Break,
+    CutShort,
+    DuplicateAddress,
+    EarlyRelease,
+    Echo,
+    LateResponse,
+    LostResponse,
+    MarkParity,
+    NoiseInGaps,
+)
+from sniff.simulation.line_mix import low_times, receive
+from sniff.simulation.scenarios import Scenario, simulate
+from sniff.simulation.tap import CH340, EXACT, FTDI, FTDI_LOW_LATENCY, OCTETS, UART, TapModel
+from tests.faults.buses import modbus, mstp, n2
+from tests.faults.stations import AnswersAs, AnswersBroadcasts, Dies, Drifts, Ignores, Of, Pauses
+
+MS = 1_000_000
+S = 1_000_000_000
+
+Heard = tuple[Session, Iterable[Item]]
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """One fault. `make(seed=…)`: the bus. `expect`: code and subject that must be found, all of them.
+
+    `hear`: what the sniffer gets of the bus, `simulate` unless the fault is in the sniffer itself.
+    """
+
+    name: str
+    make: Callable[..., Scenario]
+    expect: tuple[tuple[str, str], ...]
+    tap: TapModel = EXACT
+    seconds: float = 60
+    hear: Callable[[Scenario, float, TapModel], Heard] = simulate
+
+    @property
+    def about(self) -> frozenset[str]:
+        """Subjects that may be named at warning or above: those struck, and what they share."""
+        return frozenset(("bus", "master", "adapter", *(subject for _, subject in self.expect)))
+
+
+def clean_cases(seconds: float) -> Iterator[Case]:
+    """Nothing is wrong: nothing may be found at warning or above."""
+    buses = {"RTU": modbus, "ASCII": partial(modbus, is_ascii=True), "N2": n2, "MS/TP": mstp}
+    for protocol, make in buses.items():
+        for tap in (EXACT, OCTETS, FTDI, FTDI_LOW_LATENCY, UART, CH340):
+            yield Case(f"{protocol} clean, {tap.name}", make, (), tap, seconds)
+
+
+# ---- what goes wrong in the sniffer
+
+
+def _other_settings(settings: str, plan: Scenario, seconds: float, tap: TapModel) -> Heard:
+    """The same line heard by a UART with other settings, bit by bit."""
+    session, _ = simulate(plan, seconds, tap)
+    other = LineSettings.parse(settings)
+
+    def items() -> Iterator[Item]:
+        for burst in plan.wire().run(int(seconds * S)):
+            if burst.octets:
+                received = receive(other, low_times(plan.line, burst.start, burst.octets, {}))
+                if received.octets:
+                    yield Chunk(max(received.ends), received.octets, received.marks)
+
+    return replace(session, line=other), items()
+
+
+def _swapped(plan: Scenario, seconds: float, tap: TapModel) -> Heard:
+    """A and B swapped: what was low is high; the silence between frames reads as a break."""
+    session, _ = simulate(plan, seconds, tap)
+
+    def items() -> Iterator[Item]:
+        silent_since = 0
+        for burst in plan.wire().run(int(seconds * S)):
+            if not burst.octets:
+                continue
+            lows = sorted(low_times(plan.line, burst.start, burst.octets, {}))
+            inverted, at = [], silent_since
+            for begin, end in lows:
+                if begin > at:
+                    inverted.append((at, begin))
+                at = max(at, end)
+            silent_since = at
+            received = receive(plan.line, inverted)
+            if received.octets:
+                yield Chunk(max(received.ends), received.octets, received.marks)
+
+    return session, items()
+
+
+def _losing(plan: Scenario, seconds: float, tap: TapModel) -> Heard:
+    """A computer that loses a read now and then, and says so."""
+    session, items = simulate(plan, seconds, tap)
+    dice = Random(plan.seed)
+
+    def some() -> Iterator[Item]:
+        for item in items:
+            if isinstance(item, Chunk) and dice.random() < 0.01:
+                yield LineEvent(item.time, LineEventKind.DROPPED, "", len(item.octets))
+            else:
+                yield item
+
+    return session, some()
+
+
+def _overrunning(plan: Scenario, seconds: float, tap: TapModel) -> Heard:
+    """An adapter that loses octets inside a read, and marks the place."""
+    session, items = simulate(plan, seconds, tap)
+    dice = Random(plan.seed)
+
+    def some() -> Iterator[Item]:
+        for item in items:
+            if isinstance(item, Chunk) and len(item.octets) > 4 and dice.random() < 0.02:
+                yield Chunk(item.time, item.octets[:2] + item.octets[4:], (Mark(2, LineError.OVERRUN),))
+            else:
+                yield item
+
+    return session, some()
+
+
+def _silent(plan: Scenario, seconds: float, tap: TapModel) -> Heard:
+    session, _ = simulate(plan, seconds, tap)
+    return session, ()
+
+
+# ---- the table
+
+_ascii = partial(modbus, is_ascii=True)
+_wrong_place = {2: partial(AnswersAs, unit=7)}
+_short_answers = {2: partial(AnswersAs, drop=2)}
+
+CASES: tuple[Case, ...] = (
+    # Modbus RTU: who fails
+    Case("RTU station absent", partial(modbus, absent=(4,)), (("MB001", "station 4"), ("MB105", "bus"))),
+    Case("RTU station with wrong address", partial(modbus, absent=(3,), units=(1, 2, 7)), (("MB001", "station 3"),)),
+    Case("RTU answers lost", partial(modbus, (LostResponse(0.08, ("unit 2",)),)), (("MB002", "station 2"),)),
+    Case("RTU repeats cost time", partial(modbus, (LostResponse(0.25, ("unit 2",)),)), (("MB104", "station 2"),)),
+    Case("RTU station dies", partial(modbus, change={2: partial(Dies, at=30 * S)}), (("MB003", "station 2"),)),
+    Case(
+        "RTU station away for a while",
+        partial(modbus, change={2: partial(Dies, at=20 * S, until=26 * S)}),
+        (("MB002", "station 2"),),
+    ),
+    Case("RTU function ignored", partial(modbus, change={2: partial(Ignores, function=4)}), (("MB004", "station 2"),)),
+    Case("RTU exception 2", partial(modbus, extra=(read_holding(1, 100, 2),)), (("MB008", "station 1"),)),
+    Case("RTU exception 1", partial(modbus, extra=(b"\x03\x14\x07\x06\0\1\0\0\0\1",)), (("MB008", "station 3"),)),
+    Case("RTU answers do not fit", partial(modbus, change=_short_answers), (("MB010", "station 2"),)),
+    # Modbus RTU: damage
+    Case("RTU bit errors of one station", partial(modbus, (BitFlips(6e-3, ("unit 2",)),)), (("MB005", "station 2"),)),
+    Case("RTU bit errors everywhere", partial(modbus, (BitFlips(4e-3),)), (("MB007", "bus"),)),
+    Case("RTU bit errors of the master", partial(modbus, (BitFlips(8e-3, ("master",)),)), (("MB009", "master"),)),
+    Case("RTU early release", partial(modbus, (EarlyRelease(0.3, ("unit 3",)),)), (("MB006", "station 3"),)),
+    Case("RTU answers cut short", partial(modbus, (CutShort(0.1, ("unit 3",)),)), (("MB005", "station 3"),)),
+    Case("RTU parity errors", partial(modbus, (MarkParity(0.01, ("unit 2",)),)), (("LN101", "station 2"),)),
+    Case("RTU breaks", partial(modbus, (Break(0.02),)), (("LN103", "bus"),)),
+    Case(
+        "RTU noise before a station",
+        partial(modbus, (Of("unit 2", NoiseInGaps(0.1, places=(Place.BEFORE,))),)),
+        (("LN201", "station 2"),),
+    ),
+    Case(
+        "RTU noise after a station",
+        partial(modbus, (Of("unit 2", NoiseInGaps(0.1, places=(Place.AFTER,), values=b"\xff\xfe\xf8")),)),
+        (("LN202", "station 2"),),
+    ),
+    Case(
+        "RTU noise in silence",
+        partial(modbus, (NoiseInGaps(0.04, places=(Place.BETWEEN,), spread=12),)),
+        (("LN203", "bus"),),
+    ),
+    # Modbus RTU: time
+    Case("RTU slow station", partial(modbus, delays={3: 160 * MS}), (("MB101", "station 3"),)),
+    Case(
+        "RTU drifting station",
+        partial(modbus, change={3: partial(Drifts, per_second=MS // 2)}),
+        (("MB102", "station 3"),),
+        seconds=120,
+    ),
+    Case("RTU late answers", partial(modbus, (LateResponse(0.06, 230 * MS, ("unit 1",)),)), (("MB103", "station 1"),)),
+    Case("RTU too quick", partial(modbus, delays={2: MS // 2}), (("MB301", "station 2"),)),
+    Case(
+        "RTU pauses inside frames",
+        partial(modbus, (Of("unit 2", Pauses(0.1, 1_500_000)),)),
+        (("MB302", "station 2"),),
+    ),
+    # Modbus RTU: addresses and masters
+    Case("RTU answered twice", partial(modbus, (DuplicateAddress("unit 2", 19 * MS),)), (("MB201", "station 2"),)),
+    Case("RTU two stations collide", partial(modbus, (DuplicateAddress("unit 2", 3 * MS),)), (("MB202", "station 2"),)),
+    Case("RTU two masters", partial(modbus, second_master=True), (("MB203", "bus"),)),
+    Case(
+        "RTU answer to a broadcast",
+        partial(modbus, extra=(write_register(0, 3, 7),), change={2: partial(AnswersBroadcasts, unit=2)}),
+        (("MB204", "bus"),),
+    ),
+    Case(
+        "RTU answer to a broadcast, as 0",
+        partial(modbus, extra=(write_register(0, 3, 7),), change={2: partial(AnswersBroadcasts, unit=0)}),
+        (("MB204", "bus"),),
+    ),
+    Case("RTU address 250", partial(modbus, units=(1, 2, 250)), (("MB205", "station 250"),)),
+    Case("RTU answers as another", partial(modbus, change=_wrong_place), (("MB206", "station 2"),)),
+    Case("RTU echo", partial(modbus, (Echo(("master",), after=200_000),)), (("LN205", "bus"),)),
+    # the sniffer and its settings
+    Case("wrong baud rate", modbus, (("LN003", "bus"),), hear=partial(_other_settings, "9600,8E1")),
+    Case("wrong baud rate, too high", modbus, (("LN003", "bus"),), hear=partial(_other_settings, "38400,8E1")),
+    Case("wrong parity", modbus, (("LN004", "bus"),), hear=partial(_other_settings, "19200,8O1")),
+    Case("A and B swapped", modbus, (("LN003", "bus"),), hear=_swapped),
+    Case("octets lost by the computer", modbus, (("LN005", "adapter"),), hear=_losing),
+    Case("octets lost in the adapter", modbus, (("LN104", "adapter"),), hear=_overrunning),
+    Case("adapter unplugged", modbus, (("LN006", "adapter"),), replace(EXACT, unplugged=((20 * S, 22 * S),))),
+    Case("silent bus", modbus, (("LN002", "bus"),), hear=_silent),
+    # through a USB adapter that holds octets back for 16 ms
+    Case("FTDI station absent", partial(modbus, absent=(4,)), (("MB001", "station 4"),), FTDI),
+    Case("FTDI answers lost", partial(modbus, (LostResponse(0.08, ("unit 2",)),)), (("MB002", "station 2"),), FTDI),
+    Case(
+        "FTDI bit errors of one station",
+        partial(modbus, (BitFlips(6e-3, ("unit 2",)),)),
+        (("MB005", "station 2"),),
+        FTDI,
+    ),
+    Case("FTDI slow station", partial(modbus, delays={3: 175 * MS}), (("MB101", "station 3"),), FTDI),
+    Case(
+        "FTDI answered twice", partial(modbus, (DuplicateAddress("unit 2", 19 * MS),)), (("MB201", "station 2"),), FTDI
+    ),
+    Case("FTDI exception 2", partial(modbus, extra=(read_holding(1, 100, 2),)), (("MB008", "station 1"),), FTDI),
+    # Modbus ASCII
+    Case("ASCII station absent", partial(_ascii, absent=(4,)), (("MB001", "station 4"),)),
+    Case("ASCII answers lost", partial(_ascii, (LostResponse(0.08, ("unit 2",)),)), (("MB002", "station 2"),)),
+    Case("ASCII bit errors of one station", partial(_ascii, (BitFlips(4e-3, ("unit 2",)),)), (("MB005", "station 2"),)),
+    Case("ASCII exception 2", partial(_ascii, extra=(read_holding(1, 100, 2),)), (("MB008", "station 1"),)),
+    Case("ASCII answered twice", partial(_ascii, (DuplicateAddress("unit 2", 45 * MS),)), (("MB201", "station 2"),)),
+    # Metasys N2
+    Case("N2 station absent", partial(n2, absent=True), (("N2005", "station 3"),)),
+    Case("N2 answers lost", partial(n2, (LostResponse(0.08, ("drive 2",)),)), (("N2005", "station 2"),)),
+    Case("N2 bit errors of one station", partial(n2, (BitFlips(8e-3, ("drive 2",)),)), (("N2004", "station 2"),)),
+    Case("N2 no such point", partial(n2, no_such_point=True), (("N2002", "station 1"),)),
+    Case("N2 answered twice", partial(n2, (DuplicateAddress("drive 2", 40 * MS),)), (("N2008", "station 2"),)),
+    Case("N2 two masters", partial(n2, second_master=True), (("N2007", "bus"),)),
+    # BACnet MS/TP
+    Case("MS/TP lost token", partial(mstp, node_faults={9: {"loses_token_every": 400}}), (("MS101", "MAC 9"),)),
+    Case("MS/TP slow to use the token", partial(mstp, node_faults={5: {"use_delay": 18 * MS}}), (("MS103", "MAC 5"),)),
+    Case("MS/TP silent drive", partial(mstp, node_faults={9: {"silent": True}}), (("MS301", "MAC 9"),)),
+    Case("MS/TP damaged frames of one", partial(mstp, node_faults={5: {"damages_every": 40}}), (("MS401", "bus"),)),
+    Case("MS/TP bit errors everywhere", partial(mstp, (BitFlips(3e-4),)), (("MS401", "bus"),)),
+    Case("MS/TP postponed replies", partial(mstp, node_faults={9: {"postpones": True}}), (("MS303", "MAC 9"),)),
+)
