@@ -45,6 +45,23 @@ class McapWriter:
         self._file = file
         self._batcher = Batcher()
         self._part = PartFile(file.stream, session)
+        self._sequences: dict[str, int] = {}
+
+    def derived(
+        self,
+        topic: str,
+        schema_name: str,
+        log_time: int,
+        publish_time: int,
+        data: bytes,
+        metadata: Mapping[str, str] | None = None,
+    ) -> None:
+        """Add a result of the engine; arguments as `Recorder.derived` takes them. Raises CaptureError."""
+        if topic in (RAW, LINE):
+            return
+        sequence = self._sequences.get(topic, 0)
+        self._sequences[topic] = (sequence + 1) % (1 << 32)
+        self._part.add(Message(topic, stamp(log_time), stamp(publish_time), sequence, data), schema_name, metadata)
 
     def write(self, item: Item) -> None:
         """Add a chunk or line event. Raises CaptureError."""

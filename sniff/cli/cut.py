@@ -1,0 +1,52 @@
+"""Times: seconds from the start (+12.5) or ISO 8601 (2026-03-01T10:00:12.5Z). Frames: numbers as `show` has them.
+--around takes the code of a finding, as `check` has it, and cuts from its first to its last evidence.
+"""
+
+from __future__ import annotations
+
+import argparse
+
+from sniff.cli import USAGE, Failure, arguments, writing
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Options of `cut`."""
+    parser.add_argument("file", metavar="FILE", help="capture")
+    writing.add_output(parser)
+    arguments.add_line(parser)
+    parser.add_argument("--from", dest="since", metavar="TIME", help="begin here")
+    parser.add_argument("--to", dest="until", metavar="TIME", help="end here")
+    parser.add_argument("--frames", metavar="A-B", help="these frames")
+    parser.add_argument("--around", metavar="CODE", help="around the evidence of a finding")
+    parser.add_argument(
+        "--margin", type=arguments.duration, default=None, metavar="TIME", help="more on both sides (--around: 2s)"
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Cut one stretch out."""
+    from sniff.editing import cutting
+
+    chosen = [bool(args.since or args.until), bool(args.frames), bool(args.around)]
+    if sum(chosen) != 1:
+        raise Failure("say what to keep: --from and --to, or --frames, or --around", USAGE)
+    capture = arguments.open_capture(args.file)
+    session = arguments.settings_of(args, capture.session)
+    try:
+        if args.frames:
+            stretch = cutting.of_frames(capture, session, args.frames)
+        elif args.around:
+            stretch = cutting.around_finding(capture, session, args.around)
+        else:
+            first = cutting.parse_time(args.since, session) if args.since else -cutting.FOREVER
+            last = cutting.parse_time(args.until, session) if args.until else cutting.FOREVER
+            stretch = cutting.Stretch(first, last)
+    except ValueError as error:
+        raise Failure(str(error), USAGE) from None
+    margin = args.margin if args.margin is not None else 2.0 if args.around else 0.0
+    stretch = stretch.widened(int(margin * 1e9))
+    count = writing.write(args, session, cutting.cut(capture.items(), stretch, session.line.char), [args.file])
+    if not count:
+        raise Failure(f"{args.file}: nothing in that stretch; {args.output} is empty", USAGE)
+    writing.say_incomplete(args.file, capture)
+    return 0

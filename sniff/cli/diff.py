@@ -1,0 +1,38 @@
+"""Before and after a repair: stations, answers, times, findings. A time counts as changed when it moved by a tenth and
+by more than both adapters together may have added. Exit code 1 when something differs.
+"""
+
+from __future__ import annotations
+
+import argparse
+
+from sniff.cli import arguments, tables
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Options of `diff`."""
+    parser.add_argument("before", metavar="BEFORE", help="capture")
+    parser.add_argument("after", metavar="AFTER", help="capture")
+    style = parser.add_mutually_exclusive_group()
+    style.add_argument("--json", action="store_const", const="json", dest="style", help="one JSON object a difference")
+    style.add_argument("--csv", action="store_const", const="csv", dest="style", help="comma-separated values")
+    parser.set_defaults(style="text")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Compare two captures."""
+    from sniff.editing.comparing import Side, differences
+    from sniff.testing.capture_reading import read_capture
+
+    sides = []
+    for path in (args.before, args.after):
+        arguments.open_capture(path)
+        reading = read_capture(path)
+        sides.append(Side(path, reading.counts, reading.findings, reading.session.adapter.latency))
+    found = list(differences(*sides))
+    rows = [(one.subject, one.what, one.before, one.after) for one in found]
+    if rows or args.style != "text":
+        tables.write(("subject", "what", "before", "after"), rows, args.style)
+    else:
+        print("no difference worth saying")
+    return 1 if found else 0

@@ -1,0 +1,29 @@
+"""The captures must be of one bus with the same settings: parts of a rotation, or several days."""
+
+from __future__ import annotations
+
+import argparse
+
+from sniff.cli import UNREADABLE, Failure, arguments, writing
+from sniff.formats import CaptureError
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Options of `merge`."""
+    arguments.add_files(parser)
+    writing.add_output(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Merge by time."""
+    from sniff.editing.merging import merged, merged_session
+
+    captures = [arguments.open_capture(path) for path in args.files]
+    try:
+        session = merged_session(captures, args.files)
+    except CaptureError as error:
+        raise Failure(str(error), UNREADABLE) from None
+    writing.write(args, session, merged(captures), args.files)
+    for path, capture in zip(args.files, captures, strict=True):
+        writing.say_incomplete(path, capture)
+    return 0

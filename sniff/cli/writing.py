@@ -1,0 +1,125 @@
+"""Writing a capture, shared by the commands that make one: where to, what it could not keep, progress."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+
+from dissectors.frame import Chunk
+from sniff.cli import UNREADABLE, USAGE, Failure
+from sniff.formats import Capture, CaptureError, create
+from sniff.session import Item, Session
+
+
+def add_output(parser: argparse.ArgumentParser) -> None:
+    """-o and -f."""
+    parser.add_argument("-o", "--output", metavar="OUT", required=True, help="capture to write, by suffix")
+    parser.add_argument("-f", "--force", action="store_true", help="overwrite OUT")
+
+
+def write(
+    args: argparse.Namespace,
+    session: Session,
+    items: Iterable[Item],
+    sources: Sequence[str],
+    options: Mapping[str, str] | None = None,
+    with_frames: bool = False,
+) -> int:
+    """Write items to `args.output`; say on standard error what it holds and what it lost. Gives the octets.
+
+    `with_frames`: with what the engine finds in them, on /frames. Ends with exit code 2 when OUT is there.
+    """
+    target = Path(args.output)
+    if target.exists() and any(name != "-" and Path(name).samefile(target) for name in sources):
+        raise Failure(f"{target}: is a capture to read; name another file", USAGE)
+    if target.exists() and not args.force and not target.is_char_device():
+        raise Failure(f"{target}: exists; add --force to overwrite it", USAGE)
+    chunks = octets = 0
+    progress = _Progress(target.name)
+    try:
+        with create(target, session, options) as writer:
+            frames = _Frames(writer, session) if with_frames else None
+            for item in items:
+                writer.write(item)
+                if isinstance(item, Chunk):
+                    chunks += 1
+                    octets += len(item.octets)
+                    if frames is not None:
+                        frames.add(item)
+                    progress.show(chunks)
+            if frames is not None:
+                frames.close()
+    except CaptureError as error:
+        raise Failure(str(error), UNREADABLE) from None
+    finally:
+        progress.end()
+    print(f"{target}: {octets} octets in {chunks} reads", file=sys.stderr)
+    for loss in getattr(writer, "losses", ()):
+        print(f"sniff485: {target}: {loss}", file=sys.stderr)
+    return octets
+
+
+def say_incomplete(path: str, capture: Capture) -> None:
+    """Where a capture that was read ends too early."""
+    complete = capture.completeness()
+    if not complete.whole:
+        print(f"sniff485: {path}: {complete.text}", file=sys.stderr)
+
+
+class _Frames:
+    """Runs the engine beside the writing; its results go to /frames."""
+
+    AT_ONCE = 1000
+
+    def __init__(self, writer: object, session: Session) -> None:
+        from sniff.reading import engine_for
+        from sniff.recording.frames import SCHEMA, FrameLog
+        from sniff.recording.topics import FRAMES
+        from sniff.recording.writer import McapWriter
+
+        assert isinstance(writer, McapWriter)
+        self._writer = writer
+        self._engine = engine_for(session)
+        self._log = FrameLog()
+        self._topic, self._schema = FRAMES, SCHEMA.name
+        self._count = 0
+
+    def add(self, chunk: Chunk) -> None:
+        output = self._engine.feed(chunk)
+        self._log.add(output)
+        self._count += len(output.rows)
+        if self._count >= self.AT_ONCE:
+            self._take()
+
+    def close(self) -> None:
+        self._log.add(self._engine.close())
+        self._take()
+
+    def _take(self) -> None:
+        self._count = 0
+        message = self._log.take()
+        if message is not None:
+            self._writer.derived(self._topic, self._schema, *message)
+
+
+class _Progress:
+    """Says on a terminal, twice a second, how far a long work is."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.next = time.monotonic() + 1
+        self.shown = False
+
+    def show(self, chunks: int) -> None:
+        if chunks % 1024 or not sys.stderr.isatty() or time.monotonic() < self.next:
+            return
+        self.next = time.monotonic() + 0.5
+        self.shown = True
+        print(f"\r{self.name}: {chunks} reads", end="", file=sys.stderr, flush=True)
+
+    def end(self) -> None:
+        if self.shown:
+            print("\r\x1b[K", end="", file=sys.stderr)

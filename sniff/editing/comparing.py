@@ -1,0 +1,98 @@
+"""Two captures of a bus side by side: what is new, what is gone, what is slower. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from dissectors.findings import Finding, Severity
+from dissectors.tracker import Verdict
+from sniff.analysis.nodes import Node
+from sniff.analysis.summary import Summary
+from sniff.analysis.wording import milliseconds
+
+NOTICEABLE = 0.02
+"""A share has changed when it moved by as much; a time when it moved by a tenth and more than the adapters allow."""
+
+COMPARED_VERDICTS = (Verdict.NO_RESPONSE, Verdict.EXCEPTION, Verdict.DAMAGED_ANSWER, Verdict.LATE, Verdict.RETRY)
+
+
+@dataclass(frozen=True, slots=True)
+class Side:
+    """One capture: what was counted and found in it. `latency`: ns that its adapter may hold octets back."""
+
+    name: str
+    counts: Summary
+    findings: tuple[Finding, ...]
+    latency: int
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """One thing that differs. `subject`: "station 3", "bus"; `before`, `after`: in words, with units."""
+
+    subject: str
+    what: str
+    before: str
+    after: str
+
+
+def differences(before: Side, after: Side) -> Iterator[Difference]:
+    """What differs, the bus first, then station by station, then the findings."""
+    yield from _bus(before, after)
+    old = {node.address: node for node in before.counts.nodes.present()}
+    new = {node.address: node for node in after.counts.nodes.present()}
+    doubt = before.latency + after.latency
+    for address in sorted(old.keys() | new.keys()):
+        subject = f"station {address}"
+        if address not in old or address not in new:
+            yield Difference(subject, "presence", _presence(old.get(address)), _presence(new.get(address)))
+        else:
+            yield from _node(subject, old[address], new[address], doubt)
+    yield from _findings(before, after)
+
+
+def _bus(before: Side, after: Side) -> Iterator[Difference]:
+    shares = (
+        ("load", before.counts.load.overall(), after.counts.load.overall()),
+        ("damaged frames", _share(before.counts.damaged, before.counts.frames),
+         _share(after.counts.damaged, after.counts.frames)),
+        ("noise octets", _share(before.counts.noise, before.counts.octets),
+         _share(after.counts.noise, after.counts.octets)),
+    )  # fmt: skip
+    for what, old, new in shares:
+        if abs(old - new) >= NOTICEABLE or (old == 0) != (new == 0):
+            yield Difference("bus", what, f"{old:.1%}", f"{new:.1%}")
+
+
+def _node(subject: str, old: Node, new: Node, doubt: int) -> Iterator[Difference]:
+    for verdict in COMPARED_VERDICTS:
+        was, now = _share(old.verdicts[verdict], old.asked), _share(new.verdicts[verdict], new.asked)
+        if abs(was - now) >= NOTICEABLE or (was == 0) != (now == 0):
+            yield Difference(subject, verdict.value, f"{was:.1%} of {old.asked}", f"{now:.1%} of {new.asked}")
+    for name, share in (("response p50", 0.5), ("response p95", 0.95)):
+        was_time, now_time = old.latency.quantile(share), new.latency.quantile(share)
+        if was_time is None or now_time is None:
+            continue
+        if abs(was_time - now_time) > max(doubt, was_time // 10):
+            yield Difference(subject, name, milliseconds(was_time), milliseconds(now_time))
+    for kind in sorted(old.kinds.keys() ^ new.kinds.keys()):
+        yield Difference(subject, kind, f"{old.kinds[kind]} times", f"{new.kinds[kind]} times")
+
+
+def _findings(before: Side, after: Side) -> Iterator[Difference]:
+    old = {(finding.code, finding.subject): finding for finding in before.findings}
+    new = {(finding.code, finding.subject): finding for finding in after.findings}
+    for key in sorted(old.keys() ^ new.keys()):
+        found = old.get(key) or new[key]
+        if found.severity >= Severity.NOTE:
+            gone, came = (found.seen, "not found") if key in old else ("not found", found.seen)
+            yield Difference(found.subject, found.code, gone, came)
+
+
+def _presence(node: Node | None) -> str:
+    return "absent" if node is None else f"{node.sent} frames from it, {node.asked} requests to it"
+
+
+def _share(part: int, whole: int) -> float:
+    return part / whole if whole else 0.0

@@ -1,0 +1,29 @@
+"""Several captures of one bus as one: the parts of a rotation, or of several days."""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+from sniff.formats import Capture, CaptureError
+from sniff.session import Item, Session
+
+
+def merged_session(captures: Sequence[Capture], names: Sequence[str]) -> Session:
+    """The session of all together: the earliest start, the worst adapter. Raises CaptureError where they differ."""
+    first = captures[0].session
+    for capture, name in zip(captures[1:], names[1:], strict=True):
+        other = capture.session
+        if (other.protocol, other.line) != (first.protocol, first.line):
+            raise CaptureError(
+                f"{name}: {other.protocol} {other.line}, but {names[0]} is {first.protocol} {first.line}; "
+                "captures of one bus with the same settings can be merged"
+            )
+    worst = max((capture.session.adapter for capture in captures), key=lambda adapter: adapter.latency)
+    return replace(first, started=min(capture.session.started for capture in captures), adapter=worst)
+
+
+def merged(captures: Sequence[Capture]) -> Iterator[Item]:
+    """The items of all in order of time."""
+    return heapq.merge(*(capture.items() for capture in captures), key=lambda item: item.time)
