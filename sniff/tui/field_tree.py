@@ -15,7 +15,7 @@ from textual.strip import Strip
 
 from sniff.tui.spans import Field
 
-FOLDED = (("frame",), ("transaction",), ("noise",))
+FOLDED = (("frame",), ("transaction",))
 """What is known besides the packet begins folded: its first line says the most."""
 
 Path = tuple[str, ...]

@@ -26,7 +26,7 @@ COLUMNS = (
 WIDE = 110
 """From this width on the verdict is written in full."""
 
-FOUND_LETTERS = {Found.LENGTH: "l", Found.SPLIT: "s", Found.JOINED: "j"}
+FOUND_LETTERS = {Found.SPLIT: "s", Found.JOINED: "j"}
 
 
 def mark_letter(error: LineError) -> str:

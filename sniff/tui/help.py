@@ -23,7 +23,7 @@ LEGEND: tuple[tuple[str, str], ...] = (
     ("P F B O", "line error on an octet: parity, framing, break, overrun"),
     ("E", "parity or framing error, the driver did not say which"),
     ("n", "noise directly before the frame"),
-    ("l s j", "frame found by its length, split out of a run, joined over a silence"),
+    ("s j", "frame split out of a run of octets, joined over a silence"),
     ("38 (−0/+16)", "a time in ms: in truth up to 0 less or 16 more, as far as the adapter tells"),
 )
 

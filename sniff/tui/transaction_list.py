@@ -19,8 +19,8 @@ COLUMNS = (
     Column("verdict", "verdict", 12),
     Column("latency", "latency ms", 14, right=True),
     Column("attempt", "try", 3, right=True),
-    Column("request", "request", 8, right=True, needs=96),
-    Column("response", "response", 8, right=True, needs=96),
+    Column("request", "request", 8, right=True, needs=128),
+    Column("response", "response", 8, right=True, needs=128),
 )
 WIDE = 110
 
@@ -63,7 +63,7 @@ class TransactionList(LineList):
             "tx": Cell(str(transaction.id), "dim"),
             "time": Cell(self._time(transaction, line)),
             "station": Cell("" if transaction.station is None else str(transaction.station)),
-            "kind": Cell(self._kind(transaction)),
+            "kind": Cell(self._what(transaction)),
             "verdict": verdict_cell(transaction, width, attempts=False),
             "latency": latency_cell(transaction.latency),
             "attempt": Cell(str(transaction.attempt), "doubt" if transaction.attempt > 1 else "dim"),
@@ -71,13 +71,15 @@ class TransactionList(LineList):
             "response": Cell("–" if transaction.response is None else str(transaction.response), "dim"),
         }
 
-    @staticmethod
-    def _kind(transaction: Transaction) -> str:
-        parts = [plain(transaction.kind)]
-        if transaction.error:
-            parts.append(plain(transaction.error))
+    def _what(self, transaction: Transaction) -> str:
+        """What its frames say; its kind where they are no longer in memory."""
+        rows = [self.store.by_no(no) for no in (transaction.request, transaction.response) if no is not None]
+        parts = [plain(self.store.text(row)) for row in rows if row is not None] or [plain(transaction.kind)]
+        error = plain(transaction.error or "")
+        if error and not any(error in part for part in parts):
+            parts.append(error)
         if transaction.of is not None and transaction.verdict in (Verdict.LATE, Verdict.ECHO, Verdict.ANSWERED_TWICE):
-            parts.append(f"of tx {transaction.of}")
+            parts.insert(0, f"of tx {transaction.of}")
         return " · ".join(parts)
 
     def _time(self, transaction: Transaction, line: int) -> str:

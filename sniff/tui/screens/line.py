@@ -172,17 +172,24 @@ def _table(parts: list[Part]) -> Table:
     return table
 
 
+class Page(VerticalScroll, can_focus=True, inherit_bindings=False):
+    """Scrolls with the keys of the lists."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("up,k", "scroll_up", "line up", show=False),
+        Binding("down,j", "scroll_down", "line down", show=False),
+        Binding("pageup", "page_up", "page up", show=False),
+        Binding("pagedown", "page_down", "page down", show=False),
+        Binding("home,g", "scroll_home", "first line", show=False),
+        Binding("end,G", "scroll_end", "last line", show=False),
+    ]
+
+
 class LineScreen(ViewScreen):
     """One scrolling page."""
 
     TITLE = "Line"
     CSS_PATH = "line.tcss"
-    BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("up,k", "scroll_page('up')", "up", show=False),
-        Binding("down,j", "scroll_page('down')", "down", show=False),
-        Binding("home,g", "scroll_page('home')", "first line", show=False),
-        Binding("end,G", "scroll_page('end')", "last line", show=False),
-    ]
 
     def __init__(self) -> None:
         super().__init__()
@@ -190,13 +197,13 @@ class LineScreen(ViewScreen):
 
     def compose_view(self) -> ComposeResult:
         """The sections."""
-        with VerticalScroll(id="main"):
+        with Page(id="main"):
             for name in ("settings", "errors", "load", "gaps", "events"):
                 yield Static(id=name)
 
     def draw(self) -> None:
         """Bring the page up to date, unless frozen."""
-        page = self.query_one("#main", VerticalScroll)
+        page = self.query_one(Page)
         width = page.scrollable_content_region.width - LABEL - 4
         state = (self.store.version, width)
         if self._drawn == state or (self.viewing.frozen and self._drawn and self._drawn[1] == width) or width < 1:
@@ -216,7 +223,3 @@ class LineScreen(ViewScreen):
     def on_resize(self) -> None:
         """Charts take the new width."""
         self.call_after_refresh(self.draw)
-
-    def action_scroll_page(self, where: str) -> None:
-        """Scroll the page."""
-        getattr(self.query_one("#main", VerticalScroll), f"scroll_{where}")(animate=False)

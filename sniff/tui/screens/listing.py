@@ -17,6 +17,8 @@ from sniff.tui.screens.base import ViewScreen
 SLICE_SECONDS = 0.012
 """How long one piece of searching may take: short enough that a key never waits for it."""
 SLICE_ROWS = 128
+DATA_ONLY = "!(role in {token, poll})"
+"""On an idle MS/TP ring more than nine rows of ten are tokens."""
 
 
 class ListingScreen(ViewScreen):
@@ -27,6 +29,7 @@ class ListingScreen(ViewScreen):
         Binding("slash", "filter", "filter", tooltip="filter: show only what an expression accepts"),
         Binding("f", "app.follow", "follow", tooltip="follow the newest row, or stay"),
         Binding("t", "app.time", "time", tooltip="time of day, since the first row, or since the row before"),
+        Binding("d", "data", "data", tooltip="data only: hide tokens and polls, or show them again", show=False),
         Binding("escape", "leave", "clear", tooltip="back to the list; there: remove the filter", show=False),
         Binding("e", "error(1)", "error", tooltip="next error"),
         Binding("E", "error(-1)", "error", tooltip="error before"),
@@ -110,6 +113,10 @@ class ListingScreen(ViewScreen):
         """Ask for a filter."""
         hint = 'addr == 3 && verdict == no-response      kind contains "write"'
         self.query_one(Prompt).ask("filter", self.viewing.filter, hint, self._wrong, FIELDS)
+
+    def action_data(self) -> None:
+        """Hide what only keeps a token-passing bus going, or show it again."""
+        self.app.filter("" if self.viewing.filter == DATA_ONLY else DATA_ONLY)
 
     def _wrong(self, text: str) -> str:
         try:

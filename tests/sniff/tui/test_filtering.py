@@ -6,7 +6,9 @@ from typing import Any
 
 import pytest
 
-from dissectors.tracker import Verdict
+from dissectors.frame import Role
+from dissectors.tracker import Transaction, Verdict
+from sniff.engine import Output
 from sniff.tui.prompt import Prompt
 from sniff.tui.viewing import Viewing
 
@@ -133,9 +135,6 @@ def test_a_verdict_that_comes_later_brings_its_rows(look: Any, make_bus: Any) ->
         await filter_by(see, "verdict == no-response")
         assert shown(see) == []
         request = bus.store.by_no(3)
-        from dissectors.tracker import Transaction
-        from sniff.engine import Output
-
         closed = Transaction(2, 1, "read", 3, None, Verdict.NO_RESPONSE, request.event.start, request.event.end)
         bus.store.add(Output((), (closed,)))
         await see.poll()
@@ -195,3 +194,19 @@ def test_the_filter_searches_from_the_cursor_outwards(look: Any, make_bus: Any, 
         assert len(see.main.index) == 600
 
     look(bus.store, script, start=start)
+
+
+def test_data_only_hides_tokens_and_polls(look: Any, make_bus: Any) -> None:
+    bus = make_bus()
+    bus.ask(1)
+    for role in (Role.TOKEN, Role.POLL, Role.DATA):
+        bus.store.add(Output((bus.row(bus.frame(b"\x01\x03\x00"), 9, role),)))
+    bus.noise()
+
+    async def script(see: Any) -> None:
+        await see.press("d")
+        assert shown(see) == [1, 2, 5, 6]
+        await see.press("d")
+        assert shown(see) == [1, 2, 3, 4, 5, 6]
+
+    look(bus.store, script)

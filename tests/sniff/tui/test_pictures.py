@@ -17,23 +17,24 @@ def test_pictures(look: Any, golden: Any, busy_bus: Any, size: str) -> None:
     busy_bus.store.add_line_event(LineEvent(busy_bus.now, LineEventKind.UNPLUGGED, "gone"))
 
     async def script(see: Any) -> None:
-        def compare(name: str) -> None:
+        async def compare(name: str) -> None:
+            await see.poll()  # the header follows ten times a second
             golden(f"{name}-{size}", see.text())
             assert "None" not in see.text()
             assert "{" not in see.text()
             assert all(len(line) <= SIZES[size][0] for line in see.lines())
 
         await see.press("colon", "8", "enter")  # damaged, with a line error
-        compare("frames")
+        await compare("frames")
         await see.press("enter", "down", "down")
-        compare("fields")
+        await compare("fields")
         await see.press("2")
-        compare("transactions")
+        await compare("transactions")
         await see.press("3")
-        compare("nodes")
+        await compare("nodes")
         await see.press("8")
-        compare("line")
+        await compare("line")
         await see.press("question_mark")
-        compare("help")
+        await compare("help")
 
     look(busy_bus.store, script, SIZES[size], live=True, recording="/tmp/x.mcap")
