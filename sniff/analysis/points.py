@@ -177,6 +177,11 @@ class Point:
         return self.sample.value.entry
 
     @property
+    def is_command(self) -> bool:
+        """Whether the latest was written to the station, not read from it."""
+        return self.sample.value.how is How.WRITE
+
+    @property
     def quality(self) -> Quality:
         """Of the latest sample."""
         return self.sample.value.quality

@@ -1,0 +1,219 @@
+"""Readings to named values: scale, unit, quality, and what they say in words. Without a profile: plain numbers.
+
+Register numbers of points without a profile are those of the field: holding 0x006B is "holding/40108".
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import struct
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+
+from dissectors.profiles.model import Entry, Kind, Profile, Role
+from dissectors.readings import How, Reading
+
+MOST_WORDS = 6
+"""Values that one line of words names."""
+
+NO_BITS = "none"
+"""What a register says whose bits are all 0 without a word for that."""
+
+_FIRST = {"coil": 0, "discrete": 1, "input": 3, "holding": 4}
+_REGISTERS = ("holding", "input")
+_PARAMETER = re.compile(r"[A-Za-z]+2?\.\d+|\d\d-\d\d")
+
+
+class Quality(IntEnum):
+    """How far a value is to be trusted."""
+
+    GOOD = 0
+    UNCERTAIN = 1  # no public source for its layout, or the manual contradicts itself
+    BAD = 2  # outside the range that the device can have
+
+
+@dataclass(frozen=True, slots=True)
+class Value:
+    """One value with its name. `value`: scaled, in `unit`; `raw`: as on the wire, None for text.
+
+    `entry`: what the profile says of it, None for a point without profile; `bit`: True for a single bit or a part of
+    that entry. `reading`: the place it is from.
+    """
+
+    name: str
+    value: int | float | str
+    raw: int | None
+    unit: str
+    quality: Quality
+    reading: Reading
+    entry: Entry | None = None
+    bit: bool = False
+    words: str = ""
+
+    @property
+    def how(self) -> How:
+        return self.reading.how
+
+    @property
+    def text(self) -> str:
+        """For people: "60.00 Hz", "run, forward", "17"."""
+        return self.words or number(self.value, self.entry, self.unit)
+
+
+def decode(profile: Profile | None, readings: Sequence[Reading]) -> tuple[Value, ...]:
+    """The values that the readings of one exchange make, in their order; named bits follow their register."""
+    if profile is None:
+        return tuple(map(_plain, readings))
+    there = {(reading.how, reading.space, reading.address): reading for reading in readings if not reading.part}
+    values: list[Value] = []
+    for reading in readings:
+        entry = None if reading.part else profile.at(reading.space, reading.address)
+        if entry is not None and entry.reserved and reading.how is How.READ:
+            continue  # read along with its neighbours
+        if entry is None or entry.reserved:
+            values.append(_attribute(profile, reading) if reading.part else _plain(reading))
+            continue
+        if entry.kind.registers == 1 or reading.space not in _REGISTERS:
+            values += _values(entry, reading, (reading.raw,))
+            continue
+        halves = [there.get((reading.how, reading.space, entry.address + step)) for step in (0, 1)]
+        if halves[0] is None or halves[1] is None:
+            values.append(_plain(reading))  # half a value is none
+        elif halves[0] is reading:
+            values += _values(entry, reading, (reading.raw, halves[1].raw))
+    return tuple(values)
+
+
+def say(profile: Profile | None, readings: Sequence[Reading]) -> str:
+    """What an exchange says: "run, reverse", "frequency command 60.00 Hz"; empty when the profile knows nothing."""
+    known = [value for value in decode(profile, readings) if value.entry is not None and not value.bit]
+    return _joined([phrase(value) for value in known if value.words != NO_BITS])
+
+
+def phrase(value: Value) -> str:
+    """A value with its name; a command word says what to do by itself."""
+    entry = value.entry
+    if entry is None:
+        return f"{value.name} {value.text}"
+    if entry.role is Role.COMMAND and entry.bits:
+        return value.text
+    if value.words.startswith("no "):
+        return value.words  # "no fault" says what of
+    title = entry.title
+    if _PARAMETER.fullmatch(entry.name) and entry.name not in title:
+        title = f"{entry.name} {title}"
+    return f"{title} {value.text}" + (" (?)" if entry.doubt else "")
+
+
+def number(value: int | float | str, entry: Entry | None = None, unit: str = "") -> str:
+    """A value with its unit and the digits that its scale makes."""
+    if isinstance(value, str):
+        return '"' + "".join(c if c.isprintable() else f"\\x{ord(c):02x}" for c in value) + '"'
+    scaled = entry is not None and entry.scale != 1 and isinstance(value, float) and math.isfinite(value)
+    digits = f"{value:.{min(entry.decimals, 4)}f}" if scaled and entry is not None else f"{value:.7g}"
+    return f"{digits} {unit}".rstrip()
+
+
+def plain_name(space: str, address: int) -> str:
+    """ "holding/40108" for Modbus, with six digits from 410000 on; "AI/9" else."""
+    first = _FIRST.get(space)
+    if first is None:
+        return f"{space}/{address}"
+    return f"{space}/{first}{address + 1:0{4 if address < 9999 else 5}d}"
+
+
+def state_words(entry: Entry, value: int) -> str:
+    """The state or code in the maker's words, empty when it has none."""
+    return entry.states.get(value, "")
+
+
+def bit_words(entry: Entry, raw: int) -> str:
+    """What the bits of a register say; empty when it has no named bits."""
+    words = [bit.on if raw >> bit.number & 1 else bit.off for bit in entry.bits]
+    words += [part.states.get(part.of(raw), f"{part.name} {part.of(raw)}") for part in entry.parts]
+    said = ", ".join(word for word in words if word)
+    return said or (NO_BITS if entry.bits or entry.parts else "")
+
+
+def _plain(reading: Reading) -> Value:
+    name = plain_name(reading.space, reading.address) + (f"/{reading.part}" if reading.part else "")
+    return Value(name, reading.value, reading.raw, "", _quality(reading, reading.value), reading)
+
+
+def _attribute(profile: Profile, reading: Reading) -> Value:
+    """An attribute or property of a known object has the object's name."""
+    entry = profile.at(reading.space, reading.address)
+    base = plain_name(reading.space, reading.address) if entry is None or entry.reserved else entry.name
+    return Value(f"{base}/{reading.part}", reading.value, reading.raw, "", _quality(reading, reading.value), reading)
+
+
+def _values(entry: Entry, reading: Reading, raws: Sequence[int | None]) -> Iterable[Value]:
+    value, raw = _scaled(entry, reading, raws)
+    quality = _quality(reading, value, entry)
+    words = ""
+    if isinstance(value, int) or (isinstance(value, float) and value.is_integer()):
+        words = state_words(entry, int(value))
+        if not words and entry.states:
+            words = f"code {int(value)}"
+    if raw is not None and (entry.bits or entry.parts):
+        words = bit_words(entry, raw)
+    yield Value(entry.name, value, raw, entry.unit, quality, reading, entry, words=words)
+    if raw is None:
+        return
+    for bit in entry.bits:
+        on = raw >> bit.number & 1
+        yield Value(f"{entry.name}.{bit.name}", on, on, "", quality, reading, entry, True, bit.on if on else bit.off)
+    for part in entry.parts:
+        held = part.of(raw)
+        yield Value(
+            f"{entry.name}.{part.name}", held, held, "", quality, reading, entry, True, part.states.get(held, "")
+        )
+
+
+def _scaled(entry: Entry, reading: Reading, raws: Sequence[int | None]) -> tuple[int | float | str, int | None]:
+    """The value of an entry and its bits on the wire, in the order of significance."""
+    if entry.kind in (Kind.REAL, Kind.BIT, Kind.TEXT) or reading.space not in _REGISTERS:
+        value = reading.value
+        if isinstance(value, str) or (entry.scale == 1 and not entry.offset):
+            return value, reading.raw
+        return _rounded(value, entry), reading.raw
+    words = [raw & 0xFFFF for raw in raws if raw is not None]
+    if entry.little:
+        words = [word >> 8 | (word & 0xFF) << 8 for word in words]
+    raw = 0
+    for word in reversed(words) if entry.swapped else words:
+        raw = raw << 16 | word
+    if entry.kind is Kind.F32:
+        return float(struct.unpack(">f", raw.to_bytes(4, "big"))[0]) * entry.scale + entry.offset, raw
+    width = 16 * len(words)
+    signed = raw - (1 << width) if entry.kind in (Kind.S16, Kind.S32) and raw >> width - 1 else raw
+    return (signed if entry.scale == 1 and not entry.offset else _rounded(signed, entry)), raw
+
+
+def _rounded(value: float, entry: Entry) -> float:
+    """raw · scale + offset without the noise of binary fractions."""
+    scaled = value * entry.scale + entry.offset
+    return round(scaled, max(entry.decimals, 6)) if math.isfinite(scaled) else scaled
+
+
+def _quality(reading: Reading, value: int | float | str, entry: Entry | None = None) -> Quality:
+    if isinstance(value, float) and not math.isfinite(value):
+        return Quality.BAD
+    if entry is not None and not in_range(entry, value):
+        return Quality.BAD
+    return Quality.GOOD if reading.sure and (entry is None or not entry.doubt) else Quality.UNCERTAIN
+
+
+def in_range(entry: Entry, value: int | float | str) -> bool:
+    """Whether the profile allows a value; one that it says nothing of is allowed."""
+    if isinstance(value, str):
+        return True
+    return not ((entry.low is not None and value < entry.low) or (entry.high is not None and value > entry.high))
+
+
+def _joined(phrases: Sequence[str]) -> str:
+    more = len(phrases) - MOST_WORDS
+    shown = phrases[:MOST_WORDS]
+    return "; ".join(shown) + (f"; +{more}" if more > 0 else "")

@@ -1,0 +1,237 @@
+"""What is wrong with a device by its own profile: the rules PR…, and the class that finds them row by row. Pure.
+
+Only what is certain is judged: no value whose layout is a guess, no response time beyond what the adapter allows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import cast
+
+from dissectors.findings import Finding, Rule, Severity, Tally
+from dissectors.frame import Event, Frame, Header, Role
+from dissectors.line import Timing
+from dissectors.profiles import Devices, Entry, Profile
+from dissectors.profiles import Role as EntryRole
+from dissectors.profiles.decoding import Value, bit_words, decode, in_range, number, plain_name, state_words
+from dissectors.readings import How, Reading, Readings
+from dissectors.registry import Dissector
+from dissectors.tracker import Placement, Transaction
+from sniff.analysis.points import ALL, PointReader, Sample
+from sniff.analysis.wording import milliseconds
+from sniff.engine import Output, Row
+
+MOST_TOLD = 2_000
+"""Different things that are told of at most: rubbish that passes a check must not fill the memory."""
+
+PROFILE_RULES: dict[str, Rule] = {
+    rule.code: rule
+    for rule in (
+        Rule(
+            "PR001",
+            Severity.WARNING,
+            "value out of range",
+            "A value that a station answered, or that was written to it, lies outside the range that its profile gives "
+            "(from the manual of the device).",
+            "the wrong profile, a setting beyond the device, or a failed sensor",
+            "compare the device with its profile (`profile guess`), then look at the setting",
+        ),
+        Rule(
+            "PR002",
+            Severity.WARNING,
+            "write to a reserved register",
+            "A master writes to a register that the maker keeps for itself. The TECO manuals say not to (1.0.2).",
+            "the master's register list does not fit this device, or counts from 1 where it should count from 0",
+            "compare the master's register numbers with the device's table",
+        ),
+        Rule(
+            "PR003",
+            Severity.WARNING,
+            "write to what is read only",
+            "A master writes to a register or object that can only be read.",
+            "the master's list does not fit this device, or the wrong station is asked",
+            "compare the master's list with the device's table",
+        ),
+        Rule(
+            "PR004",
+            Severity.ERROR,
+            "device reports a fault",
+            "A station answered a fault code or a trip bit other than none, worded as in its manual.",
+            "the device has stopped, or will not start, because of it",
+            "look the fault up in the device's manual; reset it when its cause is gone",
+        ),
+        Rule(
+            "PR005",
+            Severity.WARNING,
+            "device reports an alarm",
+            "A station answered an alarm code or warning bit other than none, worded as in its manual.",
+            "the device runs on, but not as it should",
+            "look the alarm up in the device's manual",
+        ),
+        Rule(
+            "PR006",
+            Severity.WARNING,
+            "frame longer than the device takes",
+            "A frame to or from a station has more octets on the line than its manual allows (TECO E510 and F510: 80, "
+            "1.0.1).",
+            "a master that reads or writes too much at once",
+            "have the master read fewer registers in one request",
+        ),
+        Rule(
+            "PR007",
+            Severity.NOTE,
+            "slower than the device promises",
+            "Answers came later than the response time that the manual gives (TECO E510 and F510: 10 ms, 1.0.1), even "
+            "when all that the adapter may have added is taken off.",
+            "a response delay that is set in the device, a device busy with other work, or a gateway in between",
+            "allow for it in the master's timeout; look at the device's response delay setting",
+        ),
+    )
+}
+
+Key = tuple[str, str, str]
+"""Code, subject, and which of several things about it."""
+
+
+@dataclass(slots=True)
+class _Told:
+    """One finding in the making. `worst`: ns, of the slowest answer."""
+
+    seen: str
+    tally: Tally = field(default_factory=Tally)
+    worst: int = 0
+
+
+class ProfileFindings:
+    """Fed every row and every closed transaction of one bus (`dissectors.findings.Judge`)."""
+
+    def __init__(self, timing: Timing, dissector: Dissector, devices: Devices) -> None:
+        self._devices = devices
+        self._reader = PointReader(dissector, devices)
+        self._readings = cast("Readings | None", dissector.extras.get("readings"))
+        self._told: dict[Key, _Told] = {}
+        self._answers: dict[str, int] = {}
+
+    def see(self, no: int, event: Event, header: Header | None, placement: Placement | None) -> None:
+        """Take the next row."""
+        self._reader.add(Output(rows=(Row(no, event, header, placement),)))
+        if not isinstance(event, Frame) or not event.ok or placement is None:
+            return
+        self._judge_length(no, event, placement)
+        if placement.role is not Role.RESPONSE and self._readings is not None:
+            station = None if placement.role is Role.BROADCAST else placement.destination
+            readings = tuple(reading for reading in self._readings(event, None) if reading.how is How.WRITE)
+            if readings:
+                self._judge_writes(no, event, station, readings)
+
+    def settle(self, transaction: Transaction) -> None:
+        """Take a transaction that closed."""
+        for sample in self._reader.add(Output(transactions=(transaction,))):
+            if sample.value.how is not How.WRITE:
+                self._judge_value(sample)
+        self._judge_time(transaction)
+
+    def findings(self) -> tuple[Finding, ...]:
+        """All findings so far, in the order of first sight."""
+        return tuple(self._found(key, told) for key, told in self._told.items())
+
+    def _found(self, key: Key, told: _Told) -> Finding:
+        code, subject, _ = key
+        count, seen = told.tally.count, told.seen
+        if code == "PR007":
+            seen = f"{count} of {self._answers.get(subject, 0)} answers {seen}, the slowest at least "
+            seen += milliseconds(told.worst)
+        elif count > 1:
+            seen = f"{seen}, {count} times"
+        return told.tally.found(PROFILE_RULES[code], subject, seen)
+
+    # --- the rules ---
+
+    def _judge_length(self, no: int, frame: Frame, placement: Placement) -> None:
+        station = placement.source if placement.role is Role.RESPONSE else placement.destination
+        profile = self._devices.at(station)
+        longest = profile.limits.frame if profile is not None else None
+        if profile is not None and longest is not None and len(frame.octets) > longest:
+            way = "from" if placement.role is Role.RESPONSE else "to"
+            seen = f"frames of {len(frame.octets)} octets {way} it, {longest} allowed"
+            self._add("PR006", _subject(profile, station), way, seen, frame.end, no)
+
+    def _judge_writes(self, no: int, frame: Frame, station: int | None, readings: tuple[Reading, ...]) -> None:
+        profile = self._devices.at(station)
+        if profile is None:
+            return
+        who = _subject(profile, station)
+        for reading in readings:
+            entry = None if reading.part else profile.at(reading.space, reading.address)
+            if profile.is_reserved(reading.space, reading.address):
+                place = entry.number if entry is not None else plain_name(reading.space, reading.address)
+                self._add("PR002", who, place, f"{reading.value} written to reserved {place}", frame.end, no)
+            elif entry is not None and not entry.access.writable:
+                seen = f"{entry.title} ({entry.number}) written, it is read only"
+                self._add("PR003", who, entry.name, seen, frame.end, no)
+        for value in decode(profile, readings):
+            self._judge_range(value, who, frame.end, no)
+
+    def _judge_value(self, sample: Sample) -> None:
+        profile = self._devices.at(sample.device)
+        value = sample.value
+        if profile is None or not value.reading.sure:
+            return
+        who = _subject(profile, sample.device)
+        self._judge_range(value, who, sample.time, sample.frame)
+        entry = value.entry
+        if entry is None or value.bit or value.raw is None or entry.role not in (EntryRole.FAULT, EntryRole.ALARM):
+            return
+        code = "PR004" if entry.role is EntryRole.FAULT else "PR005"
+        for words in _troubles(entry, value):
+            self._add(code, who, f"{entry.name} {words}", f"{entry.title}: {words}", sample.time, sample.frame)
+
+    def _judge_range(self, value: Value, who: str, time: int, no: int) -> None:
+        entry = value.entry
+        if entry is None or value.bit or entry.doubt or not value.reading.sure or in_range(entry, value.value):
+            return
+        low = "" if entry.low is None else f"{entry.low:g}"
+        high = "" if entry.high is None else f"{entry.high:g}"
+        what = "written" if value.how is How.WRITE else "answered"
+        seen = f"{entry.title} {number(value.value, entry, value.unit)} {what}, range {low} … {high} {entry.unit}"
+        self._add("PR001", who, f"{entry.name} {what}", seen.rstrip(), time, no)
+
+    def _judge_time(self, transaction: Transaction) -> None:
+        profile = self._devices.at(transaction.station)
+        latency = transaction.latency
+        if profile is None or latency is None or transaction.response is None:
+            return
+        who = _subject(profile, transaction.station)
+        self._answers[who] = self._answers.get(who, 0) + 1
+        limit = profile.limits.response
+        if limit is not None and latency.low > limit:
+            seen = f"took over {milliseconds(limit)}"
+            told = self._add("PR007", who, "", seen, transaction.end, transaction.response)
+            if told is not None:
+                told.worst = max(told.worst, latency.low)
+
+    def _add(self, code: str, subject: str, which: str, seen: str, time: int, no: int) -> _Told | None:
+        key = code, subject, which
+        told = self._told.get(key)
+        if told is None:
+            if len(self._told) >= MOST_TOLD:
+                return None
+            told = self._told[key] = _Told(seen)
+        told.tally.add(time, no)
+        return told
+
+
+def _troubles(entry: Entry, value: Value) -> Iterator[str]:
+    """What a fault or alarm register reports; nothing when all is well."""
+    raw = value.raw or 0
+    if entry.bits:
+        yield from (bit.on for bit in entry.bits if raw >> bit.number & 1)
+    elif value.value and isinstance(value.value, int | float):
+        code = int(value.value)
+        words = state_words(entry, code) or bit_words(entry, raw)
+        yield words if entry.high == 1 else f"code {code}, {words}" if words else f"code {code}, not in the manual"
+
+
+def _subject(profile: Profile, station: int | None) -> str:
+    return f"{ALL} {profile.noun}s" if station is None else f"{profile.noun} {station}"

@@ -1,0 +1,119 @@
+"""Values by name: the latest of each point as a table; --csv and --json give every sample. Names and units come from
+device profiles (-d), else a point is its place: holding/40108, AI/9. Quality: 0 good, 1 uncertain, 2 out of range.
+"""
+
+from __future__ import annotations
+
+import argparse
+import fnmatch
+import sys
+from collections.abc import Iterator
+
+from dissectors.line import NS_PER_S
+from dissectors.profiles.decoding import number
+from sniff.analysis.points import Point, PointReader, PointTable, Sample
+from sniff.cli import arguments, tables
+from sniff.cli.rows import iso
+from sniff.cli.tables import Cell
+from sniff.engine import Output
+from sniff.formats import Capture
+from sniff.reading import dissector_for, outputs
+from sniff.session import Session
+
+LATEST = ("device", "point", "value", "unit", "means", "quality", "age s", "changed s", "samples")
+SAMPLES = ("time", "device", "point", "value", "raw", "unit", "quality", "how", "frame", "means")
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Options of `points`."""
+    arguments.add_files(parser)
+    arguments.add_line(parser)
+    arguments.add_devices(parser)
+    parser.add_argument("-n", "--name", action="append", default=[], metavar="GLOB", help="only points like output-*")
+    parser.add_argument("--bits", action="store_true", help="in the table, also the single bits of registers")
+    style = parser.add_mutually_exclusive_group()
+    style.add_argument("--json", action="store_const", const="json", dest="style", help="one JSON object a sample")
+    style.add_argument("--csv", action="store_const", const="csv", dest="style", help="comma-separated values")
+    which = parser.add_mutually_exclusive_group()
+    which.add_argument("--latest", action="store_const", const=True, dest="latest", help="only the latest of each")
+    which.add_argument("--all", action="store_const", const=False, dest="latest", help="every sample")
+    parser.set_defaults(style="text", latest=None)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print the values of every capture in turn."""
+    for path in args.files:
+        capture = arguments.open_capture(path)
+        session = arguments.settings_of(args, capture.session)
+        latest = args.latest if args.latest is not None else args.style == "text"
+        if latest:
+            _print_latest(args, capture, session)
+        else:
+            chosen = (_sample(sample) for samples in _samples(args, capture, session) for sample in samples)
+            tables.write(SAMPLES, chosen, args.style)
+        complete = capture.completeness()
+        if not complete.whole:
+            sys.stdout.flush()
+            print(f"sniff485: {path}: {complete.text}", file=sys.stderr)
+    return 0
+
+
+def _samples(args: argparse.Namespace, capture: Capture, session: Session) -> Iterator[list[Sample]]:
+    """The samples that the user wants, a step of the engine at a time."""
+    reader = PointReader(dissector_for(session), arguments.noted_devices(args, session))
+    for output in outputs(capture.items(), session):
+        if isinstance(output, Output):
+            yield [sample for sample in reader.add(output) if _wanted(args, sample)]
+
+
+def _wanted(args: argparse.Namespace, sample: Sample) -> bool:
+    return not args.name or any(fnmatch.fnmatchcase(sample.name, name) for name in args.name)
+
+
+def _print_latest(args: argparse.Namespace, capture: Capture, session: Session) -> None:
+    points, end = PointTable(), 0
+    for samples in _samples(args, capture, session):
+        points.add(samples)
+        end = max([end, *(sample.time for sample in samples)])
+    shown = [point for point in points if args.bits or args.name or not point.sample.value.bit]
+    shown.sort(key=lambda point: (point.sample.device is not None, point.sample.device or 0))
+    tables.write(LATEST, [_latest(point, end, args.style) for point in shown], args.style)
+
+
+def _latest(point: Point, end: int, style: str) -> tuple[Cell, ...]:
+    sample, value = point.sample, point.sample.value
+    means = f"command: {value.words}".rstrip(": ") if point.is_command else value.words
+    age = round((end - sample.time) / NS_PER_S, 3)
+    changed = round((end - point.changed) / NS_PER_S, 3) if point.changed else None
+    shown = _rounded(sample) if style == "text" else _cell(sample)
+    return (sample.station, sample.name, shown, value.unit, means, int(value.quality), age, changed, point.count)
+
+
+def _sample(sample: Sample) -> tuple[Cell, ...]:
+    value = sample.value
+    return (
+        iso(sample.time),
+        sample.station,
+        sample.name,
+        _cell(sample),
+        value.raw,
+        value.unit,
+        int(value.quality),
+        value.how.value,
+        sample.frame,
+        value.words,
+    )
+
+
+def _rounded(sample: Sample) -> Cell:
+    """The value as a text with the digits that its scale makes."""
+    value = sample.value
+    return _cell(sample) if isinstance(value.value, str) else number(value.value, value.entry)
+
+
+def _cell(sample: Sample) -> Cell:
+    """The value; text from the wire without its control characters, no number as text."""
+    value = sample.value.value
+    if isinstance(value, str):
+        return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in value)
+    return value if sample.finite else str(value)

@@ -1,0 +1,169 @@
+"""list: what there is. show NAME: registers, objects, limits. check FILE…: whether profiles are right. guess CAPTURE…:
+which profiles fit the stations that were heard. Own profiles: ./profiles/NAME.toml, or the user's folder.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+from dissectors.profiles import Entry, Profile, ProfileError
+from sniff.cli import UNREADABLE, USAGE, Failure, arguments, tables
+from sniff.engine import Output
+from sniff.profile_files import UnknownProfile, available, find, read
+from sniff.reading import dissector_for, outputs
+
+ENTRY_HEADINGS = ("place", "point", "unit", "range", "access", "what")
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """`list`, `show`, `check` and `guess`."""
+    actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
+    listing = actions.add_parser("list", help="profiles by name, with where they are from")
+    listing.add_argument("--json", action="store_true", help="one JSON object a profile")
+    show = actions.add_parser("show", help="what a profile says")
+    show.add_argument("name", metavar="NAME", help="a profile's name, or a .toml file")
+    show.add_argument("--json", action="store_true", help="one JSON object a register or object")
+    check = actions.add_parser("check", help="read profiles and say what is wrong with them")
+    check.add_argument("files", nargs="+", metavar="FILE", help="a .toml file")
+    guess = actions.add_parser("guess", help="profiles that fit the stations of a capture")
+    arguments.add_files(guess)
+    arguments.add_line(guess)
+    guess.add_argument("--json", action="store_true", help="one JSON object a guess")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Do one of the four."""
+    return {"list": _list, "show": _show, "check": _check, "guess": _guess}[args.action](args)
+
+
+def _list(args: argparse.Namespace) -> int:
+    rows = [
+        (
+            listed.name,
+            listed.profile.title if listed.profile is not None else f"BROKEN: {listed.error}",
+            " ".join(listed.profile.protocols) if listed.profile is not None else "",
+            len(listed.profile.entries) if listed.profile is not None else 0,
+            listed.origin,
+        )
+        for listed in available()
+    ]
+    tables.write(("name", "device", "protocols", "entries", "from"), rows, "json" if args.json else "text")
+    return 0
+
+
+def _show(args: argparse.Namespace) -> int:
+    try:
+        profile = find(args.name)
+    except (UnknownProfile, ProfileError) as error:
+        raise Failure(str(error), USAGE) from None
+    if args.json:
+        for entry in profile.entries:
+            print(json.dumps(_as_json(entry), ensure_ascii=False))
+        return 0
+    print(f"{profile.name}: {profile.title} ({profile.vendor}; {', '.join(profile.models)})")
+    print(f"protocols: {', '.join(profile.protocols)}")
+    print(f"source: {profile.source}")
+    limits = profile.limits
+    if limits.frame is not None:
+        print(f"longest frame: {limits.frame} octets")
+    if limits.response is not None:
+        print(f"answers within: {limits.response / 1e6:g} ms")
+    for family, codes in profile.exceptions.items():
+        for code, words in codes.items():
+            print(
+                f"{family} error {code:02X}h: {words}" if family == "modbus" else f"{family} error {code:02d}: {words}"
+            )
+    for key, value in profile.constants.items():
+        print(f"{key}: {value}")
+    for first, last in profile.reserved:
+        print(f"reserved: {first:04X}h … {last:04X}h on the wire")
+    print()
+    tables.write(ENTRY_HEADINGS, [_row(entry) for entry in profile.entries])
+    _print_codes(profile)
+    return 0
+
+
+def _row(entry: Entry) -> tuple[str, ...]:
+    low = "" if entry.low is None else f"{entry.low:g}"
+    high = "" if entry.high is None else f"{entry.high:g}"
+    span = f"{low} … {high}" if low or high else ""
+    title = f"{entry.title} (doubtful: {entry.doubt})" if entry.doubt else entry.title
+    place = (
+        entry.number if entry.space == "holding" else f"{entry.space} {entry.number.removeprefix(entry.space + ' ')}"
+    )
+    return place, entry.name, entry.unit, span, entry.access.value, title
+
+
+def _print_codes(profile: Profile) -> None:
+    """Bits and codes, after the table, once for each name."""
+    done: set[str] = set()
+    for entry in profile.entries:
+        if entry.name in done or not (entry.bits or entry.parts or entry.states):
+            continue
+        done.add(entry.name)
+        print(f"\n{entry.name} ({entry.number})")
+        for code, words in entry.states.items():
+            print(f"  {code:>5}  {words}")
+        for bit in entry.bits:
+            print(f"  bit {bit.number:X}  {bit.on}" + (f", else {bit.off}" if bit.off else ""))
+        for part in entry.parts:
+            print(f"  bits {part.low:X}…{part.high:X}  {part.name}")
+            for code, words in part.states.items():
+                print(f"    {code:>5}  {words}")
+
+
+def _as_json(entry: Entry) -> dict[str, Any]:
+    return {
+        "space": entry.space,
+        "address": entry.address,
+        "number": entry.number,
+        "name": entry.name,
+        "title": entry.title,
+        "type": entry.kind.value,
+        "scale": entry.scale,
+        "offset": entry.offset,
+        "unit": entry.unit,
+        "low": entry.low,
+        "high": entry.high,
+        "access": entry.access.value,
+        "reserved": entry.reserved,
+        "states": {str(code): words for code, words in entry.states.items()},
+        "bits": {str(bit.number): bit.on for bit in entry.bits},
+        "doubt": entry.doubt,
+    }
+
+
+def _check(args: argparse.Namespace) -> int:
+    wrong = 0
+    for name in args.files:
+        try:
+            profile = read(Path(name))
+        except ProfileError as error:
+            wrong += 1
+            print(f"sniff485: {error}", file=sys.stderr)
+        else:
+            print(f"{name}: {profile.name}, {len(profile.entries)} registers and objects: right")
+    return UNREADABLE if wrong else 0
+
+
+def _guess(args: argparse.Namespace) -> int:
+    from sniff.analysis.profile_guess import Guessing
+
+    profiles = [listed.profile for listed in available() if listed.profile is not None]
+    rows: list[tuple[tables.Cell, ...]] = []
+    for path in args.files:
+        capture = arguments.open_capture(path)
+        session = arguments.settings_of(args, capture.session)
+        guessing = Guessing(dissector_for(session))
+        for output in outputs(capture.items(), session):
+            if isinstance(output, Output):
+                guessing.add(output)
+        rows += [
+            (guess.station, guess.profile.name, f"{guess.score:.0%}", guess.why) for guess in guessing.guesses(profiles)
+        ]
+    tables.write(("station", "profile", "fits", "why"), rows, "json" if args.json else "text")
+    return 0
