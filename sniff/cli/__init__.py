@@ -33,6 +33,7 @@ COMMANDS: dict[str, str] = {
     "redissect": "computes frames and transactions anew, with other settings if need be",
     "recover": "makes a whole file of one that was cut off or damaged",
     "replay": "plays a capture to a pseudo-terminal or a TCP port of this machine",
+    "extcap": "lets Wireshark capture from a port through this program",
     "snapshot": "writes or compares the expectations of captures that are tests",
     "config": "where the configured buses and their values come from",
     "demo": "a virtual RS-485 bus with simulated drives, through the real capture path",
@@ -98,6 +99,9 @@ def _run(arguments: list[str]) -> int:
             chosen = import_module(f"sniff.cli.{command}")
             sub.epilog = chosen.__doc__
             chosen.configure(sub)
-    args = parser.parse_args(arguments)
+    if getattr(chosen, "TOLERANT", False):
+        args, _ = parser.parse_known_args(arguments)
+    else:
+        args = parser.parse_args(arguments)
     assert chosen is not None  # argparse has refused anything else
     return int(chosen.run(args))

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import struct
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
@@ -216,7 +216,7 @@ class PcapngWriter:
         """Add a chunk or line event."""
         self.put(self.maker.add(item))
 
-    def put(self, records: Iterator[Record]) -> None:
+    def put(self, records: Iterable[Record]) -> None:
         """Add records as they come from `maker`."""
         for record in records:
             self._packet(record)
