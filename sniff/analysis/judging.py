@@ -1,4 +1,4 @@
-"""All rules over one bus: those of its protocol and those of the line. Pure; the same live and offline."""
+"""All rules over one bus: of its protocol, of the line, of device profiles. Pure; the same live and offline."""
 
 from __future__ import annotations
 
@@ -7,43 +7,79 @@ from typing import cast
 
 from dissectors import registry
 from dissectors.findings import Finding, Judge, Rule
+from dissectors.frame import Noise, Place, Reason
 from dissectors.line import Timing
+from dissectors.profiles import Devices
 from dissectors.registry import Dissector
+from dissectors.tracker import Transaction, Verdict
 from sniff.analysis.line_findings import LineFindings
 from sniff.analysis.line_rules import LINE_RULES
+from sniff.analysis.profile_findings import PROFILE_RULES, ProfileFindings
 from sniff.engine import Output
-from sniff.session import LineEvent, Session
+from sniff.session import LineEvent, LineEventKind, Session
+
+_HOLES = frozenset((LineEventKind.DROPPED, LineEventKind.UNPLUGGED, LineEventKind.REPLUGGED))
+_DOUBTFUL = frozenset(
+    (Verdict.NO_RESPONSE, Verdict.UNSOLICITED, Verdict.LATE, Verdict.DAMAGED_ANSWER, Verdict.DAMAGED_REQUEST)
+)
 
 
 class Judging:
     """Fed what the engine gives; `findings` may be asked at any time."""
 
-    def __init__(self, session: Session, dissector: Dissector) -> None:
+    def __init__(self, session: Session, dissector: Dissector, devices: Devices | None = None) -> None:
         make = cast("Callable[[Timing], Judge] | None", dissector.extras.get("findings"))
         self.judge = make(session.timing) if make is not None else None
         self.line = LineFindings(session)
+        self.devices = ProfileFindings(session.timing, dissector, devices) if devices else None
+        self._hole: int | None = None  # when octets were lost, by the newest line event that says so
+        self._first_after: int | None = None  # number of the first row after it
 
     def add(self, output: Output) -> None:
         """Take rows and closed transactions."""
-        judge, line = self.judge, self.line
+        judge, line, devices = self.judge, self.line, self.devices
         for row in output.rows:
             line.see(row)
+            if self._hole is not None and self._first_after is None:
+                self._first_after = row.no
+                if judge is not None:  # something was there that nobody heard: no silence
+                    gap = Noise(b"", row.event.start, row.event.start, Place.BETWEEN, Reason.NO_FRAME)
+                    judge.see(row.no, gap, None, None)
             if judge is not None:
                 judge.see(row.no, row.event, row.header, row.placement)
+            if devices is not None:
+                devices.see(row.no, row.event, row.header, row.placement)
         for transaction in output.transactions:
             line.settle(transaction)
+            if self._is_torn(transaction):
+                continue
             if judge is not None:
                 judge.settle(transaction)
+            if devices is not None:
+                devices.settle(transaction)
 
     def add_line_event(self, event: LineEvent) -> None:
         """Take something that happened to the line."""
         self.line.add_line_event(event)
+        if event.kind in _HOLES:
+            self._hole, self._first_after = event.time, None
+
+    def _is_torn(self, transaction: Transaction) -> bool:
+        """Whether octets were lost inside it, so that what is missing says nothing about the bus."""
+        if self._hole is None or transaction.verdict not in _DOUBTFUL:
+            return False
+        if transaction.start <= self._hole:
+            return True
+        numbers = [no for no in (transaction.request, transaction.response) if no is not None]
+        return self._first_after is None or min(numbers, default=0) <= self._first_after + 1
 
     def findings(self) -> tuple[Finding, ...]:
         """All findings so far, the gravest first. Where hardly anything is a frame, the line speaks alone."""
         made = [*self.line.findings()]
         if self.judge is not None and not self.line.rubbish:
             made += self.judge.findings()
+        if self.devices is not None and not self.line.rubbish:
+            made += self.devices.findings()
         return tuple(
             sorted(made, key=lambda finding: (-finding.severity, finding.first, finding.code, finding.subject))
         )
@@ -54,9 +90,14 @@ def rules_of(dissector: Dissector) -> Mapping[str, Rule]:
     return cast("Mapping[str, Rule]", dissector.extras.get("rules", {}))
 
 
+def rules_over(dissector: Dissector) -> dict[str, Rule]:
+    """Every rule that a bus of this protocol is judged by: its own, those of the line, those of device profiles."""
+    return {**LINE_RULES, **PROFILE_RULES, **rules_of(dissector)}
+
+
 def all_rules() -> dict[str, Rule]:
-    """Every rule of every protocol and of the line, by code."""
-    rules = dict(LINE_RULES)
+    """Every rule of every protocol, of the line and of device profiles, by code."""
+    rules = {**LINE_RULES, **PROFILE_RULES}
     for name in registry.names():
         rules.update(rules_of(registry.get(name)))
     return rules

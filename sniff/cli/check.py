@@ -10,6 +10,7 @@ from array import array
 from pathlib import Path
 
 from dissectors.findings import Finding, Severity
+from dissectors.profiles import Devices
 from dissectors.registry import Dissector
 from sniff.analysis.health import Health, bus_health, station_health
 from sniff.analysis.judging import Judging
@@ -29,6 +30,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     """Options of `check`."""
     parser.add_argument("sources", nargs="+", metavar="FILE|PORT", help="captures, or one port or configured bus")
     arguments.add_line(parser)
+    arguments.add_devices(parser)
     parser.add_argument("--format", choices=("text", "json", "junit"), default="text", help="default: text")
     parser.add_argument("--json", action="store_const", const="json", dest="format", help="one JSON object a finding")
     parser.add_argument(
@@ -65,7 +67,7 @@ def _check(source: str, args: argparse.Namespace) -> Checked:
     if source == "-" or source.lower().endswith(tuple(READERS)) or Path(source).is_file():
         capture = arguments.open_capture(source)
         session = arguments.settings_of(args, capture.session)
-        run_of = Checking(session, dissector_for(session))
+        run_of = Checking(session, dissector_for(session), arguments.noted_devices(args, session))
         for item in outputs(capture.items(), session):
             run_of.take(item)
         complete = capture.completeness()
@@ -85,7 +87,7 @@ def _listen(port: str, args: argparse.Namespace) -> Checked:
     duration = args.duration or DEFAULT_DURATION
     print(f"sniff485: listening to {port} for {duration:g} s", file=sys.stderr)
     live = listening.start(target.source, None)
-    run_of = Checking(live.session, live.dissector)
+    run_of = Checking(live.session, live.dissector, target.devices)
     until = time.monotonic() + duration
     with listening.until_interrupted() as caught:
         while live.ended is None:
@@ -99,10 +101,10 @@ def _listen(port: str, args: argparse.Namespace) -> Checked:
 class Checking:
     """One source on its way through the rules."""
 
-    def __init__(self, session: Session, dissector: Dissector) -> None:
+    def __init__(self, session: Session, dissector: Dissector, devices: Devices) -> None:
         self.session = session
         self.dissector = dissector
-        self.judging = Judging(session, dissector)
+        self.judging = Judging(session, dissector, devices)
         self.summary = Summary(session.line)
         self._starts = array("q")  # of each row, so that evidence can be given its time
 

@@ -15,8 +15,7 @@ from xml.sax.saxutils import escape, quoteattr
 from dissectors.findings import Finding, Rule, Severity
 from dissectors.line import NS_PER_S
 from sniff.analysis.health import Health
-from sniff.analysis.judging import rules_of
-from sniff.analysis.line_rules import LINE_RULES
+from sniff.analysis.judging import rules_over
 from sniff.cli.rows import iso
 from sniff.reading import dissector_for
 from sniff.session import Session
@@ -117,7 +116,7 @@ def _paragraph(text: str, width: int, first: str, rest: str | None = None) -> No
 
 
 def _title(one: Checked, finding: Finding) -> str:
-    rule = LINE_RULES.get(finding.code) or rules_of(dissector_for(one.session)).get(finding.code)
+    rule = rules_over(dissector_for(one.session)).get(finding.code)
     return rule.title[:1].lower() + rule.title[1:] if rule is not None else ""
 
 
@@ -192,7 +191,7 @@ def write_junit(checked: Sequence[Checked], fail_on: Severity) -> None:
 
 
 def _suite(one: Checked, fail_on: Severity) -> list[str]:
-    rules: dict[str, Rule] = {**LINE_RULES, **rules_of(dissector_for(one.session))}
+    rules: dict[str, Rule] = rules_over(dissector_for(one.session))
     failing = {finding.code for finding in one.findings if finding.severity >= fail_on}
     head = (
         f"  <testsuite name={_attribute(one.source)} tests={_attribute(str(len(rules)))} "

@@ -74,9 +74,8 @@ def _show(args: argparse.Namespace) -> int:
         print(f"answers within: {limits.response / 1e6:g} ms")
     for family, codes in profile.exceptions.items():
         for code, words in codes.items():
-            print(
-                f"{family} error {code:02X}h: {words}" if family == "modbus" else f"{family} error {code:02d}: {words}"
-            )
+            number = f"{code:02X}h" if family == "modbus" else f"{code:02d}"
+            print(f"{family} error {number}: {words}")
     for key, value in profile.constants.items():
         print(f"{key}: {value}")
     for first, last in profile.reserved:
@@ -92,9 +91,7 @@ def _row(entry: Entry) -> tuple[str, ...]:
     high = "" if entry.high is None else f"{entry.high:g}"
     span = f"{low} … {high}" if low or high else ""
     title = f"{entry.title} (doubtful: {entry.doubt})" if entry.doubt else entry.title
-    place = (
-        entry.number if entry.space == "holding" else f"{entry.space} {entry.number.removeprefix(entry.space + ' ')}"
-    )
+    place = f"input {entry.number}" if entry.space == "input" else entry.number
     return place, entry.name, entry.unit, span, entry.access.value, title
 
 
