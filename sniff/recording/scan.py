@@ -33,6 +33,7 @@ MOST_PROBLEMS = 5  # that are kept in words
 
 _RECORD = struct.Struct("<BQ")
 _CHUNK = struct.Struct("<QQQIi")  # first and last time, size and check sum unpacked, length of the compression's name
+_CHUNK_START = _CHUNK.size + 32  # octets that hold all of a chunk's sizes, its compression having a short name
 _ZSTD = b"\x04\x00\x00\x00zstd"
 _ZSTD_AT = _RECORD.size + 28  # of that in a chunk record
 _BLOCK = 1 << 20
@@ -124,13 +125,15 @@ def records(stream: BinaryIO, report: Report, since: int | None = None, start: i
             report.end = position
             _summary(stream, report)
             return
-        if opcode == CHUNK and since is not None and length >= _CHUNK.size:
-            times = stream.read(16)
-            if len(times) == 16 and struct.unpack("<QQ", times)[1] < since:
-                stream.seek(length - 16, 1)
+        sound = False  # a chunk whose sizes agree
+        if opcode == CHUNK and length <= MOST_RECORD:
+            start_of_body = stream.read(min(length, _CHUNK_START))
+            sound = _sizes_agree(start_of_body, length)
+            if sound and since is not None and _last_time(start_of_body) < since:
+                stream.seek(length - len(start_of_body), 1)
                 body: bytes | None = None
             else:
-                body = times + stream.read(length - 16)
+                body = start_of_body + stream.read(length - len(start_of_body))
         elif length <= MOST_RECORD:
             body = stream.read(length)
         else:
@@ -142,8 +145,8 @@ def records(stream: BinaryIO, report: Report, since: int | None = None, start: i
         yield Record(opcode, position, body)
         record_at, position = position, position + _RECORD.size + length
         report.end = position
-        if opcode == CHUNK and body is not None and _sizes_agree(body):
-            report.chunks.add(record_at, struct.unpack_from("<Q", body, 8)[0])
+        if sound:
+            report.chunks.add(record_at, _last_time(start_of_body))
             anchor = position
 
 
@@ -151,9 +154,14 @@ def _plausible(opcode: int, length: int, left: int) -> bool:
     return length <= left and (0 < opcode <= LAST_OPCODE or opcode >= PRIVATE_OPCODES)
 
 
-def _sizes_agree(body: bytes) -> bool:
-    at = _CHUNK.size + (_CHUNK.unpack_from(body)[4] if len(body) >= _CHUNK.size else 0)
-    return _CHUNK.size <= at <= len(body) - 8 and struct.unpack_from("<Q", body, at)[0] == len(body) - at - 8
+def _sizes_agree(start: bytes, length: int) -> bool:
+    """Whether the sizes at the start of a chunk record add up to its length."""
+    at = _CHUNK.size + (_CHUNK.unpack_from(start)[4] if len(start) >= _CHUNK.size else 0)
+    return _CHUNK.size <= at <= len(start) - 8 and struct.unpack_from("<Q", start, at)[0] == length - at - 8
+
+
+def _last_time(start: bytes) -> int:
+    return int(_CHUNK.unpack_from(start)[1])
 
 
 def _next_chunk(stream: BinaryIO, position: int, size: int) -> int | None:

@@ -344,3 +344,30 @@ def test_many_damaged_places(tmp_path: Path, small: tuple[bytes, list[Item], lis
     told = capture.completeness()
     assert "295 more such places" in told.text
     assert "batches numbered backwards" in told.text
+
+
+def test_from_a_time_on_in_a_damaged_file(tmp_path: Path) -> None:
+    """The same as a whole pass finds, and it ends."""
+    path = tmp_path / "a.mcap"
+    items = some_items(300)
+    sizes = write_in_chunks(path, items, 20)
+    octets = path.read_bytes()
+    since = items[150].time
+    for flush in (2, 5, 8, 12):
+        for offset in (1, 5, 12, 40, 90):
+            damaged = bytearray(octets)
+            damaged[sizes[flush] + offset] ^= 0x81
+            capture = written(path, bytes(damaged))
+            due = [item for item in capture.items() if item.time >= since]
+            assert [item for item in read_from(path, since) if not is_hole(item)] == [
+                item for item in due if not is_hole(item)
+            ]
+            assert [item for item in capture.items(since) if not is_hole(item)] == [
+                item for item in due if not is_hole(item)
+            ]
+
+
+def read_from(path: Path, since: int) -> list[Item]:
+    capture = opened(path)
+    assert capture is not None
+    return list(capture.items(since))
