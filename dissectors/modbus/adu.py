@@ -23,7 +23,7 @@ _HEX = frozenset(b"0123456789ABCDEFabcdef")
 
 def rtu_adu(frame: Frame) -> bytes:
     """Unit and PDU of an RTU frame, without its CRC; of a damaged one, what is there. Total."""
-    return frame.octets[: rtu_end(frame)]
+    return frame.octets[:-2] if frame.damage is None else frame.octets[: rtu_end(frame)]
 
 
 def rtu_end(frame: Frame) -> int:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from dissectors.frame import Frame, Header
 from dissectors.modbus.functions import EXCEPTION_BIT, FUNCTIONS
@@ -57,21 +57,14 @@ class Exchange:
     disturbed: bool = False
     answered: bool = False
     copied: int | None = None
+    octets: bytes = field(init=False)  # unit and PDU of the request
+    unit: int = field(init=False)  # the unit asked, 0 … 255
+    end: int = field(init=False)  # of the request, ns
 
-    @property
-    def octets(self) -> bytes:
-        """Unit and PDU of the request."""
-        return self.request.octets
-
-    @property
-    def unit(self) -> int:
-        """The unit asked, 0 … 255."""
-        return self.octets[0] if self.octets else 0
-
-    @property
-    def end(self) -> int:
-        """End of the request, ns."""
-        return self.request.frame.end
+    def __post_init__(self) -> None:
+        self.octets = self.request.octets
+        self.unit = self.octets[0] if self.octets else 0
+        self.end = self.request.frame.end
 
     @property
     def writes(self) -> bool:
@@ -80,8 +73,9 @@ class Exchange:
 
     def is_for(self, octets: bytes) -> bool:
         """Whether unit and function (as an exception or not) of an answer are those asked."""
-        own = self.octets
-        return len(octets) > 1 and own[:1] == octets[:1] and own[1:2] == bytes((octets[1] & ~EXCEPTION_BIT,))
+        if len(octets) < 2 or len(self.octets) < 2:
+            return False
+        return octets[0] == self.unit and octets[1] & ~EXCEPTION_BIT == self.octets[1]
 
     def gap(self, start: int) -> int:
         """From the end of the request to `start`, ns, never negative."""
