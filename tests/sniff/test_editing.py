@@ -1,0 +1,198 @@
+"""File work: cut, merged, compared, recovered and anonymised captures keep what they must."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from dissectors.frame import Chunk, Frame
+from sniff.editing.anonymising import anonymised, anonymous_session
+from sniff.formats import create, read
+from sniff.reading import settled
+from sniff.session import Item, Session
+from sniff.simulation.scenarios import scenario, simulate
+from sniff.testing.capture_reading import read_capture
+
+OURS = Path(__file__).parents[2] / "captures"
+CAPTURES = sorted(OURS.glob("*.cap.txt"))
+
+
+@pytest.fixture
+def sniff485(capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:
+    from sniff.cli import main
+
+    def run(*arguments: object) -> tuple[int, str, str]:
+        code = main([str(argument) for argument in arguments])
+        captured = capsys.readouterr()
+        return code, captured.out, captured.err
+
+    return run
+
+
+def octets(items: list[Item]) -> bytes:
+    return b"".join(item.octets for item in items if isinstance(item, Chunk))
+
+
+def shape(session: Session, items: list[Item]) -> list[tuple[object, ...]]:
+    """What anonymising must not change."""
+    return [
+        (item.row.event.start, item.row.event.end, len(item.row.event.octets), isinstance(item.row.event, Frame),
+         isinstance(item.row.event, Frame) and item.row.event.ok, item.row.header.kind if item.row.header else None,
+         item.transaction.verdict if item.transaction else None)
+        for item in settled(items, session)
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("path", CAPTURES, ids=lambda path: path.name)
+def test_anonymising_keeps_frames_times_checks_and_verdicts(path: Path) -> None:
+    capture = read(path)
+    before = list(capture.items())
+    after = list(anonymised(before, capture.session))
+    assert shape(capture.session, after) == shape(capture.session, before)
+    assert [item.time for item in after] == [item.time for item in before]
+    assert [getattr(item, "marks", ()) for item in after] == [getattr(item, "marks", ()) for item in before]
+
+
+@pytest.mark.parametrize("name", ["modbus-rtu", "modbus-ascii", "n2", "mstp"])
+def test_anonymising_renumbers_stations_one_for_one(name: str) -> None:
+    session, made = simulate(scenario(name, faults=False), 3)
+    items = list(made)
+    names = [
+        (item.row.header.source, item.row.header.destination)
+        for capture in (items, list(anonymised(items, session)))
+        for item in settled(capture, session)
+        if item.row.header is not None
+    ]
+    half = len(names) // 2
+    pairs = {(a, b) for old, new in zip(names[:half], names[half:], strict=True) for a, b in zip(old, new, strict=True)}
+    assert len({a for a, _ in pairs}) == len({b for _, b in pairs}) == len(pairs)
+
+
+def test_no_name_survives(tmp_path: Path, sniff485: Callable[..., tuple[int, str, str]]) -> None:
+    from sniff.testing.crafting import modbus_rtu, mstp
+
+    secret = b"BOILER ROOM 7"
+    answer = modbus_rtu(9, b"\x11" + bytes([len(secret) + 1]) + secret + b"\xff")
+    i_have = b"\x01\x00\x10\x01" + b"\xc4\x02\x00\x04\xd2" + b"\xc4\x02\x00\x04\xd2" + b"\x75\x0e\x00" + secret
+    for protocol, line, frame in (("modbus-rtu", "19200,8E1", answer), ("mstp", "38400,8N1", mstp(6, 255, 5, i_have))):
+        path, out = tmp_path / f"{protocol}.cap.txt", tmp_path / f"{protocol}.mcap"
+        path.write_text(
+            f"#!sniff-capture 1\n# line: {line}\n# protocol: {protocol}\n# port: /dev/boiler\n+0 {frame.hex()}\n"
+        )
+        assert sniff485("anonymise", path, "-o", out)[0] == 0
+        assert secret not in out.read_bytes()
+        assert b"boiler" not in out.read_bytes()
+        (row,) = read_capture(out).frames
+        assert isinstance(row.event, Frame)
+        assert row.event.ok
+        assert b"\x04\xd2" not in row.event.octets
+        assert secret not in octets(list(read(out).items()))
+
+
+def test_session_without_names() -> None:
+    session = read(CAPTURES[0]).session
+    assert anonymous_session(session).port == "anonymised"
+    assert anonymous_session(session).timing == session.timing
+
+
+def test_parts_of_a_cut_merge_to_the_whole(tmp_path: Path, sniff485: Callable[..., tuple[int, str, str]]) -> None:
+    whole = OURS / "rtu-usual-faults.cap.txt"
+    first, second, both = (tmp_path / f"{name}.mcap" for name in ("first", "second", "both"))
+    assert sniff485("cut", whole, "-o", first, "--to", "+5.5")[0] == 0
+    assert sniff485("cut", whole, "-o", second, "--from", "+5.500000001")[0] == 0
+    assert sniff485("merge", second, first, "-o", both)[0] == 0
+    assert list(read(both).items()) == list(read(whole).items())
+
+
+def test_cut_by_frames_gives_these_frames(tmp_path: Path, sniff485: Callable[..., tuple[int, str, str]]) -> None:
+    whole, part = OURS / "rtu-usual-faults.cap.txt", tmp_path / "part.mcap"
+    rows = [json.loads(line) for line in sniff485("show", "--json", whole)[1].splitlines()]
+    assert sniff485("cut", whole, "-o", part, "--frames", "21-30")[0] == 0
+    cut = [json.loads(line) for line in sniff485("show", "--json", part)[1].splitlines()]
+    assert [row["hex"] for row in cut] == [row["hex"] for row in rows[20:30]]
+
+
+def test_cut_around_a_finding_holds_its_evidence(tmp_path: Path, sniff485: Callable[..., tuple[int, str, str]]) -> None:
+    whole, part = OURS / "rtu-usual-faults.cap.txt", tmp_path / "part.mcap"
+    assert sniff485("cut", whole, "-o", part, "--around", "mb008")[0] == 0
+    assert any(finding.code == "MB008" for finding in read_capture(part).findings)
+    assert len(read_capture(part).rows) < len(read_capture(whole).rows)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--around", "ZZ1"], "there are: "),
+        (["--frames", "7000-8000"], "none of them"),
+        (["--frames", "x"], "12-40"),
+        (["--from", "noon"], "+12.5"),
+        ([], "say what to keep"),
+        (["--frames", "1", "--around", "MB008"], "say what to keep"),
+    ],
+)
+def test_a_cut_that_means_nothing_is_explained(
+    tmp_path: Path, arguments: list[str], said: str, sniff485: Callable[..., tuple[int, str, str]]
+) -> None:
+    code, _, err = sniff485("cut", OURS / "rtu-usual-faults.cap.txt", "-o", tmp_path / "x.mcap", *arguments)
+    assert code == 2
+    assert said in err
+
+
+def test_captures_of_different_buses_are_not_merged(
+    tmp_path: Path, sniff485: Callable[..., tuple[int, str, str]]
+) -> None:
+    code, _, err = sniff485("merge", OURS / "rtu-clean.cap.txt", OURS / "n2-clean.cap.txt", "-o", tmp_path / "x.mcap")
+    assert code == 3
+    assert "n2 9600,8N1" in err
+
+
+@pytest.mark.parametrize("path", CAPTURES, ids=lambda path: path.name)
+def test_redissect_of_an_untouched_capture_changes_nothing(
+    tmp_path: Path, path: Path, sniff485: Callable[..., tuple[int, str, str]]
+) -> None:
+    out, again = tmp_path / "out.mcap", tmp_path / "again.mcap"
+    assert sniff485("redissect", path, "-o", out)[0] == 0
+    assert sniff485("redissect", out, "-o", again)[0] == 0
+    assert list(read(out).items()) == list(read(path).items())
+    assert out.read_bytes() == again.read_bytes()
+
+
+def test_a_recovered_recording_is_whole_and_says_what_was_lost(
+    tmp_path: Path, sniff485: Callable[..., tuple[int, str, str]]
+) -> None:
+    source, cut, out = tmp_path / "a.mcap", tmp_path / "cut.mcap", tmp_path / "out.mcap"
+    assert sniff485("convert", OURS / "rtu-usual-faults.cap.txt", source)[0] == 0
+    cut.write_bytes(source.read_bytes()[:-1500])
+    code, _, err = sniff485("recover", cut, "-o", out)
+    assert code == 0
+    assert "cut" in err
+    recovered = read(out)
+    items = list(recovered.items())
+    assert recovered.completeness().whole
+    assert octets(list(read(source).items())).startswith(octets(items))
+    assert "recovered" in recovered.session.notes
+
+
+def test_diff_of_a_capture_with_itself_is_silent(sniff485: Callable[..., tuple[int, str, str]]) -> None:
+    path = OURS / "rtu-usual-faults.cap.txt"
+    assert sniff485("diff", path, path)[:2] == (0, "no difference worth saying\n")
+
+
+def test_diff_names_the_station_that_went_bad(sniff485: Callable[..., tuple[int, str, str]]) -> None:
+    code, out, _ = sniff485("diff", "--json", OURS / "rtu-clean.cap.txt", OURS / "rtu-early-release.cap.txt")
+    found = [json.loads(line) for line in out.splitlines()]
+    assert code == 1
+    assert any(one["subject"] == "station 2" and one["what"] == "MB006" for one in found)
+    assert not any(one["subject"] == "station 1" and "response" in one["what"] for one in found)
+
+
+def test_a_target_that_is_a_source_is_refused(tmp_path: Path, sniff485: Callable[..., tuple[int, str, str]]) -> None:
+    path = tmp_path / "a.mcap"
+    with create(path, read(CAPTURES[0]).session):
+        pass
+    before = path.read_bytes()
+    assert sniff485("convert", "-f", path, path)[0] == 2
+    assert path.read_bytes() == before
