@@ -9,72 +9,41 @@ from __future__ import annotations
 
 from dissectors.bacnet.application import Device, Thing, supported, thing
 from dissectors.bacnet.values import Enumerated, ObjectId
+from dissectors.profiles import packaged
 
 VENDOR = 461
 
-_AI, _AO, _AV, _BI, _BO, _BV, _DEVICE = 0, 1, 2, 3, 4, 5, 8
+_DEVICE = 8
+_KINDS = {
+    "analog-input": 0,
+    "analog-output": 1,
+    "analog-value": 2,
+    "binary-input": 3,
+    "binary-output": 4,
+    "binary-value": 5,
+}
+_UNITS = {"Hz": "hertz", "V": "volts", "A": "amperes", "s": "seconds", "hp": "horsepower", "kHz": "kilohertz"}
+_NO_UNITS = "no-units"  # as printed, also for the rotation speed
 
-_HZ, _V, _A, _S, _NONE = "hertz", "volts", "amperes", "seconds", "no-units"
-
-INPUTS: tuple[tuple[str, str, float], ...] = (
-    ("TM2 AIN", _V, 0.0),
-    ("TM2 AIN2", _V, 0.0),
-    ("Error code", _NONE, 0.0),
-    ("Freq cmd", _HZ, 0.0),
-    ("Frequency", _HZ, 0.0),
-    ("Current", _A, 0.0),
-    ("Control Mode", _NONE, 0.0),
-    ("Motor R-Volt", _V, 440.0),
-    ("Motor R-HP", "horsepower", 5.0),
-    ("Motor R-RPM", _NONE, 1750.0),
-    ("Motor R-Hz", _HZ, 60.0),
-    ("CarrierFreq", "kilohertz", 4.0),
-    ("Comm Station", _NONE, 1.0),
-    ("BaudRate", _NONE, 2.0),
-    ("BacnetSel", _NONE, 1.0),
-    ("DevInstance", _NONE, 1.0),
-)
-"""Analog inputs AI0 …: name, unit, value."""
-
-OUTPUTS: tuple[tuple[str, str, float, float | None], ...] = (
-    ("Set frequency", _HZ, 0.0, 60.0),
-    ("TB2 AO1", _V, 0.0, None),
-    ("TB2 AO2", _V, 0.0, None),
-    ("Motor R-Amp", _A, 7.5, 65535.0),
-    ("PwrL Sel", _NONE, 0.0, None),
-    ("RestartSel", _NONE, 0.0, None),
-    ("RestartDelay", _S, 0.0, None),
-    *((f"FreqCommand{stage}", _HZ, 0.0, 400.0) for stage in range(1, 17)),
-    ("RunMode", _NONE, 2.0, 2.0),
-    ("ReverseOper", _NONE, 0.0, 1.0),
-    ("StoppingSel", _NONE, 0.0, 1.0),
-    ("FrequenceComm", _NONE, 2.0, 5.0),
-    ("FreqUpperLim", _HZ, 60.0, 400.0),
-    ("FreqLowerLim", _HZ, 0.0, 400.0),
-    ("Acc Time1", _S, 10.0, 3600.0),
-    ("Dec Time1", _S, 10.0, 3600.0),
-)
-"""Analog outputs AO0 …: name, unit, value, upper limit (None: read-only)."""
-
-GAINS: tuple[tuple[str, float, float], ...] = (
-    ("PID – P Gain", 1.0, 10.0),
-    ("PID – I Time", 1.0, 100.0),
-    ("PID – D Time", 0.0, 10.0),
-)
-DIGITAL_INPUTS = (
-    "Run/Stop",
-    "Direction",
-    "status",
-    "Abnormal",
-    "DI_1 status",
-    "DI_2 status",
-    "DI_3 status",
-    "DI_4 status",
-    "DI_5 status",
-    "DI_6 status",
-)
-RELAYS = ("RY1 status", "RY2 status", "RY3 status")
-COMMANDS = ("RUN/STOP", "FWD/REV")
+_INITIAL: dict[str, float] = {
+    "motor-rated-voltage": 440.0,
+    "motor-rated-power": 5.0,
+    "motor-rated-speed": 1750.0,
+    "motor-rated-frequency": 60.0,
+    "motor-rated-current": 7.5,
+    "carrier-frequency": 4.0,
+    "station-address": 1.0,
+    "baud-rate": 2.0,
+    "communication-mode": 1.0,
+    "run-source": 2.0,
+    "frequency-source": 2.0,
+    "upper-limit-frequency": 60.0,
+    "acceleration-time-1": 10.0,
+    "deceleration-time-1": 10.0,
+    "pid-gain": 1.0,
+    "pid-integral-time": 1.0,
+}
+"""What a drive holds at first, by point: plausible, not the manual's."""
 
 
 def f510(instance: int = 1, *, name: str = "TECO F510") -> Device:
@@ -85,15 +54,14 @@ def f510(instance: int = 1, *, name: str = "TECO F510") -> Device:
         target = ObjectId(kind, number)
         objects[target] = thing(target, label, value, **more)  # type: ignore[arg-type]
 
-    for number, (label, unit, value) in enumerate(INPUTS):
-        add(_AI, number, label, float(instance) if label == "DevInstance" else value, units=unit)
-    for number, (label, unit, value, high) in enumerate(OUTPUTS):
-        add(_AO, number, label, value, units=unit, writable=high is not None, low=0.0, high=high)
-    for number, (label, value, high) in enumerate(GAINS):
-        add(_AV, number, label, value, units=_NONE, writable=True, low=0.0, high=high)
-    for kind, labels, writable in ((_BI, DIGITAL_INPUTS, False), (_BO, RELAYS, False), (_BV, COMMANDS, True)):
-        for number, label in enumerate(labels):
-            add(kind, number, label, Enumerated(0, "BinaryPV"), writable=writable, low=0.0, high=1.0)
+    for entry in packaged("teco-f510").in_space(*_KINDS):
+        held: object = float(instance) if entry.name == "device-instance" else _INITIAL.get(entry.name, 0.0)
+        limits = {"writable": entry.access.writable, "low": entry.low, "high": entry.high}
+        if entry.space.startswith("binary"):
+            add(_KINDS[entry.space], entry.address, entry.label, Enumerated(0, "BinaryPV"), **limits)
+        else:
+            unit = _UNITS.get(entry.unit, _NO_UNITS)
+            add(_KINDS[entry.space], entry.address, entry.label, held, units=unit, **limits)
     device = ObjectId(_DEVICE, instance)
     objects[device] = Thing(
         {

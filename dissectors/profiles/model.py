@@ -80,8 +80,8 @@ class Entry:
 
     `space`, `address`: its place on the wire ("holding" 0x2524, "AI" 10, "analog-input" 4). `number`: the place as the
     manual writes it. `name`: of the point, the same for the same thing in every protocol of the device; `title`: for
-    people. value = raw · `scale` + `offset`, in `unit`, within `low` … `high` (None: not said). `states_from`: the
-    entry whose states these are. `codes`: how many
+    people; `label`: what the device itself calls it (BACnet's Object_Name). value = raw · `scale` + `offset`, in
+    `unit`, within `low` … `high` (None: not said). `states_from`: the entry whose states these are. `codes`: how many
     codes the manual lists, with those that it leaves empty. `doubt`: why its meaning is not certain, in words.
     """
 
@@ -90,6 +90,7 @@ class Entry:
     number: str
     name: str
     title: str
+    label: str = ""
     kind: Kind = Kind.U16
     swapped: bool = False  # low register first
     little: bool = False  # low octet of a register first

@@ -160,6 +160,7 @@ def _entry(table: Table, space: str, address: int, number: str, modbus: Table | 
         number=number,
         name=name,
         title=table.text("title", "reserved" if reserved else name.replace("-", " ")),
+        label=table.text("label", ""),
         kind=Kind(table.choice("type", [kind.value for kind in Kind], usual.value)),
         swapped=table.choice("word-order", orders, word_order) == "low-first",
         little=table.choice("octet-order", orders, octet_order) == "low-first",
