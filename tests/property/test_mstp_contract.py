@@ -103,10 +103,20 @@ def test_a_frame_cut_short_does_not_swallow_the_next_one(frame, data):
 @given(st.integers(2, 30), st.integers(120, 400))
 def test_a_late_read_inside_a_good_frame_joins_it(at, pause):
     frame = mstp(6, 255, 2, bytes.fromhex("0120ffff00ff10080a04d21a04d2") + bytes(20))
-    events = drive(frame[:at], (pause * MS, frame[at:]))
-    assert [e.octets for e in events] == [frame]
+    events = drive(frame[:at], (pause * MS, frame[at:]), (20 * MS, TOKEN))
+    assert [e.octets for e in events] == [frame, TOKEN]
     assert events[0].ok
     assert events[0].found is Found.JOINED
+
+
+def test_after_silence_a_good_header_ends_a_cut_frame_at_once():
+    """Without waiting for as many octets as the cut frame had announced."""
+    framer = MstpFramer(LINE)
+    cut = mstp(6, 1, 2, bytes(400))[:30]
+    assert framer.feed(Chunk(START, cut)) == []
+    events = framer.feed(Chunk(START + 25 * MS, TOKEN)) + framer.advance(START + 40 * MS)
+    assert [e.octets for e in events] == [cut, TOKEN]
+    assert events[0].damage is Damage.RESTARTED
 
 
 def test_the_pad_octet_belongs_to_the_frame_and_a_second_one_does_not():
