@@ -34,8 +34,6 @@ from scapy.packet import Packet, Raw
 from dissectors.modbus.functions import DIAGNOSTICS, EXCEPTION_BIT, EXCEPTIONS
 from dissectors.modbus.header import kind_of
 
-_MOST = 256  # items of any list, so that scapy's own limit of 100 does not cut it
-
 
 class Cut(Raw):
     """What remains of a message that ends in the middle of a field."""
@@ -67,11 +65,11 @@ class Pdu(Packet):
 
 
 def _list(name: str, item: Field, count: Any) -> FieldListField:
-    return _WholeItems(name, [], item, count_from=count, max_count=_MOST)
+    return _WholeItems(name, [], item, count_from=count)
 
 
 class _WholeItems(FieldListField):
-    """A list that leaves half an item, at the end of a cut message, to what follows."""
+    """A list of any length that leaves half an item, at the end of a cut message, to what follows."""
 
     def getfield(self, pkt: Packet, s: bytes) -> tuple[bytes, list[int]]:
         size = struct.calcsize(self.field.fmt)

@@ -349,3 +349,18 @@ def test_a_master_that_does_not_wait_got_an_answer_that_this_tap_missed(bus):
     assert reading.transactions[-2].verdict is Verdict.NO_RESPONSE
     assert "may have been missed at this tap" in reading.transactions[-2].error
     assert reading.transactions[1].error is None
+
+
+def test_the_response_time_that_a_copy_may_take_is_the_learnt_one(known):
+    """8 ms learnt: a copy after 14 ms is the answer, one after 30 ms the request again."""
+    before = len(known.run().transactions)
+    reading = (
+        known.exchange(WRITE, WRITE, answer=14).say(WRITE_OTHER).exchange(WRITE_OTHER, WRITE_OTHER, pause=30).run()
+    )
+    assert [t.verdict.value for t in fresh(reading, before)] == ["answered", "no-response", "retry"]
+
+
+def test_a_wait_with_something_in_it_teaches_no_timeout(bus):
+    for _ in range(3):
+        bus.say(READ, 300).noise(b"\x55\xaa")
+    assert bus.say(READ, 300).run().tracker.timeout is None
