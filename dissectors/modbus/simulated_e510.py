@@ -1,4 +1,4 @@
-"""A simulated TECO E510 drive: its register map as a table, a small model of a motor behind it.
+"""A simulated TECO E510 drive: the register map of its device profile, a small model of a motor behind it.
 
     SimulatedE510(unit=1)      answers 03, 06, 08 and 10h like the manual says
 
@@ -12,16 +12,19 @@ does this drive: `examples=True` answers with the codes of the examples.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from dissectors.line import NS_PER_S
-from dissectors.modbus.simulated import ILLEGAL_ADDRESS, MILLISECOND, ModbusServer, Refused
+from dissectors.modbus.functions import MAX_FRAME
+from dissectors.modbus.simulated import ILLEGAL_ADDRESS, ModbusServer, Refused
+from dissectors.profiles import packaged
 from dissectors.simulated import Send
 
 DATA_SETTING, WRITE_MODE = 4, 5  # exception codes of the manual's table beside the standard's 01 … 03
-LONGEST_FRAME = 80  # octets (1.0.1)
-RESPONSE_TIME = 10 * MILLISECOND  # (1.0.1)
+_LIMITS = packaged("teco-e510").limits
+LONGEST_FRAME = _LIMITS.frame or MAX_FRAME
+RESPONSE_TIME = _LIMITS.response or 0
 
 RUN, REVERSE, EXTERNAL_FAULT, FAULT_RESET = 0x0001, 0x0002, 0x0004, 0x0008  # command word 2501h
 EXTERNAL_FAULT_CODE = 17  # 2521h
@@ -143,37 +146,38 @@ def _nothing(drive: Drive) -> int:
     return 0
 
 
-REGISTERS: tuple[Register, ...] = (
-    # command data, read and write; without functions: a plain store
-    Register(0x2501, "operation command", _command, Drive.obey),
-    Register(0x2502, "frequency command, 0.01 Hz", _set_point, Drive.set_frequency),
-    Register(0x2503, "torque command, 8192 is 100 %"),
-    Register(0x2504, "speed limit, %"),
-    Register(0x2505, "AO1, 0.01 V"),
-    Register(0x2507, "DO"),
-    Register(0x2510, "12-00 display, high word"),
-    Register(0x2511, "12-00 display, low word"),
-    # monitor data, read only
-    Register(0x2520, "status", Drive.status),
-    Register(0x2521, "fault code", _fault),
-    Register(0x2522, "DI state", _digital_inputs),
-    Register(0x2523, "frequency command, 0.01 Hz", _set_point),
-    Register(0x2524, "output frequency, 0.01 Hz", Drive.frequency),
-    Register(0x2525, "reserved", _nothing),
-    Register(0x2526, "DC voltage, 0.1 V", Drive.dc_bus),
-    Register(0x2527, "output current, 0.1 A", Drive.current),
-    Register(0x2528, "alarm", _nothing),
-    Register(0x2529, "DO state", _relay),
-    Register(0x252A, "AO1, 0.01 V", lambda drive: drive.frequency() // 60),
-    Register(0x252B, "reserved", _nothing),
-    Register(0x252C, "AI1, 0.1 %", _nothing),
-    Register(0x252D, "AI2, 0.1 %", _nothing),
-    Register(0x252E, "reserved", _nothing),
-    Register(0x252F, "series check", _identity),
-    # reserved command registers read as 0; parameters of group 0 that exist (1.0.3)
-    *(Register(address, "reserved", _nothing) for address in (0x2500, 0x2506, *range(0x2508, 0x2510))),
-    *(Register(number, f"parameter 0-{number:02d}") for number in (*range(20), 26, 27, 34, 35, 36)),
-)
+_BEHAVIOUR: dict[str, tuple[Read, Write | None]] = {
+    "command": (_command, Drive.obey),
+    "set-frequency": (_set_point, Drive.set_frequency),
+    "status": (Drive.status, None),
+    "fault": (_fault, None),
+    "inputs": (_digital_inputs, None),
+    "frequency-command": (_set_point, None),
+    "output-frequency": (Drive.frequency, None),
+    "dc-voltage": (Drive.dc_bus, None),
+    "output-current": (Drive.current, None),
+    "outputs": (_relay, None),
+    "analog-output-1": (lambda drive: drive.frequency() // 60, None),
+    "series": (_identity, None),
+}
+"""What stands behind a point of the profile. Any other is a plain store, or 0 where it cannot be written."""
+
+_ONLY_IN_AN_EXAMPLE = 0x0123  # the manual's worked example reads it; its tables have no such register
+
+
+def _registers() -> Iterator[Register]:
+    """The register map of the profile with the motor behind it."""
+    for entry in packaged("teco-e510").in_space("holding"):
+        if entry.address == _ONLY_IN_AN_EXAMPLE:
+            continue
+        read, write = _BEHAVIOUR.get(entry.name, (None, None))
+        if read is None and (entry.reserved or not entry.access.writable):
+            read = _nothing
+        for step in range(entry.kind.registers):
+            yield Register(entry.address + step, entry.title, read, write)
+
+
+REGISTERS: tuple[Register, ...] = tuple(_registers())
 
 _EXAMPLE_CODES = {(code, cause): 0x52 for code in (3, 6, 16) for cause in range(1, 6)} | {(8, 3): 0x20}
 
