@@ -244,3 +244,13 @@ def _stand(event: Event) -> None:
 def test_a_packet_of_any_octets_gives_them_back(octets: bytes):
     assert rebuilt(dissect(octets)) == octets
     assert rebuilt(dissect(b"\x55\xff" + octets)) == b"\x55\xff" + octets
+
+
+def test_segments_name_their_service_and_only_the_first_names_an_object():
+    target = bytes.fromhex("0c020004d2")
+    for pdu, sizes in ((0x0E, b"\x03"), (0x3C, b"")):
+        for sequence, address in ((0, 1234), (1, None)):
+            apdu = bytes((pdu,)) + sizes + bytes((9, sequence, 4, 14)) + target
+            header = peek(frame_of(frame(5, 5, 2, b"\x01\x04" + apdu)))
+            assert (header.kind, header.address) == ("read-property-multiple", address)
+            assert header.role is (Role.REQUEST if pdu == 0x0E else Role.RESPONSE)

@@ -327,3 +327,19 @@ def test_their_basetypes_are_all_in_our_tables():
     for name in ("TimeStamp", "DateRange", "Recipient", "NotificationParameters", "PriorityValue"):
         assert hasattr(basetypes, name)
         assert layout.exists(name)
+
+
+@pytest.mark.parametrize("size", [0, 4, 5, 253, 254, 300, 65535, 65536, 70000])
+def test_lengths_in_all_their_forms(size: int):
+    content = b"\x00" + b"x" * (size - 1) if size else b""
+    octets = tags.write([tags.Tag(7, False, content)])
+    widths = {0: 1, 4: 1, 5: 2, 253: 2, 254: 4, 300: 4, 65535: 4, 65536: 6, 70000: 6}
+    assert len(octets) == widths[size] + size
+    if 254 <= size < 65536:
+        assert octets[:4] == b"\x75\xfe" + struct.pack(">H", size)
+    if size >= 65536:
+        assert octets[:6] == b"\x75\xff" + struct.pack(">I", size)
+    (tag,) = tags.read(octets).tags
+    assert tag.octets == content
+    their_tag = primitive.TagList.decode(PDU(octets))[0]
+    assert bytes(their_tag.tag_data) == content
