@@ -62,6 +62,8 @@ class ModbusFindings:
         self._codes: dict[int, int] = {}  # exception codes by transaction
         self._elsewhere: dict[int, int] = {}  # requests (by frame) that another unit answered, and which
         self._repeats: deque[int] = deque(maxlen=64)  # the last transactions that repeated another
+        self._no_requests: deque[int] = deque(maxlen=64)  # frames that the tracker takes for requests, but are none
+        self._damaged: deque[int] = deque(maxlen=64)  # transactions of the last damaged answers
 
     # ---- the contract
 
@@ -120,16 +122,29 @@ class ModbusFindings:
     # ---- rows
 
     def _see_request(self, asked: _Asked, placement: Placement) -> None:
-        if self._broadcast is not None and self._is_answer_to_broadcast(asked):
-            self._seen.answers_to_broadcast.add(asked.frame.start, self._broadcast.no, asked.no)
+        if len(self._asked) < _OPEN_KEPT:
+            self._asked[placement.tx] = asked
+        if self._is_no_request(asked):
+            self._no_requests.append(asked.no)
+            self._open = self._broadcast = None
+            return
         self._seen.requests += 1
         if self._open is not None:
             self._waited_in_vain(self._open, asked)
-        if len(self._asked) < _OPEN_KEPT:
-            self._asked[placement.tx] = asked
         is_broadcast = placement.role is Role.BROADCAST or asked.unit == BROADCAST
         self._open = None if is_broadcast or not asked.header.ok else asked
         self._broadcast = asked if is_broadcast and asked.header.ok else None
+
+    def _is_no_request(self, asked: _Asked) -> bool:
+        """Whether it is an answer in the shape of a request: to a broadcast, or by another unit than the one asked."""
+        if self._broadcast is not None and self._is_answer_to_broadcast(asked):
+            self._seen.answers_to_broadcast.add(asked.frame.start, self._broadcast.no, asked.no)
+            return True
+        if self._open is not None and self._is_answer_of_another(self._open, asked):
+            self._seen.pair((self._open.unit, asked.unit)).add(asked.frame.start, self._open.no, asked.no)
+            self._elsewhere[self._open.no] = asked.unit
+            return True
+        return False
 
     def _waited_in_vain(self, before: _Asked, asked: _Asked) -> None:
         """A request after another that nothing has followed."""
@@ -156,6 +171,7 @@ class ModbusFindings:
                 if len(self._codes) > _OPEN_KEPT:
                     self._codes.clear()
         elif placement.source is not None:
+            self._damaged.append(placement.tx)
             station = self._station(placement.source)
             station.cut += frame.damage is Damage.SHORT
             if _ends_badly(frame):
@@ -185,12 +201,16 @@ class ModbusFindings:
             self._seen.gap_tally(self._seen.paused, sender).add(frame.start, no)
 
     def _is_answer_to_broadcast(self, asked: _Asked) -> bool:
-        """Whether a frame to address 0 is a station's copy of the broadcast before it."""
+        """Whether what looks like a request is a station's copy of the broadcast before it, as itself or as 0."""
         broadcast = self._broadcast
-        if broadcast is None or asked.octets != broadcast.octets or self._seen.echoes:
+        if broadcast is None or asked.octets[1:] != broadcast.octets[1:] or (self._seen.echoes and not asked.unit):
             return False
         gap = asked.frame.start - broadcast.frame.end
         return self._timing.char + self._timing.latency < gap < TURNAROUND
+
+    def _is_answer_of_another(self, before: _Asked, asked: _Asked) -> bool:
+        """Whether what looks like a request is the copy of the one before it, by a unit that is known to answer so."""
+        return asked.octets[1:] == before.octets[1:] and (before.unit, asked.unit) in self._seen.pairs
 
     # ---- transactions
 
@@ -206,10 +226,18 @@ class ModbusFindings:
             return
         if not self._seen.stations and not self._seen.requests:
             return  # the capture began between a request and its answer
+        if transaction.id in self._damaged:  # more likely a request, when nobody was asked
+            self._seen.damaged_requests.add(transaction.start, transaction.response)
+            return
         self._seen.unasked.add(transaction.start, transaction.response)
 
     def _settle_request(self, station: Station, transaction: Transaction, asked: _Asked, code: int) -> None:
         verdict = transaction.verdict
+        if asked.no in self._no_requests:
+            return
+        if verdict is Verdict.NO_RESPONSE and asked.no in self._elsewhere:
+            del self._elsewhere[asked.no]  # the pair is reported instead
+            return
         request = station.request(asked.key)
         request.tries += 1
         if transaction.attempt == 1:
@@ -221,9 +249,6 @@ class ModbusFindings:
         station.last_start = transaction.start
         station.asked += 1
         if verdict is Verdict.NO_RESPONSE:
-            if self._elsewhere.pop(asked.no, None) is not None:
-                station.asked -= 1  # the pair is reported instead
-                return
             request.missing.add(transaction.start, transaction.request)
             station.missing.add(transaction.start, transaction.request)
             station.silent.add(transaction.start, transaction.request)
@@ -236,6 +261,8 @@ class ModbusFindings:
         station.answered += 1
         if transaction.latency is not None:
             station.times.add(transaction.latency)
+            if asked.header.ok and transaction.attempt == 1:
+                self._learnt.answered(transaction.station or 0, False, transaction.latency.nominal)
             timeout = self._learnt.timeout
             limit = SLOW_UNLEARNT if timeout is None else timeout * 7 // 10
             if transaction.latency.low > limit:

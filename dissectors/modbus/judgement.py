@@ -20,6 +20,7 @@ SILENT_AT_END = 5
 
 _SENDERS_KEPT = 300
 _HASTE = 100 * MS  # no master gives up sooner on a station that is alive, unless it always waits as long
+_COLLATERAL = frozenset(("MB002", "MB003", "MB005", "MB007", "MB009", "MB103", "MB104", "MB201", "MB202", "MB302"))
 _WASTE = 0.05
 _REPEATS_COST = 0.02
 
@@ -70,12 +71,19 @@ class Evidence:
 
 def judge(seen: Evidence, timeout: int | None) -> tuple[Finding, ...]:
     """All findings: the bus first, then station by station. `timeout`: the master's, ns, None while unlearnt."""
-    made = [*_of_bus(seen), *_of_masters(seen), *_of_gaps(seen)]
+    masters = [*_of_masters(seen)]
+    made = [*_of_bus(seen), *masters, *_of_gaps(seen)]
     common = _common_damage(seen)
     made += common
     for unit in sorted(seen.stations):
         made += _of_station(seen, f"station {unit}", seen.stations[unit], timeout, bool(common))
+    if masters:  # they collide, and what comes of it is no finding of its own
+        return tuple(_as_note(finding) if finding.code in _COLLATERAL else finding for finding in made)
     return tuple(made)
+
+
+def _as_note(finding: Finding) -> Finding:
+    return replace(finding, severity=min(finding.severity, Severity.NOTE))
 
 
 # ---- the bus
@@ -206,7 +214,7 @@ def _of_station(seen: Evidence, name: str, station: Station, timeout: int | None
         why, _ = station.unfit_words.most_common(1)[0] if station.unfit_words else ("", 0)
         words = f"{station.unfit.count} of {station.answered} answers do not fit their requests: {why}"
         yield station.unfit.found(RULES["MB010"], name, words, _note_if(station.unfit.count == 1))
-    yield from _times(name, station, timeout, seen)
+    yield from _times(name, station, timeout, seen, is_common)
     if station.twice.count:
         words = f"two answers to one request {times(station.twice.count)}"
         yield station.twice.found(RULES["MB201"], name, words, _warn_if(station.twice.count == 1))
@@ -287,7 +295,7 @@ def _exception(name: str, station: Station, key: Key, code: int, tally: Tally) -
     return replace(tally.found(RULES["MB008"], name, words, severity), means=means, next=following)
 
 
-def _times(name: str, station: Station, timeout: int | None, seen: Evidence) -> Iterator[Finding]:
+def _times(name: str, station: Station, timeout: int | None, seen: Evidence, is_common: bool) -> Iterator[Finding]:
     times_, slow = station.times, station.slow
     if slow.count >= 3 and 100 * slow.count >= station.answered:
         against = "500 ms" if timeout is None else f"70 in 100 of the master's timeout of {ms(timeout)}"
@@ -314,7 +322,8 @@ def _times(name: str, station: Station, timeout: int | None, seen: Evidence) -> 
         words = (
             f"{station.repeats.count} repeats cost {seconds(station.repeats_cost)}, {share:.1%} of the time of the bus"
         )
-        yield station.repeats.found(RULES["MB104"], name, words, Severity.WARNING if share > _REPEATS_COST else None)
+        costly = share > _REPEATS_COST and not is_common
+        yield station.repeats.found(RULES["MB104"], name, words, Severity.WARNING if costly else None)
 
 
 # ---- words and numbers

@@ -39,7 +39,12 @@ class Learnt:
             self._timeout = self._agreed()
 
     def unanswered(self, elapsed: int) -> None:
-        """A sure request got nothing for `elapsed`; then the master sent another."""
+        """A sure request got nothing for `elapsed`; then a master sent another.
+
+        Not a timeout when answers have been waited for longer: then a second master broke in, or the answer was missed.
+        """
+        if elapsed <= self._slowest():
+            return
         self._unanswered.append(elapsed)
         self._timeout = self._agreed()
 
@@ -92,6 +97,10 @@ class Learnt:
     def too_soon(self, silence: int) -> int:
         """The gap below which a frame after an answer is not the master's next request; `silence` while unlearnt."""
         return max(silence, min(self._pauses) // 2) if len(self._pauses) >= 4 else silence
+
+    def _slowest(self) -> int:
+        samples = (each for by_unit in (self._reads, self._writes) for each in by_unit.values())
+        return max((max(each) for each in samples), default=0)
 
     def _patience(self) -> int:
         return (self._timeout or 0) * 4 // 5

@@ -160,7 +160,7 @@ _ALL = (
         Severity.ERROR,
         "two masters",
         "Requests that come while another one waits for a station that is alive, sooner than that station can answer "
-        "or than any timeout seen. At least three.",
+        "or than any timeout seen. At least three. What their collisions cause at single stations is only noted then.",
         "two masters on one bus, or a commissioning tool left connected",
         "find the second master; a bus has one, use a gateway or multiplexer for more",
     ),

@@ -39,7 +39,7 @@ class LineFindings:
     def __init__(self, session: Session) -> None:
         self._session = session
         self._packets = "whole" in session.adapter.detail  # an error flag is somewhere among the octets marked
-        self._octets = self._in_frames = self._marked = self._rows = self._frames = 0
+        self._octets = self._in_frames = self._marked = self._rows = self._frames = self._good = 0
         self._first = self._now = 0
         self._senders: dict[str, _Sender] = {}
         self._breaks, self._overruns, self._lost = Tally(), Tally(), Tally()
@@ -51,6 +51,7 @@ class LineFindings:
         self._echo, self._asked = Tally(), 0
         self._values: Counter[int] = Counter()
         self._before: str | None = None  # who sent the frame before
+        self._awaiting = False  # a request was the newest frame of a known kind
         self._pending: list[tuple[int, Noise]] = []  # noise directly before the frame to come
 
     # ---- taking in
@@ -108,10 +109,15 @@ class LineFindings:
 
     def _see_frame(self, row: Row, frame: Frame) -> None:
         sender = _sender(row)
+        role = row.placement.role if row.placement is not None else Role.UNKNOWN
+        if role is Role.RESPONSE and not frame.ok and not self._awaiting:
+            sender = "bus"  # nobody was asked: it may be anything
+        self._awaiting = role is Role.REQUEST or (self._awaiting and role is not Role.RESPONSE)
         record = self._senders.setdefault(sender, _Sender()) if len(self._senders) < 600 else _Sender()
         record.frames += 1
         self._frames += 1
         if frame.ok:
+            self._good += 1
             self._in_frames += len(frame.octets)
         for no, noise in self._pending:
             _stray(record, "LN201", no, noise)
@@ -144,7 +150,8 @@ class LineFindings:
     @property
     def rubbish(self) -> bool:
         """Whether hardly anything is a frame, so that nothing else can be judged."""
-        return self._octets >= RUBBISH_LEAST and 10 * self._in_frames < 3 * self._octets
+        few = 10 * self._in_frames < 3 * self._octets and 10 * self._good < 3 * self._rows
+        return self._octets >= RUBBISH_LEAST and few
 
     def findings(self) -> tuple[Finding, ...]:
         """All findings so far."""
@@ -213,9 +220,14 @@ class LineFindings:
         return replace(self._whole("LN004", "bus", words), count=self._marked)
 
     def _wrong_octets(self) -> Iterator[Finding]:
-        for name, record in sorted(self._senders.items()):
-            if not record.wrong.count:
-                continue
+        struck = {name: record for name, record in sorted(self._senders.items()) if record.wrong.count}
+        whole = {name for name, record in self._senders.items() if record.frames >= 20}
+        if len(whole) >= 3 and all(
+            name in struck and self._note_if(struck[name].wrong.count, struck[name].frames) is None for name in whole
+        ):
+            yield self._wrong_everywhere(struck)
+            struck = {}
+        for name, record in struck.items():
             kinds = "line errors somewhere in" if self._packets else "parity or framing errors in"
             words = f"{kinds} {record.wrong.count} of {record.frames} frames"
             if record.at:
@@ -230,6 +242,24 @@ class LineFindings:
             yield finding
         for kind, tally in sorted(self._counted.items()):
             yield tally.found(RULES["LN102"], "bus", f"{tally.count} {kind or 'line'} errors counted by the driver")
+
+    def _wrong_everywhere(self, struck: dict[str, _Sender]) -> Finding:
+        """One finding in place of one for each sender."""
+        tally = Tally()
+        for record in struck.values():
+            for no in record.wrong.evidence:
+                tally.add(record.wrong.first, no)
+        count = sum(record.wrong.count for record in struck.values())
+        each = ", ".join(f"{name} {record.wrong.count}" for name, record in struck.items())
+        words = f"parity or framing errors in {count} of {self._frames} frames, whoever sends ({each})"
+        finding = tally.found(RULES["LN101"], "bus", words)
+        return replace(
+            finding,
+            count=count,
+            last=max(record.wrong.last for record in struck.values()),
+            means="a cause common to all: termination, bias, ground, cable, or noise at the tap",
+            next="120 Ω at both ends only, one bias, the shield grounded once; the tap's own wires",
+        )
 
     def _of_bus(self) -> Iterator[Finding]:
         if self._breaks.count:

@@ -33,8 +33,8 @@ _ALL = (
         "LN003",
         Severity.ERROR,
         "hardly anything is a frame",
-        "Under 3 in 10 octets belong to a good frame, of at least 60 octets. All other rules are left out then: they "
-        "would judge rubbish.",
+        "Under 3 in 10 octets, and under 3 in 10 of all frames and other stretches, are good frames; of at least 60 "
+        "octets. All other rules are left out then: they would judge rubbish.",
         "wrong baud rate, wrong parity, wrong protocol, or A and B swapped",
         "the settings of the line (-s) and the protocol (-p); then A and B",
     ),
@@ -77,7 +77,7 @@ _ALL = (
         "parity or framing errors",
         "Octets of frames that the adapter marked, counted at the station that sent the frame (a master's frames at "
         "the master). A single one, or fewer than 1 frame in 100 and at most two a minute, is only noted. Where one "
-        "flag covers a whole packet, only damaged frames count.",
+        "flag covers a whole packet, only damaged frames count. Where all are struck, one finding names the bus.",
         "noise while this station sends, weak levels from it, or two that send at once",
         "this station's connector, stub and ground; " + _WIRING,
     ),

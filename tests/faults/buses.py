@@ -32,6 +32,7 @@ def modbus(
     change: dict[int, Change] | None = None,
     second_master: bool = False,
     units: Sequence[int] = (1, 2, 3),
+    pause: int = 25 * MS,
     line: LineSettings | None = None,
     seed: int = 0,
 ) -> Scenario:
@@ -50,6 +51,7 @@ def modbus(
         change or {},
         second_master,
         tuple(units),
+        pause,
     )
     gap = 0 if is_ascii else Timing(line).t35
     name = "modbus-ascii" if is_ascii else "modbus-rtu"
@@ -65,14 +67,15 @@ def _modbus_parties(
     change: dict[int, Change],
     second_master: bool,
     units: tuple[int, ...],
+    pause: int,
 ) -> list[Party]:
-    asked = [unit for unit in (*units, *absent)]
+    asked = (*units, *(unit for unit in absent if unit not in units))
     requests: list[bytes] = []
     for unit in asked:
         requests += [read_holding(unit, 0, 6), read_holding(unit, 16, 2), b"%c\x04\0\0\0\x03" % unit]
         requests.append(write_register(unit, 3, 1234))
     master = PollingMaster(
-        [*requests, *extra], line, is_ascii=is_ascii, interval=0, pause=25 * MS, timeout=200 * MS, retries=1
+        [*requests, *extra], line, is_ascii=is_ascii, interval=0, pause=pause, timeout=200 * MS, retries=1
     )
     parties = [Party("master", master, answers=False)]
     for unit in units:
@@ -95,7 +98,7 @@ def _modbus_parties(
             is_ascii=is_ascii,
             start=7 * MS,
             interval=0,
-            pause=170 * MS,
+            pause=470 * MS,
             timeout=200 * MS,
             retries=0,
         )
@@ -132,12 +135,12 @@ def _n2_parties(
         jobs.insert(5, reading(1, 1, 200))
     parties = [Party("supervisor", Master(jobs, line=N2_LINE, delay=60 * MS, timeout=250 * MS), answers=False)]
     for address, delay in ((1, 10 * MS), (2, 18 * MS)):
-        follower: Station = Follower(address, delay=delays.get(address, delay))
+        follower: Station = Follower(address, points=monitored, delay=delays.get(address, delay))
         if address in change:
             follower = change[address](follower)
         parties.append(Party(f"drive {address}", follower))
     if second_master:
-        other = Master(readings(1, monitored), line=N2_LINE, delay=170 * MS, timeout=250 * MS, retries=0, start=30 * MS)
+        other = Master(readings(1, monitored), line=N2_LINE, delay=470 * MS, timeout=250 * MS, retries=0, start=30 * MS)
         parties.append(Party("second supervisor", other, answers=False))
     return parties
 

@@ -17,7 +17,6 @@ from sniff.simulation.faults import (
     CutShort,
     DuplicateAddress,
     EarlyRelease,
-    Echo,
     LateResponse,
     LostResponse,
     MarkParity,
@@ -39,6 +38,7 @@ Heard = tuple[Session, Iterable[Item]]
 class Case:
     """One fault. `make(seed=…)`: the bus. `expect`: code and subject that must be found, all of them.
 
+    `struck`: further subjects that may be named.
     `hear`: what the sniffer gets of the bus, `simulate` unless the fault is in the sniffer itself.
     """
 
@@ -48,11 +48,12 @@ class Case:
     tap: TapModel = EXACT
     seconds: float = 60
     hear: Callable[[Scenario, float, TapModel], Heard] = simulate
+    struck: tuple[str, ...] = ()
 
     @property
     def about(self) -> frozenset[str]:
         """Subjects that may be named at warning or above: those struck, and what they share."""
-        return frozenset(("bus", "master", "adapter", *(subject for _, subject in self.expect)))
+        return frozenset(("bus", "master", "adapter", *self.struck, *(subject for _, subject in self.expect)))
 
 
 def clean_cases(seconds: float) -> Iterator[Case]:
@@ -134,6 +135,20 @@ def _overrunning(plan: Scenario, seconds: float, tap: TapModel) -> Heard:
     return session, some()
 
 
+def _echoing(plan: Scenario, seconds: float, tap: TapModel) -> Heard:
+    """A tap behind a converter that gives back what the master sends."""
+    session, _ = simulate(plan, seconds, tap)
+
+    def items() -> Iterator[Item]:
+        for burst in plan.wire().run(int(seconds * S)):
+            if burst.octets:
+                yield Chunk(burst.end, burst.octets, burst.marks)
+            if burst.octets and burst.sent[0].party == "master":
+                yield Chunk(burst.end + len(burst.octets) * plan.line.char + 200_000, burst.octets)
+
+    return session, items()
+
+
 def _silent(plan: Scenario, seconds: float, tap: TapModel) -> Heard:
     session, _ = simulate(plan, seconds, tap)
     return session, ()
@@ -143,6 +158,7 @@ def _silent(plan: Scenario, seconds: float, tap: TapModel) -> Heard:
 
 _ascii = partial(modbus, is_ascii=True)
 _wrong_place = {2: partial(AnswersAs, unit=7)}
+_some_lost = LostResponse(0.04, ("unit 3",))
 _short_answers = {2: partial(AnswersAs, drop=2)}
 
 CASES: tuple[Case, ...] = (
@@ -181,11 +197,12 @@ CASES: tuple[Case, ...] = (
     ),
     Case(
         "RTU noise in silence",
-        partial(modbus, (NoiseInGaps(0.04, places=(Place.BETWEEN,), spread=12),)),
+        partial(modbus, (Of("unit 3", NoiseInGaps(0.2, places=(Place.BETWEEN,), spread=30)),)),
         (("LN203", "bus"),),
+        struck=("station 3",),
     ),
     # Modbus RTU: time
-    Case("RTU slow station", partial(modbus, delays={3: 160 * MS}), (("MB101", "station 3"),)),
+    Case("RTU slow station", partial(modbus, (_some_lost,), delays={3: 160 * MS}), (("MB101", "station 3"),)),
     Case(
         "RTU drifting station",
         partial(modbus, change={3: partial(Drifts, per_second=MS // 2)}),
@@ -213,9 +230,9 @@ CASES: tuple[Case, ...] = (
         partial(modbus, extra=(write_register(0, 3, 7),), change={2: partial(AnswersBroadcasts, unit=0)}),
         (("MB204", "bus"),),
     ),
-    Case("RTU address 250", partial(modbus, units=(1, 2, 250)), (("MB205", "station 250"),)),
+    Case("RTU address 250", partial(modbus, units=(1, 2, 250), delays={250: 9 * MS}), (("MB205", "station 250"),)),
     Case("RTU answers as another", partial(modbus, change=_wrong_place), (("MB206", "station 2"),)),
-    Case("RTU echo", partial(modbus, (Echo(("master",), after=200_000),)), (("LN205", "bus"),)),
+    Case("RTU echo", modbus, (("LN205", "bus"),), hear=_echoing),
     # the sniffer and its settings
     Case("wrong baud rate", modbus, (("LN003", "bus"),), hear=partial(_other_settings, "9600,8E1")),
     Case("wrong baud rate, too high", modbus, (("LN003", "bus"),), hear=partial(_other_settings, "38400,8E1")),
@@ -234,7 +251,7 @@ CASES: tuple[Case, ...] = (
         (("MB005", "station 2"),),
         FTDI,
     ),
-    Case("FTDI slow station", partial(modbus, delays={3: 175 * MS}), (("MB101", "station 3"),), FTDI),
+    Case("FTDI slow station", partial(modbus, (_some_lost,), delays={3: 175 * MS}), (("MB101", "station 3"),), FTDI),
     Case(
         "FTDI answered twice", partial(modbus, (DuplicateAddress("unit 2", 19 * MS),)), (("MB201", "station 2"),), FTDI
     ),
@@ -244,19 +261,33 @@ CASES: tuple[Case, ...] = (
     Case("ASCII answers lost", partial(_ascii, (LostResponse(0.08, ("unit 2",)),)), (("MB002", "station 2"),)),
     Case("ASCII bit errors of one station", partial(_ascii, (BitFlips(4e-3, ("unit 2",)),)), (("MB005", "station 2"),)),
     Case("ASCII exception 2", partial(_ascii, extra=(read_holding(1, 100, 2),)), (("MB008", "station 1"),)),
-    Case("ASCII answered twice", partial(_ascii, (DuplicateAddress("unit 2", 45 * MS),)), (("MB201", "station 2"),)),
+    Case(
+        "ASCII answered twice",
+        partial(_ascii, (DuplicateAddress("unit 2", 30 * MS),), pause=70 * MS),
+        (("MB201", "station 2"),),
+    ),
     # Metasys N2
     Case("N2 station absent", partial(n2, absent=True), (("N2005", "station 3"),)),
     Case("N2 answers lost", partial(n2, (LostResponse(0.08, ("drive 2",)),)), (("N2005", "station 2"),)),
     Case("N2 bit errors of one station", partial(n2, (BitFlips(8e-3, ("drive 2",)),)), (("N2004", "station 2"),)),
     Case("N2 no such point", partial(n2, no_such_point=True), (("N2002", "station 1"),)),
     Case("N2 answered twice", partial(n2, (DuplicateAddress("drive 2", 40 * MS),)), (("N2008", "station 2"),)),
-    Case("N2 two masters", partial(n2, second_master=True), (("N2007", "bus"),)),
+    Case(
+        "N2 two masters",
+        partial(n2, second_master=True),
+        (("N2007", "bus"),),
+        struck=("station 1", "station 2"),
+    ),
     # BACnet MS/TP
     Case("MS/TP lost token", partial(mstp, node_faults={9: {"loses_token_every": 400}}), (("MS101", "MAC 9"),)),
     Case("MS/TP slow to use the token", partial(mstp, node_faults={5: {"use_delay": 18 * MS}}), (("MS103", "MAC 5"),)),
     Case("MS/TP silent drive", partial(mstp, node_faults={9: {"silent": True}}), (("MS301", "MAC 9"),)),
-    Case("MS/TP damaged frames of one", partial(mstp, node_faults={5: {"damages_every": 40}}), (("MS401", "bus"),)),
+    Case(
+        "MS/TP damaged frames of one",
+        partial(mstp, node_faults={5: {"damages_every": 40}}),
+        (("MS401", "bus"),),
+        struck=("MAC 5",),
+    ),
     Case("MS/TP bit errors everywhere", partial(mstp, (BitFlips(3e-4),)), (("MS401", "bus"),)),
     Case("MS/TP postponed replies", partial(mstp, node_faults={9: {"postpones": True}}), (("MS303", "MAC 9"),)),
 )
