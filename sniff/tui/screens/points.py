@@ -1,0 +1,211 @@
+"""Screen 4: the latest value of every point, by device and name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import ClassVar
+
+from rich.text import Text
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.widgets import DataTable, Static
+
+from dissectors.line import NS_PER_S
+from dissectors.profiles.decoding import Quality, Value, number
+from sniff.analysis.points import Point
+from sniff.tui.charts import BARS
+from sniff.tui.plain import plain
+from sniff.tui.screens.base import ViewScreen
+from sniff.tui.tables import StationTable
+
+SHOWN = 500
+"""Points in the table at most."""
+
+FRESH = 2 * NS_PER_S
+"""How long a change is marked."""
+
+TREND = 12
+"""Values of the small chart."""
+
+WORDS = 26
+MARKS = {Quality.UNCERTAIN: "?", Quality.BAD: "!"}
+
+
+def trend(values: Sequence[float]) -> str:
+    """A chart between the least and the most of the values; flat in the middle when they are all the same."""
+    values = values[-TREND:]
+    if len(values) < 2:
+        return ""
+    low, high = min(values), max(values)
+    if low == high:
+        return BARS[4] * len(values)
+    steps = len(BARS) - 2
+    return "".join(BARS[1 + round((value - low) / (high - low) * steps)] for value in values)
+
+
+def age(nanoseconds: int) -> str:
+    """ "3 s", "4 min", "2 h"."""
+    seconds = max(0, nanoseconds) // NS_PER_S
+    if seconds < 120:
+        return f"{seconds} s"
+    return f"{seconds // 60} min" if seconds < 7200 else f"{seconds // 3600} h"
+
+
+def shown_value(value: Value) -> str:
+    """The value with unit, or what it says in words."""
+    text = value.words or number(value.value, value.entry, value.unit)
+    return plain(text if len(text) <= WORDS else text[: WORDS - 1] + "…")
+
+
+COLUMNS: tuple[str, ...] = ("", "stn", "point", "value", "age", "trend")
+Key = tuple[str, str]
+
+
+class PointsScreen(ViewScreen):
+    """One line a point; enter shows the frame that carried its latest value."""
+
+    TITLE = "Points"
+    CSS_PATH = "points.tcss"
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("p", "pin", "pin", tooltip="pin the point to the top, or let it go"),
+        Binding("b", "bits", "bits", tooltip="show the single bits of registers, or hide them"),
+        Binding("c", "commands", "commands", tooltip="only what was written to devices, or everything"),
+    ]
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._pinned: list[Key] = []
+        self._bits = False
+        self._commands = False
+        self._drawn: object = None
+
+    def compose_view(self) -> ComposeResult:
+        """The table, and more about the point under the cursor."""
+        yield StationTable(id="main", cursor_type="row", zebra_stripes=True)
+        yield Static(id="detail", markup=False)
+
+    def on_mount(self) -> None:
+        """Columns."""
+        table = self.query_one(StationTable)
+        for title in COLUMNS:
+            table.add_column(Text(title), key=title or "mark")
+        table.cell_padding = 1
+
+    def draw(self) -> None:
+        """Bring the table up to date, unless frozen."""
+        view = (tuple(self._pinned), self._bits, self._commands)
+        state = (self.store.version, view)
+        if self._drawn == state or (self.viewing.frozen and self._drawn and self._drawn[1] == view):
+            return
+        self._drawn = state
+        now = self.store.rows[-1].event.end if self.store.rows else 0
+        points = self._chosen()
+        self.query_one(StationTable).fill((_key(point), _cells(point, now, self._pinned)) for point in points[:SHOWN])
+        self._hidden = max(0, len(points) - SHOWN)
+        self._draw_detail()
+
+    def _chosen(self) -> list[Point]:
+        wanted: Callable[[Point], bool] = lambda point: (  # noqa: E731
+            (self._bits or not point.sample.value.bit) and (not self._commands or point.is_command)
+        )
+        pinned = [point for key in self._pinned if (point := self.store.points.get(*key)) is not None]
+        others = [point for point in self.store.points if _place(point) not in self._pinned and wanted(point)]
+        others.sort(key=lambda point: (point.sample.device is None, point.sample.device or 0))
+        return pinned + others
+
+    def _draw_detail(self) -> None:
+        self.query_one("#detail", Static).update(self._detail())
+
+    def _detail(self) -> str:
+        point = self._here()
+        if point is None:
+            return "no values yet: they come from answered reads, confirmed writes and reports" + self._more()
+        value, entry = point.sample.value, point.entry
+        words = [f"{point.sample.station}/{value.name}"]
+        words += [entry.title] if entry is not None else []
+        words.append(number(value.value, entry, value.unit) + (f" ({value.words})" if value.words else ""))
+        words.append(f"raw {value.raw:#x}" if value.raw is not None else "")
+        if entry is not None and (entry.low is not None or entry.high is not None):
+            low, high = ("" if limit is None else f"{limit:g}" for limit in (entry.low, entry.high))
+            words.append(f"range {low} … {high}")
+        words += [{Quality.UNCERTAIN: "? uncertain", Quality.BAD: "! out of range"}.get(point.quality, "")]
+        words += [f"? {entry.doubt}" if entry is not None and entry.doubt else ""]
+        words.append("→ a command" if point.is_command else "")
+        words.append(f"{point.count} samples, row {point.sample.frame}")
+        return plain(" · ".join(word for word in words if word) + self._more())
+
+    def _more(self) -> str:
+        hidden = getattr(self, "_hidden", 0)
+        return f" · {hidden} more points are not shown" if hidden else ""
+
+    def _here(self) -> Point | None:
+        key = self.query_one(StationTable).key_here()
+        if key is None:
+            return None
+        station, _, name = key.partition("/")
+        return self.store.points.get(station, name)
+
+    def on_data_table_row_highlighted(self, event: DataTable.RowHighlighted) -> None:
+        """The cursor went to another point."""
+        event.stop()
+        self._draw_detail()
+
+    def on_data_table_row_selected(self, event: DataTable.RowSelected) -> None:
+        """Enter or click on a point."""
+        event.stop()
+        self.action_choose()
+
+    def action_choose(self) -> None:
+        """Show the frame that carried the latest value."""
+        point = self._here()
+        if point is None:
+            return
+        if self.store.by_no(point.sample.frame) is None:
+            self.notify("its frame is no longer in memory", timeout=2)
+        else:
+            self.app.show_row(point.sample.frame)
+
+    def action_pin(self) -> None:
+        """Pin the point under the cursor, or let it go."""
+        point = self._here()
+        if point is None:
+            return
+        key = _place(point)
+        if key in self._pinned:
+            self._pinned.remove(key)
+        else:
+            self._pinned.append(key)
+        self.draw()
+
+    def action_bits(self) -> None:
+        """Single bits or not."""
+        self._bits = not self._bits
+        self.draw()
+
+    def action_commands(self) -> None:
+        """Only commands or everything."""
+        self._commands = not self._commands
+        self.draw()
+
+
+def _place(point: Point) -> Key:
+    return point.sample.station, point.sample.name
+
+
+def _key(point: Point) -> str:
+    return "/".join(_place(point))
+
+
+def _cells(point: Point, now: int, pinned: list[Key]) -> list[Text]:
+    sample, value = point.sample, point.sample.value
+    mark = ("^" if _place(point) in pinned else "") + ("→" if point.is_command else "") + MARKS.get(point.quality, "")
+    fresh = bool(point.changed) and now - point.changed <= FRESH
+    style = "bold" if fresh else ""
+    return [
+        Text(mark),
+        Text(sample.station, justify="right"),
+        Text(plain(sample.name)),
+        Text(("*" if fresh else "") + shown_value(value), style=style, justify="right"),
+        Text(age(now - sample.time), justify="right"),
+        Text(trend([number for _, number in point.history])),
+    ]
