@@ -47,6 +47,8 @@ class Store:
         self.devices = devices or Devices()
         self.reader = PointReader(dissector, self.devices)
         self.points = PointTable()
+        observe = dissector.extras.get("ring")
+        self.ring = observe(session.timing) if observe is not None else None  # of a protocol that passes a token
         self.error_total = 0  # like `errors`, with those that were dropped
         self.marks: Counter[LineError] = Counter()  # octets by the line errors reported on them
         self.gaps = Histogram()  # silence between one row and the next, ns
@@ -67,6 +69,8 @@ class Store:
             self.rows.append(row)
             self.load.add(row)
             self.nodes.add_row(row)
+            if self.ring is not None:
+                self.ring.see(row.no, row.event, row.header)
             for mark in row.event.marks:
                 self.marks[mark.error] += 1
             if is_error(row):

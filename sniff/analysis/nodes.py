@@ -20,6 +20,7 @@ class Node:
     sent: int = 0  # frames from it
     received: int = 0  # frames to it
     damaged: int = 0
+    heard: int = 0  # good frames from it: a damaged frame may name a station that there is not
     first: int | None = None
     last: int | None = None
     verdicts: Counter[Verdict] = field(default_factory=Counter)
@@ -29,8 +30,8 @@ class Node:
 
     @property
     def seen(self) -> bool:
-        """Whether there is a sign of it but being polled for: it sent something, or was asked something."""
-        return bool(self.sent or self.asked)
+        """Whether there is a sign of it but being polled for: it sent a good frame, or was asked something."""
+        return bool(self.heard or self.asked)
 
     @property
     def asked(self) -> int:
@@ -51,6 +52,7 @@ class Node:
             self.sent + other.sent,
             self.received + other.received,
             self.damaged + other.damaged,
+            self.heard + other.heard,
             min(times, default=None),
             max(lasts, default=None),
             self.verdicts + other.verdicts,
@@ -90,6 +92,7 @@ class NodeTable:
             node.sent += sends
             node.received += not sends
             node.damaged += not row.event.ok
+            node.heard += sends and row.event.ok
             node.first = row.event.start if node.first is None else node.first
             node.last = row.event.end
 

@@ -27,6 +27,8 @@ SCREENS: tuple[Entry, ...] = (
     Entry("1", "Frames", "sniff.tui.screens.frames:FramesScreen"),
     Entry("2", "Transactions", "sniff.tui.screens.transactions:TransactionsScreen"),
     Entry("3", "Nodes", "sniff.tui.screens.nodes:NodesScreen"),
+    Entry("4", "Points", "sniff.tui.screens.points:PointsScreen"),
+    Entry("7", "Ring", "sniff.tui.screens.ring:RingScreen"),
     Entry("8", "Line", "sniff.tui.screens.line:LineScreen"),
 )
 

@@ -93,7 +93,7 @@ class NodesScreen(ViewScreen):
             return
         self._drawn = state
         title, order = ORDERS[self._order]
-        nodes = sorted(self.store.nodes, key=order)
+        nodes = sorted(self.store.nodes.present(), key=order)
         self.query_one(StationTable).fill((str(node.address), _cells(node)) for node in nodes)
         self.query_one("#legend", Static).update(
             f"{len(nodes)} stations, sorted by {title} · answ.: answered in time, exceptions too · none: no answer · "

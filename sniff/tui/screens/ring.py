@@ -1,0 +1,96 @@
+"""Screen 7: the token ring of an MS/TP bus: its order, its times, what went wrong in it."""
+
+from __future__ import annotations
+
+from time import monotonic
+
+from rich.text import Text
+from textual.app import ComposeResult
+from textual.containers import VerticalScroll
+from textual.widgets import DataTable, Static
+
+from sniff.analysis import ring_words
+from sniff.tui.screens.base import ViewScreen
+from sniff.tui.tables import StationTable
+
+PERIOD = 1.0
+"""Seconds between two looks: the ring as a value is made anew each time."""
+
+COLUMNS: tuple[tuple[str, str], ...] = (
+    ("MAC", "mac"),
+    ("next", "next"),
+    ("tokens", "tok."),
+    ("retries", "retr"),
+    ("lost", "lost"),
+    ("loop p50 ms", "loop50"),
+    ("loop max ms", "loopmax"),
+    ("use p95 ms", "use95"),
+    ("reply p95 ms", "repl95"),
+    ("postponed", "post"),
+    ("polls unanswered", "poll-"),
+    ("damaged", "dam."),
+)
+"""Columns of `ring_words.HEADINGS` that fit into 80, with their short titles."""
+TROUBLE = {"retries", "lost", "damaged"}
+
+
+class RingScreen(ViewScreen):
+    """One line a master, then the ring in sentences; enter shows the frames of a master."""
+
+    TITLE = "Ring"
+    CSS_PATH = "ring.tcss"
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._drawn = (-1, 0.0)
+
+    def compose_view(self) -> ComposeResult:
+        """The table, and the sentences."""
+        yield StationTable(id="main", cursor_type="row", zebra_stripes=True)
+        with VerticalScroll(id="sentences"):
+            yield Static(id="words", markup=False)
+
+    def on_mount(self) -> None:
+        """Columns."""
+        table = self.query_one(StationTable)
+        for name, title in COLUMNS:
+            table.add_column(Text(title, justify="right"), key=name)
+        table.cell_padding = 1
+
+    def draw(self) -> None:
+        """Bring it up to date once a second, unless frozen."""
+        version, time = self._drawn
+        waits = self.viewing.frozen or monotonic() - time < PERIOD
+        if self.store.version == version or (waits and version >= 0):
+            return
+        self._drawn = (self.store.version, monotonic())
+        words = self.query_one("#words", Static)
+        observer = self.store.ring
+        if observer is None:
+            words.update(f"{self.store.session.protocol} passes no token: there is no ring to show")
+            return
+        ring = observer.ring()
+        places = [ring_words.HEADINGS.index(name) for name, _ in COLUMNS]
+        rows = ring_words.rows(ring)
+        self.query_one(StationTable).fill(
+            (str(row[0]), [_cell(COLUMNS[at][0], row[place]) for at, place in enumerate(places)]) for row in rows
+        )
+        legend = "times in ms · use: from token to first frame · repl: answers · poll-: unanswered polls for masters"
+        words.update("\n".join((*ring_words.sentences(ring), "", legend)))
+
+    def on_data_table_row_selected(self, event: DataTable.RowSelected) -> None:
+        """Enter or click on a master: its frames."""
+        event.stop()
+        key = self.query_one(StationTable).key_here()
+        if key is not None:
+            self.app.filter(f"addr == {key}")
+            self.app.action_switch("frames")
+
+
+def _cell(name: str, value: ring_words.Cell) -> Text:
+    if value is None:
+        return Text("–", justify="right")
+    text = (f"{value:.1f}" if abs(value) < 100 else f"{value:.0f}") if isinstance(value, float) else str(value)
+    if name in TROUBLE and text != "0":
+        return Text(f"!{text}", style="bold", justify="right")
+    return Text(text, justify="right")
