@@ -1,8 +1,11 @@
-"""The suffix of OUT chooses the format. What a format cannot keep is said."""
+"""The suffix of OUT chooses the format. What a format cannot keep is said. An .mcap also holds the values of devices
+that have a profile (-d), each point on a channel of its own.
+"""
 
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 
 from sniff.cli import arguments, writing
 
@@ -12,6 +15,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("source", metavar="IN", help="capture to read")
     parser.add_argument("output", metavar="OUT", help="capture to write")
     arguments.add_line(parser)
+    arguments.add_devices(parser)
     parser.add_argument(
         "--link-type",
         type=int,
@@ -28,6 +32,9 @@ def run(args: argparse.Namespace) -> int:
     capture = arguments.open_capture(args.source)
     session = arguments.settings_of(args, capture.session)
     options = {"link-type": str(args.link_type)} if args.link_type is not None else None
-    writing.write(args, session, capture.items(), [args.source], options)
+    devices = arguments.noted_devices(args, session) if args.output.lower().endswith(".mcap") else None
+    if devices:
+        session = replace(session, notes={**session.notes, arguments.DEVICES_NOTE: devices.text()})
+    writing.write(args, session, capture.items(), [args.source], options, devices=devices)
     writing.say_incomplete(args.source, capture)
     return 0

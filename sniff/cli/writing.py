@@ -9,7 +9,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from dissectors.frame import Chunk
+from dissectors.profiles import Devices
 from sniff.cli import UNREADABLE, USAGE, Failure
+from sniff.engine import Output
 from sniff.formats import Capture, CaptureError, create
 from sniff.session import Item, Session
 
@@ -27,10 +29,11 @@ def write(
     sources: Sequence[str],
     options: Mapping[str, str] | None = None,
     with_frames: bool = False,
+    devices: Devices | None = None,
 ) -> int:
     """Write items to `args.output`; say on standard error what it holds and what it lost. Gives the octets.
 
-    `with_frames`: with what the engine finds in them, on /frames. Ends with exit code 2 when OUT is there.
+    `with_frames`: with what the engine finds in them, on /frames. `devices`: with their values, on /values. Ends with exit code 2 when OUT is there.
     """
     target = Path(args.output)
     if target.exists() and any(name != "-" and Path(name).samefile(target) for name in sources):
@@ -42,6 +45,7 @@ def write(
     try:
         with create(target, session, options) as writer:
             frames = _Frames(writer, session) if with_frames else None
+            values = _Values(writer, session, devices) if devices else None
             for item in items:
                 writer.write(item)
                 if isinstance(item, Chunk):
@@ -49,9 +53,13 @@ def write(
                     octets += len(item.octets)
                     if frames is not None:
                         frames.add(item)
+                    if values is not None:
+                        values.add(item)
                     progress.show(chunks)
             if frames is not None:
                 frames.close()
+            if values is not None:
+                values.close()
     except CaptureError as error:
         raise Failure(str(error), UNREADABLE) from None
     finally:
@@ -103,6 +111,36 @@ class _Frames:
         message = self._log.take()
         if message is not None:
             self._writer.derived(self._topic, self._schema, *message)
+
+
+class _Values:
+    """Runs the engine beside the writing; the values of known devices go to /values."""
+
+    def __init__(self, writer: object, session: Session, devices: Devices) -> None:
+        from sniff.analysis.points import PointReader
+        from sniff.reading import engine_for
+        from sniff.recording.writer import McapWriter
+        from sniff.value_channels import ValueChannels
+
+        assert isinstance(writer, McapWriter)
+        self._writer = writer
+        self._engine = engine_for(session)
+        self._points = PointReader(self._engine.dissector, devices)
+        self._channels = ValueChannels(session.bus, devices)
+
+    def add(self, chunk: Chunk) -> None:
+        self._take(self._engine.feed(chunk))
+
+    def close(self) -> None:
+        self._take(self._engine.close())
+
+    def _take(self, output: Output) -> None:
+        for sample in self._points.add(output):
+            message = self._channels.message(sample)
+            if message is not None:
+                self._writer.derived(
+                    message.topic, message.schema, message.time, message.time, message.data, message.metadata
+                )
 
 
 class _Progress:
