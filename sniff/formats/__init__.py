@@ -53,6 +53,9 @@ READERS: dict[str, str] = {
     ".pcap": "sniff.formats.pcap:read",
     ".cap": "sniff.formats.pcap:read",
     ".pcapng": "sniff.formats.pcapng:read",
+    ".log": "sniff.formats.bytelog:read",
+    ".hex": "sniff.formats.bytelog:read",
+    ".csv": "sniff.formats.bytelog:read",
 }
 WRITERS: dict[str, str] = {
     ".cap.txt": "sniff.formats.text:create",

@@ -1,0 +1,99 @@
+"""Byte logs of other tools: every kind is told and read; real ones of logic analysers too."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from dissectors.frame import Chunk, Frame
+from dissectors.line import LineSettings
+from sniff.formats import CaptureError, read
+from sniff.reading import settled, with_settings
+
+REQUEST, ANSWER = bytes.fromhex("010300000002C40B"), bytes.fromhex("01030400D7001ACBC0")
+DAY = 1_139_833_427  # 2006-02-13T12:23:47Z
+
+LOGS = {
+    "candump": "(1139833427.100000) bus 01 03 00 00 00 02 C4 0B\n(1139833427.110000) bus 1#01030400D7001ACBC0\n",
+    "Docklight": (
+        "2/13/2006 12:23:47.100 [TX] - 01 03 00 00 00 02 C4 0B \n"
+        "13.02.2006 12:23:47.110 [RX] - 01 03 04 00 D7 00 1A CB C0\n"
+    ),
+    "jpnevulator": (
+        "2006-02-13 12:23:47.100000: /dev/ttyS0\n01 03 00 00 00 02 C4 0B                          ........\n"
+        "2006-02-13 12:23:47.110000: /dev/ttyS0\n01 03 04 00 D7 00                                ......\n1A CB C0\n"
+    ),
+    "times and pairs": (
+        "# a note\n0.100000 01 03 00 00 00 02 c4 0b ; request\n0.110000 01 03 04 00 d7 00 1a cb c0 ; answer\n"
+    ),
+    "hexdump": ("00000000  01 03 00 00 00 02 c4 0b  01 03 04 00 d7 00 1a cb  |................|\n00000010  c0  |.|\n"),
+}
+
+
+@pytest.mark.parametrize("kind", LOGS)
+def test_every_kind_is_told_and_read(kind: str, tmp_path: Path) -> None:
+    path = tmp_path / "x.log"
+    path.write_text(LOGS[kind])
+    log = read(path)
+    chunks = [item for item in log.items() if isinstance(item, Chunk)]
+    assert kind in log.completeness().text
+    assert b"".join(chunk.octets for chunk in chunks) == REQUEST + ANSWER
+    assert "not understood" not in log.completeness().text
+    if kind != "hexdump":
+        assert chunks[1].time - chunks[0].time == 10_000_000
+    if kind in {"candump", "Docklight", "jpnevulator"}:
+        assert chunks[0].time == DAY * 10**9 + 100_000_000
+    frames = [item.row.event for item in settled(chunks, log.session)]
+    assert [frame.octets for frame in frames] == [REQUEST, ANSWER]
+    assert all(isinstance(frame, Frame) and frame.ok for frame in frames)
+
+
+def test_xxd_is_a_hexdump_too(tmp_path: Path) -> None:
+    path = tmp_path / "x.hex"
+    path.write_text("00000000: 0103 0000 0002 c40b  ........\n")
+    assert [item.octets for item in read(path).items() if isinstance(item, Chunk)] == [REQUEST]
+
+
+def test_what_is_no_byte_log_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "x.log"
+    path.write_text("Dear diary,\ntoday nothing happened.\n")
+    with pytest.raises(CaptureError, match=r"no byte log .* candump"):
+        read(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "line", "count"),
+    [
+        ("sigrok-flowmeter-graph_tool", "9600,8N1", 18),
+        ("sigrok-flowmeter-target_0liter_per_min", "9600,8N1", 112),
+        ("sigrok-flowmeter-target_20liter_per_min", "9600,8N1", 66),
+        ("sigrok-brainchild-io16do", "19200,8E1", 30),
+    ],
+)
+def test_logic_analyser_csv_of_others(name: str, line: str, count: int) -> None:
+    path = Path(__file__).parents[4] / "shared/captures" / name / "octets.csv"
+    if not path.exists():
+        pytest.skip("shared captures are not here")
+    log = read(path)
+    session = with_settings(log.session, "modbus-rtu", LineSettings.parse(line))
+    rows = [item.row.event for item in settled(log.items(), session)]
+    assert len(rows) == count
+    assert all(isinstance(row, Frame) and row.ok for row in rows)
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None, max_examples=200)
+@given(kind=st.sampled_from(sorted(LOGS)), place=st.floats(0, 0.999), text=st.text(max_size=3), cut=st.floats(0, 1))
+def test_any_change_is_no_traceback(tmp_path: Path, kind: str, place: float, text: str, cut: float) -> None:
+    whole = LOGS[kind]
+    at = int(place * len(whole))
+    path = tmp_path / "x.log"
+    changed = whole[:at] + text + whole[at + 1 :]
+    path.write_text(changed[: int(cut * len(changed))], encoding="utf-8", errors="replace")
+    try:
+        log = read(path)
+    except CaptureError:
+        return
+    assert all(isinstance(item, Chunk) for item in log.items())
