@@ -33,7 +33,10 @@ def add_line(parser: argparse.ArgumentParser) -> None:
 def add_files(parser: argparse.ArgumentParser) -> None:
     """One or more captures."""
     parser.add_argument(
-        "files", nargs="+", metavar="FILE", help="capture: .mcap, .cap.txt; - for text on standard input"
+        "files",
+        nargs="+",
+        metavar="FILE",
+        help="capture: .mcap .cap.txt .pcap .pcapng .log .hex .csv; - for standard input",
     )
 
 
