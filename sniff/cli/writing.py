@@ -33,7 +33,8 @@ def write(
 ) -> int:
     """Write items to `args.output`; say on standard error what it holds and what it lost. Gives the octets.
 
-    `with_frames`: with what the engine finds in them, on /frames. `devices`: with their values, on /values. Ends with exit code 2 when OUT is there.
+    `with_frames`: with what the engine finds in them, on /frames. `devices`: with their values, on /values.
+    Ends with exit code 2 when OUT is there.
     """
     target = Path(args.output)
     if target.exists() and any(name != "-" and Path(name).samefile(target) for name in sources):
