@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from dissectors.frame import Chunk
 from dissectors.profiles import Devices
+from sniff.analysis.channels import BusChannels, DerivedMessage
 from sniff.analysis.points import PointReader, Sample
 from sniff.capture.link import CaptureLink
 from sniff.capture.wire import Ended, Received, Status, Tick
 from sniff.engine import Engine, Output
 from sniff.reading import dissector_for
+from sniff.recording.frames import METADATA, SCHEMA, FrameLog
+from sniff.recording.topics import FRAMES
 from sniff.session import LineEvent
 from sniff.value_channels import ValueChannels
 
@@ -33,6 +36,8 @@ class LiveBus:
         self.devices = devices or Devices()
         self.points = PointReader(self.dissector, self.devices)
         self._channels = ValueChannels(self.session.bus, self.devices) if link.paths else None
+        self._bus_channels = BusChannels(self.session, self.dissector) if link.paths else None
+        self._frames = FrameLog()
 
     def poll(self, timeout: float = 0.0) -> list[LiveItem]:
         """What has come, in order; waits up to `timeout` seconds. The end closes the engine and comes last."""
@@ -58,16 +63,24 @@ class LiveBus:
             self.status = message
             return [message]
         if isinstance(message, Tick):
+            if self._bus_channels is not None and (due := self._bus_channels.due(message.now)):
+                self._send(due)
+                self._send_frames()
             deadline = self.engine.deadline()
             due = deadline is not None and message.now >= deadline
             return self._some(self.engine.advance(message.now)) if due or deadline is None else []
         if isinstance(message.item, Chunk):
             return self._some(self.engine.feed(message.item))
+        if self._bus_channels is not None:
+            self._bus_channels.add_line_event(message.item)
         return [message.item]
 
     def _some(self, output: Output) -> list[LiveItem]:
         if not output:
             return []
+        if self._bus_channels is not None:
+            self._bus_channels.add(output)
+            self._frames.add(output)
         for sample in self.points.add(output):
             self._record(sample)
         return [output]
@@ -79,3 +92,14 @@ class LiveBus:
             self.link.derived(
                 self.bus, message.topic, message.schema, message.time, message.time, message.data, message.metadata
             )
+
+    def _send(self, messages: list[DerivedMessage]) -> None:
+        """Send statistics and findings back into the file, best effort."""
+        for one in messages:
+            self.link.derived(self.bus, one.topic, one.schema, one.log_time, one.publish_time, one.data, one.metadata)
+
+    def _send_frames(self) -> None:
+        """Send what was made of the octets; not once octets were missed here, since places of octets are counted."""
+        batch = self._frames.take()
+        if batch is not None and not self.status.dropped:
+            self.link.derived(self.bus, FRAMES, SCHEMA.name, *batch, METADATA)

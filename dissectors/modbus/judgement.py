@@ -217,7 +217,7 @@ def _of_station(seen: Evidence, name: str, station: Station, timeout: int | None
     yield from _times(name, station, timeout, seen, is_common)
     if station.twice.count:
         words = f"two answers to one request {times(station.twice.count)}"
-        yield station.twice.found(RULES["MB201"], name, words, _warn_if(station.twice.count == 1))
+        yield station.twice.found(RULES["MB201"], name, words, _note_if(station.twice.count == 1))
     if station.reserved.count:
         yield station.reserved.found(RULES["MB205"], name, f"{station.reserved.count} frames name it")
 
@@ -374,7 +374,3 @@ def _units(units: Iterable[int]) -> str:
 
 def _note_if(condition: bool) -> Severity | None:
     return Severity.NOTE if condition else None
-
-
-def _warn_if(condition: bool) -> Severity | None:
-    return Severity.WARNING if condition else None

@@ -1,0 +1,157 @@
+"""What a live bus sends back into its recording beside frames: /bus, /nodes and /findings. Pure: messages out.
+
+One message a second for the bus and for each station heard in it, flat JSON as in `sniff.recording.topics`; one
+message in the schema foxglove.Log for each finding when it is raised, and again when it gets graver.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from dissectors.findings import Finding, Severity
+from dissectors.line import NS_PER_S
+from dissectors.registry import Dissector
+from dissectors.tracker import Verdict
+from sniff.analysis.health import bus_health, station_health
+from sniff.analysis.histogram import Histogram
+from sniff.analysis.judging import Judging
+from sniff.analysis.nodes import Node
+from sniff.analysis.summary import Summary
+from sniff.engine import Output
+from sniff.session import LineEvent, Session
+
+WINDOW = NS_PER_S
+JUDGED_EVERY = 5
+"""Windows between two looks at the findings."""
+
+BUS, NODE, LOG = "sniff485.Bus", "sniff485.Node", "foxglove.Log"
+"""Schema records, of `sniff.recording.topics`."""
+
+_LEVELS = {Severity.INFO: 2, Severity.NOTE: 2, Severity.WARNING: 3, Severity.ERROR: 4}
+_TROUBLE = (
+    Verdict.NO_RESPONSE,
+    Verdict.LATE,
+    Verdict.DAMAGED_ANSWER,
+    Verdict.DAMAGED_REQUEST,
+    Verdict.ANSWERED_TWICE,
+    Verdict.EXCEPTION,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class DerivedMessage:
+    """One message, as `Recorder.derived` takes it. Times are ns."""
+
+    topic: str
+    schema: str
+    log_time: int
+    publish_time: int
+    data: bytes
+    metadata: dict[str, str] = field(default_factory=dict)
+
+
+class BusChannels:
+    """Messages of one bus. Fed like `Judging`; `due` gives what is to be written by then."""
+
+    def __init__(self, session: Session, dissector: Dissector) -> None:
+        self._session = session
+        self._bus = re.sub(r"[^A-Za-z0-9_.-]+", "-", session.bus).strip("-") or "bus"
+        self._judging = Judging(session, dissector)
+        self._window = Summary(session.line)
+        self._begin: int | None = None
+        self._windows = 0
+        self._said: dict[tuple[str, str], Severity] = {}
+
+    def add(self, output: Output) -> None:
+        """Take what the engine gave."""
+        self._judging.add(output)
+        self._window.add(output)
+
+    def add_line_event(self, event: LineEvent) -> None:
+        """Take something that happened to the line."""
+        self._judging.add_line_event(event)
+
+    def due(self, now: int) -> list[DerivedMessage]:
+        """What a window that has ended by `now` (ns, the capture's clock) gives; nothing in between."""
+        if self._begin is None:
+            self._begin = now
+        if now - self._begin < WINDOW:
+            return []
+        begin, window = self._begin, self._window
+        self._begin, self._window = now, Summary(self._session.line)
+        self._windows += 1
+        messages = [*self._of_window(begin, now, window)]
+        if self._windows % JUDGED_EVERY == 0:
+            messages += self.findings(now)
+        return messages
+
+    def findings(self, now: int) -> list[DerivedMessage]:
+        """Findings that are new, or graver than they were said to be."""
+        messages = []
+        for finding in self._judging.findings():
+            key = finding.code, finding.subject
+            before = self._said.get(key)
+            if before is None or finding.severity > before:
+                self._said[key] = finding.severity
+                messages.append(_log(finding, self._bus, now))
+        return messages
+
+    def _of_window(self, begin: int, end: int, window: Summary) -> Iterator[DerivedMessage]:
+        span = max(1, end - begin)
+        errors = window.damaged + sum(window.verdicts[verdict] for verdict in _TROUBLE)
+        content: dict[str, object] = {
+            "load": min(1.0, window.load.total.busy / span),
+            "frames": window.frames,
+            "octets": window.octets,
+            "errors": errors,
+            "error_rate": min(1.0, errors / window.frames) if window.frames else 0.0,
+            "health": bus_health(window).score,
+            **_latency(window.latency),
+        }
+        yield DerivedMessage(f"/bus/{self._bus}", BUS, end, begin, _json(content))
+        for node in window.nodes.present():
+            yield DerivedMessage(f"/nodes/{self._bus}/{node.address}", NODE, end, begin, _json(_of_node(node)))
+
+
+def _of_node(node: Node) -> dict[str, object]:
+    errors = sum(node.verdicts[verdict] for verdict in _TROUBLE)
+    health = station_health(node)
+    return {
+        "requests": node.asked,
+        "responses": node.sent,
+        "errors": errors,
+        "error_rate": min(1.0, errors / node.asked) if node.asked else 0.0,
+        **({} if health is None else {"health": health.score}),
+        **_latency(node.latency),
+    }
+
+
+def _latency(latency: Histogram) -> dict[str, object]:
+    """Response times in ms; absent where there were none, since the schema has no null."""
+    named = (
+        ("latency_p50_ms", latency.quantile(0.5)),
+        ("latency_p95_ms", latency.quantile(0.95)),
+        ("latency_max_ms", latency.most),
+    )
+    return {name: value / 1e6 for name, value in named if value is not None}
+
+
+def _log(finding: Finding, bus: str, now: int) -> DerivedMessage:
+    seconds, rest = divmod(finding.last, NS_PER_S)
+    parts = (finding.seen, f"means: {finding.means}" if finding.means else "", f"next: {finding.next}")
+    content = {
+        "timestamp": {"sec": seconds, "nsec": rest},
+        "level": _LEVELS[finding.severity],
+        "message": f"{finding.subject}: {'; '.join(part for part in parts if part)}",
+        "name": finding.code,
+        "file": bus,
+        "line": finding.evidence[0] if finding.evidence else 0,
+    }
+    return DerivedMessage("/findings", LOG, now, finding.first, _json(content))
+
+
+def _json(content: dict[str, object]) -> bytes:
+    return json.dumps(content, ensure_ascii=False).encode()
