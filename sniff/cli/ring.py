@@ -2,29 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from dissectors.bacnet import RingObserver
 from dissectors.bacnet.ring import Ring
 from sniff.analysis import ring_words
 from sniff.cli import tables
 from sniff.engine import Output
-from sniff.formats import Capture
 from sniff.reading import outputs
-from sniff.session import Session
+from sniff.session import Item, Session
 
 
-def ring_of(capture: Capture, session: Session) -> Ring:
-    """The ring of a whole capture."""
+def ring_of(items: Iterable[Item], session: Session) -> Ring:
+    """The ring that items show."""
     observer = RingObserver(session.timing)
-    for output in outputs(capture.items(), session):
+    for output in outputs(items, session):
         if isinstance(output, Output):
             for row in output.rows:
                 observer.see(row.no, row.event, row.header)
     return observer.ring()
 
 
-def show(capture: Capture, session: Session, style: str) -> int:
+def show(items: Iterable[Item], session: Session, style: str) -> int:
     """Print the ring; the sentences only as text."""
-    ring = ring_of(capture, session)
+    ring = ring_of(items, session)
     tables.write(ring_words.HEADINGS, ring_words.rows(ring), style)
     if style == "text":
         print()

@@ -15,6 +15,7 @@ from sniff.analysis.summary import Summary
 from sniff.cli import USAGE, Failure, arguments, tables
 from sniff.cli.rows import iso
 from sniff.cli.tables import Cell
+from sniff.editing.merging import merged, merged_session
 from sniff.engine import Output
 from sniff.reading import dissector_for, outputs
 
@@ -23,8 +24,8 @@ TABLES = ("nodes", "transactions", "latency", "load", "ring")
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Options of `stats`."""
-    parser.add_argument("file", metavar="FILE", help="capture")
-    parser.add_argument("table", nargs="?", choices=TABLES, default="nodes", help="which table (default: nodes)")
+    parser.add_argument("words", nargs="+", metavar="FILE", help="captures of one bus; parts of a rotation together")
+    parser.add_argument("--table", choices=TABLES, help="which table; may also stand after the files (default: nodes)")
     arguments.add_line(parser)
     parser.add_argument("--every", type=arguments.duration, default=1.0, metavar="TIME", help="load: length of a row")
     style = parser.add_mutually_exclusive_group()
@@ -35,26 +36,30 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print one table."""
-    capture = arguments.open_capture(args.file)
-    session = arguments.settings_of(args, capture.session)
-    if args.table == "ring":
+    table, files = args.table or "nodes", args.words
+    if len(files) > 1 and files[-1] in TABLES:
+        table, files = files[-1], files[:-1]
+    captures = [arguments.open_capture(path) for path in files]
+    session = arguments.settings_of(args, merged_session(captures, files))
+    items = merged(captures) if len(captures) > 1 else captures[0].items()
+    if table == "ring":
         if "ring" not in dissector_for(session).extras:
             raise Failure(f"ring: {session.protocol} passes no token; this table is for mstp", USAGE)
         from sniff.cli import ring
 
-        return ring.show(capture, session, args.style)
+        return ring.show(items, session, args.style)
     summary = Summary(session.line)
     kinds: Counter[tuple[str, str]] = Counter()
-    for output in outputs(capture.items(), session):
+    for output in outputs(items, session):
         if isinstance(output, Output):
             summary.add(output)
             kinds.update((transaction.kind, transaction.verdict.value) for transaction in output.transactions)
-    if args.table == "nodes":
+    if table == "nodes":
         tables.write(NODE_HEADINGS, [_node(node) for node in summary.nodes.present()], args.style)
-    elif args.table == "transactions":
+    elif table == "transactions":
         ordered = sorted(kinds.items(), key=lambda pair: (pair[0][0], -pair[1]))
         tables.write(("kind", "verdict", "count"), [(*key, count) for key, count in ordered], args.style)
-    elif args.table == "latency":
+    elif table == "latency":
         rows = [(node.address, *_quantiles(node.latency)) for node in summary.nodes if node.latency.count]
         bound = session.adapter.latency / 1e6
         tables.write(LATENCY_HEADINGS, [(*row, bound) for row in rows], args.style)
