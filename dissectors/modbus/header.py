@@ -41,7 +41,8 @@ def peek_ascii(frame: Frame) -> Header:
     error = None if frame.ok else _damage(frame, "LRC error: 0x{:02X}, computed 0x{:02X}", ascii_check(frame))
     if frame.check is not Check.ABSENT:
         octets += b"\0"  # one octet more makes it as long as its RTU twin: LRC and filler stand where the CRC would
-    return _peek(ASCII_NAME, octets, frame, error, None if frame.ok else _rtu_length(frame.expected))
+    missing = 0 if frame.expected is None else (frame.expected - len(frame.octets)) // 2
+    return _peek(ASCII_NAME, octets, frame, error, len(octets) + missing if missing else None)
 
 
 def exception_name(code: int) -> str:
@@ -81,6 +82,8 @@ def _peek(protocol: str, octets: bytes, frame: Frame, error: str | None, expecte
         role = _role(function, octets, size, expected)
         if role is Role.UNKNOWN and ok:
             error = f"{size} octets fit neither request nor response"
+        elif ok and expected not in (None, size):
+            error = f"{size} octets where its own count makes it {expected}"
     if unit == BROADCAST and role in (Role.REQUEST, Role.EITHER):
         role = Role.BROADCAST
     address, count = _address_count(code, role, octets, size if frame.check is Check.ABSENT else size - 2)
@@ -161,7 +164,3 @@ def _damage(frame: Frame, check_words: str, check: tuple[int, int] | None) -> st
     if frame.check is Check.BAD and check is not None:
         return check_words.format(*check)
     return "no check"
-
-
-def _rtu_length(ascii_length: int | None) -> int | None:
-    return None if ascii_length is None else (ascii_length - 1) // 2

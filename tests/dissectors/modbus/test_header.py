@@ -78,6 +78,27 @@ def test_a_good_check_with_a_length_that_fits_nothing_says_so(frame_of, peek_any
     assert header.error == "6 octets fit neither request nor response"
 
 
+def test_a_good_check_with_a_length_that_its_own_count_contradicts_says_so(frame_of):
+    """The framer gives such a frame with the length that its first octets predict."""
+    header = peek_rtu(replace(frame_of(seal_rtu(bytes.fromhex("01020201"))), expected=7))
+    assert (header.ok, header.role) == (True, Role.RESPONSE)
+    assert header.error == "6 octets where its own count makes it 7"
+
+
+def test_the_same_in_ascii(frame_of):
+    frame = frame_of(seal_ascii(bytes.fromhex("01020201")))
+    header = peek_ascii(replace(frame, expected=len(frame.octets) + 2))
+    assert (header.role, header.error) == (Role.RESPONSE, "6 octets where its own count makes it 7")
+
+
+@pytest.mark.parametrize("ending", [b"\r\n", b"\r", b"\r;"])
+def test_other_ends_of_ascii_frames_change_nothing(ending, frame_of):
+    octets = seal_ascii(bytes.fromhex("01030425202521"))[:-2] + ending
+    frame = replace(frame_of(octets), check=Check.GOOD, damage=None, expected=len(octets))
+    header = peek_ascii(frame)
+    assert (header.role, header.count, header.error) == (Role.RESPONSE, 2, None)
+
+
 @given(adu=ADU)
 def test_both_envelopes_say_the_same(frame_of, adu):
     rtu, ascii_ = peek_rtu(frame_of(seal_rtu(adu))), peek_ascii(frame_of(seal_ascii(adu)))

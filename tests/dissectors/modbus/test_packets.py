@@ -146,7 +146,7 @@ PDUS = {
 
 
 @pytest.mark.parametrize("name", PDUS)
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(data=st.data(), unit=st.integers(0, 255))
 def test_every_function_in_both_envelopes(name, data, unit, frame_of, peek_any):
     adu = bytes((unit,)) + data.draw(PDUS[name])

@@ -83,7 +83,7 @@ def play(paper_bus, exchanges, missing=None):
     return placed, found
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(exchanges=traffic(), data=st.data())
 def test_a_missed_frame_inverts_nothing(paper_bus, exchanges, data):
     missing = data.draw(st.integers(36, 2 * len(exchanges) - 1), label="missing frame")
@@ -111,7 +111,7 @@ def test_a_clean_bus_is_read_as_it_is(paper_bus, exchanges):
         assert found[2 * no, 2 * no + 1].verdict.value == ("exception" if answer[1] & 0x80 else "answered")
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(octets=st.lists(st.binary(max_size=12), max_size=30), data=st.data())
 def test_any_events_any_times(paper_bus, octets, data):
     """Total: every frame is in exactly one transaction, whatever comes and whenever."""
