@@ -30,12 +30,7 @@ class Table:
 
     def text(self, key: str, default: str | None = None) -> str:
         """A text; without default it must be there."""
-        value = self._value(key, default)
-        if not isinstance(value, str):
-            raise self.error(key, f"expected a text in quotes, not {value!r}")
-        if any(not character.isprintable() for character in value):
-            raise self.error(key, "has a control character")
-        return value
+        return self.spoken(key, self._value(key, default))
 
     def whole(self, key: str, default: int | None = None) -> int:
         """A whole number."""
@@ -94,6 +89,19 @@ class Table:
                 raise self.error(f"{key}.{word}", "is there twice")
             found[number] = value
         return found
+
+    def words(self, key: str) -> dict[int, str]:
+        """A table of texts by number; empty when absent."""
+        table = self.table(key)
+        return {number: table.spoken(str(number), words) for number, words in self.numbered(key).items()}
+
+    def spoken(self, key: str, value: Any) -> str:
+        """A text that may be shown to people."""
+        if not isinstance(value, str):
+            raise self.error(key, f"expected a text in quotes, not {value!r}")
+        if any(not character.isprintable() for character in value):
+            raise self.error(key, "has a control character")
+        return value
 
     def numbers(self, key: str) -> tuple[int, ...]:
         """Numbers as "0-19 26 27"; empty when absent."""

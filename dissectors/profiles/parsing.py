@@ -23,7 +23,7 @@ def parse(data: Mapping[str, Any], origin: str) -> Profile:
     name = _name(top, "name")
     modbus, n2, bacnet = top.table("modbus"), top.table("n2"), top.table("bacnet")
     registers, absent = _modbus(modbus)
-    exceptions = {"modbus": _words(modbus, "exceptions"), "n2": _words(n2, "errors")}
+    exceptions = {"modbus": modbus.words("exceptions"), "n2": n2.words("errors")}
     objects = [_object(table, _n2_place(table), n2=True) for table in n2.tables("object")]
     objects += [_object(table, _bacnet_place(table)) for table in bacnet.tables("object")]
     limits = top.table("limits")
@@ -100,7 +100,7 @@ def _parameters(table: Table, offset: int, tables: tuple[str, ...]) -> tuple[lis
     access = Access(table.choice("access", [access.value for access in Access], "rw"))
     present, absent = table.numbers("present"), table.numbers("absent")
     elsewhere = {number: _whole(table, f"elsewhere.{number}", at) for number, at in table.numbered("elsewhere").items()}
-    titles = {number: str(words) for number, words in table.numbered("titles").items()}
+    titles = table.words("titles")
     for number in {*titles, *elsewhere} - {*present, *absent}:
         raise table.error(f"titles.{number}", "is no parameter of this group")
     if set(present) & set(absent):
@@ -150,7 +150,7 @@ def _entry(table: Table, space: str, address: int, number: str, modbus: Table | 
     reserved = table.flag("reserved")
     name = _name(table, "name") if not reserved or "name" in table else f"reserved.{number.replace(' ', '-')}"
     low, high = table.pair("range")
-    states = {code: str(words) for code, words in table.numbered("states").items()}
+    states = table.words("states")
     empty = table.numbers("reserved-codes")
     if set(states) & set(empty):
         raise table.error("reserved-codes", "has a code that is also in states")
@@ -188,9 +188,9 @@ def _bit(table: Table, number: int, value: Any) -> Bit:
     if not 0 <= number <= 31:
         raise table.error(f"bits.{number}", "expected a bit number 0 … 31")
     if isinstance(value, str):
-        return Bit(number, _slug(value), value)
+        return Bit(number, _slug(value), table.spoken(f"bits.{number}", value))
     if isinstance(value, list) and len(value) in (2, 3) and all(isinstance(item, str) for item in value):
-        return Bit(number, *value)
+        return Bit(number, *(table.spoken(f"bits.{number}", word) for word in value))
     raise table.error(f"bits.{number}", f'expected "name" or ["name", "on", "off"], not {value!r}')
 
 
@@ -198,7 +198,7 @@ def _part(table: Table) -> Part:
     low, high = table.pair("bits")
     if low is None or high is None or not 0 <= low <= high <= 31:
         raise table.error("bits", "expected [lowest, highest] within 0 … 31")
-    states = {code: str(words) for code, words in table.numbered("states").items()}
+    states = table.words("states")
     part = Part(int(low), int(high), _name(table, "name"), states)
     table.finish()
     return part
@@ -244,10 +244,6 @@ def _properties(table: Table) -> dict[str, tuple[str, ...]]:
 
 def _constants(table: Table) -> dict[str, str | int]:
     return {key: table.whole(key) if isinstance(value, int) else table.text(key) for key, value in table.data.items()}
-
-
-def _words(table: Table, key: str) -> dict[int, str]:
-    return {code: str(words) for code, words in table.numbered(key).items()}
 
 
 def _check(profile: Profile) -> None:

@@ -1,0 +1,166 @@
+"""Readings to values: types, orders, scale, words, quality."""
+
+from __future__ import annotations
+
+import math
+import struct
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dissectors.profiles import packaged, parse_text
+from dissectors.profiles.decoding import Quality, decode, plain_name, say
+from dissectors.readings import How, Reading
+
+E510 = packaged("teco-e510")
+ACN = packaged("automationdirect-acn")
+
+
+def holding(first: int, *values: int, how: How = How.READ) -> tuple[Reading, ...]:
+    return tuple(Reading("holding", first + step, value, value, how) for step, value in enumerate(values))
+
+
+def device(text: str) -> object:
+    return parse_text(f'name = "x"\ntitle = "x"\nprotocols = []\n{text}', "x.toml")
+
+
+def one(text: str, *words: int) -> float | int | str:
+    profile = device(f'[[modbus.register]]\naddress = 0\nname = "a"\n{text}')
+    (value,) = decode(profile, holding(0, *words))  # type: ignore[arg-type]
+    return value.value
+
+
+@pytest.mark.parametrize(
+    ("text", "words", "expected"),
+    [
+        ('type = "u16"', (0xFFFF,), 65535),
+        ('type = "s16"', (0xFFFF,), -1),
+        ('type = "s16"\nscale = 0.1', (0x8000,), -3276.8),
+        ('type = "u32"', (1, 2), 0x10002),
+        ('type = "u32"\nword-order = "low-first"', (1, 2), 0x20001),
+        ('type = "u32"\noctet-order = "low-first"', (0x0102, 0x0304), 0x02010403),
+        ('type = "s32"', (0xFFFF, 0xFFFE), -2),
+        ('type = "f32"', struct.unpack(">HH", struct.pack(">f", 12.5)), 12.5),
+        ('type = "f32"\nword-order = "low-first"', struct.unpack(">HH", struct.pack(">f", 12.5))[::-1], 12.5),
+        ("scale = 0.01", (5003,), 50.03),
+        ("scale = 0.1\noffset = -40", (651,), 25.1),
+    ],
+)
+def test_types_and_orders(text: str, words: tuple[int, ...], expected: float) -> None:
+    assert one(text, *words) == expected
+
+
+@given(st.integers(0, 0xFFFF))
+def test_hundredths_are_exact_decimals(raw: int) -> None:
+    value = one("scale = 0.01", raw)
+    assert str(value) == str(float(f"{raw // 100}.{raw % 100:02d}"))
+
+
+def test_half_of_a_long_value_is_no_value() -> None:
+    profile = device('[[modbus.register]]\naddress = 8\nname = "a"\ntype = "u32"')
+    assert [value.name for value in decode(profile, holding(8, 1))] == ["holding/40009"]  # type: ignore[arg-type]
+    assert [value.name for value in decode(profile, holding(9, 1))] == ["holding/40010"]  # type: ignore[arg-type]
+    assert [value.name for value in decode(profile, holding(7, 1, 2, 3, 4))] == [  # type: ignore[arg-type]
+        "holding/40008",
+        "a",
+        "holding/40011",
+    ]
+
+
+def test_values_out_of_range_are_bad_and_doubtful_ones_uncertain() -> None:
+    good, bad = decode(E510, holding(0x2502, 59_900)), decode(E510, holding(0x2502, 59_901))
+    assert (good[0].quality, bad[0].quality) == (Quality.GOOD, Quality.BAD)
+    assert decode(E510, holding(0x0102, 6000))[0].quality == Quality.UNCERTAIN
+    unsure = Reading("holding", 0x2524, 1, 1, How.READ, sure=False)
+    assert decode(E510, (unsure,))[0].quality == Quality.UNCERTAIN
+    nan = Reading("AI", 10, 0x7FC00000, math.nan, How.READ)
+    assert decode(packaged("teco-f510"), (nan,))[0].quality == Quality.BAD
+
+
+def test_bits_are_points_of_their_own() -> None:
+    values = {value.name: value for value in decode(E510, holding(0x2520, 0b1001))}
+    assert values["status"].text.startswith("running, forward, not ready, fault")
+    assert (values["status.running"].value, values["status.reverse"].value, values["status.fault"].value) == (1, 0, 1)
+    assert values["status.fault"].words == "fault"
+    assert "status" in values
+    assert all(value.bit for name, value in values.items() if name != "status")
+
+
+def test_parts_of_a_register() -> None:
+    values = {value.name: value for value in decode(ACN, holding(0x0304, 0x8041))}
+    assert values["state"].text == "fault, decelerating, forward"
+    assert (values["state.condition"].value, values["state.motion"].value, values["state.direction"].value) == (8, 4, 1)
+
+
+def test_codes_in_the_manuals_words() -> None:
+    (fault,) = decode(E510, holding(0x2521, 49))
+    assert (fault.value, fault.text) == (49, "MtrSw (DI motor switch fault)")
+    assert decode(E510, holding(0x2521, 11))[0].text == "code 11"
+
+
+def test_a_register_read_along_with_its_neighbours_is_no_point() -> None:
+    assert [value.name for value in decode(E510, holding(0x2524, 6000, 7, 3100))] == ["output-frequency", "dc-voltage"]
+
+
+@pytest.mark.parametrize(
+    ("readings", "said"),
+    [
+        (holding(0x2502, 6000, how=How.WRITE), "frequency command 60.00 Hz"),
+        (holding(0x2501, 1, how=How.WRITE), "run, forward"),
+        (holding(0x2501, 3, how=How.WRITE), "run, reverse"),
+        (holding(0x2501, 0, how=How.WRITE), "stop, forward"),
+        (holding(0x2501, 1, 6000, how=How.WRITE), "run, forward; frequency command 60.00 Hz"),
+        (holding(0x2521, 0, how=How.READ), "no fault"),
+        (holding(0x2521, 17, how=How.READ), "fault external fault 01"),
+        (holding(0x0064, 1), ""),
+    ],
+)
+def test_what_an_exchange_says(readings: tuple[Reading, ...], said: str) -> None:
+    assert say(E510, readings) == said
+
+
+def test_acn_commands_in_words() -> None:
+    assert say(ACN, holding(0x0381, 3, how=How.WRITE)) == "run, forward"
+    assert say(ACN, holding(0x0381, 1, how=How.WRITE)) == "run, reverse"
+
+
+@pytest.mark.parametrize(
+    ("space", "address", "name"),
+    [
+        ("holding", 107, "holding/40108"),
+        ("holding", 0, "holding/40001"),
+        ("holding", 9998, "holding/49999"),
+        ("holding", 9999, "holding/410000"),
+        ("holding", 65535, "holding/465536"),
+        ("input", 5, "input/30006"),
+        ("coil", 0, "coil/00001"),
+        ("discrete", 12, "discrete/10013"),
+        ("AI", 9, "AI/9"),
+        ("analog-input", 4, "analog-input/4"),
+    ],
+)
+def test_names_without_a_profile(space: str, address: int, name: str) -> None:
+    if space == "discrete":
+        name = "discrete/10013"
+    assert plain_name(space, address) == name
+
+
+readings = st.builds(
+    Reading,
+    st.sampled_from(["holding", "input", "coil", "AI", "BO", "analog-input", "device", "x"]),
+    st.integers(0, 0xFFFF) | st.integers(0x2500, 0x2530) | st.integers(0, 40),
+    st.none() | st.integers(0, 2**64),
+    st.integers(-(2**63), 2**64) | st.floats() | st.text(max_size=5),
+    st.sampled_from(list(How)),
+    st.sampled_from(["", "units"]),
+    st.booleans(),
+)
+
+
+@given(st.sampled_from(["teco-e510", "teco-f510", "automationdirect-acn"]), st.lists(readings, max_size=8))
+def test_any_readings_decode(name: str, given_readings: list[Reading]) -> None:
+    for value in decode(packaged(name), given_readings):
+        assert value.text
+        assert value.text.isprintable()
+    assert say(packaged(name), given_readings).isprintable()
