@@ -21,7 +21,7 @@ from sniff.capture.config import RecordSpec, SourceSpec
 from sniff.capture.link import CaptureLink
 from sniff.capture.wire import Ended, Status
 from sniff.cli import PORT_TROUBLE, UNREADABLE, USAGE, Failure, arguments, rows
-from sniff.config import ConfigError, load
+from sniff.config import Config, ConfigError, load
 from sniff.engine import Output
 from sniff.formats import CaptureError
 from sniff.live import LiveBus
@@ -45,8 +45,9 @@ def target_of(args: argparse.Namespace) -> Target:
         config = load()
     except ConfigError as error:
         raise Failure(str(error), USAGE) from None
-    bus = config.buses.get(args.port)
-    port = (bus.port or args.port) if bus is not None else args.port
+    wanted = args.port or _only_port(config)
+    bus = config.buses.get(wanted)
+    port = (bus.port or wanted) if bus is not None else wanted
     protocol = args.protocol or (bus.protocol if bus is not None else None) or "modbus-rtu"
     line = args.line or (bus.line if bus is not None else None)
     if line is None:
@@ -56,6 +57,19 @@ def target_of(args: argparse.Namespace) -> Target:
     devices = arguments.devices_of(args, bus.devices if bus is not None else None)
     source = SourceSpec(port, line, protocol, name, notes_of(devices))
     return Target(source, bus.record if bus is not None else None, devices)
+
+
+def _only_port(config: Config) -> str:
+    """The bus or port that can only be meant when none is named. Ends with exit code 2 where there is a choice."""
+    if len(config.buses) == 1:
+        return next(iter(config.buses))
+    from sniff.sources.ports import list_ports
+
+    there = [*config.buses] or [port.device for port in list_ports()]
+    if len(there) == 1:
+        return there[0]
+    found = f"there are: {', '.join(there)}" if there else "there are no serial ports here; try `sniff485 demo`"
+    raise Failure(f"which port? {found}", USAGE)
 
 
 def notes_of(devices: Devices) -> dict[str, str]:

@@ -13,7 +13,9 @@ from sniff.live import LiveBus
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Options of `live`."""
-    parser.add_argument("port", metavar="PORT", help="port, gateway, or a configured bus")
+    parser.add_argument(
+        "port", nargs="?", metavar="PORT", help="port, gateway, or a configured bus; not needed for one"
+    )
     arguments.add_line(parser)
     arguments.add_devices(parser)
     parser.add_argument("-w", "--write", metavar="FILE", help="recording (.mcap); default: a new name in this folder")
