@@ -63,8 +63,8 @@ class LiveBus:
             self.status = message
             return [message]
         if isinstance(message, Tick):
-            if self._bus_channels is not None and (due := self._bus_channels.due(message.now)):
-                self._send(due)
+            if self._bus_channels is not None and (messages := self._bus_channels.due(message.now)):
+                self._send(messages)
                 self._send_frames()
             deadline = self.engine.deadline()
             due = deadline is not None and message.now >= deadline
