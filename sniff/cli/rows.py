@@ -95,8 +95,6 @@ def text_line(item: Settled, dissector: Dissector, session: Session, colour: boo
     seconds = (row.event.start - session.started) / NS_PER_S
     notes: list[str] = []
     bad = not isinstance(row.event, Frame) or not row.event.ok
-    if isinstance(row.event, Frame) and not row.event.ok and row.header is not None and row.header.error:
-        notes.append(f"DAMAGED ({row.header.error})")
     if row.event.marks:
         notes.append(f"{len(row.event.marks)} line error{'s' if len(row.event.marks) != 1 else ''}")
     if transaction is not None and (transaction.response or transaction.request) == row.no:
@@ -109,6 +107,8 @@ def text_line(item: Settled, dissector: Dissector, session: Session, colour: boo
     if not isinstance(row.event, Frame):
         shown = row.event.octets[:16].hex(" ").upper()
         text = f"{text}: {shown}{' …' if len(row.event.octets) > 16 else ''}"
+    elif not row.event.ok and row.header is not None and row.header.error and row.header.error not in text:
+        notes.insert(0, row.header.error)
     text = _in_words(text, item)
     line = (
         f"{row.no:>6} {seconds:12.6f} s  {'!' if bad else ' '} {text}{'  [' + '; '.join(notes) + ']' if notes else ''}"
