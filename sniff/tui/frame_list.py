@@ -72,15 +72,23 @@ class FrameList(LineList):
         """The row itself."""
         return number
 
+    def linked(self, number: int) -> tuple[int, ...]:
+        """Request or response."""
+        row = self.store.by_no(number)
+        partner = None if row is None else self.store.partner(row)
+        return () if partner is None else (partner,)
+
+    def state(self, number: int) -> object:
+        """Its verdict may come later; marks come and go; the partner of the cursor is marked."""
+        row = self.store.by_no(number)
+        transaction = None if row is None else self.store.transaction(row)
+        return transaction, number in self.viewing.marks, self.viewing.time_mode
+
     def edge(self, number: int) -> Cell:
         """Cursor or partner, and the user's mark."""
-        here = ">" if number == self.cursor else "=" if number == self._partner() else " "
+        here = ">" if number == self.cursor else "=" if number in self.linked(self.cursor) else " "
         mark = "*" if number in self.viewing.marks else " "
         return Cell(here + mark, "linked" if here == "=" else "mark" if mark == "*" else "")
-
-    def _partner(self) -> int | None:
-        row = self.store.by_no(self.cursor)
-        return None if row is None else self.store.partner(row)
 
     def cells(self, number: int, line: int) -> dict[str, Cell]:
         """What is known of one row."""

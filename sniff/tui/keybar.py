@@ -27,8 +27,8 @@ NAMES = {
     "ctrl+q": "^q",
     "ctrl+c": "^c",
 }
-NOT_OURS = {"screen.copy_text", "help_quit"}
-"""Actions that the framework binds and that mean nothing here."""
+NOT_OURS = {"screen.copy_text", "help_quit", "app.focus_next", "app.focus_previous"}
+"""Actions that the framework binds; they count here only where a screen explains them (a binding with a tooltip)."""
 ALWAYS = ("help", "back")
 """Descriptions of the keys that the bar never leaves out."""
 FIRST = ("filter", "", "freeze", "follow", "error", "pair", "mark", "time", "open", "go to")
@@ -56,7 +56,7 @@ def working_keys(screen: Screen) -> list[tuple[str, ActiveBinding]]:
         for key, active in screen.active_bindings.items()
         if active.binding.description
         and active.enabled
-        and active.binding.action not in NOT_OURS
+        and (active.binding.tooltip or active.binding.action not in NOT_OURS)
         and (not isinstance(focused, Input) or active.node in (focused, focused.parent))
     ]
 

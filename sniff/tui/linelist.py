@@ -69,6 +69,7 @@ class LineList(ScrollView, can_focus=True, inherit_bindings=False):
         self.cursor = 0
         self.drawn_lines = 0  # how many lines were ever drawn; tests count them
         self.columns: list[Column] = []
+        self._drawn: object = None
 
     # -- what a subclass gives ---------------------------------------------------------------------------------
 
@@ -87,6 +88,14 @@ class LineList(ScrollView, can_focus=True, inherit_bindings=False):
     def row_of(self, number: int) -> int | None:
         """The row of the store that a number stands for."""
         raise NotImplementedError
+
+    def linked(self, number: int) -> tuple[int, ...]:
+        """Numbers that are drawn otherwise while the cursor is on `number`."""
+        return ()
+
+    def state(self, number: int) -> object:
+        """What else than its number decides how a line looks; compared with `==`."""
+        return None
 
     def empty_text(self) -> str:
         """What to say when there is no line."""
@@ -127,7 +136,7 @@ class LineList(ScrollView, can_focus=True, inherit_bindings=False):
     def _settle(self, top: int | None) -> None:
         """After the index changed: size, scroll position (`top` stays at the top), cursor."""
         follow = self.viewing.follow and not self.is_vertical_scrollbar_grabbed
-        self.virtual_size = Size(0, len(self.index) + 1)
+        self._set_length(len(self.index) + 1)
         if top is not None and not follow:
             line = self.index.position(top)
             if line != self.scroll_offset.y:
@@ -139,7 +148,23 @@ class LineList(ScrollView, can_focus=True, inherit_bindings=False):
             if follow:
                 self.show_cursor()
         self.columns = self.lay_out_columns(self._width)
-        self.refresh()
+        picture = self._picture()
+        if picture != self._drawn:  # over a slow line every line drawn again costs
+            self._drawn = picture
+            self.refresh()
+
+    def _set_length(self, lines: int) -> None:
+        """Set the virtual size and the scroll bar; without the layout and the full redraw that the reactive causes."""
+        self.set_reactive(LineList.virtual_size, Size(0, lines))
+        self.vertical_scrollbar.window_virtual_size = lines
+        self.vertical_scrollbar.window_size = self.scrollable_content_region.height
+
+    def _picture(self) -> object:
+        """Equal as long as the visible lines are, the cursor apart: who moves it draws what it touches."""
+        index, top = self.index, self.scroll_offset.y
+        visible = [index[line] for line in range(top, min(len(index), top + self.size.height))]
+        note = "" if len(index) else self.empty_text()
+        return self.columns, note, [(number, self.state(number)) for number in visible]
 
     # -- the cursor --------------------------------------------------------------------------------------------
 
@@ -155,10 +180,13 @@ class LineList(ScrollView, can_focus=True, inherit_bindings=False):
         self.show_cursor(centre=not self._visible(self.index.position(nearest)))
 
     def _set_cursor(self, number: int, by_user: bool) -> None:
+        touched = [self.cursor, *self.linked(self.cursor), number, *self.linked(number)]
         self.cursor = number
         self.viewing.row = self.row_of(number) or self.viewing.row
         self.viewing.row_from = self
-        self.refresh()
+        for changed in touched:
+            if changed in self.index:
+                self.refresh_line(self.index.position(changed) + 1)
         self.post_message(self.Moved(self, number, by_user))
 
     def _visible(self, line: int) -> bool:

@@ -47,6 +47,10 @@ class TransactionList(LineList):
         transaction = self.store.closed_by_no(number)
         return None if transaction is None else transaction.request or transaction.response
 
+    def state(self, number: int) -> object:
+        """A closed transaction does not change."""
+        return self.viewing.time_mode
+
     def edge(self, number: int) -> Cell:
         """Cursor, and trouble."""
         transaction = self.store.closed_by_no(number)

@@ -28,6 +28,8 @@ SCREENS: tuple[Entry, ...] = (
     Entry("2", "Transactions", "sniff.tui.screens.transactions:TransactionsScreen"),
     Entry("3", "Nodes", "sniff.tui.screens.nodes:NodesScreen"),
     Entry("4", "Points", "sniff.tui.screens.points:PointsScreen"),
+    Entry("5", "Findings", "sniff.tui.screens.findings:FindingsScreen"),
+    Entry("6", "Timeline", "sniff.tui.screens.timeline:TimelineScreen"),
     Entry("7", "Ring", "sniff.tui.screens.ring:RingScreen"),
     Entry("8", "Line", "sniff.tui.screens.line:LineScreen"),
 )

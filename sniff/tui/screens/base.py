@@ -20,6 +20,7 @@ class ViewScreen(Screen[None]):
 
     A subclass gives `TITLE` (as in the table of screens), `compose_view` (its widgets) and `draw` (brings them up to
     date: called when shown and then ten times a second while anything changes; it must not walk over all rows).
+    Rules in its tcss file stand inside a block with its class name: style sheets hold for the whole app.
     """
 
     TITLE: ClassVar[str] = ""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -32,6 +33,16 @@ def test_every_screen_of_the_table_is_there(look: Any, busy_bus: Any) -> None:
             assert see.lines()[-1].endswith("? help  q back")
 
     look(busy_bus.store, script)
+
+
+def test_style_sheets_of_screens_touch_nothing_else() -> None:
+    """A rule outside a block with the screen's name would change all screens once this one was shown."""
+    for entry in SCREENS:
+        screen = load(entry)
+        path = Path(sys.modules[screen.__module__].__file__).parent / (vars(screen).get("CSS_PATH") or "none")
+        if path.is_file():
+            outer = [line for line in path.read_text().splitlines() if line.endswith("{") and not line.startswith(" ")]
+            assert outer == [f"{screen.__name__} {{"], path.name
 
 
 def test_an_unknown_start_screen_is_refused(busy_bus: Any) -> None:

@@ -119,3 +119,23 @@ def test_a_filter_shows_its_neighbourhood_before_it_has_seen_everything(look: An
         assert see.main.cursor == index.nearest(500_000)
 
     look(store, script)
+
+
+def test_only_lines_that_changed_are_drawn(look: Any, store_of: Any) -> None:
+    """A terminal over ssh pays for every line."""
+    store = store_of(1000)
+
+    async def script(see: Any) -> None:
+        await see.press("down")
+        before = see.main.drawn_lines
+        await see.press("down")
+        assert see.main.drawn_lines - before == 2  # where the cursor was and where it is
+        before = see.main.drawn_lines
+        for _ in range(5):
+            store.rows.count += 10
+            store.version += 1
+            await see.poll()
+        assert see.main.index.last == 1050
+        assert see.main.drawn_lines == before  # nothing of it is in sight
+
+    look(store, script)

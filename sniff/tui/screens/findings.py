@@ -1,0 +1,190 @@
+"""Screen 5: what is wrong, in words, the gravest first; enter goes to the frames that show it."""
+
+from __future__ import annotations
+
+import time
+from typing import ClassVar
+
+from rich.text import Text
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.containers import VerticalScroll
+from textual.widgets import DataTable, Static
+
+from dissectors.findings import Finding, Severity
+from sniff.analysis.judging import rules_over
+from sniff.tui.judged import Judged
+from sniff.tui.plain import plain
+from sniff.tui.screens.base import ViewScreen
+from sniff.tui.tables import StationTable
+from sniff.tui.times import clock
+
+SLICE_SECONDS = 0.012
+SLICE_ROWS = 200
+PERIOD = 1.0
+"""Seconds between two looks at the findings while rows keep coming."""
+
+COLUMNS = ("severity", "code", "subject", "n", "what")
+_SIGNS = {Severity.ERROR: "E!", Severity.WARNING: "W", Severity.NOTE: "n", Severity.INFO: "i"}
+_STYLES = {Severity.ERROR: "bold red", Severity.WARNING: "yellow", Severity.NOTE: "", Severity.INFO: "dim"}
+
+
+class FindingsScreen(ViewScreen):
+    """A line a finding; below it what it means, what to do next, and where to see it."""
+
+    TITLE = "Findings"
+    CSS_PATH = "findings.tcss"
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("s", "order", "order", tooltip="order by severity, or by subject"),
+        Binding("i", "infos", "facts", tooltip="show or hide facts and notes"),
+        Binding("e", "evidence(1)", "next", tooltip="next frame that shows the finding under the cursor"),
+        Binding("E", "evidence(-1)", "before", tooltip="frame before that shows it", show=False),
+    ]
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._judged: Judged | None = None
+        self._looked = -PERIOD
+        self._by_subject = False
+        self._all = True
+        self._found: dict[str, Finding] = {}
+        self._evidence: dict[str, int] = {}  # place in the evidence of each finding that was shown last
+        self._titles: dict[str, str] = {}
+
+    def compose_view(self) -> ComposeResult:
+        """The table, and the finding under the cursor in full."""
+        yield StationTable(id="main", cursor_type="row", zebra_stripes=True)
+        with VerticalScroll(id="detail"):
+            yield Static(id="words", markup=False)
+
+    def on_mount(self) -> None:
+        """Columns."""
+        table = self.query_one(StationTable)
+        for name in COLUMNS:
+            table.add_column(Text("" if name == "severity" else name), key=name)
+        table.cell_padding = 1
+        self._titles = {code: rule.title for code, rule in rules_over(self.store.dissector).items()}
+
+    # -- keeping up --------------------------------------------------------------------------------------------
+
+    def draw(self) -> None:
+        """Look again when all rows are judged, at most once a second."""
+        if self._judged is None or self._judged.store is not self.store:
+            self._judged = Judged(self.store)
+        if not self.work_left() and time.monotonic() - self._looked >= PERIOD:
+            self._look()
+
+    def work_left(self) -> bool:
+        """Whether rows are still to be judged."""
+        return self._judged is not None and self._judged.left(self.viewing.last_row) > 0
+
+    def work(self) -> bool:
+        """Judge some rows."""
+        judged = self._judged
+        if judged is None:
+            return False
+        end = time.perf_counter() + SLICE_SECONDS
+        last = self.viewing.last_row
+        while judged.left(last) and time.perf_counter() < end:
+            judged.step(SLICE_ROWS, last)
+        if not judged.left(last) or time.monotonic() - self._looked >= PERIOD:
+            self._look()
+        return self.work_left()
+
+    def note(self) -> str:
+        """How far the rules are."""
+        judged = self._judged
+        left = judged.left(self.viewing.last_row) if judged is not None else 0
+        return f"{left} rows to judge" if left else ""
+
+    def _look(self) -> None:
+        judged = self._judged
+        if judged is None:
+            return
+        self._looked = time.monotonic()
+        if self.viewing.last_row >= self.store.last_no:
+            judged.step(0, self.viewing.last_row)  # what closed since
+        found = [f for f in judged.findings() if self._all or f.severity >= Severity.WARNING]
+        if self._by_subject:
+            found.sort(key=lambda f: (f.subject, -f.severity, f.code))
+        self._found = {f"{finding.code} {finding.subject}": finding for finding in found}
+        self.query_one(StationTable).fill((key, self._cells(f)) for key, f in self._found.items())
+        self._describe()
+
+    # -- showing -----------------------------------------------------------------------------------------------
+
+    def _cells(self, finding: Finding) -> list[Text]:
+        style = _STYLES[finding.severity]
+        title = self._titles.get(finding.code, "")
+        cells = (_SIGNS[finding.severity], finding.code, finding.subject, str(finding.count), title)
+        return [Text(plain(cell), style=style if at in (0, 1) else "") for at, cell in enumerate(cells)]
+
+    def _describe(self) -> None:
+        words = self.query_one("#words", Static)
+        finding = self._here()
+        if finding is None:
+            left = self.work_left()
+            words.update("the rules are still reading" if left else "nothing was found")
+            return
+        text = Text()
+        text.append(f"{finding.severity.label} {finding.code} ", style=_STYLES[finding.severity])
+        text.append(plain(f"{finding.subject}: {finding.seen}") + "\n")
+        for word, said in (("means", finding.means), ("next", finding.next)):
+            if said:
+                text.append(f"{word}: ", style="bold")
+                text.append(plain(said) + "\n")
+        if finding.evidence:
+            text.append("frames: ", style="bold")
+            text.append(", ".join(self._place(no) for no in finding.evidence[:8]) + " (enter, e, E)\n")
+        span = (
+            clock(finding.first) if finding.first == finding.last else f"{clock(finding.first)} … {clock(finding.last)}"
+        )
+        text.append(f"seen: {span}", style="dim")
+        words.update(text)
+
+    def _place(self, no: int) -> str:
+        row = self.store.by_no(no)
+        return f"{no}" if row is None else f"{no} at {clock(row.event.start)}"
+
+    def _here(self) -> Finding | None:
+        key = self.query_one(StationTable).key_here()
+        return self._found.get(key) if key is not None else None
+
+    # -- keys --------------------------------------------------------------------------------------------------
+
+    def on_data_table_row_highlighted(self, event: DataTable.RowHighlighted) -> None:
+        """The cursor moved."""
+        event.stop()
+        self._describe()
+
+    def on_data_table_row_selected(self, event: DataTable.RowSelected) -> None:
+        """Enter or click: the first frame that shows it."""
+        event.stop()
+        self._go(0)
+
+    def action_evidence(self, step: int) -> None:
+        """The next frame that shows the finding under the cursor, or the one before."""
+        key = self.query_one(StationTable).key_here()
+        self._go(self._evidence.get(key or "", -1 if step > 0 else 0) + step)
+
+    def _go(self, place: int) -> None:
+        finding, key = self._here(), self.query_one(StationTable).key_here()
+        if finding is None or key is None:
+            return
+        kept = [no for no in finding.evidence if self.store.by_no(no) is not None]
+        if not kept:
+            self.app.notify("no frame of it is kept" if finding.evidence else "it is about no single frame", timeout=3)
+            return
+        self._evidence[key] = place % len(kept)
+        self.app.show_row(kept[place % len(kept)])
+
+    def action_order(self) -> None:
+        """By severity, or by subject."""
+        self._by_subject = not self._by_subject
+        self.app.notify(f"ordered by {'subject' if self._by_subject else 'severity'}", timeout=2)
+        self._look()
+
+    def action_infos(self) -> None:
+        """With facts and notes, or without."""
+        self._all = not self._all
+        self._look()

@@ -1,0 +1,271 @@
+"""Screen 6: load and errors over time; zoom, go along, and take a stretch of it as a filter."""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from typing import ClassVar, NamedTuple
+
+from rich.text import Text
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.widgets import Static
+
+from dissectors.line import NS_PER_S
+from sniff.analysis.load import Second
+from sniff.store import Store
+from sniff.tui.charts import sparkline
+from sniff.tui.screens.base import ViewScreen
+from sniff.tui.times import clock
+
+ZOOMS = (1, 2, 5, 10, 30, 60, 300, 600, 1800, 3600)
+"""Seconds that one column may stand for."""
+
+LABEL = 9
+
+
+class Column(NamedTuple):
+    """Some seconds of the bus drawn as one character. `begin`: s since the epoch."""
+
+    begin: int
+    load: float
+    frames: int
+    damaged: int
+    noise: int
+    failed: int
+
+
+def columns(store: Store, begin: int, width: int, zoom: int) -> list[Column]:
+    """`width` columns of `zoom` seconds each from second `begin` on."""
+    seconds = store.load.seconds
+    made = []
+    for at in range(begin, begin + width * zoom, zoom):
+        parts = [seconds[number] for number in range(at, at + zoom) if number in seconds]
+        together = Second(
+            busy=sum(part.busy for part in parts),
+            frames=sum(part.frames for part in parts),
+            damaged=sum(part.damaged for part in parts),
+            noise=sum(part.noise for part in parts),
+        )
+        failed = _failed(store, at, at + zoom) if parts else 0
+        load = min(1.0, together.busy / (zoom * NS_PER_S))
+        made.append(Column(at, load, together.frames, together.damaged, together.noise, failed))
+    return made
+
+
+def _failed(store: Store, begin: int, end: int) -> int:
+    """Rows that are damaged, noise, or of a bad transaction in these seconds."""
+    first, last = (_row_at(store, second * NS_PER_S) for second in (begin, end))
+    return bisect_left(store.errors, last) - bisect_left(store.errors, first)
+
+
+def _row_at(store: Store, time: int) -> int:
+    """Number of the first row that begins at `time` (ns) or after."""
+    return store.first_no + bisect_left(store.rows, time, key=lambda row: row.event.start)
+
+
+class TimelineScreen(ViewScreen):
+    """Three charts over the same seconds, a cursor, and a selection."""
+
+    TITLE = "Timeline"
+    CSS_PATH = "timeline.tcss"
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("left,h", "move(-1)", "earlier", tooltip="cursor to an earlier time"),
+        Binding("right,l", "move(1)", "later", tooltip="cursor to a later time"),
+        Binding("pageup", "move(-20)", "page earlier", show=False),
+        Binding("pagedown", "move(20)", "page later", show=False),
+        Binding("g,home", "end(-1)", "first", show=False),
+        Binding("G,end", "end(1)", "last", show=False),
+        Binding("plus,equals_sign", "zoom(-1)", "zoom in", tooltip="fewer seconds a column"),
+        Binding("minus", "zoom(1)", "zoom out", tooltip="more seconds a column"),
+        Binding("e", "error(1)", "error", tooltip="next column with errors"),
+        Binding("E", "error(-1)", "error", tooltip="column with errors before", show=False),
+        Binding("v", "select", "select", tooltip="begin a selection here; again: end it"),
+        Binding("enter", "open", "frames", tooltip="show the frames of the selection, or those at the cursor"),
+        Binding("escape", "clear", "clear", tooltip="remove selection and filter", show=False),
+    ]
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._zoom: int | None = None  # place in ZOOMS; None until it has been chosen to show everything
+        self._cursor: int | None = None  # s since the epoch; None follows the newest
+        self._anchor: int | None = None  # where the selection began
+        self._begin = 0
+        self._drawn: tuple[object, ...] = ()
+
+    def compose_view(self) -> ComposeResult:
+        """The charts."""
+        yield _Chart(id="main", markup=False)
+
+    def draw(self) -> None:
+        """Bring the charts up to date, unless frozen."""
+        width = max(10, self.size.width - LABEL - 2)
+        state = (self.store.version, width, self.size.height, self._zoom, self._cursor, self._anchor)
+        frozen = self.viewing.frozen and self._drawn and self._drawn[1:] == state[1:]
+        if state == self._drawn or frozen:
+            return
+        self._drawn = state
+        chart = self.query_one("#main", Static)
+        first, last = self._span()
+        if first is None or last is None:
+            chart.update("nothing was heard yet")
+            return
+        if self._zoom is None:
+            fitting = (at for at, zoom in enumerate(ZOOMS) if (last - first + 1) <= zoom * width)
+            self._zoom = next(fitting, len(ZOOMS) - 1)
+        zoom = ZOOMS[self._zoom]
+        cursor = last if self._cursor is None else min(max(self._cursor, first), last)
+        self._begin = self._scrolled(first, last, cursor, width, zoom)
+        chart.update(self._text(columns(self.store, self._begin, width, zoom), cursor, zoom))
+
+    def _scrolled(self, first: int, last: int, cursor: int, width: int, zoom: int) -> int:
+        """Second at which the charts begin, a whole number of columns after the first; the cursor is inside."""
+        begin = first + max(0, (self._begin - first) // zoom) * zoom
+        if cursor < begin:
+            begin = first + (cursor - first) // zoom * zoom
+        elif cursor >= begin + width * zoom:
+            begin = first + ((cursor - first) // zoom - width + 1) * zoom
+        return begin
+
+    def _text(self, made: list[Column], cursor: int, zoom: int) -> Text:
+        at = (cursor - self._begin) // zoom
+        chosen = self._chosen(cursor, zoom)
+        text = Text(no_wrap=True)
+        peak = max((column.load for column in made), default=0.0)
+        top = next((step for step in (0.1, 0.25, 0.5, 1.0) if peak <= step), 1.0)
+        rows = (
+            (f"load {top:.0%}", [column.load for column in made], top, ""),
+            ("frames", [float(column.frames) for column in made], 0.0, ""),
+            ("errors", [float(column.failed) for column in made], 0.0, "bold red"),
+            ("damaged", [float(column.damaged) for column in made], 0.0, "red"),
+            ("noise", [float(column.noise) for column in made], 0.0, "yellow"),
+        )
+        for label, values, most, style in rows:
+            text.append(f"{label:<{LABEL}}", style="bold")
+            for place, bar in enumerate(sparkline(values, most or max(values, default=0.0))):
+                begin = made[place].begin
+                marked = chosen is not None and chosen[0] <= begin < chosen[1]
+                text.append(bar, style="reverse" if place == at else f"{style} on blue" if marked else style)
+            text.append(f" {max(values, default=0):.0f}\n" if not most else "\n")
+        text.append(" " * LABEL + " " * max(0, at) + "▲\n")
+        text.append(self._axis(made, zoom) + "\n\n")
+        text.append(self._words(made[at] if 0 <= at < len(made) else None, zoom, chosen))
+        return text
+
+    def _axis(self, made: list[Column], zoom: int) -> str:
+        left, right = clock(made[0].begin * NS_PER_S)[:8], clock((made[-1].begin + zoom) * NS_PER_S)[:8]
+        middle = f"one column {_duration(zoom)}"
+        space = max(1, len(made) - len(left) - len(right) - len(middle))
+        return " " * LABEL + left + " " * (space // 2) + middle + " " * (space - space // 2) + right
+
+    def _words(self, column: Column | None, zoom: int, chosen: tuple[int, int] | None) -> str:
+        if column is None:
+            return ""
+        words = (
+            f"{clock(column.begin * NS_PER_S)[:8]} + {_duration(zoom)}: load {column.load:.1%}, {column.frames} frames,"
+            f" "
+            f"{column.failed} errors, {column.damaged} damaged, {column.noise} octets of noise"
+        )
+        if self._anchor is not None and chosen is not None:
+            span = f"{clock(chosen[0] * NS_PER_S)[:8]} … {clock(chosen[1] * NS_PER_S)[:8]}"
+            words += f"\nselected: {span}; enter shows its frames, escape lets it go"
+        return words
+
+    # -- time --------------------------------------------------------------------------------------------------
+
+    def _span(self) -> tuple[int | None, int | None]:
+        load = self.store.load
+        if load.first is None or load.last is None:
+            return None, None
+        return load.first // NS_PER_S, load.last // NS_PER_S
+
+    def _chosen(self, cursor: int, zoom: int) -> tuple[int, int] | None:
+        """The selected seconds, whole columns; None without a selection."""
+        if self._anchor is None:
+            return None
+        low, high = sorted((self._anchor, cursor))
+        low, high = (self._begin + (value - self._begin) // zoom * zoom for value in (low, high))
+        return low, high + zoom
+
+    # -- keys --------------------------------------------------------------------------------------------------
+
+    def _place(self) -> int | None:
+        first, last = self._span()
+        if first is None or last is None:
+            return None
+        return last if self._cursor is None else min(max(self._cursor, first), last)
+
+    def action_move(self, step: int) -> None:
+        """Move the cursor by columns; at the newest one it follows."""
+        here = self._place()
+        if here is None or self._zoom is None:
+            return
+        first, last = self._span()
+        moved = here + step * ZOOMS[self._zoom]
+        self._cursor = None if moved >= (last or 0) else max(first or 0, moved)
+        self.draw()
+
+    def action_end(self, side: int) -> None:
+        """To the first or the last column."""
+        self._cursor = self._span()[0] if side < 0 else None
+        self.draw()
+
+    def action_zoom(self, step: int) -> None:
+        """Fewer or more seconds a column."""
+        if self._zoom is not None:
+            self._zoom = min(max(0, self._zoom + step), len(ZOOMS) - 1)
+            self.draw()
+
+    def action_error(self, step: int) -> None:
+        """To the next column with an error, or the one before."""
+        here = self._place()
+        if here is None or self._zoom is None:
+            return
+        zoom = ZOOMS[self._zoom]
+        begin = self._begin + (here - self._begin) // zoom * zoom
+        edge = begin + zoom if step > 0 else begin
+        row = _row_at(self.store, edge * NS_PER_S)
+        no = self.store.next_error(row - 1) if step > 0 else self.store.previous_error(row)
+        found = self.store.by_no(no) if no is not None else None
+        if found is None:
+            self.app.notify("no more errors that way", timeout=2)
+            return
+        self._cursor = found.event.start // NS_PER_S
+        self.draw()
+
+    def action_select(self) -> None:
+        """Begin a selection, or end it by showing its frames."""
+        if self._anchor is not None:
+            self.action_open()
+            return
+        self._anchor = self._place()
+        self.draw()
+
+    def action_clear(self) -> None:
+        """No selection, no filter."""
+        self._anchor = None
+        if self.viewing.filter:
+            self.app.filter("")
+        self.draw()
+
+    def action_open(self) -> None:
+        """Show the frames of the selection as a filter, or go to the first frame at the cursor."""
+        here = self._place()
+        if here is None or self._zoom is None:
+            return
+        zoom = ZOOMS[self._zoom]
+        chosen = self._chosen(here, zoom)
+        begin = self._begin + (here - self._begin) // zoom * zoom
+        low, high = chosen or (begin, begin + zoom)
+        first, after = (_row_at(self.store, second * NS_PER_S) for second in (low, high))
+        if chosen is not None:
+            self.app.filter(f"no >= {first} && no < {after}")
+            self._anchor = None
+        self.app.show_row(min(first, self.store.last_no))
+
+
+class _Chart(Static, can_focus=True):
+    """The charts take the keys."""
+
+
+def _duration(seconds: int) -> str:
+    return f"{seconds} s" if seconds < 60 else f"{seconds // 60} min" if seconds < 3600 else f"{seconds // 3600} h"

@@ -1,0 +1,120 @@
+"""Screens 5 and 6 over real findings: a Modbus bus with an absent station and noise, in simulated time."""
+
+from __future__ import annotations
+
+import pytest
+
+from dissectors.registry import get
+from sniff.engine import Output
+from sniff.reading import outputs
+from sniff.simulation.faults import LostResponse
+from sniff.simulation.scenarios import simulate
+from sniff.store import Store
+from sniff.tui.judged import Judged
+from tests.faults.buses import modbus
+
+START = 1_772_359_200_000_000_000
+
+
+@pytest.fixture(scope="module")
+def store() -> Store:
+    plan = modbus((LostResponse(0.1, ("unit 2",)),), absent=(4,), seed=3)
+    session, items = simulate(plan, 30, started=START)
+    made = Store(session, get(plan.protocol))
+    for output in outputs(items, session):
+        if isinstance(output, Output):
+            made.add(output)
+        else:
+            made.add_line_event(output)
+    return made
+
+
+def test_judging_in_pieces_gives_what_judging_at_once_gives(store):
+    pieces, whole = Judged(store), Judged(store)
+    while pieces.left(store.last_no):
+        pieces.step(7, store.last_no)
+    whole.step(store.last_no, store.last_no)
+    assert pieces.findings() == whole.findings()
+    assert {"MB001", "MB002"} <= {finding.code for finding in whole.findings()}
+
+
+def test_the_gravest_finding_stands_first_and_says_what_to_do(look, store):
+    async def script(looking):
+        await looking.press("5")
+        lines = looking.lines()
+        rows = [line for line in lines if " MB001 " in line]
+        assert "station 4" in rows[0]
+        assert lines.index(rows[0]) < next(at for at, line in enumerate(lines) if " MB002 " in line)
+        assert "next: " in looking.text()
+        assert "its supply, address switch" in looking.text()
+
+    look(store, script)
+
+
+def test_enter_goes_to_the_frame_that_shows_it(look, store):
+    judged = Judged(store)
+    judged.step(store.last_no, store.last_no)
+    evidence = next(finding for finding in judged.findings() if finding.code == "MB001").evidence
+
+    async def script(looking):
+        await looking.press("5", "enter")
+        assert looking.app.current_mode == "frames"
+        assert looking.app.viewing.row == evidence[0]
+        await looking.press("5", "e")
+        assert looking.app.viewing.row == evidence[1]
+
+    look(store, script)
+
+
+def test_facts_and_notes_can_be_left_out(look, store):
+    async def script(looking):
+        await looking.press("5")
+        assert "LN001" in looking.text()
+        await looking.press("i")
+        assert "LN001" not in looking.text()
+        assert "MB001" in looking.text()
+
+    look(store, script)
+
+
+def test_the_timeline_shows_all_of_a_capture_and_zooms(look, store):
+    async def script(looking):
+        await looking.press("6")
+        assert "one column 1 s" in looking.text()
+        assert "10:00:00" in looking.text()
+        assert "10:00:30" in looking.text() or "10:00:29" in looking.text() or "10:01:0" in looking.text()
+        await looking.press("-")
+        assert "one column 2 s" in looking.text()
+
+    look(store, script)
+
+
+def test_a_stretch_of_the_timeline_becomes_a_filter(look, store):
+    async def script(looking):
+        await looking.press("6", "g", "right", "right", "v", "right", "right", "enter")
+        assert looking.app.current_mode == "frames"
+        first, last = START + 2 * 10**9, START + 5 * 10**9
+        shown = [row for row in store.rows if looking.app.viewing.accepts_row(row.no)]
+        assert shown
+        assert all(first <= row.event.start < last for row in shown)
+        assert len(shown) == sum(first <= row.event.start < last for row in store.rows)
+
+    look(store, script)
+
+
+def test_e_goes_to_the_next_second_with_an_error(look, store):
+    async def script(looking):
+        await looking.press("6", "g", "e")
+        words = next(line for line in looking.lines() if "errors," in line)
+        assert " 0 errors," not in words
+
+    look(store, script)
+
+
+@pytest.mark.parametrize("key", ["5", "6"])
+def test_an_empty_store_is_said_to_be_empty(look, make_bus, key):
+    async def script(looking):
+        await looking.press(key)
+        assert "nothing was heard" in looking.text() or "nothing" in looking.text() or "not one octet" in looking.text()
+
+    look(make_bus().store, script)
