@@ -1,0 +1,95 @@
+"""What BACnet exchanges tell."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dissectors.bacnet import apdu as apdus
+from dissectors.bacnet import codec, services
+from dissectors.bacnet.application import confirmed
+from dissectors.bacnet.f510 import f510
+from dissectors.bacnet.frame_making import npdu_frame
+from dissectors.bacnet.frame_types import FrameType
+from dissectors.bacnet.readings import readings
+from dissectors.bacnet.values import Enumerated
+from dissectors.frame import Check, Found, Frame
+
+MASTER, DRIVE = 1, 5
+
+
+def frame(source: int, destination: int, npdu: bytes, expecting: bool = False) -> Frame:
+    octets = npdu_frame(destination, source, npdu, expecting)
+    return Frame("mstp", octets, 0, 1, Check.GOOD, Found.DELIMITER)
+
+
+def exchange(request: bytes) -> list[tuple[Any, ...]]:
+    drive = f510(510)
+    answer = drive.answer(MASTER, request)
+    assert answer is not None
+    found = readings(frame(MASTER, DRIVE, request, True), frame(DRIVE, MASTER, answer))
+    return [(r.space, r.address, r.value, r.how.value, r.part, r.station) for r in found]
+
+
+def read(thing: str, prop: str = "present-value") -> bytes:
+    return confirmed(1, 12, {"object-identifier": thing, "property-identifier": prop})
+
+
+def test_read_property() -> None:
+    assert exchange(read("analog-input,10")) == [("analog-input", 10, 60.0, "read", "", DRIVE)]
+    assert exchange(read("binary-input,0")) == [("binary-input", 0, 0, "read", "", DRIVE)]
+    assert exchange(read("device,510", "vendor-name")) == [("device", 510, "TECO F510", "read", "vendor-name", DRIVE)]
+    assert exchange(read("analog-input,99")) == []
+
+
+def test_write_property() -> None:
+    write = {"object-identifier": "analog-output,0", "property-identifier": "present-value", "property-value": 42.5}
+    request = confirmed(2, 15, write)
+    assert exchange(request) == [("analog-output", 0, 42.5, "write", "", DRIVE)]
+    alone = readings(frame(MASTER, DRIVE, request, True), None)
+    assert [(r.address, r.value, r.station) for r in alone] == [(0, 42.5, DRIVE)]
+    assert exchange(confirmed(3, 15, {**write, "property-value": 99.0})) == []
+
+
+def test_read_property_multiple() -> None:
+    spec = {
+        "object-identifier": "analog-input,11",
+        "list-of-property-references": [{"property-identifier": "present-value"}, {"property-identifier": "priority"}],
+    }
+    request = confirmed(4, 14, {"list-of-read-access-specs": [spec]})
+    assert exchange(request) == [("analog-input", 11, 4.0, "read", "", DRIVE)]
+
+
+def test_change_of_value() -> None:
+    values = {
+        "subscriber-process-identifier": 1,
+        "initiating-device-identifier": "device,510",
+        "monitored-object-identifier": "analog-input,4",
+        "time-remaining": 0,
+        "list-of-values": [
+            {"property-identifier": "present-value", "value": 59.9},
+            {"property-identifier": "status-flags", "value": Enumerated(1)},
+        ],
+    }
+    layout = services.parameters(1, 2)
+    assert layout is not None
+    npdu = b"\x01\x00" + apdus.encode(1, service=2) + codec.encode(layout, values)
+    found = readings(frame(DRIVE, 255, npdu), None)
+    assert [(r.space, r.address, r.value, r.how.value, r.part, r.station) for r in found] == [
+        ("analog-input", 4, 59.9, "report", "", DRIVE),
+        ("analog-input", 4, 1, "report", "status-flags", DRIVE),
+    ]
+
+
+def test_tokens_tell_nothing() -> None:
+    token = bytes.fromhex("55ff0010050000 8c".replace(" ", ""))
+    assert readings(Frame("mstp", token, 0, 1, Check.GOOD, Found.DELIMITER), None) == ()
+
+
+@given(st.binary(max_size=40), st.none() | st.binary(max_size=40))
+def test_any_octets(request: bytes, response: bytes | None) -> None:
+    for kind in (FrameType.DATA_EXPECTING_REPLY, FrameType.DATA_NOT_EXPECTING_REPLY):
+        asked = frame(MASTER, DRIVE, b"\x01\x00" + request, kind == FrameType.DATA_EXPECTING_REPLY)
+        readings(asked, None if response is None else frame(DRIVE, MASTER, b"\x01\x00" + response))
