@@ -23,8 +23,8 @@ from dissectors.checksums import sum8
 from dissectors.frame import Check, Chunk, Damage, Event, Found, Frame, LineError, Noise, Reason
 from dissectors.framer import UNKNOWN_SILENCE, OctetWindow
 from dissectors.line import NS_PER_S, Timing
-from dissectors.modbus.functions import DIAGNOSTIC_DELIMITER, ascii_length
-from dissectors.modbus.remains import Side, noise_place, predicted
+from dissectors.modbus.functions import DIAGNOSTIC_DELIMITER, ascii_length, is_open_length
+from dissectors.modbus.remains import ODD_LENGTH, Side, noise_place, predicted
 
 MAX_CHARACTERS: Final = 513
 LONGEST_SILENCE: Final = NS_PER_S
@@ -213,6 +213,8 @@ class AsciiFramer:
         if damage is None and ending == b"\n":
             damage = Damage.FORM
         expected = None if length is None else ascii_length(length) - 2 + len(ending)
+        if check is Check.GOOD and expected not in (None, count):
+            flags.update(ODD_LENGTH)
         self._take(count, check, damage, expected, tuple(sorted(flags)))
         if damage is None:
             self._track_delimiter(body)
@@ -280,10 +282,10 @@ def _judge(body: bytes, formed: bool) -> tuple[Check, Damage | None, int | None]
         return Check.BAD, Damage.FORM, None
     if len(body) < 3:
         return Check.ABSENT, Damage.SHORT, None
-    own = len(body) + 1
-    right = predicted(body + b"\0")  # as long as the RTU frame, which has one octet more of check
+    own = len(body) + 1  # as an RTU frame, whose check has one octet more
+    right = None if is_open_length(body) else predicted(body + b"\0")
     if not sum8(body):
-        return Check.GOOD, None, own if right == own else None
+        return Check.GOOD, None, right
     if right is None or right == own:
         return Check.BAD, Damage.CHECK, right
     return Check.BAD, Damage.SHORT if own < right else Damage.LONG, right

@@ -40,16 +40,24 @@ from dissectors.modbus.candidates import (
 )
 from dissectors.modbus.expectation import Expected, expectation
 from dissectors.modbus.functions import BROADCAST, EXCEPTION_BIT, FUNCTIONS, MAX_FRAME, MAX_UNIT, MORE, is_open_length
-from dissectors.modbus.remains import Injury, Side, injury, noise_place, noise_reason, predicted, zeros_at_start
+from dissectors.modbus.remains import (
+    ODD_LENGTH,
+    Injury,
+    Side,
+    injury,
+    noise_place,
+    noise_reason,
+    predicted,
+    zeros_at_start,
+)
 from dissectors.modbus.segmentation import (
     ADJACENT,
     HEARD,
     LIKELY,
     PROVED,
-    SCALE,
     SILENCE_INSIDE,
-    THRESHOLD,
     segment,
+    worth,
 )
 
 WINDOW: Final = 2 * MAX_FRAME
@@ -249,9 +257,9 @@ class RtuFramer:
                     bits += ZERO_TAIL
                 if expected is not None:
                     bits += expected.fit(stretch, 0, length)
-                worth = self._worth(bits, length)
-                if worth > best_worth:
-                    best, best_worth = reading, worth
+                own = self._worth(bits, length)
+                if own > best_worth:
+                    best, best_worth = reading, own
             else:
                 hopes = reading  # of two readings only the longer can be the one that is open
         if best is None:
@@ -277,7 +285,7 @@ class RtuFramer:
             bits += HEARD
         if self._cuts:
             bits += SILENCE_INSIDE * self.inside(self._finder.base, self._finder.base + length)
-        return (bits - THRESHOLD) * SCALE + length
+        return worth(bits, length)
 
     def _segment(self, count: int) -> tuple[list[Candidate], list[Candidate]]:
         """Best segmentation of the first `count` octets: its frames, and those that nothing to come can undo."""
@@ -341,16 +349,16 @@ class RtuFramer:
         """Give the first `count` octets as a frame with a good CRC."""
         found = self._found(count)
         octets, start, end, slack, marks = self._window.take(count)
-        damage: Damage | None = None
         expected: int | None = count
-        if not (request or response):  # its length contradicts its octets; its CRC does not
-            expected = predicted(octets)
-            if expected is not None and expected != count:
-                damage = Damage.SHORT if count < expected else Damage.LONG
+        flags: tuple[str, ...] = ()
+        if not (request or response):  # its octets contradict its length, not its CRC
+            expected, flags = predicted(octets), ODD_LENGTH
         elif is_open_length(octets):
             expected = None
         self._out.append(
-            Frame("modbus-rtu", octets, start, end, Check.GOOD, found, damage, expected, self._skipped, slack, marks)
+            Frame(
+                "modbus-rtu", octets, start, end, Check.GOOD, found, None, expected, self._skipped, slack, marks, flags
+            )
         )
         self._skipped = 0
         self._taken(count, Side.FRAME)

@@ -21,6 +21,10 @@ from dissectors.modbus.functions import (
 _COMMON = frozenset({0x01, 0x02, 0x03, 0x04, 0x05, 0x06, 0x0F, 0x10})
 
 
+ODD_LENGTH = ("odd-length",)
+"""Flags of a frame with a good check whose octets say another length: the sender's mistake, not the line's."""
+
+
 class Side(Enum):
     """What stands beside a stretch, without proved silence between (SILENCE: with it)."""
 

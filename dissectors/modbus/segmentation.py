@@ -8,10 +8,10 @@ Evidence is counted in bits. A candidate brings those of its octets (candidates.
     +2 … +10  it answers the open request, or repeats it (expectation.py)
     -6  each silence proved inside it
 
-and THRESHOLD is taken off. What remains is its worth, plus a sixteenth of a bit an octet, which only matters between
-readings that contradict each other: a long frame is a better reading than noise with a short one inside. The path of
-candidates with the greatest sum wins. So a weak request is taken together with the answer that fits it, and neither
-alone.
+and THRESHOLD is taken off. What remains is its worth. A candidate that stands on its own gains a sixteenth of a bit an
+octet, to decide between readings that contradict each other: a long frame is a better reading than noise with a short
+one inside. The path of candidates with the greatest sum wins. So a weak request is taken together with the answer
+that fits it, and neither alone.
 
 A stretch that would be a frame if the octets to come make its CRC good is weighed too, at its best. Frames are
 committed as far as the best path and the best path that ends in such a hope agree.
@@ -66,6 +66,12 @@ class _Step(NamedTuple):
     expected: Expected | None
 
 
+def worth(bits: int, length: int) -> int:
+    """Worth of a candidate of `length` octets with that much evidence; not negative when it stands on its own."""
+    excess = bits - THRESHOLD
+    return excess * SCALE + length if excess >= 0 else excess * SCALE
+
+
 def context_bits(around: Surroundings, unit: int, start: int, end: int, adjacent: bool) -> int:
     """Bits from what stands round a stretch, without its end and the open request."""
     bits = ADJACENT if adjacent else around.edge(start)
@@ -96,10 +102,10 @@ def segment(
     for candidate in sorted(candidates):
         best: _Step | None = None
         for step in _before(steps, candidate.start):
-            worth = step.worth + _worth(candidate, step, around)
-            if best is None or worth > best.worth:
+            total = step.worth + _worth(candidate, step, around)
+            if best is None or total > best.worth:
                 after = expectation(step.expected, candidate.octets, candidate.request, candidate.response)
-                best = _Step(worth, candidate, step, candidate.end, after)
+                best = _Step(total, candidate, step, candidate.end, after)
         if best is not None:
             steps.append(best)
     winner = max(steps, key=_by_worth)
@@ -108,9 +114,9 @@ def segment(
     most = winner.worth
     for start, reading in pending:
         for step in _before(steps, start):
-            worth = step.worth + _hope(octets, start - base, end, start, reading, step, around)
-            if worth > most:
-                most, hope = worth, step
+            total = step.worth + _hope(octets, start - base, end, start, reading, step, around)
+            if total > most:
+                most, hope = total, step
     if hope is None:
         return path, path
     agreed = []
@@ -139,7 +145,7 @@ def _worth(candidate: Candidate, step: _Step, around: Surroundings) -> int:
     bits += context_bits(around, candidate.unit, start, start + length, step.end == start)
     if step.expected is not None:
         bits += step.expected.fit(candidate.octets, 0, length)
-    return (bits - THRESHOLD) * SCALE + length
+    return worth(bits, length)
 
 
 def _hope(octets: Octets, at: int, end: int, start: int, reading: Reading, step: _Step, around: Surroundings) -> int:
@@ -148,7 +154,7 @@ def _hope(octets: Octets, at: int, end: int, start: int, reading: Reading, step:
     bits += context_bits(around, octets[at], start, start + length, step.end == start)
     if step.expected is not None:
         bits += step.expected.hope(octets, at, length)
-    return (bits - THRESHOLD) * SCALE + length
+    return worth(bits, length)
 
 
 def _frames(step: _Step | None) -> list[Candidate]:

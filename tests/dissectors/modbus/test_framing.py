@@ -220,7 +220,9 @@ def test_loop_back_data_may_be_of_any_length() -> None:
 def test_a_right_crc_at_a_wrong_length_is_said_as_it_is() -> None:
     frame = rtu("07 03 02 0000 0000")
     (event,) = read((0, frame))
-    assert brief([event]) == [(Damage.LONG, frame, Check.GOOD, 7)]
+    assert brief([event]) == [(Found.GAP, frame)]
+    assert isinstance(event, Frame)
+    assert (event.expected, event.flags) == (7, ("odd-length",))
 
 
 @pytest.mark.parametrize("code", [0x10, 0x20, 0x51, 0x52, 0x99])
