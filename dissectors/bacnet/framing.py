@@ -31,7 +31,7 @@ from dissectors.bacnet.limits import (
 )
 from dissectors.checksums import crc8_mstp, crc16_x25
 from dissectors.frame import Check, Chunk, Damage, Event, Found, Frame, LineError, Noise, Place, Reason
-from dissectors.framer import OctetWindow
+from dissectors.framer import OctetWindow, Taken
 from dissectors.line import Timing
 
 NOISE_MAX = 1024
@@ -67,6 +67,8 @@ class MstpFramer:
         self._window = OctetWindow(timing)
         self._char = timing.char
         self._pause = timing.line.bits(FRAME_ABORT_BITS)
+        self._least = min(self._pause, T_FRAME_ABORT_MAX)
+        self._silences: list[tuple[int, int]] = []  # octets of the window with so much proved silence before them
         self._noise = 0  # octets at the front of the window that begin no frame
         self._skipped = 0  # octets of noise given out since the last frame
         self._after_frame = False  # the event before was a frame
@@ -77,14 +79,22 @@ class MstpFramer:
         """Take one read; give the events it completes."""
         count = len(chunk.octets)
         if count <= _PIECE:
-            self._window.append(chunk)
+            self._append(chunk)
             return self._drain(0, final=False)
         events: list[Event] = []
         for begin in range(0, count, _PIECE):
             end = min(begin + _PIECE, count)
-            self._window.append(_part(chunk, begin, end, self._char))
+            self._append(_part(chunk, begin, end, self._char))
             events += self._drain(0, final=False)
         return events
+
+    def _append(self, chunk: Chunk) -> None:
+        index = len(self._window)
+        self._window.append(chunk)
+        if chunk.octets:
+            silence = self._window.silence(index)[0]
+            if silence >= self._least:
+                self._silences.append((index, silence))
 
     def advance(self, now: int) -> list[Event]:
         """Say that no read returned up to `now`; give what the silence completes."""
@@ -138,14 +148,14 @@ class MstpFramer:
 
     def _look(self) -> int:
         """The plain case, which is nearly every case: octets of a good frame at the front with no gap in it, else 0."""
-        window, octets = self._window, self._window.octets
+        octets = self._window.octets
         if len(octets) < HEADER or octets[:2] != PREAMBLE or crc8_mstp(bytes(octets[2:7])) != octets[7]:
             return 0
         frame_type, length = octets[2], octets[5] << 8 | octets[6]
         size = total(length)
         if length > MAX_DATA or is_encoded(frame_type) or len(octets) < size:
             return 0
-        if window.end(size - 1) - window.end(0) > (size - 1) * self._char + self._pause:
+        if self._silence_in(1, size, self._least) is not None:
             return 0
         if length and not body_is_good(frame_type, length, bytes(octets[HEADER:size])):
             return 0
@@ -274,11 +284,8 @@ class MstpFramer:
 
     def _silence_in(self, begin: int, end: int, limit: int) -> int | None:
         """The first octet of [begin, end) with at least `limit` of proved silence before it."""
-        window = self._window
-        if end <= begin or window.end(end - 1) - window.end(begin - 1) - (end - begin) * self._char < limit:
-            return None
-        for index in range(begin, end):
-            if window.silence(index)[0] >= limit:
+        for index, silence in self._silences:
+            if begin <= index < end and silence >= limit:
                 return index
         return None
 
@@ -315,7 +322,7 @@ class MstpFramer:
         flags: tuple[str, ...] = ()
         if check is Check.GOOD and expected is not None and size > expected:
             flags = ("trailing-pad",)
-        taken = self._window.take(size)
+        taken = self._take(size)
         skipped, self._skipped = self._skipped, 0
         self._plain = 0
         self._after_frame = True
@@ -334,6 +341,11 @@ class MstpFramer:
             flags,
         )
 
+    def _take(self, count: int) -> Taken:
+        if self._silences:
+            self._silences = [(index - count, silence) for index, silence in self._silences if index >= count]
+        return self._window.take(count)
+
     def _take_noise(self, before_frame: bool) -> Noise:
         window, count = self._window, self._noise
         place = Place.BETWEEN
@@ -341,7 +353,7 @@ class MstpFramer:
             place = Place.AFTER
         elif before_frame and window.silence(count)[1] < self._pause:
             place = Place.BEFORE
-        taken = window.take(count)
+        taken = self._take(count)
         self._noise = 0
         self._skipped += count
         self._after_frame = False

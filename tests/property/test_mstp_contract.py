@@ -47,7 +47,7 @@ frames = st.one_of(
     st.binary(min_size=502, max_size=700).map(lambda data: mstp(33, 1, 2, data)),
 )
 
-TestMstpContract = framer_contract(MstpFramer, frames)
+TestMstpContract = framer_contract(MstpFramer, frames, examples=25)
 
 
 def drive(octets: bytes, *more: tuple[int, bytes], timing: Timing = LINE) -> list[Event]:

@@ -29,11 +29,11 @@ from tests.dissectors.bacnet.captures import (
 Capture = tuple[str, list[tuple[int, bytes]], list[list[Event]]]
 
 
-COMPARED = (
+COMPARED = (  # noqa: SIM905
     "bacnet.version bacnet.control bacnet.dnet bacnet.dadr_eth bacnet.snet bacnet.hopc bacnet.mesgtyp "
     "bacapp.type bacapp.confirmed_service bacapp.unconfirmed_service bacapp.invoke_id bacapp.objectType "
     "bacapp.instance_number bacapp.property_identifier bacapp.error_class bacapp.error_code"
-)
+).split()
 
 
 def test_each_record_is_one_frame_as_wireshark_reads_it(capture: Capture):
@@ -53,7 +53,7 @@ def test_each_record_is_one_frame_as_wireshark_reads_it(capture: Capture):
         found = fields(frame, header.role)
         assert found["mstp.len"] == int(row["mstp.len"])
         assert found["mstp.hdr_crc"] == int(row["mstp.hdr_crc"], 16)
-        for column in COMPARED.split():
+        for column in COMPARED if len(frame.octets) > 8 else ():
             theirs = row[column]
             ours = found.get(column, "")
             if column == "bacnet.control" and theirs:
@@ -214,7 +214,7 @@ def test_packets_fields_and_header_agree_on_every_frame(capture: Capture):
     """The two dissections are one: same type, addresses, check; the packet gives the frame back."""
     _, _, by_record = capture
     frames = [e for events in by_record for e in events if isinstance(e, Frame)]
-    for frame in frames if len(frames) < 3000 else [f for f in frames if len(f.octets) > 8][:300] + frames[:200]:
+    for frame in [f for f in frames if len(f.octets) > 8][:120] + frames[:100]:
         header = peek(frame)
         found = packet(frame, header.role)
         assert (found.frame_type, found.destination, found.source) == (
