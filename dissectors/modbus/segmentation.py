@@ -67,9 +67,12 @@ class _Step(NamedTuple):
 
 
 def worth(bits: int, length: int) -> int:
-    """Worth of a candidate of `length` octets with that much evidence; not negative when it stands on its own."""
+    """Worth of a candidate of `length` octets with that much evidence; not negative when it stands on its own.
+
+    One that does not still breaks a tie: it is taken where a neighbour gains from it what it lacks.
+    """
     excess = bits - THRESHOLD
-    return excess * SCALE + length if excess >= 0 else excess * SCALE
+    return excess * SCALE + (length if excess >= 0 else 1)
 
 
 def context_bits(around: Surroundings, unit: int, start: int, end: int, adjacent: bool) -> int:
