@@ -1,0 +1,15 @@
+"""Settings of all tests: how many examples hypothesis makes.
+
+The suite is to run in minutes on two cores; `HYPOTHESIS_PROFILE=thorough` searches longer. No example has a deadline:
+how long one takes depends on what else the machine does.
+"""
+
+from __future__ import annotations
+
+import os
+
+from hypothesis import HealthCheck, settings
+
+settings.register_profile("suite", max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.register_profile("thorough", max_examples=1000, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "suite"))
