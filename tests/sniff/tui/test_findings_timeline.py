@@ -83,7 +83,7 @@ def test_the_timeline_shows_all_of_a_capture_and_zooms(look, store):
         assert "one column 1 s" in looking.text()
         assert "10:00:00" in looking.text()
         assert "10:00:30" in looking.text() or "10:00:29" in looking.text() or "10:01:0" in looking.text()
-        await looking.press("-")
+        await looking.press("minus")
         assert "one column 2 s" in looking.text()
 
     look(store, script)
