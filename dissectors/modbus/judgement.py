@@ -95,7 +95,7 @@ def _of_bus(seen: Evidence) -> Iterator[Finding]:
     if damaged.count:
         words = f"{damaged.count} of {requests} requests were damaged"
         yield damaged.found(RULES["MB009"], "master", words, _note_if(seen.rare(damaged.count, requests)))
-    absent = {unit: s for unit, s in seen.stations.items() if s.asked and not s.answered and not s.damaged.count}
+    absent = {unit: station for unit, station in seen.stations.items() if _is_absent(station)}
     waited = sum(station.waited for station in absent.values())
     if waited:
         share = waited / seen.span
@@ -226,14 +226,17 @@ def _missing(seen: Evidence, name: str, station: Station) -> Iterator[Finding]:
     missing = station.missing
     if not missing.count:
         return
-    if not station.answered and not station.damaged.count and not station.late.count:
+    if _is_absent(station):
         if missing.count >= 2:
-            yield missing.found(RULES["MB001"], name, f"nothing followed any of {missing.count} requests")
+            words = f"no answer to any of {station.asked} requests"
+            stray = station.damaged.count
+            words += f"; noise followed {times(stray)}" if stray else ""
+            yield missing.found(RULES["MB001"], name, words)
         else:
-            yield missing.found(RULES["MB001"], name, "nothing followed the only request to it", Severity.NOTE)
+            yield missing.found(RULES["MB001"], name, "no answer to the only request", Severity.NOTE)
         return
     silent = station.silent
-    if silent.count >= SILENT_AT_END and station.last_heard is not None:
+    if silent.count >= SILENT_AT_END and station.answered and station.last_heard is not None:
         since = seen.now - station.last_heard
         words = f"no answer to its last {silent.count} requests; last heard {seconds(since)} before the end"
         yield silent.found(RULES["MB003"], name, words)
@@ -245,7 +248,7 @@ def _missing(seen: Evidence, name: str, station: Station) -> Iterator[Finding]:
     else:
         ignored = []
     explained = sum(request.missing.count for _, request in ignored)
-    if silent.count >= SILENT_AT_END:
+    if silent.count >= SILENT_AT_END and station.answered:
         explained += silent.count
     left = missing.count - explained
     if left > 0:
@@ -254,13 +257,19 @@ def _missing(seen: Evidence, name: str, station: Station) -> Iterator[Finding]:
         yield replace(finding, count=left)
 
 
+def _is_absent(station: Station) -> bool:
+    """Whether no good frame ever came from it, and no more than stray damage in place of answers."""
+    heard = station.answered or station.late.count or station.twice.count
+    return bool(station.missing.count) and not heard and 4 * station.damaged.count <= station.asked
+
+
 def _is_ignored(request: Requested) -> bool:
     return request.turns >= 3 and request.missing.count == request.tries
 
 
 def _damaged(seen: Evidence, name: str, station: Station, is_common: bool) -> Iterator[Finding]:
     damaged, ends = station.damaged, station.last_octet
-    if not damaged.count:
+    if not damaged.count or _is_absent(station):
         return
     rare = seen.rare(damaged.count, station.asked)
     if ends.count >= 3 and 2 * ends.count >= damaged.count:

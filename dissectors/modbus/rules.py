@@ -12,8 +12,8 @@ _ALL = (
         "MB001",
         Severity.ERROR,
         "never answers",
-        "Requests to a station that nothing ever followed: no answer, no damaged answer, not one octet. "
-        "At least two requests.",
+        "Requests to a station of which no good frame was ever heard, and at most 1 in 4 of them followed by octets "
+        "that are no frame. At least two requests.",
         "no station at this address: off, set to another address or baud rate, or cut off",
         "its supply, address switch and baud rate; if it is gone, take it out of the master's list",
     ),

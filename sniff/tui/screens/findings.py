@@ -45,6 +45,7 @@ class FindingsScreen(ViewScreen):
         super().__init__()
         self._judged: Judged | None = None
         self._looked = -PERIOD
+        self._first_look = True
         self._by_subject = False
         self._all = True
         self._found: dict[str, Finding] = {}
@@ -108,7 +109,11 @@ class FindingsScreen(ViewScreen):
         if self._by_subject:
             found.sort(key=lambda f: (f.subject, -f.severity, f.code))
         self._found = {f"{finding.code} {finding.subject}": finding for finding in found}
-        self.query_one(StationTable).fill((key, self._cells(f)) for key, f in self._found.items())
+        table = self.query_one(StationTable)
+        table.fill((key, self._cells(f)) for key, f in self._found.items())
+        if self._first_look:  # the cursor stays on the gravest one until all was read once
+            table.move_cursor(row=0, animate=False)
+            self._first_look = self.work_left()
         self._describe()
 
     # -- showing -----------------------------------------------------------------------------------------------

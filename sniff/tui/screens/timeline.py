@@ -20,7 +20,7 @@ from sniff.tui.times import clock
 ZOOMS = (1, 2, 5, 10, 30, 60, 300, 600, 1800, 3600)
 """Seconds that one column may stand for."""
 
-LABEL = 9
+LABEL = 14
 
 
 class Column(NamedTuple):
@@ -75,8 +75,8 @@ class TimelineScreen(ViewScreen):
         Binding("pagedown", "move(20)", "page later", show=False),
         Binding("g,home", "end(-1)", "first", show=False),
         Binding("G,end", "end(1)", "last", show=False),
-        Binding("plus,equals_sign", "zoom(-1)", "zoom in", tooltip="fewer seconds a column"),
-        Binding("minus", "zoom(1)", "zoom out", tooltip="more seconds a column"),
+        Binding("plus,equals_sign", "zoom(-1)", "zoom in", key_display="+", tooltip="fewer seconds a column"),
+        Binding("minus", "zoom(1)", "zoom out", key_display="-", tooltip="more seconds a column"),
         Binding("e", "error(1)", "error", tooltip="next column with errors"),
         Binding("E", "error(-1)", "error", tooltip="column with errors before", show=False),
         Binding("v", "select", "select", tooltip="begin a selection here; again: end it"),
@@ -139,13 +139,14 @@ class TimelineScreen(ViewScreen):
             ("damaged", [float(column.damaged) for column in made], 0.0, "red"),
             ("noise", [float(column.noise) for column in made], 0.0, "yellow"),
         )
-        for label, values, most, style in rows:
-            text.append(f"{label:<{LABEL}}", style="bold")
+        for name, values, most, style in rows:
+            label = name if most else f"{name} {max(values, default=0):.0f}"
+            text.append(f"{label:<{LABEL}}"[:LABEL], style="bold")
             for place, bar in enumerate(sparkline(values, most or max(values, default=0.0))):
                 begin = made[place].begin
                 marked = chosen is not None and chosen[0] <= begin < chosen[1]
                 text.append(bar, style="reverse" if place == at else f"{style} on blue" if marked else style)
-            text.append(f" {max(values, default=0):.0f}\n" if not most else "\n")
+            text.append("\n")
         text.append(" " * LABEL + " " * max(0, at) + "▲\n")
         text.append(self._axis(made, zoom) + "\n\n")
         text.append(self._words(made[at] if 0 <= at < len(made) else None, zoom, chosen))
@@ -161,9 +162,8 @@ class TimelineScreen(ViewScreen):
         if column is None:
             return ""
         words = (
-            f"{clock(column.begin * NS_PER_S)[:8]} + {_duration(zoom)}: load {column.load:.1%}, {column.frames} frames,"
-            f" "
-            f"{column.failed} errors, {column.damaged} damaged, {column.noise} octets of noise"
+            f"{clock(column.begin * NS_PER_S)[:8]} + {_duration(zoom)}: load {column.load:.1%}, "
+            f"{column.frames} frames, {column.failed} errors, {column.damaged} damaged, {column.noise} octets of noise"
         )
         if self._anchor is not None and chosen is not None:
             span = f"{clock(chosen[0] * NS_PER_S)[:8]} … {clock(chosen[1] * NS_PER_S)[:8]}"
