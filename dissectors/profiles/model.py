@@ -10,6 +10,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 
+FAMILIES = {"modbus-rtu": "modbus", "modbus-ascii": "modbus", "n2": "n2", "mstp": "bacnet"}
+"""Registry name of a protocol → the family under which a profile speaks of it."""
+
 
 class Kind(Enum):
     """How the bits of an entry are read. `size`: bits, 0 for what carries its own size."""
@@ -138,10 +141,10 @@ class Limits:
 class Profile:
     """Everything known of one kind of device.
 
-    `noun`: what a person calls it ("drive"). `protocols`: registry names. `exceptions`: exception and error codes by
-    family ("modbus", "n2") in the maker's words. `properties`: BACnet property → object types that have it.
-    `constants`: BACnet device property → its value. `absent`: parameters that the manual lists without a register.
-    `reserved`: spans of registers (first, last, on the wire) that the maker keeps for itself.
+    `noun`: what a person calls it ("drive"). `protocols`: registry names. `limits`, `exceptions`: by family ("modbus",
+    "n2", "bacnet"); the exceptions are exception and error codes in the maker's words. `properties`: BACnet property →
+    object types that have it. `constants`: BACnet device property → its value. `absent`: parameters that the manual
+    lists without a register. `reserved`: spans of registers (first, last, on the wire) that the maker keeps for itself.
     """
 
     name: str
@@ -151,7 +154,7 @@ class Profile:
     noun: str
     protocols: tuple[str, ...]
     entries: tuple[Entry, ...]
-    limits: Limits = field(default_factory=Limits)
+    limits: Mapping[str, Limits] = field(default_factory=dict)
     exceptions: Mapping[str, Mapping[int, str]] = field(default_factory=dict)
     signs: tuple[Sign, ...] = ()
     properties: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
@@ -184,6 +187,10 @@ class Profile:
     def in_space(self, *spaces: str) -> Iterator[Entry]:
         """The entries of some tables, in the order of the profile."""
         return (entry for entry in self.entries if entry.space in spaces)
+
+    def limits_on(self, protocol: str) -> Limits:
+        """What the device promises on a protocol, by its registry name."""
+        return self.limits.get(FAMILIES.get(protocol, protocol), Limits())
 
     def exception(self, family: str, code: int) -> str:
         """The maker's words for an exception code; empty when there are none."""

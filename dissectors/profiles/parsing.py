@@ -26,7 +26,6 @@ def parse(data: Mapping[str, Any], origin: str) -> Profile:
     exceptions = {"modbus": modbus.words("exceptions"), "n2": n2.words("errors")}
     objects = [_object(table, _n2_place(table), n2=True) for table in n2.tables("object")]
     objects += [_object(table, _bacnet_place(table)) for table in bacnet.tables("object")]
-    limits = top.table("limits")
     profile = Profile(
         name=name,
         title=top.text("title"),
@@ -35,7 +34,7 @@ def parse(data: Mapping[str, Any], origin: str) -> Profile:
         noun=top.text("noun", "device"),
         protocols=top.texts("protocols"),
         entries=_with_shared_states(origin, (*registers, *objects)),
-        limits=_limits(limits),
+        limits={family.path: _limits(family.table("limits")) for family in (modbus, n2, bacnet)},
         exceptions=exceptions,
         signs=tuple(_sign(table, modbus) for table in top.tables("sign")),
         properties=_properties(bacnet.table("properties")),
@@ -45,7 +44,7 @@ def parse(data: Mapping[str, Any], origin: str) -> Profile:
         source=top.text("source", ""),
         origin=origin,
     )
-    for table in (top, modbus, n2, bacnet, limits):
+    for table in (top, modbus, n2, bacnet):
         table.finish()
     _check(profile)
     return profile
@@ -221,6 +220,7 @@ def _limits(table: Table) -> Limits:
     response = table.number("response-ms") if "response-ms" in table else None
     if (frame is not None and frame < 1) or (response is not None and response <= 0):
         raise table.error("", "expected numbers above 0")
+    table.finish()
     return Limits(frame, None if response is None else int(response * MILLISECOND))
 
 

@@ -73,8 +73,8 @@ PROFILE_RULES: dict[str, Rule] = {
             "PR006",
             Severity.WARNING,
             "frame longer than the device takes",
-            "A frame to or from a station has more octets on the line than its manual allows (TECO E510 and F510: 80, "
-            "1.0.1).",
+            "A frame to or from a station has more octets on the line than its manual allows (TECO E510 and F510 on "
+            "Modbus: 80, 1.0.1).",
             "a master that reads or writes too much at once",
             "have the master read fewer registers in one request",
         ),
@@ -82,8 +82,8 @@ PROFILE_RULES: dict[str, Rule] = {
             "PR007",
             Severity.NOTE,
             "slower than the device promises",
-            "Answers came later than the response time that the manual gives (TECO E510 and F510: 10 ms, 1.0.1), even "
-            "when all that the adapter may have added is taken off.",
+            "Answers came later than the response time that the manual gives (TECO E510 and F510 on Modbus: 10 ms, "
+            "1.0.1), even when all that the adapter may have added is taken off.",
             "a response delay that is set in the device, a device busy with other work, or a gateway in between",
             "allow for it in the master's timeout; look at the device's response delay setting",
         ),
@@ -107,6 +107,7 @@ class ProfileFindings:
     """Fed every row and every closed transaction of one bus (`dissectors.findings.Judge`)."""
 
     def __init__(self, timing: Timing, dissector: Dissector, devices: Devices) -> None:
+        self._protocol = dissector.name
         self._devices = devices
         self._reader = PointReader(dissector, devices)
         self._readings = cast("Readings | None", dissector.extras.get("readings"))
@@ -151,7 +152,7 @@ class ProfileFindings:
     def _judge_length(self, no: int, frame: Frame, placement: Placement) -> None:
         station = placement.source if placement.role is Role.RESPONSE else placement.destination
         profile = self._devices.at(station)
-        longest = profile.limits.frame if profile is not None else None
+        longest = profile.limits_on(self._protocol).frame if profile is not None else None
         if profile is not None and longest is not None and len(frame.octets) > longest:
             way = "from" if placement.role is Role.RESPONSE else "to"
             seen = f"frames of {len(frame.octets)} octets {way} it, {longest} allowed"
@@ -204,7 +205,7 @@ class ProfileFindings:
             return
         who = _subject(profile, transaction.station)
         self._answers[who] = self._answers.get(who, 0) + 1
-        limit = profile.limits.response
+        limit = profile.limits_on(self._protocol).response
         if limit is not None and latency.low > limit:
             seen = f"took over {milliseconds(limit)}"
             told = self._add("PR007", who, "", seen, transaction.end, transaction.response)

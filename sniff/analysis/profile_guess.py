@@ -19,6 +19,7 @@ LEAST = 0.3
 MOST_PLACES = 4096
 _RESERVED_WEIGHT = 0.3  # a block read over a reserved register says little
 _SIGN_WEIGHT = 4.0
+_CONSTANT_WEIGHT = 2.0  # of a property of the device object: people may change its name
 _SPACES = {"read-holding-registers": "holding", "read-input-registers": "input"}
 Place = tuple[str, int, str]
 
@@ -103,6 +104,12 @@ def guess(heard: Heard, profile: Profile) -> Guess:
     words += [f"{strange} out of range"] if strange else []
     words += [f"{refused} refused that it should have"] if refused else []
     total += refused
+    for (space, _, part), reading in heard.answered.items():
+        if space == "device" and part in profile.constants:
+            same = reading.value == profile.constants[part]
+            total += _CONSTANT_WEIGHT
+            weight += _CONSTANT_WEIGHT if same else 0
+            words.append(f"{part} {'fits' if same else 'is another'}")
     for sign in profile.signs:
         verdict = _check(sign, heard)
         if verdict is False:

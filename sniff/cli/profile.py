@@ -67,11 +67,11 @@ def _show(args: argparse.Namespace) -> int:
     print(f"{profile.name}: {profile.title} ({profile.vendor}; {', '.join(profile.models)})")
     print(f"protocols: {', '.join(profile.protocols)}")
     print(f"source: {profile.source}")
-    limits = profile.limits
-    if limits.frame is not None:
-        print(f"longest frame: {limits.frame} octets")
-    if limits.response is not None:
-        print(f"answers within: {limits.response / 1e6:g} ms")
+    for family, limits in profile.limits.items():
+        if limits.frame is not None:
+            print(f"{family} longest frame: {limits.frame} octets")
+        if limits.response is not None:
+            print(f"{family} answers within: {limits.response / 1e6:g} ms")
     for family, codes in profile.exceptions.items():
         for code, words in codes.items():
             number = f"{code:02X}h" if family == "modbus" else f"{code:02d}"

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dissectors.profiles import Access, Kind, Profile, ProfileError, Role, parse, parse_text
+from dissectors.profiles import Access, Kind, Limits, Profile, ProfileError, Role, parse, parse_text
 
 HEAD = 'name = "pump"\ntitle = "A pump"\nprotocols = ["modbus-rtu"]\n'
 
@@ -113,9 +113,6 @@ states-from = "fault"
 
 def test_objects_signs_limits_and_the_rest() -> None:
     profile = pump("""
-[limits]
-frame = 80
-response-ms = 2.5
 [[sign]]
 register = 3
 value = 7
@@ -127,6 +124,9 @@ value = "P1"
 address-offset = 1
 [modbus.exceptions]
 0x52 = "no"
+[modbus.limits]
+frame = 80
+response-ms = 2.5
 [[modbus.reserved]]
 first = 10
 last = 12
@@ -145,7 +145,8 @@ units = ["analog-value"]
 max-master = 127
 vendor-name = "X"
 """)
-    assert (profile.limits.frame, profile.limits.response) == (80, 2_500_000)
+    assert profile.limits_on("modbus-ascii") == profile.limits_on("modbus-rtu") == Limits(80, 2_500_000)
+    assert profile.limits_on("n2") == profile.limits_on("whatever") == Limits()
     assert [(s.space, s.address, s.part, s.value) for s in profile.signs] == [
         ("holding", 4, "", 7),
         ("device", 0, "model-name", "P1"),
@@ -191,7 +192,8 @@ vendor-name = "X"
         ("[[modbus.register]]\naddress = 3\nname = 'a b'", "modbus.register[2].name"),
         ("[[n2.object]]\nobject = 'XX 1'\nname = 'b'", "n2.object[1].object"),
         ("[[bacnet.object]]\nobject = 'analog-input'\nname = 'b'", "bacnet.object[1].object"),
-        ("[limits]\nframe = 0", "limits"),
+        ("[n2.limits]\nframe = 0", "n2.limits"),
+        ("[n2.limits]\nfraem = 3", "n2.limits.fraem: unknown key; did you mean 'frame'?"),
         ("[modbus.parameters]", "modbus.parameters"),
         ("[[modbus.parameters]]\nprefix = 'P'\nbase = 0\npresent = '1'\nabsent = '1'", "modbus.parameters[1].absent"),
         ("[whatever]", "whatever: unknown key"),

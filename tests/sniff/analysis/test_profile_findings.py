@@ -1,0 +1,151 @@
+"""The rules PR…: each raised by what it is about, none by a healthy drive."""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from dissectors.findings import Finding, Severity
+from dissectors.profiles import Devices, packaged
+from sniff.analysis.judging import Judging
+from sniff.analysis.profile_findings import PROFILE_RULES, ProfileFindings
+from sniff.engine import Output
+from sniff.reading import dissector_for, outputs
+from sniff.simulation.scenarios import scenario, simulate
+
+E510 = Devices(default=packaged("teco-e510"))
+ACN = Devices({1: packaged("automationdirect-acn")})
+
+
+def load(name: str) -> Any:
+    spec = importlib.util.spec_from_file_location(name, Path(__file__).with_name(f"{name}.py"))
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+bus = load("points_bus")
+
+
+def judged(
+    *exchanges: tuple[str, str | None], devices: Devices = E510, latency: float = 8.0, held: int = 0
+) -> tuple[Finding, ...]:
+    session = replace(bus.SESSION, adapter=replace(bus.SESSION.adapter, latency=held))
+    judge = ProfileFindings(session.timing, dissector_for(session), devices)
+    for output in bus.run(bus.chunks(*exchanges, latency=latency), session):
+        for row in output.rows:
+            judge.see(row.no, row.event, row.header, row.placement)
+        for transaction in output.transactions:
+            judge.settle(transaction)
+    return judge.findings()
+
+
+def brief(findings: Iterable[Finding]) -> list[tuple[str, str, str]]:
+    return [(finding.code, finding.subject, finding.seen) for finding in findings]
+
+
+@pytest.mark.parametrize(
+    ("exchange", "expected"),
+    [
+        (
+            ("01062502ffff", "018604"),
+            [("PR001", "drive 1", "frequency command 655.35 Hz written, range 0 … 599 Hz")],
+        ),
+        (
+            ("010325020001", "010302ffff"),
+            [("PR001", "drive 1", "frequency command 655.35 Hz answered, range 0 … 599 Hz")],
+        ),
+        (("010625080001", "018604"), [("PR002", "drive 1", "1 written to reserved 2508h")]),
+        (("010625240001", "018604"), [("PR003", "drive 1", "output frequency (2524h) written, it is read only")]),
+        (("010325210001", "0103020011"), [("PR004", "drive 1", "fault: code 17, external fault 01")]),
+        (("010325210001", "01030200ff"), [("PR004", "drive 1", "fault: code 255, not in the manual")]),
+        (("010325280001", "0103020009"), [("PR005", "drive 1", "alarm: code 9, UT")]),
+        (("010325210001", "0103020000"), []),
+        (("010600640001", "018602"), []),
+        (("010601021770", "010601021770"), []),
+    ],
+)
+def test_each_rule(exchange: tuple[str, str], expected: list[tuple[str, str, str]]) -> None:
+    assert brief(judged(exchange)) == expected
+
+
+def test_trip_bits_of_the_acn() -> None:
+    found = judged(("0103032f0002", "010304040008 08".replace(" ", "")[:14]), devices=ACN)
+    assert brief(found) == [
+        ("PR004", "drive 1", "latched trips 1: overcurrent trip"),
+        ("PR004", "drive 1", "latched trips 2: fan trip"),
+    ]
+
+
+def test_the_acns_reserved_span() -> None:
+    assert brief(judged(("010604000001", "018602"), devices=ACN)) == [
+        ("PR002", "drive 1", "1 written to reserved holding/41025")
+    ]
+
+
+def test_a_frame_that_is_too_long() -> None:
+    values = "0000" * 40
+    found = judged((f"0110250100 28 50 {values}", "018603"))
+    assert ("PR006", "drive 1", "frames of 89 octets to it, 80 allowed") in brief(found)
+    assert "PR006" not in {finding.code for finding in judged(("01030000 0023", "010346" + "0000" * 35))}
+
+
+@pytest.mark.parametrize(("latency", "held", "slow"), [(8, 0, False), (30, 0, True), (30, 16, True), (20, 16, False)])
+def test_slowness_is_judged_by_what_the_adapter_allows(latency: float, held: int, slow: bool) -> None:
+    found = judged(("010325240001", "0103020000"), latency=latency, held=held * 1_000_000)
+    assert [finding.code for finding in found] == (["PR007"] if slow else [])
+    if slow:
+        assert found[0].seen.startswith("1 of 1 answers took over 10.0 ms, the slowest at least")
+        assert found[0].severity is Severity.NOTE
+
+
+def test_findings_add_up_and_carry_evidence() -> None:
+    found = judged(*[("010325210001", "0103020011")] * 3, ("010325210001", "0103020002"))
+    assert [(f.code, f.count, f.evidence) for f in found] == [("PR004", 3, (2, 4, 6)), ("PR004", 1, (8,))]
+    assert found[0].seen == "fault: code 17, external fault 01, 3 times"
+    assert found[0].first < found[0].last
+
+
+def test_no_profile_no_finding() -> None:
+    assert judged(("01062502ffff", "018604"), devices=Devices({2: packaged("teco-e510")})) == ()
+
+
+def test_memory_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sniff.analysis.profile_findings.MOST_TOLD", 1)
+    assert len(judged(("010625080001", "018604"), ("010625090001", "018604"))) == 1
+
+
+def test_rules_are_complete() -> None:
+    for code, rule in PROFILE_RULES.items():
+        assert code == rule.code
+        assert rule.explanation
+        assert rule.means
+        assert rule.next
+
+
+@pytest.mark.parametrize("name", ["modbus-rtu", "modbus-ascii", "n2", "mstp"])
+def test_a_simulated_bus_without_faults(name: str) -> None:
+    """What the scenario does on purpose is found, nothing else: a read-only write, a value of 900 Hz, slow drives."""
+    plan = scenario(name, faults=False)
+    session, items = simulate(plan, 12 if name == "mstp" else 40)
+    devices = Devices({address: packaged(profile) for address, profile in plan.devices.items()})
+    judging = Judging(session, dissector_for(session), devices)
+    for output in outputs(items, session):
+        if isinstance(output, Output):
+            judging.add(output)
+    found = {finding.code for finding in judging.findings() if finding.code.startswith("PR")}
+    meant = {
+        "modbus-rtu": {"PR003", "PR007"},
+        "modbus-ascii": {"PR003", "PR007"},
+        "n2": {"PR001", "PR007"},
+        "mstp": set(),
+    }
+    assert found <= meant[name]
+    assert name == "mstp" or found
