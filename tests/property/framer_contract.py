@@ -197,7 +197,7 @@ def framer_contract(
     *,
     timings: st.SearchStrategy[Timing] = TIMINGS,
     silence: int = 3_000 * MS,
-    examples: int = 60,
+    examples: int = 40,
 ) -> type:
     """A test class for one framer.
 
