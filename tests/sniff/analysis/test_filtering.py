@@ -91,7 +91,7 @@ def test_noise_has_only_what_it_has(text: str, expected: bool) -> None:
     ],
 )
 def test_a_mistake_is_shown_at_its_column(text: str, column: int, expected: str) -> None:
-    with pytest.raises(FilterError, match=".") as caught:
+    with pytest.raises(FilterError) as caught:
         compile_filter(text, DISSECTOR)
     assert expected in str(caught.value)
     assert caught.value.column == column
@@ -99,9 +99,10 @@ def test_a_mistake_is_shown_at_its_column(text: str, column: int, expected: str)
 
 @given(st.text(alphabet='dst=!<>&|(){}," 0x3ok.contaismhe~\\', max_size=40))
 def test_any_text_is_a_filter_or_a_filter_error(text: str) -> None:
+    column = 0
     try:
         predicate = compile_filter(text, DISSECTOR)
-    except FilterError as error:
-        assert 0 <= error.column <= len(text)
-    else:
         assert predicate(ROW, TX) in {True, False}
+    except FilterError as error:
+        column = error.column
+    assert 0 <= column <= len(text)
