@@ -1,0 +1,81 @@
+"""One page of HTML that stands alone (no network, no script) and prints well: verdict, findings, stations, load and
+errors over time, response times, token ring, and what the measurement cannot tell. Needs `pip install
+'sniff485[report]'`; --json does not.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib.util
+import json
+import os
+import sys
+from pathlib import Path
+
+from sniff.cli import UNREADABLE, USAGE, Failure, arguments
+from sniff.formats import READERS
+from sniff.reporting.collecting import collect
+from sniff.reporting.numbers import Numbers
+
+LIBRARIES = ("jinja2", "matplotlib")
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Options of `report`."""
+    arguments.add_files(parser)
+    arguments.add_line(parser)
+    arguments.add_devices(parser)
+    parser.add_argument(
+        "-o",
+        "--output",
+        metavar="OUT",
+        help="the page (default: FILE's name with .html, beside it or in this folder); - for standard output",
+    )
+    parser.add_argument("--json", action="store_true", help="the same numbers as JSON, one object a file, no page")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Report on all captures."""
+    if not args.json:
+        require_libraries()
+    reports = [_numbers(path, args) for path in args.files]
+    if args.json:
+        text = "".join(json.dumps(report.to_json(), ensure_ascii=False) + "\n" for report in reports)
+        place = args.output or "-"
+    else:
+        from sniff.reporting.page import page
+
+        text = page(reports)
+        place = args.output or str(default_place(args.files[0]))
+    if place == "-":
+        sys.stdout.write(text)
+        return 0
+    if any(Path(place).resolve() == Path(file).resolve() for file in args.files if file != "-"):
+        raise Failure(f"{place}: is a capture that is being read; choose another name with -o", USAGE)
+    try:
+        Path(place).write_text(text, "utf-8")
+    except OSError as error:
+        raise Failure(f"{place}: cannot be written: {error.strerror}", UNREADABLE) from None
+    print(f"sniff485: report in {place}", file=sys.stderr)
+    return 0
+
+
+def require_libraries() -> None:
+    """End with one line when a library of the page is absent."""
+    absent = [name for name in LIBRARIES if importlib.util.find_spec(name) is None]
+    if absent:
+        raise Failure(f"report needs {' and '.join(absent)}: pip install 'sniff485[report]'", USAGE)
+
+
+def default_place(file: str) -> Path:
+    """The capture's name with .html, beside it where one may write, else in this folder."""
+    path = Path("standard-input" if file == "-" else file)
+    suffix = next((suffix for suffix in READERS if path.name.lower().endswith(suffix)), path.suffix)
+    name = f"{path.name[: -len(suffix)] if suffix else path.name}.html"
+    return path.with_name(name) if os.access(path.parent, os.W_OK) else Path(name)
+
+
+def _numbers(path: str, args: argparse.Namespace) -> Numbers:
+    capture = arguments.open_capture(path)
+    session = arguments.settings_of(args, capture.session)
+    return collect(Path(path).name, capture, session, arguments.noted_devices(args, session))

@@ -1,0 +1,291 @@
+"""A capture, read once for its numbers and, where findings name rows, once more for their words."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+from dissectors.findings import Finding, Severity
+from dissectors.profiles import Devices
+from dissectors.registry import Dissector
+from dissectors.tracker import Transaction, Verdict
+from sniff.analysis.health import Health, bus_health, station_health
+from sniff.analysis.judging import Judging, rules_over
+from sniff.analysis.nodes import Node
+from sniff.analysis.summary import Summary
+from sniff.analysis.wording import describe, milliseconds
+from sniff.engine import Output, Row
+from sniff.formats import Capture
+from sniff.formats.text import iso
+from sniff.reading import dissector_for, outputs
+from sniff.reporting.numbers import (
+    Distribution,
+    Evidence,
+    Found,
+    Happening,
+    Measurement,
+    Numbers,
+    RingNumbers,
+    Score,
+    Station,
+    TimePart,
+    seconds_since,
+)
+from sniff.reporting.timeline import Timeline
+from sniff.session import LineEvent, Session
+
+EVIDENCE_SHOWN = 5
+HAPPENINGS_SHOWN = 200
+DEVICES_NOTE = "devices"
+GOOD = frozenset((Verdict.ANSWERED, Verdict.BROADCAST, Verdict.DATA, Verdict.OPEN))
+
+
+def collect(source: str, capture: Capture, session: Session, devices: Devices) -> Numbers:
+    """Read a capture to its end. `session`: with the settings to use. Raises CaptureError."""
+    dissector = dissector_for(session)
+    summary = Summary(session.line)
+    judging = Judging(session, dissector, devices)
+    ring = _Ring(session) if "ring" in dissector.extras else None
+    timeline: Timeline | None = None
+    happenings: list[Happening] = []
+    trouble: dict[int, Counter[str]] = {}
+    for item in outputs(capture.items(), session):
+        if isinstance(item, LineEvent):
+            judging.add_line_event(item)
+            summary.add_line_event(item)
+            if len(happenings) < HAPPENINGS_SHOWN:
+                at = seconds_since(session.started, item.time)
+                happenings.append(Happening(at, item.kind.value, item.text, item.count))
+            continue
+        judging.add(item)
+        summary.add(item)
+        if timeline is None and item.rows:
+            timeline = Timeline(item.rows[0].event.start, session.line.char)
+        for row in item.rows:
+            if timeline is not None:
+                timeline.add_row(row)
+            if ring is not None:
+                ring.add(row)
+        for transaction in item.transactions:
+            if timeline is not None:
+                timeline.add_transaction(transaction)
+            if transaction.station is not None and transaction.verdict not in GOOD:
+                trouble.setdefault(transaction.station, Counter())[_trouble(transaction)] += 1
+    findings = judging.findings()
+    health = bus_health(summary, findings) if summary.octets else None
+    stations = tuple(_station(node, trouble.get(node.address, Counter())) for node in summary.nodes.present())
+    found = _found(findings, _words(capture, session, dissector, findings), session, dissector)
+    complete = capture.completeness()
+    load = summary.load
+    return Numbers(
+        source=source,
+        title=dissector.title,
+        verdict=verdict(health, found, stations, summary),
+        health=None if health is None else _score(health),
+        complete=complete.whole,
+        completeness=complete.text,
+        first=None if load.first is None else iso(load.first),
+        last=None if load.last is None else iso(load.last),
+        seconds=summary.seconds,
+        octets=summary.octets,
+        noise_octets=summary.noise,
+        frames=summary.frames,
+        damaged=summary.damaged,
+        load=load.overall(),
+        findings=found,
+        stations=stations,
+        polled_only=tuple(summary.nodes.absent()),
+        kinds=dict(summary.kinds.most_common()),
+        verdicts={verdict.value: count for verdict, count in summary.verdicts.most_common()},
+        damages=dict(summary.damages.most_common()),
+        line_errors=dict(summary.marks.most_common()),
+        response=Distribution.of(summary.latency),
+        part=timeline.width / 1e9 if timeline is not None else 0.0,
+        timeline=() if timeline is None else _parts(timeline, session),
+        happenings=tuple(happenings),
+        measurement=_measurement(session, dissector),
+        ring=None if ring is None else ring.numbers(),
+    )
+
+
+def verdict(health: Health | None, findings: tuple[Found, ...], stations: tuple[Station, ...], summary: Summary) -> str:
+    """The whole capture in a sentence or two."""
+    if health is None:
+        return "Nothing was heard: the capture holds no octet."
+    if not summary.frames:
+        return "Octets were heard, but not one frame: wrong line settings or protocol, or a broken line."
+    errors = [finding for finding in findings if finding.severity == Severity.ERROR.label]
+    warnings = [finding for finding in findings if finding.severity == Severity.WARNING.label]
+    ill = [station for station in stations if station.health is not None and station.health.score < 50]
+    if errors:
+        said = f"Something fails: {_subject(errors[0])}."
+    elif ill:
+        said = f"The bus works, but {_many([station.address for station in ill])} hardly."
+    elif warnings:
+        said = f"The bus works, with trouble: {_subject(warnings[0])}."
+    elif health.score < 90:
+        said = "The bus works, with losses."
+    else:
+        said = "The bus is in good order."
+    counted = [
+        f"{len(group)} {word}{'s' if len(group) > 1 else ''}"
+        for group, word in ((errors, "error"), (warnings, "warning"))
+        if group
+    ]
+    return said + (f" {' and '.join(counted)} in all." if len(errors) + len(warnings) > 1 else "")
+
+
+def _many(addresses: list[int]) -> str:
+    return f"station{'s' if len(addresses) > 1 else ''} {', '.join(map(str, addresses))}"
+
+
+def _subject(finding: Found) -> str:
+    return f"{finding.subject}: {finding.title}" if finding.title else f"{finding.subject}: {finding.seen}"
+
+
+def _trouble(transaction: Transaction) -> str:
+    """What kind of trouble: an exception by its name, else how the exchange ended."""
+    if transaction.verdict is Verdict.EXCEPTION and transaction.error:
+        return transaction.error
+    return transaction.verdict.value
+
+
+def _station(node: Node, kinds: Counter[str]) -> Station:
+    trouble = dict(kinds.most_common())
+    if node.damaged:
+        trouble["damaged frame"] = node.damaged
+    health = station_health(node)
+    failed = sum(node.verdicts[verdict] for verdict in (Verdict.NO_RESPONSE, Verdict.LATE, Verdict.DAMAGED_ANSWER))
+    return Station(
+        address=node.address,
+        sent=node.sent,
+        received=node.received,
+        asked=node.asked,
+        answered=node.asked - failed,
+        damaged=node.damaged,
+        health=None if health is None else _score(health),
+        trouble=trouble,
+        response=Distribution.of(node.latency),
+    )
+
+
+def _score(health: Health) -> Score:
+    return Score(health.score, health.reasons)
+
+
+def _parts(timeline: Timeline, session: Session) -> tuple[TimePart, ...]:
+    begin = seconds_since(session.started, timeline.origin)
+    width = timeline.width / 1e9
+    return tuple(
+        TimePart(
+            begin + number * width,
+            min(1.0, part.busy / timeline.width),
+            part.damaged,
+            part.noise,
+            part.failed,
+            part.exceptions,
+            part.line_errors,
+        )
+        for number, part in enumerate(timeline.listed())
+    )
+
+
+def _words(
+    capture: Capture, session: Session, dissector: Dissector, findings: tuple[Finding, ...]
+) -> dict[int, tuple[float, str]]:
+    """Time and text of the rows that findings show."""
+    wanted = {no for finding in findings for no in finding.evidence[:EVIDENCE_SHOWN]}
+    words: dict[int, tuple[float, str]] = {}
+    if not wanted:
+        return words
+    last = max(wanted)
+    for item in outputs(capture.items(), session):
+        if not isinstance(item, Output):
+            continue
+        for row in item.rows:
+            if row.no in wanted:
+                words[row.no] = (seconds_since(session.started, row.event.start), describe(dissector, row))
+        if item.rows and item.rows[-1].no >= last:
+            break
+    return words
+
+
+def _found(
+    findings: tuple[Finding, ...], words: dict[int, tuple[float, str]], session: Session, dissector: Dissector
+) -> tuple[Found, ...]:
+    rules = rules_over(dissector)
+    return tuple(
+        Found(
+            code=finding.code,
+            severity=finding.severity.label,
+            title=_lower(rules[finding.code].title) if finding.code in rules else "",
+            subject=finding.subject,
+            count=finding.count,
+            first=seconds_since(session.started, finding.first),
+            last=seconds_since(session.started, finding.last),
+            seen=finding.seen,
+            means=finding.means,
+            next=finding.next,
+            evidence=tuple(Evidence(no, *words.get(no, (None, ""))) for no in finding.evidence[:EVIDENCE_SHOWN]),
+        )
+        for finding in findings
+    )
+
+
+def _lower(title: str) -> str:
+    return title if title[1:2].isupper() else title[:1].lower() + title[1:]
+
+
+def _measurement(session: Session, dissector: Dissector) -> Measurement:
+    adapter = session.adapter
+    limits = []
+    if adapter.latency:
+        limits.append(
+            f"The adapter may hold octets back for {milliseconds(adapter.latency)} ({adapter.latency_from}): "
+            "every response time is known only to that."
+        )
+    else:
+        limits.append(f"Times are taken as exact ({adapter.latency_from}).")
+    if adapter.reports is None:
+        limits.append("Nobody knows which line errors this adapter reports: none seen does not mean none there.")
+    else:
+        missing = [name for name in ("parity", "framing", "break") if name not in adapter.reports]
+        if missing:
+            limits.append(f"The adapter does not report {', '.join(missing)}: none seen does not mean none there.")
+    if adapter.detail:
+        limits.append(f"Of what it reports: {adapter.detail}.")
+    return Measurement(
+        protocol=dissector.name,
+        line=str(session.line),
+        port=session.port,
+        bus=session.bus,
+        program=session.program,
+        adapter=adapter.name,
+        driver=adapter.driver,
+        latency_ms=adapter.latency / 1e6,
+        latency_from=adapter.latency_from,
+        reports=adapter.reports,
+        detail=adapter.detail,
+        limits=tuple(limits),
+        devices=session.notes.get(DEVICES_NOTE, ""),
+    )
+
+
+class _Ring:
+    """The token ring of one capture."""
+
+    def __init__(self, session: Session) -> None:
+        from dissectors.bacnet import RingObserver
+
+        self._observer = RingObserver(session.timing)
+
+    def add(self, row: Row) -> None:
+        """Take the next row."""
+        self._observer.see(row.no, row.event, row.header)
+
+    def numbers(self) -> RingNumbers:
+        """What it came to."""
+        from sniff.analysis import ring_words
+
+        ring = self._observer.ring()
+        rows = tuple(ring_words.rows(ring))
+        return RingNumbers(ring.order, ring_words.HEADINGS, rows, tuple(ring_words.sentences(ring)))

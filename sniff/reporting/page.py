@@ -1,0 +1,92 @@
+"""Numbers and pictures on one page of HTML that needs nothing else: no script, no font, no network."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from importlib import resources
+from typing import Any
+
+from sniff.reporting.numbers import Numbers
+from sniff.reporting.pictures import pictures
+
+TEMPLATE = "page.html.jinja"
+TROUBLE_MOST = 12
+"""Kinds of trouble that get a column of their own."""
+
+
+def page(reports: Sequence[Numbers]) -> str:
+    """The page of one capture or several. Raises ImportError without jinja2 or matplotlib."""
+    from jinja2 import Environment, StrictUndefined
+    from markupsafe import Markup
+
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment.filters |= {"ms": _ms, "number": _number, "percent": _percent, "seconds": _seconds, "span": _span}
+    template = environment.from_string(resources.files(__package__).joinpath(TEMPLATE).read_text("utf-8"))
+    sections = [
+        {
+            "report": report,
+            "matrix": _matrix(report),
+            # The only markup that is not escaped here: matplotlib made it out of numbers and our own words.
+            "pictures": {name: Markup(svg) for name, svg in pictures(report, f"c{number}").items()},
+        }
+        for number, report in enumerate(reports, 1)
+    ]
+    return template.render(sections=sections)
+
+
+def _matrix(report: Numbers) -> dict[str, Any]:
+    """Stations × kinds of trouble, the most frequent kinds first, the rest in one column; only stations with any."""
+    totals: dict[str, int] = {}
+    for station in report.stations:
+        for kind, count in station.trouble.items():
+            totals[kind] = totals.get(kind, 0) + count
+    kinds = sorted(totals, key=lambda kind: (-totals[kind], kind))
+    shown, rest = kinds[:TROUBLE_MOST], kinds[TROUBLE_MOST:]
+    most = max((count for station in report.stations for count in station.trouble.values()), default=0)
+    rows = []
+    for station in report.stations:
+        if not station.trouble:
+            continue
+        counts = [station.trouble.get(kind, 0) for kind in shown]
+        if rest:
+            counts.append(sum(station.trouble.get(kind, 0) for kind in rest))
+        rows.append((station, [(count, min(4, math.ceil(4 * count / most)) if count else 0) for count in counts]))
+    return {
+        "kinds": [kind.replace("-", " ") for kind in shown] + (["others"] if rest else []),
+        "rows": rows,
+        "clean": [station.address for station in report.stations if not station.trouble],
+    }
+
+
+def _ms(value: float | None) -> str:
+    """ms with the precision that is worth reading; a dash for None."""
+    if value is None:
+        return "–"
+    return f"{value:.0f}" if value >= 100 else f"{value:.1f}" if value >= 1 else f"{value:.2f}"
+
+
+def _number(value: object) -> str:
+    """A cell: None as a dash, floats with two decimals, large ones without; integers with thin spaces."""
+    if value is None:
+        return "–"
+    if isinstance(value, float):
+        return f"{value:.2f}" if abs(value) < 100 else f"{value:.0f}"
+    return f"{value:,}".replace(",", "\u202f") if isinstance(value, int) else str(value)
+
+
+def _percent(share: float) -> str:
+    return f"{share:.1%}"
+
+
+def _seconds(value: float | None) -> str:
+    return "" if value is None else f"{value:.3f} s"
+
+
+def _span(seconds: float) -> str:
+    """A duration for people."""
+    if seconds < 120:
+        return f"{seconds:.1f} s"
+    minutes, rest = divmod(int(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours} h {minutes} min" if hours else f"{minutes} min {rest} s"

@@ -1,0 +1,98 @@
+"""Load and trouble over the time of a capture, in at most MOST_PARTS equal parts whatever its length. Pure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from dissectors.frame import Frame
+from dissectors.tracker import Transaction, Verdict
+from sniff.engine import Row
+
+MOST_PARTS = 240
+FIRST_WIDTH = 100_000_000
+"""ns of a part at first; doubled whenever there would be too many of them."""
+
+FAILED = frozenset((Verdict.NO_RESPONSE, Verdict.LATE, Verdict.DAMAGED_ANSWER, Verdict.DAMAGED_REQUEST))
+
+
+@dataclass(slots=True)
+class Part:
+    """One part of the time. `busy`: ns with octets on the wire; `noise`: octets; the others are counts."""
+
+    busy: int = 0
+    damaged: int = 0
+    noise: int = 0
+    failed: int = 0
+    exceptions: int = 0
+    line_errors: int = 0
+
+    def add(self, other: Part) -> None:
+        """Take in the part that follows."""
+        self.busy += other.busy
+        self.damaged += other.damaged
+        self.noise += other.noise
+        self.failed += other.failed
+        self.exceptions += other.exceptions
+        self.line_errors += other.line_errors
+
+
+@dataclass(slots=True)
+class Timeline:
+    """Parts by number, counted from `origin` (ns). `char`: ns an octet takes. Times before the origin count as it."""
+
+    origin: int
+    char: int
+    width: int = FIRST_WIDTH
+    parts: dict[int, Part] = field(default_factory=dict)
+    _most: int = 0
+
+    def add_row(self, row: Row) -> None:
+        """Count one row: its octets where they were on the wire, its trouble where it ended."""
+        event = row.event
+        part = self._part(event.end)
+        if isinstance(event, Frame):
+            part.damaged += not event.ok
+        else:
+            part.noise += len(event.octets)
+        part.line_errors += len(event.marks)
+        self._spread(event.end - len(event.octets) * self.char, event.end)
+
+    def add_transaction(self, transaction: Transaction) -> None:
+        """Count one closed transaction where it began."""
+        if transaction.verdict in FAILED:
+            self._part(transaction.start).failed += 1
+        elif transaction.verdict is Verdict.EXCEPTION:
+            self._part(transaction.start).exceptions += 1
+
+    def listed(self) -> list[Part]:
+        """All parts from the first to the last, empty ones too."""
+        return [self.parts.get(number, Part()) for number in range(self._most + 1)] if self.parts else []
+
+    def _spread(self, start: int, end: int) -> None:
+        start, end = max(start, self.origin), max(end, self.origin)
+        while start < end:
+            edge = min(end, self.origin + ((start - self.origin) // self.width + 1) * self.width)
+            self._part(start).busy += edge - start
+            start = edge
+
+    def _part(self, time: int) -> Part:
+        offset = max(0, time - self.origin)
+        while offset // self.width >= MOST_PARTS:
+            self._halve()
+        number = offset // self.width
+        self._most = max(self._most, number)
+        part = self.parts.get(number)
+        if part is None:
+            part = self.parts[number] = Part()
+        return part
+
+    def _halve(self) -> None:
+        before, self.parts = self.parts, {}
+        self.width *= 2
+        self._most //= 2
+        for number, part in sorted(before.items()):
+            kept = self.parts.get(number // 2)
+            if kept is None:
+                self.parts[number // 2] = part
+            else:
+                kept.add(part)
