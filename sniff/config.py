@@ -114,7 +114,7 @@ class _Reader:
             settings,
             protocol,
             self.text(entry, "record", section),
-            {str(key): str(value) for key, value in devices.items()},
+            {key: self.device(devices, key, f"{section}.devices") for key in devices},
             {key: f"{self.path}:{self.line_of(key, section)}" for key in entry},
         )
 
@@ -123,6 +123,16 @@ class _Reader:
         if value is not None and not isinstance(value, str):
             raise self.error(key, section, f"expected a text in quotes, not {value!r}")
         return value
+
+    def device(self, devices: Mapping[str, Any], key: str, section: str) -> str:
+        """The profile of a station; the key is its address, or "*" for every one."""
+        try:
+            fits = key == "*" or 0 <= int(key, 0) <= 255
+        except ValueError:
+            fits = False
+        if not fits:
+            raise self.error(key, section, f'{key!r}: expected an address 0 … 255, or "*" for every station')
+        return self.text(devices, key, section) or ""
 
     def table(self, value: Any, name: str) -> Mapping[str, Any]:
         if not isinstance(value, dict):

@@ -39,6 +39,8 @@ def test_the_folder_above_counts(tmp_path: Path) -> None:
         ('[bus.a]\n\nline = "fast"\n', ":3: [bus.a] line settings 'fast'"),
         ('[bus.a]\nprotocol = "modbusrtu"\n', ":2: [bus.a] unknown protocol 'modbusrtu'; did you mean 'modbus-rtu'?"),
         ("[bus.a]\nport = 3\n", ":2: [bus.a] expected a text in quotes, not 3"),
+        ('[bus.a.devices]\n300 = "x"\n', ":2: [bus.a.devices] '300': expected an address 0 … 255"),
+        ("[bus.a.devices]\n3 = 4\n", ":2: [bus.a.devices] expected a text in quotes, not 4"),
         ("[buss.a]\n", "unknown key 'buss'; did you mean 'bus'?"),
         ("bus = 1\n", "expected a table [bus]"),
         ("[bus.a\n", "sniff485.toml: "),

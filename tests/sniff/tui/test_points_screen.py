@@ -1,0 +1,143 @@
+"""Screen 4: points of a simulated bus."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from dissectors.profiles import Devices, packaged
+from sniff.engine import Output
+from sniff.reading import dissector_for, outputs
+from sniff.simulation.scenarios import scenario, simulate
+from sniff.store import Store
+from sniff.tui.screens.points import age, trend
+
+STARTED = 1_772_359_200 * 1_000_000_000
+SIZES = {"80x24": (80, 24), "160x50": (160, 50)}
+
+
+def store_of(name: str, seconds: float, known: bool = True) -> Store:
+    plan = scenario(name, faults=False)
+    session, items = simulate(plan, seconds, started=STARTED)
+    devices = Devices({address: packaged(profile) for address, profile in plan.devices.items()} if known else {})
+    store = Store(session, dissector_for(session), devices=devices)
+    for output in outputs(items, session):
+        if isinstance(output, Output):
+            store.add(output)
+    return store
+
+
+def keys(see: Any) -> list[str]:
+    return [str(key.value) for key in see.main.rows]
+
+
+def cells(see: Any, key: str) -> list[str]:
+    return [cell.plain for cell in see.main.get_row(key)]
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_values_by_device_and_name(look: Any, size: str) -> None:
+    async def script(see: Any) -> None:
+        text = see.text()
+        assert "None" not in text
+        assert all(len(line) <= SIZES[size][0] for line in see.lines())
+        assert cells(see, "1/output-frequency")[3].endswith(" Hz")
+        assert cells(see, "1/status")[3].lstrip("*").startswith(("running", "stopped"))
+        assert cells(see, "1/command")[0].startswith("→")
+        assert keys(see)[0].startswith("1/")
+        assert "1/status.running" not in keys(see)
+
+    look(store_of("modbus-rtu", 20), script, SIZES[size], "points")
+
+
+def test_pin_bits_and_commands(look: Any) -> None:
+    async def script(see: Any) -> None:
+        await see.press("G")
+        last = see.main.key_here()
+        await see.press("p")
+        assert keys(see)[0] == last
+        assert "^" in cells(see, last)[0]
+        assert see.main.key_here() == last
+        await see.press("p")
+        assert "^" not in cells(see, last)[0]
+        await see.press("b")
+        assert "1/status.running" in keys(see)
+        await see.press("b", "c")
+        assert keys(see)
+        assert all("→" in cells(see, key)[0] for key in keys(see))
+
+    look(store_of("modbus-rtu", 20), script, start="points")
+
+
+def test_enter_goes_to_the_frame(look: Any) -> None:
+    store = store_of("modbus-rtu", 10)
+
+    async def script(see: Any) -> None:
+        await see.press("enter")
+        assert see.app.current_mode == "frames"
+        point = store.points.get("1", "status")
+        assert point is not None
+        assert see.main.cursor == point.sample.frame
+
+    look(store, script, start="points")
+
+
+def test_a_frozen_view_stands_still(look: Any) -> None:
+    plan = scenario("modbus-rtu", faults=False)
+    session, items = simulate(plan, 10, started=STARTED)
+    steps = [output for output in outputs(items, session) if isinstance(output, Output)]
+    store = Store(session, dissector_for(session), devices=Devices(default=packaged("teco-e510")))
+    for output in steps[: len(steps) // 2]:
+        store.add(output)
+
+    async def script(see: Any) -> None:
+        await see.press("space")
+        before = see.lines()[2:-1]
+        for output in steps[len(steps) // 2 :]:
+            store.add(output)
+        await see.poll()
+        assert see.lines()[2:-1] == before
+        await see.press("space")
+        await see.poll()
+        assert see.lines()[2:-1] != before
+
+    look(store, script, start="points")
+
+
+def test_no_values_yet_and_no_profile(look: Any, make_bus: Any) -> None:
+    async def empty(see: Any) -> None:
+        assert "no values yet" in see.text()
+        await see.press("enter", "p")
+
+    look(make_bus().store, empty, start="points")
+
+    async def plain(see: Any) -> None:
+        assert "1/holding/49505" in keys(see)
+
+    look(store_of("modbus-rtu", 5, known=False), plain, start="points")
+
+
+def test_names_and_values_from_the_wire_are_harmless(look: Any) -> None:
+    from dissectors.profiles.decoding import decode
+    from dissectors.readings import How, Reading
+    from sniff.analysis.points import Sample
+
+    store = store_of("mstp", 3)
+    evil = Reading("device", 5, None, "[red]x[/red]\x1b[2J\u202e", How.READ, "object-name\x1b")
+    store.points.add([Sample(STARTED, 5, value, 1) for value in decode(None, [evil])])
+
+    async def script(see: Any) -> None:
+        assert "\x1b" not in see.text()
+        assert "\u202e" not in see.text()
+        assert "[red]x[/red]" in see.text()
+
+    look(store, script, (160, 50), "points")
+
+
+def test_trend_and_age() -> None:
+    assert trend([1.0]) == ""
+    assert trend([2.0, 2.0]) == "▄▄"
+    assert trend([0, 1, 2])[0] < trend([0, 1, 2])[1] < trend([0, 1, 2])[2]
+    assert len(trend(list(range(100)))) == 12
+    assert [age(seconds * 10**9) for seconds in (-5, 3, 119, 600, 90_000)] == ["0 s", "3 s", "119 s", "10 min", "25 h"]
