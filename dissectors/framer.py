@@ -206,20 +206,22 @@ class OctetWindow:
         return Taken(octets, start, end, last.slack, marks)
 
     def _drop_runs(self, count: int) -> None:
-        kept: list[_Run] = []
         runs = self._runs
-        for position, run in enumerate(runs):
-            after = runs[position + 1].index if position + 1 < len(runs) else count + len(self.octets)
-            if after <= count:
-                continue
-            if run.index < count:  # cut inside: what is left stands directly after the octet before it
-                floor = self._end_in(run, count - 1)
-                first_end = run.first_end + (count - run.index) * self._char
-                kept.append(_Run(0, first_end, floor, 0, run.slack, run.slack))
-            else:
-                run.index -= count
-                kept.append(run)
-        self._runs = kept
+        gone = 0
+        while gone + 1 < len(runs) and runs[gone + 1].index <= count:
+            gone += 1
+        if gone:
+            del runs[:gone]
+        run = runs[0]
+        cut = count - run.index
+        if cut:  # inside the run: what is left stands directly after the octet before it
+            end = run.first_end + (cut - 1) * self._char
+            run.floor = end if end > run.floor else run.floor
+            run.first_end += cut * self._char
+            run.gap, run.room = 0, run.slack
+        run.index = 0
+        for later in runs[1:]:
+            later.index -= count
 
     def _run(self, index: int) -> _Run:
         runs = self._runs

@@ -104,14 +104,16 @@ class RtuFramer:
         """Take one read; give the events it completes, in order."""
         if not chunk.octets:
             return self.advance(chunk.time)
-        silence = self._window.least_silence_before(chunk)
+        window = self._window
+        silence = window.least_silence_before(chunk)
         if silence is not None and silence >= self._t35:
             self._hear_silence(silence)
-        self._window.append(chunk)
+        window.append(chunk)
         self._settled = False
-        while len(self._window) >= self._next:
+        octets = window.octets
+        while len(octets) >= self._next:
             self._look(self._next)
-        return self._give()
+        return self._give() if self._out else []
 
     def advance(self, now: int) -> list[Event]:
         """Say that no read returned up to `now` (ns); give what the silence completes."""
