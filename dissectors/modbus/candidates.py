@@ -215,20 +215,22 @@ class CandidateFinder:
     """Finds every candidate of a growing window, looking at each octet once.
 
     Positions count from the first octet ever fed, so that nothing moves when octets are taken from the front.
+    `good`: the candidates found, of those that the window still holds.
     """
 
-    __slots__ = ("_scanned", "_unread", "_waiting", "base", "good")
+    __slots__ = ("_base", "_scanned", "_unread", "_waiting", "good")
 
     def __init__(self) -> None:
-        self.base = 0  # octets taken so far: number of the window's first
         self.good: list[Candidate] = []
+        self._base = 0  # position of the window's first octet
         self._scanned = 0
         self._unread: list[Pending] = []  # heads that need more octets to tell a length, and what they told so far
         self._waiting: list[Pending] = []
 
-    def look(self, octets: Octets, end: int) -> None:
-        """Take notice of the window's octets up to `end` (which never falls)."""
-        base = self.base
+    def look(self, octets: Octets, base: int, end: int) -> None:
+        """Take notice of a window that begins at position `base`, up to index `end`. Neither limit ever falls back."""
+        if base > self._base:
+            self._drop(base)
         unread, self._unread = self._unread, []
         for start, told in unread:
             self._read(octets, start, end, told)
@@ -250,19 +252,15 @@ class CandidateFinder:
         """What is not complete yet; length MORE where the octets do not tell it yet."""
         return self._waiting + [Pending(start, _UNTOLD) for start, _ in self._unread]
 
-    def drop(self, count: int) -> None:
-        """The window gave out its first `count` octets."""
-        base = self.base = self.base + count
-        if self.good:
-            self.good = [c for c in self.good if c.start >= base]
-        if self._waiting:
-            self._waiting = [p for p in self._waiting if p.start >= base]
-        if self._unread:
-            self._unread = [p for p in self._unread if p.start >= base]
+    def _drop(self, base: int) -> None:
+        self._base = base
+        self.good = [c for c in self.good if c.start >= base]
+        self._waiting = [p for p in self._waiting if p.start >= base]
+        self._unread = [p for p in self._unread if p.start >= base]
 
     def _read(self, octets: Octets, start: int, end: int, told: Reading) -> None:
         more = False
-        for reading in readings(octets, start - self.base, end):
+        for reading in readings(octets, start - self._base, end):
             if reading.length == MORE:
                 more = True
             elif reading.length != told.length:

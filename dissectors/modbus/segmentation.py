@@ -24,7 +24,7 @@ from typing import Final, NamedTuple, Protocol
 
 from dissectors.modbus.candidates import CRC_BITS, Candidate, Pending, Reading, octet_hope
 from dissectors.modbus.expectation import Expected, expectation
-from dissectors.modbus.functions import MORE, Octets
+from dissectors.modbus.functions import MORE
 
 THRESHOLD: Final = 20
 SCALE: Final = 16
@@ -41,7 +41,16 @@ _NEIGHBOURS: Final = 12
 
 
 class Surroundings(Protocol):
-    """What stands round a position of the window (positions count from the first octet ever fed)."""
+    """The window, and what stands round a position of it (positions count from the first octet ever fed).
+
+    `base`: position of the window's first octet. `expected`: the open request before it. `good_before`: a good frame
+    ends directly before it.
+    """
+
+    octets: bytearray
+    base: int
+    expected: Expected | None
+    good_before: bool
 
     def edge(self, position: int) -> int:
         """Bits of evidence that one frame ends, another begins there: PROVED, LIKELY or 0."""
@@ -75,37 +84,28 @@ def worth(bits: int, length: int) -> int:
     return excess * SCALE + (length if excess >= 0 else 1)
 
 
-def context_bits(around: Surroundings, unit: int, start: int, end: int, adjacent: bool) -> int:
+def context_bits(window: Surroundings, unit: int, start: int, end: int, adjacent: bool) -> int:
     """Bits from what stands round a stretch, without its end and the open request."""
-    bits = ADJACENT if adjacent else around.edge(start)
-    if around.heard(unit):
+    bits = ADJACENT if adjacent else window.edge(start)
+    if window.heard(unit):
         bits += HEARD
-    silences = around.inside(start, end)
+    silences = window.inside(start, end)
     return bits + SILENCE_INSIDE * silences if silences else bits
 
 
 def segment(
-    octets: Octets,
-    base: int,
-    end: int,
-    candidates: Sequence[Candidate],
-    pending: Sequence[Pending],
-    around: Surroundings,
-    expected: Expected | None,
-    follows_frame: bool,
+    window: Surroundings, count: int, candidates: Sequence[Candidate], pending: Sequence[Pending]
 ) -> tuple[list[Candidate], list[Candidate]]:
     """The frames of the best path, and those of them that nothing yet to come can undo, both in order.
 
-    `octets`: the window, its first octet at position `base`; those up to index `end` are known.
-    `expected`: the open request before it.
-    `follows_frame`: a good frame ends directly before the window.
+    `count`: how many octets of the window are known.
     """
-    root = _Step(0, None, None, base if follows_frame else -1, expected)
+    root = _Step(0, None, None, window.base if window.good_before else -1, window.expected)
     steps = [root]
     for candidate in sorted(candidates):
         best: _Step | None = None
         for step in _before(steps, candidate.start):
-            total = step.worth + _worth(candidate, step, around)
+            total = step.worth + _worth(candidate, step, window)
             if best is None or total > best.worth:
                 after = expectation(step.expected, candidate.octets, candidate.request, candidate.response)
                 best = _Step(total, candidate, step, candidate.end, after)
@@ -117,7 +117,7 @@ def segment(
     most = winner.worth
     for start, reading in pending:
         for step in _before(steps, start):
-            total = step.worth + _hope(octets, start - base, end, start, reading, step, around)
+            total = step.worth + _hope(start, reading, count, step, window)
             if total > most:
                 most, hope = total, step
     if hope is None:
@@ -142,19 +142,20 @@ def _before(steps: Sequence[_Step], start: int) -> list[_Step]:
     return [max(fitting, key=_by_worth), *fitting[-_NEIGHBOURS:]]
 
 
-def _worth(candidate: Candidate, step: _Step, around: Surroundings) -> int:
+def _worth(candidate: Candidate, step: _Step, window: Surroundings) -> int:
     start, length = candidate.start, candidate.length
-    bits = candidate.bits + around.edge(start + length)
-    bits += context_bits(around, candidate.unit, start, start + length, step.end == start)
+    bits = candidate.bits + window.edge(start + length)
+    bits += context_bits(window, candidate.unit, start, start + length, step.end == start)
     if step.expected is not None:
         bits += step.expected.fit(candidate.octets, 0, length)
     return worth(bits, length)
 
 
-def _hope(octets: Octets, at: int, end: int, start: int, reading: Reading, step: _Step, around: Surroundings) -> int:
-    length = reading.length if reading.length != MORE else end - at + 1
+def _hope(start: int, reading: Reading, count: int, step: _Step, window: Surroundings) -> int:
+    octets, at = window.octets, start - window.base
+    length = reading.length if reading.length != MORE else count - at + 1
     bits = CRC_BITS + octet_hope(octets, at, reading)
-    bits += context_bits(around, octets[at], start, start + length, step.end == start)
+    bits += context_bits(window, octets[at], start, start + length, step.end == start)
     if step.expected is not None:
         bits += step.expected.hope(octets, at, length)
     return worth(bits, length)

@@ -1,0 +1,224 @@
+"""The window of the RTU framer: octets not given out yet, what stands round them, and giving them out.
+
+framing.py decides what is a frame; here is what it knows, and what becomes of its decisions.
+"""
+
+from __future__ import annotations
+
+from dissectors.checksums import crc16_modbus
+from dissectors.frame import Check, Damage, Event, Found, Frame, Noise, Place, Reason
+from dissectors.framer import UNKNOWN_SILENCE, OctetWindow
+from dissectors.line import Timing
+from dissectors.modbus.candidates import Candidate, Reading, readings
+from dissectors.modbus.expectation import Expected, expectation
+from dissectors.modbus.functions import is_open_length
+from dissectors.modbus.remains import (
+    ODD_LENGTH,
+    Injury,
+    Side,
+    injury,
+    noise_place,
+    noise_reason,
+    predicted,
+    zeros_at_start,
+)
+from dissectors.modbus.segmentation import LIKELY, PROVED
+
+
+class RtuWindow:
+    """What the framer holds. Positions count from the first octet ever fed, indices from the window's first.
+
+    `octets`: the window. `base`: position of its first octet. `cuts`: positions of proved silences inside it.
+    `end`: index at which silence or the end of the capture follows, None while octets may follow at once;
+    `end_proved`: that it is silence. `units`: stations that good frames named. `expected`: the open request.
+    `good_before`: a good frame stands directly before the window.
+    """
+
+    __slots__ = (
+        "_before",
+        "_octets",
+        "_out",
+        "_skipped",
+        "_start",
+        "_start_proved",
+        "_t15",
+        "_t35",
+        "base",
+        "cuts",
+        "end",
+        "end_proved",
+        "expected",
+        "good_before",
+        "octets",
+        "units",
+    )
+
+    def __init__(self, timing: Timing, octets: OctetWindow) -> None:
+        self._octets = octets
+        self._t15, self._t35 = timing.t15, timing.t35
+        self.octets = octets.octets
+        self.base = 0
+        self.cuts: list[int] = []
+        self.end: int | None = None
+        self.end_proved = False
+        self.units: set[int] = set()
+        self.expected: Expected | None = None
+        self.good_before = False
+        self._out: list[Event] = []
+        self._before = Side.SILENCE  # what stands directly before the window
+        self._start: int | None = None  # evidence that a frame begins with the window; None until it is asked for
+        self._start_proved = False
+        self._skipped = 0
+
+    def give(self) -> list[Event]:
+        """The events since the last call."""
+        if not self._out:
+            return []
+        out, self._out = self._out, []
+        return out
+
+    # --- what stands round a place ---------------------------------------------------------------------------------
+
+    def readings(self, count: int) -> tuple[Reading, ...]:
+        """Predicted lengths of a frame that begins with the window, of which `count` octets are known."""
+        return readings(self.octets, 0, count)
+
+    def in_step(self) -> bool:
+        """Whether the window begins where a frame may begin."""
+        return self.good_before or self.start_bits() == PROVED
+
+    def edge(self, position: int) -> int:
+        """Bits of evidence that one frame ends, another begins at a position."""
+        index = position - self.base
+        if index == 0:
+            return self.start_bits()
+        if index == self.end or (self.cuts and position in self.cuts):
+            return PROVED
+        return LIKELY if self._octets.silence(index)[0] >= self._t15 else 0
+
+    def inside(self, start: int, end: int) -> int:
+        """Number of proved silences strictly between two positions."""
+        return sum(start < cut < end for cut in self.cuts)
+
+    def heard(self, unit: int) -> bool:
+        """Whether good frames named this station."""
+        return unit in self.units
+
+    def start_bits(self) -> int:
+        """Evidence that a frame begins with the window; the begin of the capture is as good as silence."""
+        if self._start is None:
+            least, most = self._octets.silence(0)
+            self._start_proved = least >= self._t35
+            if self._start_proved or most >= UNKNOWN_SILENCE:
+                self._start = PROVED
+            else:
+                self._start = LIKELY if least >= self._t15 else 0
+        return self._start
+
+    # --- giving out ------------------------------------------------------------------------------------------------
+
+    def take_candidate(self, candidate: Candidate) -> None:
+        before = candidate.start - self.base
+        if before:
+            self.take_rest(before, Side.FRAME)
+        self.take_frame(candidate.length, candidate.request, candidate.response)
+
+    def take_frame(self, count: int, request: bool, response: bool) -> None:
+        """Give the first `count` octets as a frame with a good CRC."""
+        found = self._found(count)
+        octets, start, end, slack, marks = self._octets.take(count)
+        expected: int | None = count
+        flags: tuple[str, ...] = ()
+        if not (request or response):  # its octets contradict its length, not its CRC
+            expected, flags = predicted(octets), ODD_LENGTH
+        elif is_open_length(octets):
+            expected = None
+        self._out.append(
+            Frame(
+                "modbus-rtu", octets, start, end, Check.GOOD, found, None, expected, self._skipped, slack, marks, flags
+            )
+        )
+        self._skipped = 0
+        self._taken(count, Side.FRAME)
+        self.good_before = True
+        self.expected = expectation(self.expected, octets, request, response)
+        self.units.add(octets[0])
+
+    def take_rest(self, count: int, after: Side) -> None:
+        """Give the first `count` octets as what no frame covers, in pieces between proved silences."""
+        base = self.base
+        for cut in [c for c in self.cuts if base < c <= base + count]:
+            self._take_piece(cut - self.base, Side.SILENCE)
+        left = base + count - self.base
+        if left:
+            self._take_piece(left, after)
+
+    def _take_piece(self, count: int, after: Side) -> None:
+        before = self._side_before()
+        stretch = bytes(self.octets[:count])
+        if self.good_before and before is Side.FRAME:
+            zeros = zeros_at_start(stretch)
+            if zeros == count or zeros > 1:
+                self._take_noise(zeros, before, after if zeros == count else Side.NOISE, Reason.ZEROS)
+                if zeros == count:
+                    return
+                before, stretch, count = Side.NOISE, stretch[zeros:], count - zeros
+        heard = stretch[0] in self.units if self.units else None
+        hurt = injury(stretch, before, after, heard, self.expected)
+        if hurt is None:
+            self._take_noise(count, before, after, None)
+        elif not crc16_modbus(stretch):  # too weak to be found in a run of octets, but nothing else is beside it
+            fits = [r for r in readings(stretch, 0, count) if r.length == count]
+            self.take_frame(count, any(r.request for r in fits), any(r.response for r in fits))
+        else:
+            self._take_damaged(count, hurt)
+
+    def _take_noise(self, count: int, before: Side, after: Side, reason: Reason | None) -> None:
+        place = self._place(count, before, after)
+        taken = self._octets.take(count)
+        if reason is None:
+            reason = noise_reason(taken.octets, taken.marks)
+        self._taken(count, Side.NOISE)
+        self._skipped += count
+        self._out.append(Noise(taken.octets, taken.start, taken.end, place, reason, taken.marks))
+
+    def _take_damaged(self, count: int, hurt: Injury) -> None:
+        found = self._found(count)
+        octets, start, end, slack, marks = self._octets.take(count)
+        check = Check.ABSENT if hurt.damage is Damage.SHORT else Check.BAD
+        self._out.append(
+            Frame(
+                "modbus-rtu", octets, start, end, check, found, hurt.damage, hurt.expected, self._skipped, slack, marks
+            )
+        )
+        self._skipped = 0
+        self._taken(count, Side.FRAME)
+
+    def _taken(self, count: int, kind: Side) -> None:
+        self.base += count
+        self._before, self.good_before, self._start = kind, False, None
+        if self.end is not None:
+            self.end -= count
+        if self.cuts:
+            self.cuts = [cut for cut in self.cuts if cut > self.base]
+
+    def _found(self, count: int) -> Found:
+        base, ends = self.base, self.end == count
+        self.start_bits()
+        if self.cuts:
+            if self.inside(base, base + count):
+                return Found.JOINED
+            end_proved = (ends and self.end_proved) or base + count in self.cuts
+        else:
+            end_proved = ends and self.end_proved
+        if end_proved and self._start_proved:
+            return Found.GAP
+        touched = self._octets.gap(0) < self._t15 or (not ends and self._octets.gap(count) < self._t15)
+        return Found.SPLIT if touched else Found.LENGTH
+
+    def _side_before(self) -> Side:
+        return Side.SILENCE if self.start_bits() == PROVED else self._before
+
+    def _place(self, count: int, before: Side, after: Side) -> Place:
+        gap_after = self._octets.gap(count) if after is Side.FRAME else 0
+        return noise_place(before, after, self._octets.gap(0), gap_after)
