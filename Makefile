@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV   ?= .venv
 BIN     = $(VENV)/bin
 
-.PHONY: demo test lint bench clean
+.PHONY: demo test lint bench faults clean
 
 demo: $(VENV)/.demo
 	$(BIN)/sniff485 demo $(ARGS)
@@ -19,6 +19,10 @@ lint: $(VENV)/.test
 
 bench: $(VENV)/.test
 	$(BIN)/python -m pytest tests/bench -o norecursedirs=.venv -o testpaths=tests/bench --benchmark-only --benchmark-group-by=group $(ARGS)
+
+# Every injected fault with five seeds, and an hour of clean traffic; takes a while. ARGS chooses cases by name.
+faults: $(VENV)/.test
+	$(BIN)/python -m tests.faults.matrix $(ARGS)
 
 clean:
 	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

@@ -16,7 +16,7 @@ from dissectors.modbus.adu import RTU_NAME, adu, rtu_check
 from dissectors.modbus.functions import BROADCAST
 from dissectors.modbus.judgement import Evidence, judge
 from dissectors.modbus.learnt import Learnt
-from dissectors.modbus.station_record import Key, Station
+from dissectors.modbus.station_record import Key, Station, middle
 from dissectors.tracker import Placement, Transaction, Verdict
 
 MS = 1_000_000
@@ -27,6 +27,8 @@ SLOW_UNLEARNT = 500 * MS
 _OPEN_KEPT = 4096
 _HASTY_KEPT = 256
 _LAST_STANDARD_UNIT = 247
+_SPACING_KEPT = 64
+_SPACING_LEAST = 8
 _SETTLED_ELSEWHERE = (Verdict.ECHO, Verdict.DATA, Verdict.OPEN, Verdict.BROADCAST)
 
 
@@ -63,6 +65,7 @@ class ModbusFindings:
         self._elsewhere: dict[int, int] = {}  # requests (by frame) that another unit answered, and which
         self._repeats: deque[int] = deque(maxlen=64)  # the last transactions that repeated another
         self._no_requests: deque[int] = deque(maxlen=64)  # frames that the tracker takes for requests, but are none
+        self._spacing: dict[str, deque[int]] = {}  # silence an octet of the last frames of each sender, ns
         self._damaged: deque[int] = deque(maxlen=64)  # transactions of the last damaged answers
 
     # ---- the contract
@@ -156,6 +159,8 @@ class ModbusFindings:
             if gap > self._timing.t35 + self._timing.latency:  # no echo
                 self._learnt.unanswered(gap)
             return
+        if before.header.role is not Role.REQUEST:  # a write has the shape of its answer, which may have come late
+            return
         self._learnt.unanswered(gap)
         if len(self._seen.hasty) < _HASTY_KEPT:
             self._seen.hasty.append((gap + before.frame.slack, before.unit, asked.frame.start, before.no, asked.no))
@@ -196,9 +201,19 @@ class ModbusFindings:
             longest = max(0, frame.start - before.end) + before.slack
             if longest < timing.t35 - timing.line.bits(1):
                 self._seen.gap_tally(self._seen.close, sender).add(frame.start, no - 1, no)
-        shortest = frame.end - frame.slack - frame.start - len(frame.octets) * timing.char
-        if shortest > timing.t15:
+        self._see_pause(no, frame, sender)
+
+    def _see_pause(self, no: int, frame: Frame, sender: str) -> None:
+        """A silence inside a frame, beyond the spacing that this sender always leaves between its octets."""
+        gaps = len(frame.octets) - 1
+        if gaps < 1:
+            return
+        silence = frame.end - frame.slack - frame.start - len(frame.octets) * self._timing.char
+        usual = self._spacing.setdefault(sender, deque(maxlen=_SPACING_KEPT))
+        limit = self._timing.t15
+        if silence > limit and len(usual) >= _SPACING_LEAST and silence - gaps * max(0, middle(usual)) > limit:
             self._seen.gap_tally(self._seen.paused, sender).add(frame.start, no)
+        usual.append(silence // gaps)
 
     def _is_answer_to_broadcast(self, asked: _Asked) -> bool:
         """Whether what looks like a request is a station's copy of the broadcast before it, as itself or as 0."""

@@ -33,14 +33,14 @@ class Judging:
         self.line = LineFindings(session)
         self.devices = ProfileFindings(session.timing, dissector, devices) if devices else None
         self._hole: int | None = None  # when octets were lost, by the newest line event that says so
-        self._first_after: int | None = None  # number of the first row after it
+        self._first_after: int | None = None  # number of the first row that begins after it
 
     def add(self, output: Output) -> None:
         """Take rows and closed transactions."""
         judge, line, devices = self.judge, self.line, self.devices
         for row in output.rows:
             line.see(row)
-            if self._hole is not None and self._first_after is None:
+            if self._hole is not None and self._first_after is None and row.event.start >= self._hole:
                 self._first_after = row.no
                 if judge is not None:  # something was there that nobody heard: no silence
                     gap = Noise(b"", row.event.start, row.event.start, Place.BETWEEN, Reason.NO_FRAME)
