@@ -8,6 +8,7 @@ from typing import Any
 
 from dissectors.bacnet import message as messages
 from dissectors.bacnet.apdu import PduType
+from dissectors.bacnet.frame_types import HEADER
 from dissectors.bacnet.message import Message
 from dissectors.bacnet.values import BitString, Double, Enumerated, ObjectId, Record, show
 from dissectors.frame import Frame
@@ -20,7 +21,7 @@ _CONFIRMED_COV, _UNCONFIRMED_COV = 1, 2
 
 def readings(request: Frame | None, response: Frame | None) -> tuple[Reading, ...]:
     """See `dissectors.readings.Readings`."""
-    if request is None or not request.ok:
+    if request is None or not request.ok or len(request.octets) <= HEADER:  # tokens and polls carry nothing
         return ()
     asked = messages.read(request)
     if asked is None or asked.apdu is None:

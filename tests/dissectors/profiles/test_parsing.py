@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import dissectors.profiles
 from dissectors.profiles import Access, Kind, Limits, Profile, ProfileError, Role, parse, parse_text
 
 HEAD = 'name = "pump"\ntitle = "A pump"\nprotocols = ["modbus-rtu"]\n'
@@ -230,3 +234,11 @@ def test_any_document_gives_a_profile_or_a_profile_error(document: dict[str, obj
     except ProfileError as error:
         told = str(error)
     assert told.startswith(("x: ", "Profile("))
+
+
+def test_the_document_in_the_readme_is_a_profile() -> None:
+    readme = Path(dissectors.profiles.__file__).with_name("README.md").read_text("utf-8")
+    example = re.search(r"```toml\n(.*?)```", readme, re.DOTALL)
+    assert example is not None
+    profile = parse_text(example[1], "README.md")
+    assert {"command", "flow", "fault", "P.03"} <= {entry.name for entry in profile.entries}
