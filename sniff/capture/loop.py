@@ -67,6 +67,7 @@ class CaptureLoop:
     waker: socket.socket | None = None  # readable when a signal came
     priority: str = ""
     end_at: int | None = None
+    record: Callable[[bytes], None] | None = None  # begins to record as a message says
     reason: str | None = None
     _offset: int = 0
     _due: int = _FAR
@@ -242,6 +243,8 @@ class CaptureLoop:
     def _command(self, kind: int, bus: int, body: bytes) -> None:
         if kind == Kind.STOP:
             self.stop("stopped")
+        elif kind == Kind.RECORD and self.record is not None:
+            self.record(body)
         elif kind == Kind.DERIVED and bus < len(self.recorders):
             derived = decode_derived(bus, body)
             self.recorders[bus].derived(

@@ -13,6 +13,7 @@ import signal
 import socket
 import stat
 import sys
+from functools import partial
 from types import FrameType
 
 from sniff.capture.config import CaptureConfig, SourceSpec
@@ -103,6 +104,7 @@ def _capture(
     loop = CaptureLoop(clock, sources, recorders, outlet, connection, priority=priority)
     if config.duration is not None:
         loop.end_at = clock.now() + config.duration
+    loop.record = partial(_record, loop, sources, clock)
     waker = _end_on_signals(loop)
     try:
         reason = loop.run()
@@ -114,6 +116,25 @@ def _capture(
     waker.close()
     outlet.finish(encode(Kind.ENDED, 0, reason.encode()), FAREWELL)
     return 0
+
+
+def _record(loop: CaptureLoop, sources: list[Source], clock: Clock, body: bytes) -> None:
+    """Begin to record a capture that was begun without: its settings had to be found first."""
+    try:
+        config = CaptureConfig.from_json(decode_json(body))
+        sessions = [session_of(*pair, clock) for pair in zip(config.sources, sources, strict=True)]
+        if not loop.recorders:
+            loop.recorders.extend(open_recorders(config, sessions))
+        if config.duration is not None:
+            loop.end_at = clock.now() + config.duration
+    except (CaptureError, OSError, ValueError, KeyError, TypeError) as error:
+        loop.outlet.post(encode_json(Kind.RECORDING, {"kind": "capture", "text": str(error)}))
+        return
+    answer = {
+        "sessions": [session.to_metadata() for session in sessions],
+        "paths": [str(recorder.path) for recorder in loop.recorders],
+    }
+    loop.outlet.post(encode_json(Kind.RECORDING, answer))
 
 
 def _end_on_signals(loop: CaptureLoop) -> socket.socket:

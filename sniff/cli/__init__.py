@@ -16,6 +16,7 @@ from sniff.formats import CaptureError
 
 COMMANDS: dict[str, str] = {
     "ports": "serial ports: adapter, driver, latency, what line errors they can report, who holds them",
+    "detect": "baud rate, format and protocol of a bus, by listening only",
     "live": "listen to a port: terminal UI (frames as lines where there is no terminal); records",
     "record": "listen to a port and record, without a UI",
     "open": "terminal UI on captures",
@@ -66,11 +67,11 @@ def main(argv: list[str] | None = None) -> int:
     try:
         return _run(arguments)
     except Failure as failure:
-        print(f"sniff485: {failure}", file=sys.stderr)
+        print(f"sniff485: {_plain(failure)}", file=sys.stderr)
         return failure.code
     except CaptureError as error:  # a file that turned out to be damaged while it was read
         sys.stdout.flush()
-        print(f"sniff485: {error}", file=sys.stderr)
+        print(f"sniff485: {_plain(error)}", file=sys.stderr)
         return UNREADABLE
     except KeyboardInterrupt:
         return INTERRUPTED
@@ -107,3 +108,10 @@ def _run(arguments: list[str]) -> int:
         args = parser.parse_args(arguments)
     assert chosen is not None  # argparse has refused anything else
     return int(chosen.run(args))
+
+
+def _plain(error: Exception) -> str:
+    """A message may quote a hostile file."""
+    from sniff.analysis.plain import plain
+
+    return plain(error)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 from dissectors import registry
 from dissectors.line import LineSettings
@@ -20,14 +20,24 @@ DEVICES_NOTE = "devices"
 MOST_NOTED = 256
 
 
-def add_line(parser: argparse.ArgumentParser) -> None:
-    """-s and -p, the same everywhere."""
+AUTO = "auto"
+"""In place of line settings or a protocol: find them by listening."""
+
+
+def add_line(parser: argparse.ArgumentParser, auto: bool = False) -> None:
+    """-s and -p, the same everywhere. `auto`: whether this command can find them itself."""
+    kinds = (_or_auto(line_settings), _or_auto(protocol)) if auto else (line_settings, protocol)
+    also = "; auto: found by listening" if auto else ""
     parser.add_argument(
-        "-s", "--line", type=line_settings, metavar="LINE", help="line settings, for instance 19200,8E1 or 9600,8N1"
+        "-s", "--line", type=kinds[0], metavar="LINE", help=f"line settings, for instance 19200,8E1 or 9600,8N1{also}"
     )
     parser.add_argument(
-        "-p", "--protocol", type=protocol, metavar="PROTOCOL", help=f"one of {', '.join(registry.BUILT_IN)}"
+        "-p", "--protocol", type=kinds[1], metavar="PROTOCOL", help=f"one of {', '.join(registry.BUILT_IN)}{also}"
     )
+
+
+def _or_auto(kind: Callable[[str], object]) -> Callable[[str], object]:
+    return lambda token: AUTO if token == AUTO else kind(token)
 
 
 def add_files(parser: argparse.ArgumentParser) -> None:

@@ -9,18 +9,20 @@ import signal
 import sys
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from dissectors import registry
 from dissectors.line import LineSettings
 from dissectors.profiles import Devices
+from sniff.analysis.detecting import Ending
 from sniff.analysis.summary import Summary
 from sniff.analysis.wording import milliseconds
 from sniff.capture.config import RecordSpec, SourceSpec
 from sniff.capture.link import CaptureLink
 from sniff.capture.wire import Ended, Status
-from sniff.cli import PORT_TROUBLE, UNREADABLE, USAGE, Failure, arguments, rows
+from sniff.cli import PORT_TROUBLE, UNREADABLE, USAGE, Failure, arguments, rows, searching
+from sniff.cli.searching import Unknowns
 from sniff.config import Config, ConfigError, load
 from sniff.engine import Output
 from sniff.formats import CaptureError
@@ -37,6 +39,8 @@ class Target:
     source: SourceSpec
     record: str | None = None
     devices: Devices = field(default_factory=Devices)
+    search: Unknowns | None = None
+    """What is to be found by listening (`auto`); None when everything is given."""
 
 
 def target_of(args: argparse.Namespace) -> Target:
@@ -48,15 +52,23 @@ def target_of(args: argparse.Namespace) -> Target:
     wanted = args.port or _only_port(config)
     bus = config.buses.get(wanted)
     port = (bus.port or wanted) if bus is not None else wanted
-    protocol = args.protocol or (bus.protocol if bus is not None else None) or "modbus-rtu"
+    auto = arguments.AUTO in (args.line, args.protocol)
+    protocol = (
+        args.protocol or (bus.protocol if bus is not None else None) or (arguments.AUTO if auto else "modbus-rtu")
+    )
     line = args.line or (bus.line if bus is not None else None)
+    search = None
+    if auto:
+        search = Unknowns(None if line == arguments.AUTO else line, None if protocol == arguments.AUTO else protocol)
+        trying = search.detecting()
+        line, protocol = trying.wanted, trying.protocols[0]
     if line is None:
         line = LineSettings.parse(registry.get(protocol).default_line)
         print(f"sniff485: no line settings given (-s): assuming {line} for {protocol}", file=sys.stderr)
     name = bus.name if bus is not None else re.sub(r"[^A-Za-z0-9_-]+", "-", Path(port).name).strip("-") or "bus"
     devices = arguments.devices_of(args, bus.devices if bus is not None else None)
     source = SourceSpec(port, line, protocol, name, notes_of(devices))
-    return Target(source, bus.record if bus is not None else None, devices)
+    return Target(source, bus.record if bus is not None else None, devices, search)
 
 
 def _only_port(config: Config) -> str:
@@ -78,20 +90,51 @@ def notes_of(devices: Devices) -> dict[str, str]:
 
 
 def start(
-    source: SourceSpec, record: RecordSpec | None, duration: float | None = None, devices: Devices | None = None
+    source: SourceSpec,
+    record: RecordSpec | None,
+    duration: float | None = None,
+    devices: Devices | None = None,
+    search: Unknowns | None = None,
 ) -> LiveBus:
-    """Start the capture process. Ends with exit code 4 for the port, 3 for the file."""
+    """Start the capture process. Ends with exit code 4 for the port or a search in vain, 3 for the file.
+
+    With something to `search` for, the recording and `duration` begin when it is found.
+    """
+    link = start_link(source, record, duration) if search is None else start_link(source, None)
     try:
-        link = CaptureLink.start([source], record, duration)
-    except PortError as error:
-        raise Failure(str(error), PORT_TROUBLE) from None
-    except CaptureError as error:
-        raise Failure(str(error), UNREADABLE) from None
-    try:
+        if search is not None:
+            _settle(link, source, record, duration, search)
         return LiveBus(link, devices=devices)
     except BaseException:
         link.stop()  # a capture outlives its starter unless it is told to end
         raise
+
+
+def _settle(
+    link: CaptureLink, source: SourceSpec, record: RecordSpec | None, duration: float | None, search: Unknowns
+) -> None:
+    """Find what is not known of a bus and go on with it, without opening the port again."""
+    outcome = searching.search(link, search)
+    if outcome.ending is not Ending.FOUND or outcome.reading is None:
+        raise Failure(f"{source.spec}: {searching.sentence(outcome)}", PORT_TROUBLE)
+    print(f"sniff485: {source.spec}: {searching.sentence(outcome)}", file=sys.stderr)
+    for words in outcome.cannot_tell:
+        print(f"sniff485: cannot tell {words}", file=sys.stderr)
+    found = replace(source, line=outcome.reading.line, protocol=outcome.reading.protocol)
+    try:
+        link.settle([found], record, duration)
+    except CaptureError as error:
+        raise Failure(str(error), UNREADABLE) from None
+
+
+def start_link(source: SourceSpec, record: RecordSpec | None, duration: float | None = None) -> CaptureLink:
+    """Start the capture process without an engine. Ends with exit code 4 for the port, 3 for the file."""
+    try:
+        return CaptureLink.start([source], record, duration)
+    except PortError as error:
+        raise Failure(str(error), PORT_TROUBLE) from None
+    except CaptureError as error:
+        raise Failure(str(error), UNREADABLE) from None
 
 
 def new_recording(bus: str) -> str:

@@ -16,7 +16,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "port", nargs="?", metavar="PORT", help="port, gateway, or a configured bus; not needed for one"
     )
-    arguments.add_line(parser)
+    arguments.add_line(parser, auto=True)
     arguments.add_devices(parser)
     parser.add_argument("-w", "--write", metavar="FILE", help="recording (.mcap); default: a new name in this folder")
     parser.add_argument("--no-record", action="store_true", help="do not record")
@@ -31,7 +31,9 @@ def run(args: argparse.Namespace) -> int:
     if args.no_record and args.write:
         raise Failure("--no-record and -w contradict each other", USAGE)
     path = None if args.no_record else args.write or target.record or listening.new_recording(target.source.bus)
-    live = listening.start(target.source, RecordSpec(path) if path else None, args.duration, target.devices)
+    live = listening.start(
+        target.source, RecordSpec(path) if path else None, args.duration, target.devices, target.search
+    )
     return show(live, args.json, args.lines)
 
 

@@ -13,7 +13,7 @@ from sniff.cli import USAGE, Failure, arguments, listening
 def configure(parser: argparse.ArgumentParser) -> None:
     """Options of `record`."""
     parser.add_argument("port", metavar="PORT", help="port, gateway, or a configured bus")
-    arguments.add_line(parser)
+    arguments.add_line(parser, auto=True)
     arguments.add_devices(parser)
     parser.add_argument("-w", "--write", metavar="FILE", help="recording (.mcap); default: a new name in this folder")
     parser.add_argument("--duration", type=arguments.duration, metavar="TIME", help="stop after: 90, 90s, 5m, 2h")
@@ -29,7 +29,9 @@ def run(args: argparse.Namespace) -> int:
     path = args.write or target.record or listening.new_recording(target.source.bus)
     if not str(path).lower().endswith(".mcap"):
         raise Failure(f"{path}: recordings are .mcap; convert it afterwards with `sniff485 convert`", USAGE)
-    live = listening.start(target.source, RecordSpec(path, args.rotate, args.keep), devices=target.devices)
+    live = listening.start(
+        target.source, RecordSpec(path, args.rotate, args.keep), devices=target.devices, search=target.search
+    )
     printer = listening.Printer(live, quiet=True)
     code = listening.run(printer, args.count, args.duration, progress=not args.quiet)
     if not args.quiet:
