@@ -30,7 +30,9 @@ class LineSettings:
         """
         match = _TOKEN.fullmatch(token.strip())
         if match is None:
-            raise ValueError(f"line settings {token!r}: expected BAUD,DPS such as 19200,8E1")
+            raise ValueError(
+                f"line settings {token!r}: expected baud rate, data bits, parity (N E O M S) and stop bits as 19200,8E1"
+            )
         baud = int(match["baud"])
         if not 50 <= baud <= 10_000_000:
             raise ValueError(f"line settings {token!r}: baud rate {baud} is outside 50 … 10000000")

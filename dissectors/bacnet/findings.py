@@ -135,9 +135,9 @@ def _polls(ring: Ring) -> Iterable[Finding]:
         if polls < LEAST_FRAMES or not tokens or polls <= POLLS_SHARE * tokens:
             continue
         seen = (
-            f"{polls} polls to {tokens} tokens (one in {N_POLL} is usual), {node.polls_unanswered} of them "
+            f"{polls} polls to {tokens} tokens (one in {N_POLL} is usual), {min(polls, node.polls_unanswered)} of them "
             f"unanswered, up to address {node.highest_polled}; "
-            f"all unanswered polls take {ring.poll_waste_share:.0%} of the time"
+            f"unanswered polls of all stations take {ring.poll_waste_share:.0%} of the time"
         )
         if mac in advice:
             seen += "; " + advice[mac]

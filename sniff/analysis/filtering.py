@@ -10,6 +10,7 @@ neither 0 nor empty. Pure.
 
 from __future__ import annotations
 
+import difflib
 import operator
 import re
 from collections.abc import Callable
@@ -248,7 +249,9 @@ class _Parser:
         if name in COLUMNS:
             return COLUMNS[name]
         if not name.startswith(PREFIXES):
-            raise FilterError(f"unknown name {name!r}; columns are {', '.join(COLUMNS)}, text", column)
+            close = difflib.get_close_matches(name, FIELDS, 1, 0.5)
+            hint = f"did you mean {close[0]!r}?" if close else f"columns: {' '.join((*COLUMNS, 'text'))}"
+            raise FilterError(f"unknown name {name!r} ({hint} fields: modbus.func_code …)", column)
 
         def get(row: Row, _: Transaction | None) -> tuple[Value, ...]:
             if not isinstance(row.event, Frame):

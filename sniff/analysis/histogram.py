@@ -13,9 +13,10 @@ _STEPS = 32  # buckets per factor of two: a quantile is right to about 2 %
 
 @dataclass(slots=True)
 class Histogram:
-    """Counts of non-negative integers (ns) in logarithmic buckets; quantiles are right to ±1.1 %."""
+    """Counts of non-negative integers (ns) in logarithmic buckets; a quantile is at most 2.2 % too large."""
 
     buckets: Counter[int] = field(default_factory=Counter)
+    tops: dict[int, int] = field(default_factory=dict)  # the largest value of each bucket
     count: int = 0
     total: int = 0
     least: int | None = None
@@ -24,7 +25,9 @@ class Histogram:
     def add(self, value: int) -> None:
         """Count one value; negative ones count as 0."""
         value = max(0, value)
-        self.buckets[_bucket(value)] += 1
+        bucket = _bucket(value)
+        self.buckets[bucket] += 1
+        self.tops[bucket] = max(value, self.tops.get(bucket, 0))
         self.count += 1
         self.total += value
         self.least = value if self.least is None else min(self.least, value)
@@ -36,6 +39,7 @@ class Histogram:
         most = [value for value in (self.most, other.most) if value is not None]
         return Histogram(
             self.buckets + other.buckets,
+            {key: max(self.tops.get(key, 0), other.tops.get(key, 0)) for key in self.tops.keys() | other.tops.keys()},
             self.count + other.count,
             self.total + other.total,
             min(least, default=None),
@@ -48,7 +52,7 @@ class Histogram:
         return self.total / self.count if self.count else None
 
     def quantile(self, share: float) -> int | None:
-        """The value that `share` (0 … 1) of all values do not exceed; None without values."""
+        """The value that `share` (0 … 1) of all values do not exceed, one of those that were counted; None without."""
         if not self.count or self.least is None or self.most is None:
             return None
         rank = max(1, math.ceil(share * self.count))
@@ -56,7 +60,7 @@ class Histogram:
         for bucket in sorted(self.buckets):
             seen += self.buckets[bucket]
             if seen >= rank:
-                return min(self.most, max(self.least, _middle(bucket)))
+                return self.tops[bucket]
         return self.most
 
     def spread(self, edges: Sequence[int]) -> list[int]:
@@ -64,13 +68,9 @@ class Histogram:
         ascending, ns); a value nearer to an edge than the precision may be counted on its other side."""
         counts = [0] * (len(edges) + 1)
         for bucket, count in self.buckets.items():
-            counts[bisect_right(edges, _middle(bucket))] += count
+            counts[bisect_right(edges, self.tops[bucket])] += count
         return counts
 
 
 def _bucket(value: int) -> int:
     return 0 if value < 1 else 1 + int(math.log2(value) * _STEPS)
-
-
-def _middle(bucket: int) -> int:
-    return 0 if bucket == 0 else int(2 ** ((bucket - 0.5) / _STEPS))

@@ -105,7 +105,7 @@ class NodeTable:
         node.kinds[transaction.kind] += 1
         if transaction.error:
             node.errors[transaction.error] += 1
-        if transaction.latency is not None:
+        if transaction.latency is not None and transaction.verdict is not Verdict.DATA:  # the use of a token is none
             node.latency.add(transaction.latency.nominal)
 
     def merge(self, other: NodeTable) -> NodeTable:

@@ -70,7 +70,7 @@ class Summary:
     def _add_transaction(self, transaction: Transaction) -> None:
         self.verdicts[transaction.verdict] += 1
         self.nodes.add_transaction(transaction)
-        if transaction.latency is not None:
+        if transaction.latency is not None and transaction.verdict is not Verdict.DATA:  # the use of a token is none
             self.latency.add(transaction.latency.nominal)
 
     @property

@@ -7,6 +7,7 @@ import json
 import sys
 from typing import Any
 
+from sniff.analysis.plain import plain
 from sniff.analysis.summary import Summary
 from sniff.analysis.wording import milliseconds
 from sniff.cli import arguments
@@ -105,7 +106,7 @@ def _as_json(path: str, capture: Capture, session: Session, summary: Summary) ->
 def _print(path: str, capture: Capture, session: Session, summary: Summary, events: list[LineEvent]) -> None:
     complete = capture.completeness()
     adapter = session.adapter
-    print(f"{path}")
+    print(plain(path))
     _line("file", complete.text if complete.whole else f"CUT: {complete.text}")
     if summary.load.first is None or summary.load.last is None:
         _line("content", "no octets")
@@ -152,7 +153,7 @@ def _print(path: str, capture: Capture, session: Session, summary: Summary, even
 
 
 def _line(name: str, text: str) -> None:
-    print(f"  {name:<13}{text}")
+    print(f"  {name:<13}{plain(text)}")
 
 
 def _span(seconds: float) -> str:

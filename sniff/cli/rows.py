@@ -13,6 +13,12 @@ from sniff.analysis.wording import describe, duration
 from sniff.reading import Settled
 from sniff.session import Session
 
+JSON_KEYS = (
+    "no", "t", "start_ns", "end_ns", "proto", "src", "dst", "role", "kind", "ok", "error", "found", "noise_before",
+    "tx", "verdict", "latency_ms", "text", "hex",
+)  # fmt: skip
+"""Keys of `to_json`, in order: a promise."""
+
 GOOD_VERDICTS = {"answered", "broadcast", "data", "open"}
 
 

@@ -12,9 +12,10 @@ from collections.abc import Iterable
 
 from dissectors.frame import Frame
 from dissectors.registry import Dissector
-from sniff.analysis.filtering import FilterError, compile_filter
+from sniff.analysis.filtering import PREFIXES, FilterError, compile_filter
 from sniff.cli import USAGE, Failure, arguments, rows
 from sniff.cli.tables import safe_cell
+from sniff.config import nearest
 from sniff.reading import Settled, dissector_for, settled
 from sniff.session import Session
 
@@ -38,6 +39,9 @@ def run(args: argparse.Namespace) -> int:
     """Show every capture in turn."""
     if args.table and not args.names:
         raise Failure("-T fields: say which with -e NAME (repeatable), for instance -e modbus.func_code", USAGE)
+    for name in args.names:
+        if name not in rows.JSON_KEYS and not name.startswith((*PREFIXES, "frame.", "tx.", "line.")):
+            raise Failure(f"-e {name}: unknown field{nearest(name, rows.JSON_KEYS)}; --fields lists a capture's", USAGE)
     left = args.count
     for path in args.files:
         capture = arguments.open_capture(path)

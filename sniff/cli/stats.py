@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import argparse
 from collections import Counter
+from pathlib import Path
 
 from dissectors.line import NS_PER_S
 from sniff.analysis.histogram import Histogram
@@ -39,6 +40,10 @@ def run(args: argparse.Namespace) -> int:
     table, files = args.table or "nodes", args.words
     if len(files) > 1 and files[-1] in TABLES:
         table, files = files[-1], files[:-1]
+    stray = [word for word in files if "." not in word and not Path(word).exists() and word != "-"]
+    if len(files) > 1 and stray:
+        hint = "; values have a command of their own: points" if "points" in stray else ""
+        raise Failure(f"{stray[0]}: neither a file nor a table; tables are {', '.join(TABLES)}{hint}", USAGE)
     captures = [arguments.open_capture(path) for path in files]
     session = arguments.settings_of(args, merged_session(captures, files))
     items = merged(captures) if len(captures) > 1 else captures[0].items()

@@ -7,6 +7,8 @@ import json
 import sys
 from collections.abc import Iterable, Sequence
 
+from sniff.analysis.plain import plain
+
 Cell = str | int | float | None
 
 
@@ -33,7 +35,7 @@ def _shown(cell: Cell) -> str:
         return "–"
     if isinstance(cell, float):
         return f"{cell:.2f}" if abs(cell) < 100 else f"{cell:.0f}"
-    return str(cell)
+    return plain(cell)
 
 
 def _write_text(headings: Sequence[str], rows: list[list[str]]) -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from dissectors.frame import Chunk
 from dissectors.profiles import Devices
+from sniff.analysis.plain import plain
 from sniff.cli import UNREADABLE, USAGE, Failure
 from sniff.engine import Output
 from sniff.formats import Capture, CaptureError, create
@@ -75,7 +76,7 @@ def say_incomplete(path: str, capture: Capture) -> None:
     """Where a capture that was read ends too early."""
     complete = capture.completeness()
     if not complete.whole:
-        print(f"sniff485: {path}: {complete.text}", file=sys.stderr)
+        print(f"sniff485: {path}: {plain(complete.text)}", file=sys.stderr)
 
 
 class _Frames:

@@ -71,6 +71,8 @@ def read(path: str | Path) -> Capture:
         from sniff.formats import standard_input
 
         return standard_input.read()
+    if Path(path).is_dir():
+        raise CaptureError(f"{path}: a directory, not a capture; name a file in it")
     found: Capture = _find(READERS, Path(path))(Path(path))
     return found
 

@@ -22,6 +22,7 @@ MAGICS = {  # as read little-endian: (byte order, ns a tick)
     0xD4C3B2A1: (">", 1000),
     0x4D3CB2A1: (">", 1),
 }
+_NAMES = {1: " (Ethernet)", 101: " (IP)", 113: " (Linux cooked)", 228: " (IPv4)", 0: " (loopback)"}
 FILE_HEADER, RECORD_HEADER = 24, 16
 LONGEST = 262_144
 """A longer record is damage: no field bus has frames of that size."""
@@ -43,7 +44,10 @@ class PcapCapture:
             self._link_type = struct.unpack_from(self._order + "I", header, 20)[0] & 0x0FFFFFFF
             if self._link_type not in LINK_TYPES:
                 known = ", ".join(map(str, sorted(LINK_TYPES)))
-                raise CaptureError(f"{path}: link type {self._link_type}; this program reads {known}")
+                raise CaptureError(
+                    f"{path}: link type {self._link_type}{_NAMES.get(self._link_type, '')} holds no serial frames; "
+                    f"this program reads {known}"
+                )
             first = next(self._records(stream), None)
         protocol = protocol_of(first) if first is not None else LINK_TYPES[self._link_type].protocol
         self.session: Session = foreign_session(str(path), protocol, first.time if first is not None else 0, "pcap")

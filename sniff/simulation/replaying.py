@@ -63,6 +63,8 @@ class Replay:
     def _run(self) -> None:
         try:
             self._play(self.capture)
+        except (BrokenPipeError, ConnectionError):
+            self.error = f"the listener went away after {self.sent} octets"
         except Exception as error:  # in a thread nobody else would hear of it
             self.error = str(error)
 
