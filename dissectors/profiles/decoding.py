@@ -104,7 +104,7 @@ def phrase(value: Value) -> str:
     title = entry.title
     if _PARAMETER.fullmatch(entry.name) and entry.name not in title:
         title = f"{entry.name} {title}"
-    return f"{title} {value.text}" + (" (?)" if entry.doubt else "")
+    return f"{title} {value.text}" + (" (?)" if entry.doubt or not value.reading.sure else "")
 
 
 def number(value: int | float | str, entry: Entry | None = None, unit: str = "") -> str:
