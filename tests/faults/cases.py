@@ -209,9 +209,8 @@ CASES: tuple[Case, ...] = (
     Case("RTU slow station", partial(modbus, (_some_lost,), delays={3: 160 * MS}), (("MB101", "station 3"),)),
     Case(
         "RTU drifting station",
-        partial(modbus, change={3: partial(Drifts, per_second=MS // 2)}),
+        partial(modbus, change={3: partial(Drifts, per_second=MS)}),
         (("MB102", "station 3"),),
-        seconds=120,
     ),
     Case(
         "RTU late answers",

@@ -1,0 +1,81 @@
+"""`check` and `rule` as a user runs them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+from sniff.cli import main
+from sniff.formats import create
+from sniff.simulation.scenarios import Scenario, simulate
+from tests.faults.buses import modbus
+
+
+def recorded(plan: Scenario, path: Path, seconds: float = 10) -> str:
+    session, items = simulate(plan, seconds)
+    with create(path, session) as writer:
+        for item in items:
+            writer.write(item)
+    return str(path)
+
+
+@pytest.fixture
+def absent(tmp_path: Path) -> str:
+    return recorded(modbus(absent=(4,), seed=1), tmp_path / "absent.cap.txt")
+
+
+def test_a_finding_fails_and_is_told_with_its_evidence(absent, capsys):
+    assert main(["check", absent]) == 1
+    said = capsys.readouterr().out
+    assert "ERROR    station 4: never answers  [MB001]" in said
+    assert "rows:" in said
+    assert "station 4: 0 (100% of its requests without answer (−100))" in said
+
+
+def test_a_clean_bus_passes(tmp_path, capsys):
+    assert main(["check", recorded(modbus(seed=1), tmp_path / "clean.cap.txt")]) == 0
+    assert "health 100" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("options", "code"),
+    [(["--fail-on", "never"], 0), (["--ignore", "MB"], 0), (["--only", "MB4"], 0), (["--only", "MB001"], 1)],
+)
+def test_what_fails_can_be_chosen(absent, options, code):
+    assert main(["check", absent, *options]) == code
+
+
+def test_json_is_an_object_a_finding(absent, capsys):
+    main(["check", absent, "--json"])
+    found = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    first = next(one for one in found if one["code"] == "MB001")
+    assert (first["subject"], first["severity"]) == ("station 4", "error")
+    assert first["frames"][0]["start_ns"] == first["first_ns"]
+
+
+def test_junit_fails_the_rules_that_found_something(absent, capsys):
+    main(["check", absent, "--format", "junit"])
+    suite = ElementTree.fromstring(capsys.readouterr().out).find("testsuite")
+    failed = {case.get("name")[:5] for case in suite if case.find("failure") is not None}
+    assert failed == {"MB001", "MB105"}
+    assert int(suite.get("failures")) == len(failed)
+    assert int(suite.get("tests")) == len(suite)
+
+
+def test_every_rule_is_explained(capsys):
+    assert main(["rule", "LN", "MB", "N2", "MS"]) == 0
+    said = capsys.readouterr().out
+    assert "consistent with: " in said
+    main(["rule", "--json"])
+    for line in capsys.readouterr().out.splitlines():
+        rule = json.loads(line)
+        assert all(rule[key] for key in ("title", "explanation", "means", "next")), rule["code"]
+
+
+def test_an_unknown_code_is_a_usage_error(absent, capsys):
+    assert main(["rule", "XX9"]) == 2
+    assert main(["check", absent, "--only", "XX"]) == 2
+    assert "no rule has that code" in capsys.readouterr().err
