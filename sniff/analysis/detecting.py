@@ -366,10 +366,11 @@ class Detecting:
         if line.stop_bits == 1:
             twin = LineSettings(line.baud, line.data_bits, line.parity, 2)
             said.append(f"{twin} from {line}: a second stop bit looks like silence")
-        if line.parity != "N" and (self.reports is None or "parity" not in self.reports):
-            other = LineSettings(line.baud, line.data_bits, {"E": "O"}.get(line.parity, "E"), line.stop_bits)
+        needed = "framing" if line.parity == "N" else "parity"
+        if self.reports is None or needed not in self.reports:  # then octets alone look right with any parity
+            others = [f"{line.baud},{line.data_bits}{parity}1" for parity in "NEO" if parity != line.parity]
             why = "it is not known whether this adapter reports" if self.reports is None else "this adapter hides"
-            said.append(f"{other} from {line}: {why} parity errors")
+            said.append(f"{' or '.join(others)} from {line}: {why} {needed} errors")
         return tuple(said)
 
 

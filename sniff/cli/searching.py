@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from dissectors import registry
 from dissectors.line import LineSettings
@@ -14,6 +14,9 @@ from sniff.detection import Progress, Search
 
 TIMEOUT = 120.0
 """s after which a search gives up, unless told otherwise."""
+
+LINELESS = frozenset(("pty", "TCP gateway"))
+"""Drivers and adapters that set no line."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +47,19 @@ def search(link: CaptureLink, unknowns: Unknowns, timeout: float = TIMEOUT) -> O
         raise Failure(f"{session.port}: {running.ended.reason}", PORT_TROUBLE)
     if caught and outcome.ending is not Ending.FOUND:
         raise Failure("interrupted", INTERRUPTED)
+    if session.adapter.driver in LINELESS or session.adapter.name in LINELESS:
+        return without_line(outcome, unknowns)
     return outcome
+
+
+def without_line(outcome: Outcome, unknowns: Unknowns) -> Outcome:
+    """The outcome where octets come through no line of this machine, so that all settings hear the same."""
+    reading = outcome.reading
+    if reading is None or unknowns.line is not None:
+        return outcome
+    line = LineSettings.parse(registry.get(reading.protocol).default_line)
+    words = f"the line settings: octets come through no line here; {line} is only what such a bus usually runs"
+    return replace(outcome, reading=replace(reading, line=line), cannot_tell=(words,))
 
 
 def sentence(outcome: Outcome) -> str:

@@ -1,0 +1,97 @@
+"""`detect` and `-p auto` on pseudo-terminals with simulated stations: found, gone on with, never opened twice."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from dissectors.line import LineSettings
+from sniff.formats import read
+from sniff.simulation.bus import VirtualBus
+from sniff.simulation.ports import HAS_PTY
+from sniff.simulation.scenarios import scenario
+
+pytestmark = pytest.mark.skipif(not HAS_PTY, reason="this system has no pseudo-terminals")
+
+
+def sniff485(*arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "sniff", *arguments], capture_output=True, text=True, timeout=100, check=False
+    )
+
+
+@pytest.mark.parametrize("protocol", ["modbus-rtu", "modbus-ascii", "n2", "mstp"])
+def test_the_protocol_is_found_and_not_one_octet_leaves(protocol: str) -> None:
+    with VirtualBus.from_scenario(scenario(protocol, 1)) as bus:
+        port = bus.tap()
+        ran = sniff485("detect", port, "--json", "--timeout", "60")
+        written = bus.report().written
+    assert ran.returncode == 0, ran.stderr
+    found = json.loads(ran.stdout)
+    assert (found["outcome"], found["protocol"]) == ("found", protocol)
+    assert found["frames"] >= 3
+    assert any("octets come through no line" in words for words in found["cannot_tell"])
+    assert not any(written.get(name, 0) for name in written if name.startswith("tap"))
+
+
+def test_a_silent_bus_is_called_silent() -> None:
+    with VirtualBus(LineSettings.parse("9600,8N1")) as bus:
+        ran = sniff485("detect", bus.tap(), "--timeout", "1")
+    assert ran.returncode == 4
+    assert "silent" in ran.stdout
+
+
+def test_rubbish_is_not_called_silent() -> None:
+    with VirtualBus(LineSettings.parse("115200,8N1")) as bus:
+        port, noise = bus.tap(), bus.connect("noise")
+        noise.write(bytes(range(7, 250, 3)) * 3)
+        process = subprocess.Popen(
+            [sys.executable, "-m", "sniff", "detect", port, "--json", "--timeout", "3"],
+            stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
+        )  # fmt: skip
+        while process.poll() is None:
+            noise.write(bytes(range(7, 250, 3)))
+            noise.read(0.1)
+        assert process.stdout is not None
+        with process.stdout:
+            found = json.loads(process.stdout.read())
+    assert process.returncode == 4
+    assert found["outcome"] == "unknown"
+    assert found["octets"] > 0
+
+
+def test_record_goes_on_with_what_was_found_on_the_same_opening(tmp_path: Path) -> None:
+    path = tmp_path / "found.mcap"
+    with VirtualBus.from_scenario(scenario("mstp", 1, False)) as bus:
+        ran = sniff485("record", bus.tap(), "-p", "auto", "-s", "38400,8N1", "-w", str(path), "--duration", "1.5")
+    assert ran.returncode == 0, ran.stderr
+    assert "BACnet MS/TP, 38400,8N1" in ran.stderr
+    capture = read(path)
+    assert (capture.session.protocol, str(capture.session.line)) == ("mstp", "38400,8N1")
+    shown = sniff485("info", "--json", str(path))
+    info = json.loads(shown.stdout)
+    assert info["complete"] is True
+    assert info["frames"] > 50
+    assert info["damaged"] <= 1  # recording began somewhere in a frame
+
+
+def test_live_ends_after_its_duration_counted_from_the_find(tmp_path: Path) -> None:
+    with VirtualBus.from_scenario(scenario("n2", 1, False)) as bus:
+        ran = sniff485("live", bus.tap(), "-s", "auto", "-p", "n2", "--no-record", "--duration", "1", "--json")
+    assert ran.returncode == 0, ran.stderr
+    rows = [json.loads(line) for line in ran.stdout.splitlines()]
+    assert len(rows) > 5
+    assert {row["proto"] for row in rows} <= {"n2", None}
+
+
+def test_a_file_that_exists_is_refused_before_it_is_lost(tmp_path: Path) -> None:
+    path = tmp_path / "kept.mcap"
+    path.write_bytes(b"precious")
+    with VirtualBus.from_scenario(scenario("n2", 1, False)) as bus:
+        ran = sniff485("record", bus.tap(), "-p", "auto", "-w", str(path), "--duration", "1")
+    assert ran.returncode == 3
+    assert path.read_bytes() == b"precious"
