@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -15,16 +17,17 @@ from textual.strip import Strip
 
 from sniff.tui.spans import Field
 
-FOLDED = (("frame",), ("transaction",))
+FOLDED = ((("frame", 0),), (("transaction", 0),))
 """What is known besides the packet begins folded: its first line says the most."""
 
-Path = tuple[str, ...]
+Path = tuple[tuple[str, int], ...]
+"""From the layer down to a field: name, and which of its siblings of that name it is."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Line:
     field: Field
-    path: Path  # names from the layer down to the field
+    path: Path
 
     @property
     def depth(self) -> int:
@@ -95,11 +98,10 @@ class FieldTree(ScrollView, can_focus=True, inherit_bindings=False):
         self.refresh()
 
     def _unfold(self, fields: tuple[Field, ...], above: Path) -> None:
-        for field in fields:
-            path = (*above, field.name)
-            self._lines.append(_Line(field, path))
-            if field.children and path not in self.folded:
-                self._unfold(field.children, path)
+        for line in _placed(fields, above):
+            self._lines.append(line)
+            if line.field.children and line.path not in self.folded:
+                self._unfold(line.field.children, line.path)
 
     def _line_of(self, path: Path) -> int | None:
         return next((number for number, line in enumerate(self._lines) if line.path == path), None) if path else None
@@ -171,12 +173,18 @@ class FieldTree(ScrollView, can_focus=True, inherit_bindings=False):
         return Strip(segments).adjust_cell_length(width, base)
 
 
+def _placed(fields: tuple[Field, ...], above: Path) -> Iterator[_Line]:
+    seen: Counter[str] = Counter()
+    for field in fields:
+        yield _Line(field, (*above, (field.name, seen[field.name])))
+        seen[field.name] += 1
+
+
 def _smallest(fields: tuple[Field, ...], offset: int, above: Path) -> _Line | None:
     best: _Line | None = None
-    for field in fields:
-        path = (*above, field.name)
-        inner = _smallest(field.children, offset, path) if field.children else None
-        found = inner or (_Line(field, path) if offset in field else None)
+    for line in _placed(fields, above):
+        inner = _smallest(line.field.children, offset, line.path)
+        found = inner or (line if offset in line.field else None)
         if found is not None and (best is None or _size(found.field) <= _size(best.field)):
             best = found
     return best

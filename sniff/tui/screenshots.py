@@ -17,6 +17,7 @@ from pathlib import Path
 
 from dissectors.line import NS_PER_S
 from sniff.engine import Output
+from sniff.profile_files import devices
 from sniff.reading import dissector_for, outputs
 from sniff.simulation.scenarios import scenario, simulate
 from sniff.simulation.tap import TapModel
@@ -55,6 +56,10 @@ SHOTS = (
     Shot("filter", "modbus-rtu", (80, 24), ("home", "slash", "text:verdict == no-response && addr == 4")),
     Shot("transactions", "modbus-rtu", (110, 30), ("2", "home", "e", "e")),
     Shot("nodes", "modbus-rtu", (80, 24), ("3",)),
+    Shot("points", "modbus-rtu", (100, 30), ("4",)),
+    Shot("findings", "modbus-rtu", (100, 30), ("5",)),
+    Shot("timeline", "modbus-rtu", (100, 24), ("6",)),
+    Shot("ring", "mstp", (100, 24), ("7",)),
     Shot("line", "modbus-rtu", (100, 30), ("8",)),
     Shot("help", "modbus-rtu", (80, 24), ("question_mark",)),
 )
@@ -63,8 +68,11 @@ SHOTS = (
 @cache
 def store_of(name: str) -> Store:
     """What a sniffer with a usual adapter hears of a scenario in some minutes."""
-    session, items = simulate(scenario(name, seed=7), SECONDS, ADAPTER, STARTED)
-    store = Store(session, dissector_for(session))
+    plan = scenario(name, seed=7)
+    session, items = simulate(plan, SECONDS, ADAPTER, STARTED)
+    store = Store(
+        session, dissector_for(session), devices=devices({str(at): made for at, made in plan.devices.items()})
+    )
     for output in outputs(items, session):
         if isinstance(output, Output):
             store.add(output)

@@ -1,0 +1,93 @@
+"""The field tree by itself: siblings of one name, folds, octets."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+
+import pytest
+from textual.app import App, ComposeResult
+
+from sniff.tui.field_tree import FieldTree
+from sniff.tui.spans import Field
+
+TAG = tuple(Field("Tag", "", begin, begin + 2, (Field("number", str(begin), begin, begin + 1),)) for begin in (2, 4, 6))
+FIELDS = (
+    Field("head", "x", 0, 2),
+    Field("tags", "3", 2, 8, TAG),
+    Field("frame", "1", None, None, (Field("check", "good"),)),
+)
+
+
+class Only(App[None]):
+    def compose(self) -> ComposeResult:
+        yield FieldTree()
+
+
+@pytest.fixture
+def with_tree() -> Callable[[Callable[[FieldTree], None]], None]:
+    def run(script: Callable[[FieldTree], None]) -> None:
+        async def main() -> None:
+            app = Only()
+            async with app.run_test(size=(40, 20)):
+                script(app.query_one(FieldTree))
+
+        asyncio.run(main())
+
+    return run
+
+
+def names(tree: FieldTree) -> list[str]:
+    return [line.field.name for line in tree._lines]
+
+
+def test_an_octet_picks_the_right_one_of_equal_siblings(with_tree: Callable[..., None]) -> None:
+    def script(tree: FieldTree) -> None:
+        tree.show(FIELDS)
+        for offset, value in ((2, "2"), (4, "4"), (6, "6")):
+            assert tree.pick_octet(offset) == Field("number", value, offset, offset + 1)
+            assert tree.picked == Field("number", value, offset, offset + 1)
+        assert tree.pick_octet(5) is TAG[1]
+        assert tree.pick_octet(99) is None
+        assert tree.picked is TAG[1]
+
+    with_tree(script)
+
+
+def test_folding_one_of_equal_siblings(with_tree: Callable[..., None]) -> None:
+    def script(tree: FieldTree) -> None:
+        tree.show(FIELDS)
+        assert names(tree) == ["head", "tags", "Tag", "number", "Tag", "number", "Tag", "number", "frame"]
+        tree.pick_octet(5)
+        tree.action_fold()
+        assert names(tree) == ["head", "tags", "Tag", "number", "Tag", "Tag", "number", "frame"]
+        tree.show(FIELDS)  # the next frame, folded alike
+        assert names(tree) == ["head", "tags", "Tag", "number", "Tag", "Tag", "number", "frame"]
+        assert tree.picked is TAG[1]
+        tree.pick_octet(4)  # unfolds what it needs
+        assert len(tree._lines) == 9
+
+    with_tree(script)
+
+
+def test_parent_and_ends(with_tree: Callable[..., None]) -> None:
+    def script(tree: FieldTree) -> None:
+        tree.show(FIELDS)
+        tree.pick_octet(6)
+        tree.action_parent()
+        assert tree.picked is TAG[2]
+        tree.action_parent()
+        assert tree.picked is FIELDS[1]
+        tree.action_parent()
+        assert tree.picked is FIELDS[1]
+        tree.action_move(-999)
+        assert tree.picked is FIELDS[0]
+        tree.action_move(999)
+        assert tree.picked is FIELDS[2]
+        tree.show(())
+        assert tree.picked is None
+        tree.action_move(1)
+        tree.action_fold()
+        tree.action_parent()
+
+    with_tree(script)
