@@ -217,7 +217,8 @@ def _of_station(seen: Evidence, name: str, station: Station, timeout: int | None
     yield from _times(name, station, timeout, seen, is_common)
     if station.twice.count:
         words = f"two answers to one request {times(station.twice.count)}"
-        yield station.twice.found(RULES["MB201"], name, words, _note_if(station.twice.count == 1))
+        slow = station.twice.count <= station.late.count  # two tries, two answers: the first one came late
+        yield station.twice.found(RULES["MB201"], name, words, _note_if(station.twice.count == 1 or slow))
     if station.reserved.count:
         yield station.reserved.found(RULES["MB205"], name, f"{station.reserved.count} frames name it")
 

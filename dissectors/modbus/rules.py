@@ -142,7 +142,7 @@ _ALL = (
         Severity.ERROR,
         "answered twice",
         "A second answer from the same address directly after the first, to a request that was sent once. A single one "
-        "is only noted.",
+        "is only noted, and so are no more than the station's late answers.",
         "two stations have the same address, the second one slower",
         "switch the station off and see whether something still answers; give one another address",
     ),
