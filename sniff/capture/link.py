@@ -197,9 +197,8 @@ class CaptureLink:
     ) -> None:
         """Say what the buses run with, now that it is known, and begin to record.
 
-        Only for a link that was started without a recording. `duration`: s from now on, None for no end.
-        What came before this is dropped: it was heard while the
-        settings were searched for. Raises CaptureError.
+        Only for a link that was started without a recording. `duration`: s from now on, None for no end. What came
+        before this is dropped: it was heard while the settings were searched for. Raises CaptureError.
         """
         config = CaptureConfig(tuple(sources), record, None if duration is None else int(duration * 1e9))
         self._unsent += encode_json(Kind.RECORD, config.to_json())
