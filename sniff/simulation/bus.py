@@ -28,6 +28,10 @@ from sniff.simulation.scenarios import Scenario
 from sniff.simulation.wire import Factory, Sent
 
 PATIENCE = 10.0  # s for the process to answer or to end
+SLICE = 1_000_000
+WHOLE = 1 << 60
+"""As `slice`: a burst is handed out in one piece when it ends. On a host so busy that the kernel holds octets of a
+pseudo-terminal back for milliseconds (seen at a load of four processes a core), nothing then tears a frame apart."""
 
 
 class BusFailed(RuntimeError):
@@ -41,7 +45,7 @@ class VirtualBus:
     `faults` strike every transmission in their order, repeatable by `seed`. `gap`: ns of silence that the protocol
     wants before a frame: stations are told whether it was kept (`quiet`), and parties outside are made to keep it,
     because a program answers in less than that and no device does. `slice`: ns, how finely octets of a burst are
-    handed out. `paused`: the clock stands, and no octet moves, until `begin` is called.
+    handed out (WHOLE: not before it ends). `paused`: the clock stands, and no octet moves, until `begin` is called.
     """
 
     def __init__(
@@ -51,7 +55,7 @@ class VirtualBus:
         faults: Sequence[Fault] = (),
         seed: int = 0,
         gap: int = 0,
-        slice: int = 1_000_000,
+        slice: int = SLICE,
         paused: bool = False,
     ) -> None:
         self.line = line
@@ -61,9 +65,9 @@ class VirtualBus:
         self._control: Any = None
 
     @classmethod
-    def from_scenario(cls, plan: Scenario, paused: bool = False) -> VirtualBus:
+    def from_scenario(cls, plan: Scenario, slice: int = SLICE, paused: bool = False) -> VirtualBus:
         """The bus of a scenario, in real time."""
-        return cls(plan.line, plan.stations, plan.faults, plan.seed, plan.gap, paused=paused)
+        return cls(plan.line, plan.stations, plan.faults, plan.seed, plan.gap, slice, paused)
 
     def open(self) -> None:
         """Start the process. Raises BusFailed."""

@@ -14,7 +14,7 @@ from sniff.capture.link import CaptureLink
 from sniff.capture.wire import Received
 from sniff.engine import Engine, Row
 from sniff.simulation import scenarios
-from sniff.simulation.bus import VirtualBus
+from sniff.simulation.bus import WHOLE, VirtualBus
 from sniff.simulation.ports import HAS_PTY
 from sniff.simulation.scenarios import Scenario, scenario
 from sniff.simulation.wire import Sent
@@ -25,7 +25,7 @@ pytestmark = pytest.mark.skipif(not HAS_PTY, reason="this system has no pseudo-t
 def listen(plans: list[Scenario], seconds: float) -> list[tuple[list[Row], list[Sent]]]:
     """All buses at once through one capture process: of each the rows of the capture, and the truth."""
     with ExitStack() as stack:
-        buses = [stack.enter_context(VirtualBus.from_scenario(plan, paused=True)) for plan in plans]
+        buses = [stack.enter_context(VirtualBus.from_scenario(plan, WHOLE, paused=True)) for plan in plans]
         sources = [
             SourceSpec(bus.tap(), plan.line, plan.protocol, plan.name) for bus, plan in zip(buses, plans, strict=True)
         ]
