@@ -217,6 +217,8 @@ class Looking:
         """Press keys one after the other (the pilot's own `press` waits ten times as long)."""
         for key in keys:
             self.app.post_message(events.Key(key, key_to_character(key) if len(key) > 1 else key))
+            await self.pilot.pause(0)
+            await self.pilot.pause(0)
             await self.settle()  # what a key does must be done before the next one comes
 
     async def type(self, text: str) -> None:
