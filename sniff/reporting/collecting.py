@@ -33,7 +33,7 @@ from sniff.reporting.numbers import (
 from sniff.reporting.timeline import Timeline
 from sniff.session import LineEvent, Session
 
-EVIDENCE_SHOWN = 5
+EVIDENCE_SHOWN, EVIDENCE_OF_NOTES = 5, 2
 HAPPENINGS_SHOWN = 200
 DEVICES_NOTE = "devices"
 GOOD = frozenset((Verdict.ANSWERED, Verdict.BROADCAST, Verdict.DATA, Verdict.OPEN))
@@ -193,7 +193,7 @@ def _words(
     capture: Capture, session: Session, dissector: Dissector, findings: tuple[Finding, ...]
 ) -> dict[int, tuple[float, str]]:
     """Time and text of the rows that findings show."""
-    wanted = {no for finding in findings for no in finding.evidence[:EVIDENCE_SHOWN]}
+    wanted = {no for finding in findings for no in _shown(finding)}
     words: dict[int, tuple[float, str]] = {}
     if not wanted:
         return words
@@ -225,10 +225,15 @@ def _found(
             seen=finding.seen,
             means=finding.means,
             next=finding.next,
-            evidence=tuple(Evidence(no, *words.get(no, (None, ""))) for no in finding.evidence[:EVIDENCE_SHOWN]),
+            evidence=tuple(Evidence(no, *words.get(no, (None, ""))) for no in _shown(finding)),
         )
         for finding in findings
     )
+
+
+def _shown(finding: Finding) -> tuple[int, ...]:
+    """The rows to show: fewer of what does not matter much, so that a long capture's page stays short."""
+    return finding.evidence[: EVIDENCE_SHOWN if finding.severity >= Severity.WARNING else EVIDENCE_OF_NOTES]
 
 
 def _lower(title: str) -> str:
