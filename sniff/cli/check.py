@@ -15,7 +15,7 @@ from dissectors.registry import Dissector
 from sniff.analysis.health import Health, bus_health, station_health
 from sniff.analysis.judging import Judging
 from sniff.analysis.summary import Summary
-from sniff.cli import USAGE, Failure, arguments, check_output
+from sniff.cli import UNREADABLE, USAGE, Failure, arguments, check_output
 from sniff.cli.check_output import Checked
 from sniff.engine import Output
 from sniff.formats import READERS
@@ -72,6 +72,8 @@ def _check(source: str, args: argparse.Namespace) -> Checked:
             run_of.take(item)
         complete = capture.completeness()
         return run_of.result(source, "" if complete.whole else complete.text)
+    if not source.startswith(("/dev/", "COM", "\\\\")) and "://" not in source and ("." in source or "/" in source):
+        raise Failure(f"{source}: no such file", UNREADABLE)
     if len(args.sources) > 1:
         raise Failure(f"{source}: a port is checked alone; files end in {', '.join(READERS)}", USAGE)
     return _listen(source, args)

@@ -42,9 +42,13 @@ def run(args: argparse.Namespace) -> int:
     print(f"sniff485: virtual bus, {plan.line}: {plan.text}", file=sys.stderr)
     devices = arguments.devices_of(args, {str(address): name for address, name in plan.devices.items()})
     try:
-        with VirtualBus.from_scenario(plan) as bus:
+        with VirtualBus.from_scenario(plan, paused=True) as bus:
             source = SourceSpec(bus.tap(), plan.line, plan.protocol, "demo", listening.notes_of(devices))
             record = RecordSpec(args.write) if args.write else None
-            return show(listening.start(source, record, duration, devices), args.json, args.lines)
+            live = listening.start(source, record, duration, devices)
+            bus.begin()  # with the sniffer listening, so that the first words of the bus are heard
+            return show(live, args.json, args.lines)
+    except BrokenPipeError:  # whoever read our output went away
+        raise
     except (BusFailed, OSError) as error:
         raise Failure(f"demo: no virtual bus here: {error}", PORT_TROUBLE) from None

@@ -5,6 +5,7 @@ folder unless --no-record; says the file's name at the end. Where output is no t
 from __future__ import annotations
 
 import argparse
+import sys
 
 from sniff.capture.config import RecordSpec
 from sniff.cli import USAGE, Failure, arguments, listening
@@ -43,7 +44,12 @@ def show(live: LiveBus, as_json: bool, as_lines: bool) -> int:
         from sniff.cli.feeds import LiveFeed
         from sniff.tui import run as run_tui
 
-        run_tui(LiveFeed(live))
+        feed = LiveFeed(live)
+        run_tui(feed)
+        total = feed.store.load.total
+        print(
+            f"sniff485: {total.frames} frames ({total.damaged} damaged), {total.noise} octets of noise", file=sys.stderr
+        )
         return 0
     printer = listening.Printer(live, as_json=as_json, colour=arguments.colour())
     code = listening.run(printer)
