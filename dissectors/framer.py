@@ -215,8 +215,6 @@ class OctetWindow:
         run = runs[0]
         cut = count - run.index
         if cut:  # inside the run: what is left stands directly after the octet before it
-            end = run.first_end + (cut - 1) * self._char
-            run.floor = end if end > run.floor else run.floor
             run.first_end += cut * self._char
             run.gap, run.room = 0, run.slack
         run.index = 0

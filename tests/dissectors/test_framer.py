@@ -75,6 +75,15 @@ def test_times_that_run_backwards_mean_no_time_passed() -> None:
     assert w.least_silence_at(0) == 0
 
 
+def test_what_is_left_of_a_read_never_ends_before_what_was_taken() -> None:
+    w = window()
+    w.append(Chunk(100 * CHAR, b"a"))
+    w.append(Chunk(101 * CHAR, b"bcdefg"))
+    assert w.take(5).end == 100 * CHAR
+    assert [w.end(i) for i in range(2)] == [100 * CHAR, 101 * CHAR]
+    assert w.start(0) == 100 * CHAR
+
+
 def test_take_gives_times_and_marks_and_keeps_the_rest() -> None:
     w = window()
     w.append(Chunk(10 * CHAR, b"abcd", (Mark(1, LineError.PARITY), Mark(3, LineError.BREAK))))

@@ -12,7 +12,7 @@ import pytest
 from dissectors.checksums import lrc
 from dissectors.frame import Check, Chunk, Damage, Event, Found, Frame, LineError, Mark, Noise, Place, Reason
 from dissectors.line import NS_PER_S, LineSettings, Timing
-from dissectors.modbus.ascii_framing import MAX_CHARACTERS, AsciiFramer
+from dissectors.modbus.ascii_framing import MAX_CHARACTERS, MAX_NOISE, AsciiFramer
 from tests.bus_delivery import FTDI_LATENCY, MS, drive, exact, ftdi, laid_out
 from tests.captures_shared import listed
 
@@ -196,6 +196,14 @@ def test_noise_outside_frames_and_its_place() -> None:
         (b"\xff", Place.BEFORE),
     ]
     assert [e.skipped for e in events if isinstance(e, Frame)] == [0, 3]
+
+
+def test_noise_is_not_held_for_long() -> None:
+    framer = AsciiFramer(TIMING)
+    chunks = exact(laid_out([b"\x99" * 2000], TIMING, 0))
+    given = sum(len(e.octets) for c in chunks for e in framer.feed(c))
+    assert 2000 - given < MAX_NOISE
+    assert sum(len(e.octets) for e in framer.close()) == 2000 - given
 
 
 def test_a_break_is_said_to_be_one() -> None:

@@ -194,6 +194,16 @@ def test_an_exception_in_the_middle_of_noise_needs_its_request() -> None:
     assert exception in [e.octets for e in asked if isinstance(e, Frame) and e.ok]
 
 
+def test_a_request_inside_the_first_octets_of_the_awaited_response_is_part_of_it() -> None:
+    """The data are such that the first 8 octets read as a good request: the longer reading was asked for."""
+    asked = rtu("01 03 0000 0008")
+    answered = rtu((rtu("01 03 10 00 00 05") + bytes(range(11))).hex())
+    assert crc16_modbus(answered[:8]) == 0
+    for latency in (0, FTDI_LATENCY):
+        events = read((0, asked + answered + asked + answered), latency=latency)
+        assert [e.octets for e in events] == [asked, answered, asked, answered]
+
+
 # --- what the first octets predict ------------------------------------------------------------------------------------
 
 
@@ -324,6 +334,15 @@ def test_damage_at_the_head_does_not_hide_what_follows_without_silence() -> None
 )
 def test_text_protocols_are_noise(line: bytes) -> None:
     assert all(isinstance(e, Noise) for e in read((0, line), (40, line), (40, line)))
+
+
+def test_text_with_a_right_crc_between_two_silences_is_still_text() -> None:
+    texts = [b"A%04dB" % number for number in range(500)]
+    frames = [t + crc16_modbus(t).to_bytes(2, "little") for t in texts]
+    readable = [f for f in frames if f.isascii() and f.decode().isprintable()]
+    assert readable
+    for frame in readable:
+        assert all(isinstance(e, Noise) for e in read((0, frame)))
 
 
 # --- printed frames ---------------------------------------------------------------------------------------------------
