@@ -7,7 +7,12 @@ from __future__ import annotations
 import argparse
 from dataclasses import replace
 
+from sniff.analysis.judging import Judging
 from sniff.cli import arguments, writing
+from sniff.engine import Output
+from sniff.formats import Capture
+from sniff.reading import dissector_for, outputs
+from sniff.session import Session
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -35,6 +40,23 @@ def run(args: argparse.Namespace) -> int:
     devices = arguments.noted_devices(args, session) if args.output.lower().endswith(".mcap") else None
     if devices:
         session = replace(session, notes={**session.notes, arguments.DEVICES_NOTE: devices.text()})
-    writing.write(args, session, capture.items(), [args.source], options, devices=devices)
+    notes = _evidence(capture, session) if args.output.lower().endswith(".pcapng") else None
+    writing.write(args, session, capture.items(), [args.source], options, devices=devices, notes=notes)
     writing.say_incomplete(args.source, capture)
     return 0
+
+
+def _evidence(capture: Capture, session: Session) -> dict[int, str]:
+    """The findings in words, by the rows that show them."""
+    judging = Judging(session, dissector_for(session))
+    for output in outputs(capture.items(), session):
+        if isinstance(output, Output):
+            judging.add(output)
+        else:
+            judging.add_line_event(output)
+    notes: dict[int, str] = {}
+    for finding in judging.findings():
+        said = f"{finding.code} {finding.subject}: {finding.seen}"
+        for no in finding.evidence:
+            notes[no] = f"{notes[no]}; {said}" if no in notes else said
+    return notes

@@ -14,6 +14,7 @@ from sniff.analysis.plain import plain
 from sniff.cli import UNREADABLE, USAGE, Failure
 from sniff.engine import Output
 from sniff.formats import Capture, CaptureError, create
+from sniff.formats.records import RecordMaker
 from sniff.session import Item, Session
 
 
@@ -31,11 +32,12 @@ def write(
     options: Mapping[str, str] | None = None,
     with_frames: bool = False,
     devices: Devices | None = None,
+    notes: Mapping[int, str] | None = None,
 ) -> int:
     """Write items to `args.output`; say on standard error what it holds and what it lost. Gives the octets.
 
     `with_frames`: with what the engine finds in them, on /frames. `devices`: with their values, on /values.
-    Ends with exit code 2 when OUT is there.
+    `notes`: by row number, for the comments of packets where OUT has such. Ends with exit code 2 when OUT is there.
     """
     target = Path(args.output)
     if target.exists() and any(name != "-" and Path(name).samefile(target) for name in sources):
@@ -46,6 +48,8 @@ def write(
     progress = _Progress(target.name)
     try:
         with create(target, session, options) as writer:
+            if notes and isinstance(maker := getattr(writer, "maker", None), RecordMaker):
+                maker.notes = notes
             frames = _Frames(writer, session) if with_frames else None
             values = _Values(writer, session, devices) if devices else None
             for item in items:

@@ -6,7 +6,7 @@ are as good as that program and its host were, which nobody knows: `FOREIGN_LATE
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from dissectors import registry
@@ -81,6 +81,7 @@ class RecordMaker:
         self.link_type = link_type_for(session.protocol, wanted)
         self.engine = engine_for(session)
         self.live = live
+        self.notes: Mapping[int, str] = {}  # by row number: what else to say in the comment
         self._settling = Settling()
 
     def add(self, item: Item) -> Iterator[Record]:
@@ -142,6 +143,8 @@ class RecordMaker:
                 notes.append(shown)
         if row.event.marks:
             notes.append(f"{len(row.event.marks)} octets with line errors")
+        if row.no in self.notes:
+            notes.append(self.notes[row.no])
         return "; ".join(notes)
 
 

@@ -6,9 +6,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from dissectors.findings import Finding
 from dissectors.frame import Frame
+from dissectors.profiles import Devices
 from dissectors.registry import Dissector
 from dissectors.tracker import Transaction
+from sniff.analysis.points import Point, PointReader, PointTable
 from sniff.analysis.summary import Summary
 from sniff.engine import Output, Row
 from sniff.formats import read
@@ -32,7 +35,8 @@ class CaptureReading:
     line_events: tuple[LineEvent, ...]
     counts: Summary
     completeness: Completeness
-    findings: tuple[Any, ...] = ()
+    findings: tuple[Finding, ...] = ()
+    points: tuple[Point, ...] = ()
 
     @property
     def frames(self) -> tuple[Row, ...]:
@@ -55,6 +59,7 @@ def read_capture(path: str | Path) -> CaptureReading:
     dissector = dissector_for(session)
     counts = Summary(session.line)
     judge = Judging(session, dissector)
+    reader, points = PointReader(dissector, Devices()), PointTable()
     rows: list[Row] = []
     closed: dict[int, Transaction] = {}
     events: list[LineEvent] = []
@@ -65,6 +70,7 @@ def read_capture(path: str | Path) -> CaptureReading:
             continue
         counts.add(output)
         judge.add(output)
+        points.add(reader.add(output))
         rows.extend(output.rows)
         closed.update((transaction.id, transaction) for transaction in output.transactions)
     return CaptureReading(
@@ -77,4 +83,5 @@ def read_capture(path: str | Path) -> CaptureReading:
         counts=counts,
         completeness=capture.completeness(),
         findings=tuple(judge.findings()),
+        points=tuple(points),
     )

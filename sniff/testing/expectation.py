@@ -9,6 +9,7 @@ import difflib
 from collections.abc import Iterator
 
 from dissectors.frame import Frame
+from sniff.analysis.points import Point
 from sniff.analysis.wording import describe, mark_names
 from sniff.reading import Settled
 from sniff.testing.capture_reading import CaptureReading
@@ -58,6 +59,17 @@ def _lines(reading: CaptureReading) -> Iterator[str]:
     yield "[findings]"
     for finding in reading.findings:
         yield f"{finding.code} {finding.severity.label}: {finding.subject}: {finding.seen} (×{finding.count})"
+    if reading.points:
+        yield ""
+        yield "[points]"
+        yield from sorted(_point(point) for point in reading.points if not point.sample.value.bit)
+
+
+def _point(point: Point) -> str:
+    value = point.sample.value
+    unit = f" {value.unit}" if value.unit else ""
+    times = "once" if point.count == 1 else f"{point.count} times"
+    return f"{point.sample.station} {point.sample.name} = {value.value}{unit} (quality {int(value.quality)}, {times})"
 
 
 def _row(reading: CaptureReading, item: Settled) -> str:

@@ -203,3 +203,16 @@ def test_a_session_of_any_protocol_can_be_written(tmp_path: Path) -> None:
     with create(tmp_path / "x.pcapng", session) as writer:
         writer.write(Chunk(10**9, b">0104C5\r"))
     assert read(tmp_path / "x.pcapng").session.protocol == "n2"
+
+
+def test_findings_stand_in_the_comments_of_their_packets(tmp_path: Path) -> None:
+    from sniff.cli import main
+    from sniff.formats.pcapng import PcapngCapture
+
+    source, target = tmp_path / "x.cap.txt", tmp_path / "x.pcapng"
+    source.write_text(MODBUS)
+    assert main(["convert", str(source), str(target)]) == 0
+    with target.open("rb") as stream:
+        comments = [record.comment for record in PcapngCapture(target)._records(stream)]
+    assert "MB008 station 1: exception 2 (illegal data address)" in comments[-1]
+    assert "MB008" not in comments[0]
