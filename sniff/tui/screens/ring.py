@@ -22,8 +22,8 @@ COLUMNS: tuple[tuple[str, str], ...] = (
     ("tokens", "tok."),
     ("retries", "retr"),
     ("lost", "lost"),
-    ("loop p50 ms", "loop50"),
-    ("loop max ms", "loopmax"),
+    ("loop p50 ms", "loop"),
+    ("loop max ms", "max"),
     ("use p95 ms", "use95"),
     ("reply p95 ms", "repl95"),
     ("postponed", "post"),
@@ -75,7 +75,10 @@ class RingScreen(ViewScreen):
         self.query_one(StationTable).fill(
             (str(row[0]), [_cell(COLUMNS[at][0], row[place]) for at, place in enumerate(places)]) for row in rows
         )
-        legend = "times in ms · use: from token to first frame · repl: answers · poll-: unanswered polls for masters"
+        legend = (
+            "times in ms · loop, max: round trip of the token · use: from token to first frame · repl: answers · "
+            "poll-: unanswered polls for masters"
+        )
         words.update("\n".join((*ring_words.sentences(ring), "", legend)))
 
     def on_data_table_row_selected(self, event: DataTable.RowSelected) -> None:
