@@ -51,6 +51,26 @@ def ftdi(wire: Sequence[tuple[int, int]], *, timer: int = 16 * MS, packet: int =
     return chunks
 
 
+def stalled(chunks: Iterable[Chunk], dice: random.Random, chance: float, worst: int) -> list[Chunk]:
+    """The same reads by a host that now and then does not come round to reading, for up to `worst` ns."""
+    read: list[Chunk] = []
+    held, until = b"", 0
+    for chunk in chunks:
+        if held and chunk.time < until:
+            held += chunk.octets
+            continue
+        if held:
+            read.append(Chunk(until, held))
+            held = b""
+        if dice.random() < chance:
+            held, until = chunk.octets, chunk.time + dice.randint(1 * MS, worst)
+        else:
+            read.append(chunk)
+    if held:
+        read.append(Chunk(until, held))
+    return read
+
+
 def laid_out(frames: Iterable[bytes], timing: Timing, gap: int, start: int = 0) -> Wire:
     """Frames on a wire, octets back to back, `gap` ns of silence before each."""
     now, wire = start, []

@@ -182,6 +182,15 @@ def zeros_follow_good(stretch: bytes) -> bool:
     return False
 
 
+def lacks_zeros(stretch: bytes) -> bool:
+    """Whether a stretch with a good CRC may be a frame that lacks the zeros which its CRC ends with.
+
+    One frame in 256 ends with a zero, and is good without it.
+    """
+    lengths = [reading.length for reading in readings(stretch, 0, len(stretch))]
+    return len(stretch) not in lengths and any(n - len(stretch) in (1, 2) for n in lengths)
+
+
 def whole_stretch(octets: Octets, at: int, end: int, start: int) -> Candidate | None:
     """All of [at, end) as one frame, zeros at its end left off; None when its CRC is wrong or it is no frame.
 

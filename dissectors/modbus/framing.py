@@ -32,6 +32,7 @@ from dissectors.modbus.candidates import (
     Candidate,
     CandidateFinder,
     Reading,
+    lacks_zeros,
     octet_bits,
     octet_hope,
     readings,
@@ -132,8 +133,10 @@ class RtuFramer:
         """The same by the best segmentation."""
         window, octets = self._window, self._window.octets
         path, agreed = self._segment(len(octets))
-        if not hold or (path and path[-1].end == window.base + len(octets)):
-            agreed = path  # a good frame that ends with the silence waits for nothing
+        if not hold:
+            agreed = path
+        elif path and path[-1].end == window.base + len(octets):  # a good frame that ends with the silence …
+            agreed = path[:-1] if lacks_zeros(path[-1].octets) else path  # … waits for nothing
         for candidate in agreed:
             window.take_candidate(candidate)
         if octets and hold:

@@ -131,6 +131,19 @@ def test_a_frame_cut_by_a_late_read_is_joined(at: int) -> None:
     assert brief(events) == [(Found.GAP, REQUEST), (Found.JOINED, RESPONSE), (Found.GAP, OTHER)]
 
 
+def test_a_frame_cut_before_the_zero_that_its_crc_ends_with_is_joined() -> None:
+    request = rtu("02 03 D560 0064")
+    assert request[-1] == 0
+    assert crc16_modbus(request[:-1]) == 0
+    assert brief(read((0, request[:-1]), (8, request[-1:]), (60, OTHER))) == [
+        (Found.JOINED, request),
+        (Found.GAP, OTHER),
+    ]
+    (alone,) = read((0, request[:-1]))
+    assert isinstance(alone, Frame)
+    assert (alone.check, alone.expected, alone.flags) == (Check.GOOD, 8, ("odd-length",))
+
+
 def test_a_frame_that_never_goes_on_is_damaged_and_given_in_bounded_time() -> None:
     framer = RtuFramer(TIMING)
     octets = wire((0, REQUEST), (5, RESPONSE[:5]))
