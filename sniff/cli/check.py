@@ -29,7 +29,7 @@ SEVERITIES = tuple(severity.label for severity in Severity)
 def configure(parser: argparse.ArgumentParser) -> None:
     """Options of `check`."""
     parser.add_argument("sources", nargs="+", metavar="FILE|PORT", help="captures, or one port or configured bus")
-    arguments.add_line(parser)
+    arguments.add_line(parser, auto=True)
     arguments.add_devices(parser)
     parser.add_argument("--format", choices=("text", "json", "junit"), default="text", help="default: text")
     parser.add_argument("--json", action="store_const", const="json", dest="format", help="one JSON object a finding")
@@ -88,7 +88,7 @@ def _listen(port: str, args: argparse.Namespace) -> Checked:
     target = listening.target_of(args)
     duration = args.duration or DEFAULT_DURATION
     print(f"sniff485: listening to {port} for {duration:g} s", file=sys.stderr)
-    live = listening.start(target.source, None)
+    live = listening.start(target.source, None, None, target.devices, target.search)
     run_of = Checking(live.session, live.dissector, target.devices)
     until = time.monotonic() + duration
     with listening.until_interrupted() as caught:

@@ -52,10 +52,9 @@ def target_of(args: argparse.Namespace) -> Target:
     wanted = args.port or _only_port(config)
     bus = config.buses.get(wanted)
     port = (bus.port or wanted) if bus is not None else wanted
-    auto = arguments.AUTO in (args.line, args.protocol)
-    protocol = (
-        args.protocol or (bus.protocol if bus is not None else None) or (arguments.AUTO if auto else "modbus-rtu")
-    )
+    configured = args.protocol or (bus.protocol if bus is not None else None)
+    auto = arguments.AUTO in (args.line, configured)
+    protocol = configured or (arguments.AUTO if auto else "modbus-rtu")
     line = args.line or (bus.line if bus is not None else None)
     search = None
     if auto:
