@@ -169,7 +169,8 @@ class OctetWindow:
 
     def gap(self, index: int) -> int:
         """Nominal silence before octet `index` of the window, ns; 24 h before the first octet of a capture."""
-        run = self._run(index)
+        runs = self._runs
+        run = runs[-1] if runs[-1].index <= index else self._run(index)
         return run.gap if run.index == index else 0
 
     def start(self, index: int) -> int:

@@ -5,14 +5,14 @@
 No PC sees that silence reliably: adapters merge several frames into one read, cut one into pieces, and noise lies
 in the gaps. So the framer works on octets with times, and never on chunks:
 
-1. At the begin of the window, where a frame may begin (after a good frame, after proved silence), the predicted
-   lengths of its function code are tried. A good one is taken as soon as the octet after it has come, unless a
-   longer reading of the same octets is still open and would be the better one.
-2. Where that finds nothing, all candidates of the window are weighed and the best segmentation wins
-   (candidates.py, segmentation.py), at window lengths that depend on the octets alone.
-3. Proved silence of 3.5 characters settles everything before it at once; only a tail that begins like a frame and is
+1. Proved silence of 3.5 characters settles everything before it at once. Only a tail that begins like a frame and is
    not complete is held, for `hold` ns of silence at most, in case a late read cut the frame in two.
-4. Without silence the window never grows beyond WINDOW octets.
+2. Where a frame may begin (after silence, after a good frame), the lengths that its function code predicts are tried,
+   as request and as response. A good one is taken, unless a longer reading of the same octets is still open and would
+   be the better one. Without silence this waits for the next look, at most _FIRST octets later.
+3. Where that finds nothing, all candidates of the window are weighed and the best segmentation wins
+   (candidates.py, segmentation.py, expectation.py).
+4. Without silence the window is looked at when it has certain lengths, and never grows beyond WINDOW octets.
 5. What is left over is a damaged frame of a station, or noise (remains.py).
 
 Every decision depends on octets, their nominal times and proved silences only, so other chunks give the same events.
@@ -47,7 +47,7 @@ from dissectors.modbus.segmentation import ADJACENT, HEARD, PROVED, SILENCE_INSI
 WINDOW: Final = 2 * MAX_FRAME
 """Most octets held without silence: then all but the last MAX_FRAME are given out."""
 
-_FIRST = 9  # a first look at a window: the commonest frame and the octet after it
+_FIRST = 24  # a first look at a window: on a bus with silences most frames need none
 _STEP = 32  # octets between looks at a window that does not begin with a frame
 _PATIENT_STEP = 64  # the same while its begin may still become one
 _MOST_CUTS = 3  # silences over which a frame is pieced together

@@ -36,6 +36,7 @@ class RtuWindow:
 
     __slots__ = (
         "_before",
+        "_latency",
         "_octets",
         "_out",
         "_skipped",
@@ -55,7 +56,7 @@ class RtuWindow:
 
     def __init__(self, timing: Timing, octets: OctetWindow) -> None:
         self._octets = octets
-        self._t15, self._t35 = timing.t15, timing.t35
+        self._t15, self._t35, self._latency = timing.t15, timing.t35, timing.latency
         self.octets = octets.octets
         self.base = 0
         self.cuts: list[int] = []
@@ -94,7 +95,8 @@ class RtuWindow:
             return self.start_bits()
         if index == self.end or (self.cuts and position in self.cuts):
             return PROVED
-        return LIKELY if self._octets.silence(index)[0] >= self._t15 else 0
+        gap = self._octets.gap(index)
+        return LIKELY if gap and gap - self._latency >= self._t15 else 0
 
     def inside(self, start: int, end: int) -> int:
         """Number of proved silences strictly between two positions."""
