@@ -81,12 +81,20 @@ def rubbish(good_frames: st.SearchStrategy[bytes]) -> st.SearchStrategy[bytes]:
 
 @st.composite
 def wires(draw: st.DrawFn, timing: Timing, good_frames: st.SearchStrategy[bytes]) -> list[Wired]:
-    """A stretch of bus: frames and rubbish, gaps of every size, line errors here and there; or a healthy poll with
-    gaps that are only just proved, or not."""
-    rough = st.tuples(gaps(timing), st.one_of(good_frames, rubbish(good_frames)))
+    """A stretch of bus, line errors here and there: frames and rubbish with gaps of every size; or a run of them
+    with hardly a silence; or a healthy poll with gaps that are only just proved, or not."""
+    stuff = st.one_of(good_frames, rubbish(good_frames))
+    rough = st.tuples(gaps(timing), stuff)
+    run_on = st.tuples(st.sampled_from([0, 0, 0, 0, timing.char // 2, 2 * timing.char, timing.t35]), stuff)
     wait = timing.t35 + timing.char
     steady = st.tuples(st.sampled_from([wait, wait, 3 * timing.latency + 8 * wait]), good_frames)
-    pieces = draw(st.one_of(st.lists(rough, max_size=8), st.lists(steady, min_size=3, max_size=6)))
+    pieces = draw(
+        st.one_of(
+            st.lists(rough, max_size=8),
+            st.lists(run_on, min_size=3, max_size=8),
+            st.lists(steady, min_size=3, max_size=6),
+        )
+    )
     now, wire = EPOCH, []
     for gap, octets in pieces:
         now += gap
@@ -256,9 +264,12 @@ def framer_contract(
             live = factory(timing)
             events: list[Event] = []
             last = EPOCH
-            for chunk in chunks:
-                for now in sorted(data.draw(st.lists(st.integers(last, chunk.time), max_size=3))):
-                    events += live.advance(now)
+            moments = data.draw(
+                st.dictionaries(st.integers(0, max(0, len(chunks) - 1)), st.integers(0, 100), max_size=8)
+            )
+            for number, chunk in enumerate(chunks):
+                if number in moments:
+                    events += live.advance(last + (chunk.time - last) * moments[number] // 100)
                 while (due := live.deadline()) is not None and due <= chunk.time:
                     events += live.advance(due)
                 events += live.feed(chunk)

@@ -6,4 +6,4 @@ from dissectors.modbus.framing import RtuFramer
 from tests.property.framer_contract import framer_contract
 from tests.property.modbus_adus import rtu_frames
 
-TestRtuContract = framer_contract(RtuFramer, rtu_frames, examples=100)
+TestRtuContract = framer_contract(RtuFramer, rtu_frames, examples=60)

@@ -210,8 +210,8 @@ def test_an_exception_in_the_middle_of_noise_needs_its_request() -> None:
 
 def test_a_request_inside_the_first_octets_of_the_awaited_response_is_part_of_it() -> None:
     """The data are such that the first 8 octets read as a good request: the longer reading was asked for."""
-    asked = rtu("01 03 0000 0008")
-    answered = rtu((rtu("01 03 10 00 00 05") + bytes(range(11))).hex())
+    asked = rtu("01 03 0000 0020")
+    answered = rtu((rtu("01 03 40 00 00 05") + bytes(range(59))).hex())
     assert crc16_modbus(answered[:8]) == 0
     for latency in (0, FTDI_LATENCY):
         events = read((0, asked + answered + asked + answered), latency=latency)
