@@ -71,6 +71,12 @@ def test_clean_frames_are_found_by_their_gaps() -> None:
     assert brief(events) == [(Found.GAP, REQUEST), (Found.GAP, RESPONSE), (Found.GAP, OTHER)]
 
 
+@pytest.mark.parametrize("count", range(1, 251))
+def test_frames_of_every_length_wait_for_the_silence_that_follows(count: int) -> None:
+    frame = rtu(f"05 01 {count:02X}" + "55" * count)
+    assert brief(read((0, frame))) == [(Found.GAP, frame)]
+
+
 def test_a_clean_frame_is_given_as_soon_as_silence_is_proved() -> None:
     framer = RtuFramer(TIMING)
     octets = wire((0, REQUEST))

@@ -115,3 +115,28 @@ def test_a_host_that_reads_late_more_often_than_its_latency_says(line: str) -> N
     found, sent = good(drive(RtuFramer(timing), chunks)), Counter(frames)
     assert not found - sent
     assert (sent - found).total() <= len(frames) // 50
+
+
+@pytest.mark.parametrize("latency", [0, FTDI_LATENCY])
+def test_cuts_change_nothing_in_long_runs_without_silence(latency: int) -> None:
+    """What the property suite checks on short wires, on long ones: the window fills, and is looked at, many times."""
+    timing = Timing(LineSettings.parse("19200,8E1"), latency)
+    for seed in range(40):
+        dice = random.Random(seed)
+        frames = poll(dice, timing, 40)[1]
+        now, wire = 0, []
+        for frame in frames:
+            body = bytearray(frame)
+            if dice.random() < 0.2:
+                body[dice.randrange(len(body))] ^= 1 << dice.randrange(8)
+            now += dice.choice([0, 0, timing.char, timing.t15, timing.t35 - 1, timing.t35])
+            for octet in body + dice.randbytes(dice.choice([0, 0, 0, 1, 2, 40])):
+                now += timing.char
+                wire.append((now, octet))
+        lumps: list[Chunk] = []
+        for end, octet in wire:
+            if lumps and len(lumps[-1].octets) < 200 and end - lumps[-1].time == timing.char:
+                lumps[-1] = Chunk(end, lumps[-1].octets + bytes([octet]))
+            else:
+                lumps.append(Chunk(end, bytes([octet])))
+        assert drive(RtuFramer(timing), lumps) == drive(RtuFramer(timing), exact(wire))
