@@ -96,7 +96,7 @@ class SnifferApp(App[None]):
     def draw_screen(self) -> None:
         """Bring the shown screen up to date."""
         screen = self.shown
-        if screen is not None and screen.is_mounted:
+        if _is_whole(screen):
             screen.draw()
             if self._worker is not None and screen.work_left():
                 self._worker.resume()
@@ -110,7 +110,7 @@ class SnifferApp(App[None]):
 
     def _work(self) -> None:
         screen = self.shown
-        if screen is None or not screen.is_mounted or not screen.work():
+        if not _is_whole(screen) or not screen.work():
             self._worker.pause()
 
     def _draw_header(self) -> None:
@@ -195,3 +195,8 @@ class SnifferApp(App[None]):
 
 def _make(entry: Entry) -> Screen[None]:
     return load(entry)()
+
+
+def _is_whole(screen: ViewScreen | None) -> bool:
+    """Whether a screen can be drawn: a timer may still fire while its widgets are put in or taken out."""
+    return screen is not None and screen.is_mounted and bool(screen.query("#main"))
