@@ -155,6 +155,8 @@ class ModbusTracker:
         if request.is_for(seen.octets):
             if request.octets == seen.octets and self._is_echo_of_write(request, seen):
                 return self._echo(seen)
+            if request.octets == seen.octets and self._is_repeat_after_damage(request, seen):
+                return self._request(seen, sure=False)
             why = None if request.fault else mismatch(request.octets, seen.octets)
             # a station may answer with the value that it really took, or with a wrong length
             near = self._knows(request) and request.octets[:4] == seen.octets[:4]
@@ -229,6 +231,13 @@ class ModbusTracker:
             return True
         fastest = self.learnt.fastest(request.unit)
         return fastest is not None and latency.nominal + self._timing.char < fastest // 2
+
+    def _is_repeat_after_damage(self, request: Exchange, seen: Seen) -> bool:
+        """Whether a copy of a request comes well behind a damaged answer to it, with no learnt time that would make it
+        the answer: a master that repeats is far more frequent than a second station with the same address."""
+        if request.garble is None or self._knows(request) or self._echoing:
+            return False
+        return seen.frame.start - request.garble.end >= self.learnt.too_soon(self._silence)
 
     def _is_second_answer(self, seen: Seen) -> bool:
         """Whether an answer follows the last one of that unit with no room for a request between."""

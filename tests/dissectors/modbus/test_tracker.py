@@ -224,6 +224,24 @@ def test_an_answer_after_a_damaged_one_still_counts(bus):
     assert reading.last.error.startswith("before the answer: CRC error")
 
 
+def test_a_copy_well_behind_a_damaged_answer_is_the_masters_repeat(bus):
+    reading = bus.say(WRITE).damage(WRITE).say(WRITE, 190).say(WRITE, 12).run()
+    assert reading.roles == ["request", "response", "request", "response"]
+    assert reading.verdicts == ["damaged-answer", "retry"]
+
+
+def test_a_copy_directly_behind_garbage_is_the_answer_with_a_bad_begin(bus):
+    reading = bus.say(WRITE).noise(b"\x55\xaa\x13").say(WRITE, 1).run()
+    assert reading.verdicts == ["answered"]
+    assert reading.roles[-1] == "response"
+
+
+def test_a_copy_in_the_learnt_time_is_the_answer_whatever_came_before_it(known):
+    before = len(known.run().transactions)
+    reading = known.say(WRITE).noise(b"\x55\xaa\x13").say(WRITE, 5).run()
+    assert [t.verdict for t in fresh(reading, before)] == [Verdict.ANSWERED]
+
+
 def test_garbage_in_place_of_an_answer_is_a_damaged_answer(bus):
     reading = bus.say(READ).noise(b"\x55\xaa\x13\x77").say(READ, 300).run()
     assert reading.verdicts[0] == "damaged-answer"
