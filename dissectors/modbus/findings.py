@@ -13,9 +13,11 @@ from dissectors.findings import Finding
 from dissectors.frame import Damage, Event, Frame, Header, LineError, Noise, Role
 from dissectors.line import Timing
 from dissectors.modbus.adu import RTU_NAME, adu, rtu_check
+from dissectors.modbus.evidence import Evidence
 from dissectors.modbus.functions import BROADCAST
-from dissectors.modbus.judgement import Evidence, judge
+from dissectors.modbus.judgement import judge
 from dissectors.modbus.learnt import Learnt
+from dissectors.modbus.response_groups import Answered
 from dissectors.modbus.station_record import Key, Station, middle
 from dissectors.tracker import Placement, Transaction, Verdict
 
@@ -62,6 +64,7 @@ class ModbusFindings:
         self._broadcast: _Asked | None = None  # likewise
         self._before: Frame | None = None  # the row before, if it was a good frame
         self._codes: dict[int, int] = {}  # exception codes by transaction
+        self._answers: dict[int, bytes] = {}  # good answers by transaction
         self._elsewhere: dict[int, int] = {}  # requests (by frame) that another unit answered, and which
         self._repeats: deque[int] = deque(maxlen=64)  # the last transactions that repeated another
         self._no_requests: deque[int] = deque(maxlen=64)  # frames that the tracker takes for requests, but are none
@@ -93,6 +96,7 @@ class ModbusFindings:
         """See `dissectors.findings.Judge`."""
         asked = self._asked.pop(transaction.id, None)
         code = self._codes.pop(transaction.id, 0)
+        answer = self._answers.pop(transaction.id, b"")
         verdict = transaction.verdict
         if verdict in _SETTLED_ELSEWHERE:
             self._seen.echoes += verdict is Verdict.ECHO
@@ -116,7 +120,7 @@ class ModbusFindings:
             station.late.add(transaction.start, transaction.response)
             station.heard(transaction.end)
         elif asked is not None:
-            self._settle_request(station, transaction, asked, code)
+            self._settle_request(station, transaction, asked, code, answer)
 
     def findings(self) -> tuple[Finding, ...]:
         """See `dissectors.findings.Judge`."""
@@ -175,6 +179,10 @@ class ModbusFindings:
                 self._codes[placement.tx] = octets[2]
                 if len(self._codes) > _OPEN_KEPT:
                     self._codes.clear()
+            else:
+                self._answers[placement.tx] = octets
+                if len(self._answers) > _OPEN_KEPT:
+                    self._answers.clear()
         elif placement.source is not None:
             self._damaged.append(placement.tx)
             station = self._station(placement.source)
@@ -246,7 +254,9 @@ class ModbusFindings:
             return
         self._seen.unasked.add(transaction.start, transaction.response)
 
-    def _settle_request(self, station: Station, transaction: Transaction, asked: _Asked, code: int) -> None:
+    def _settle_request(
+        self, station: Station, transaction: Transaction, asked: _Asked, code: int, answer: bytes
+    ) -> None:
         verdict = transaction.verdict
         if asked.no in self._no_requests:
             return
@@ -282,6 +292,9 @@ class ModbusFindings:
             limit = SLOW_UNLEARNT if timeout is None else timeout * 7 // 10
             if transaction.latency.low > limit:
                 station.slow.add(transaction.end, transaction.request, transaction.response)
+            if verdict is Verdict.ANSWERED and transaction.error is None and transaction.response is not None:
+                came = Answered(transaction.response, transaction.end, transaction.latency, answer)
+                station.compare(asked.key, asked.octets, came)
         if verdict is Verdict.EXCEPTION:
             station.exception(asked.key, code).add(transaction.end, transaction.request, transaction.response)
         elif (

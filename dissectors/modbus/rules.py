@@ -198,6 +198,18 @@ _ALL = (
         "whether the tap is at a place where the master is heard well",
     ),
     Rule(
+        "MB208",
+        Severity.NOTE,
+        "two response times",
+        "Good answers to exactly the same request that fall into two groups, each of at least 8 and 1 in 8 of the last "
+        "32 … 96, with a gap of 3 ms or more between the longest reading of the quick ones and the shortest of the "
+        "slow ones, and that take turns. A warning when something else agrees: second answers, answers with octets "
+        "mixed in, or different values in the two groups.",
+        "one device that is held up now and then, by a cyclic task, by writing its memory or by a gateway; or two "
+        "devices with this address, each of which misses some of the requests",
+        "the manual for a second response time; switch the station off and see whether something still answers",
+    ),
+    Rule(
         "MB301",
         Severity.WARNING,
         "frames too close together",

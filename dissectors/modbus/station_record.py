@@ -7,10 +7,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from dissectors.findings import Tally
+from dissectors.modbus.response_groups import Answered, SameRequest
 from dissectors.tracker import Interval
 
 KEYS_KEPT = 512
 """Most different requests, or exceptions, of a station that are counted apart."""
+
+SAME_KEPT = 8
+"""Requests of a station whose answers are compared with each other."""
 
 _BLOCKS = 64
 
@@ -128,6 +132,7 @@ class Station:
     times: ResponseTimes = field(default_factory=ResponseTimes)
     requests: dict[Key, Requested] = field(default_factory=dict)
     exceptions: dict[tuple[Key, int], Tally] = field(default_factory=dict)
+    same: dict[tuple[Key, bytes], SameRequest] = field(default_factory=dict)  # by request, octet by octet
 
     def request(self, key: Key) -> Requested:
         """The record of one kind of request; beyond KEYS_KEPT kinds, one for all others."""
@@ -140,6 +145,11 @@ class Station:
         if (key, code) not in self.exceptions and len(self.exceptions) >= KEYS_KEPT:
             key = ("other requests", None)
         return self.exceptions.setdefault((key, code), Tally())
+
+    def compare(self, key: Key, request: bytes, answer: Answered) -> None:
+        """Keep an answer beside the others to exactly the same request; the first SAME_KEPT requests only."""
+        if (key, request) in self.same or len(self.same) < SAME_KEPT:
+            self.same.setdefault((key, request), SameRequest()).answers.append(answer)
 
     def heard(self, time: int) -> None:
         """Something came from it."""

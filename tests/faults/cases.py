@@ -26,7 +26,20 @@ from sniff.simulation.line_mix import low_times, receive
 from sniff.simulation.scenarios import Scenario, simulate
 from sniff.simulation.tap import CH340, EXACT, FTDI, FTDI_LOW_LATENCY, OCTETS, UART, TapModel
 from tests.faults.buses import modbus, mstp, n2
-from tests.faults.stations import AnswersAs, AnswersBroadcasts, Dies, Drifts, Ignores, Of, Pauses
+from tests.faults.case import Case, Heard
+from tests.faults.drive_cases import DRIVE_CASES
+from tests.faults.ring_cases import RING_CASES
+from tests.faults.stations import (
+    AnswersAs,
+    AnswersBroadcasts,
+    Dies,
+    Drifts,
+    Ignores,
+    Of,
+    Pauses,
+    Resets,
+)
+from tests.faults.uneven_stations import TakesTurns, Waits
 
 MS = 1_000_000
 S = 1_000_000_000
@@ -43,6 +56,18 @@ class Case:
     """
 
     name: str
+def unsteady_cases() -> Iterator[Case]:
+    """Stations whose times vary, yet nothing is wrong, or the adapter does not let anybody know."""
+    uneven = partial(modbus, change={2: partial(Waits, spread=30 * MS), 3: partial(Waits, spread=8 * MS)})
+    groups = partial(modbus, change={2: partial(Waits, spread=12 * MS, groups=True)})
+    rare = partial(modbus, change={2: partial(Waits, spread=25 * MS, groups=True, share=0.03)})
+    yield Case("RTU clean, uneven times", uneven, (), never=("MB208",))
+    yield Case("RTU clean, uneven times, FTDI 16 ms", uneven, (), FTDI, never=("MB208",))
+    yield Case("RTU clean, uneven times, octet by octet", uneven, (), OCTETS, never=("MB208",))
+    yield Case("RTU clean, two times that an FTDI hides", groups, (), FTDI, never=("MB208",))
+    yield Case("RTU clean, busy now and then", rare, (), never=("MB208",))
+
+
     make: Callable[..., Scenario]
     expect: tuple[tuple[str, str], ...]
     tap: TapModel = EXACT
@@ -231,6 +256,21 @@ CASES: tuple[Case, ...] = (
         "RTU answer to a broadcast",
         partial(modbus, extra=(write_register(0, 3, 7),), change={2: partial(AnswersBroadcasts, unit=2)}),
         (("MB204", "bus"),),
+    Case(
+        "RTU two response times",
+        partial(modbus, change={2: partial(Waits, spread=12 * MS, groups=True)}),
+        (("MB208", "station 2"),),
+    ),
+    Case(
+        "RTU two devices in turns",
+        partial(modbus, change={2: partial(TakesTurns, later=9 * MS, value=77)}),
+        (("MB208", "station 2"),),
+    ),
+    Case(
+        "ASCII two response times",
+        partial(_ascii, change={2: partial(Waits, spread=12 * MS, groups=True)}),
+        (("MB208", "station 2"),),
+    ),
     ),
     Case(
         "RTU answer to a broadcast, as 0",

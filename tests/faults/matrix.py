@@ -10,7 +10,7 @@ from dissectors.findings import Finding, Severity
 from sniff.analysis.judging import Judging
 from sniff.engine import Output
 from sniff.reading import dissector_for, outputs
-from tests.faults.cases import CASES, Case, clean_cases
+from tests.faults.cases import CASES, Case, clean_cases, unsteady_cases
 
 SEEDS = (1, 2, 3, 4, 5)
 
@@ -48,10 +48,13 @@ def run(case: Case, seed: int = 1) -> Outcome:
     false = tuple(
         f"{finding.code} {finding.subject}"
         for finding in findings
-        if finding.severity >= Severity.WARNING
-        and (
-            finding.subject.split(",")[0] not in allowed
-            or (finding.severity is Severity.ERROR and finding.code not in graves)
+        if finding.code in case.never
+        or (
+            finding.severity >= Severity.WARNING
+            and (
+                finding.subject.split(",")[0] not in allowed
+                or (finding.severity is Severity.ERROR and finding.code not in graves)
+            )
         )
     )
     return Outcome(case, seed, findings, missed, false)
@@ -59,7 +62,7 @@ def run(case: Case, seed: int = 1) -> Outcome:
 
 def main(words: list[str]) -> int:
     """Print the whole table; `words` choose cases by name. Exit code 1 below 95 in 100, or with a false alarm."""
-    cases = [*CASES, *clean_cases(3600)]
+    cases = [*CASES, *unsteady_cases(), *clean_cases(3600)]
     chosen = [case for case in cases if not words or any(word.lower() in case.name.lower() for word in words)]
     right = total = clean = 0
     for case in chosen:

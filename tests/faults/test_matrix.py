@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import pytest
 
-from tests.faults.cases import CASES, Case, clean_cases
+from tests.faults.cases import CASES, Case, clean_cases, unsteady_cases
 from tests.faults.matrix import run
 
 RING = "MS/TP"  # a second of a token ring is some hundred frames
@@ -41,7 +41,7 @@ def test_what_is_wrong_is_found_where_it_is(case: Case) -> None:
     assert outcome.false == ()
 
 
-@pytest.mark.parametrize("case", BRIEF_CLEAN, ids=lambda case: case.name)
+@pytest.mark.parametrize("case", [*BRIEF_CLEAN, *unsteady_cases()], ids=lambda case: case.name)
 def test_of_a_clean_bus_nothing_is_said(case: Case) -> None:
     outcome = run(case, seed=1)
     assert outcome.false == ()
