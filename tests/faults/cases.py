@@ -26,19 +26,7 @@ from sniff.simulation.line_mix import low_times, receive
 from sniff.simulation.scenarios import Scenario, simulate
 from sniff.simulation.tap import CH340, EXACT, FTDI, FTDI_LOW_LATENCY, OCTETS, UART, TapModel
 from tests.faults.buses import modbus, mstp, n2
-from tests.faults.case import Case, Heard
-from tests.faults.drive_cases import DRIVE_CASES
-from tests.faults.ring_cases import RING_CASES
-from tests.faults.stations import (
-    AnswersAs,
-    AnswersBroadcasts,
-    Dies,
-    Drifts,
-    Ignores,
-    Of,
-    Pauses,
-    Resets,
-)
+from tests.faults.stations import AnswersAs, AnswersBroadcasts, Dies, Drifts, Ignores, Of, Pauses
 from tests.faults.uneven_stations import TakesTurns, Waits
 
 MS = 1_000_000
@@ -52,22 +40,11 @@ class Case:
     """One fault. `make(seed=…)`: the bus. `expect`: code and subject that must be found, all of them.
 
     `struck`: further subjects that may be named; `also`: further codes that may be errors.
+    `never`: codes that must not be found, not even as a note.
     `hear`: what the sniffer gets of the bus, `simulate` unless the fault is in the sniffer itself.
     """
 
     name: str
-def unsteady_cases() -> Iterator[Case]:
-    """Stations whose times vary, yet nothing is wrong, or the adapter does not let anybody know."""
-    uneven = partial(modbus, change={2: partial(Waits, spread=30 * MS), 3: partial(Waits, spread=8 * MS)})
-    groups = partial(modbus, change={2: partial(Waits, spread=12 * MS, groups=True)})
-    rare = partial(modbus, change={2: partial(Waits, spread=25 * MS, groups=True, share=0.03)})
-    yield Case("RTU clean, uneven times", uneven, (), never=("MB208",))
-    yield Case("RTU clean, uneven times, FTDI 16 ms", uneven, (), FTDI, never=("MB208",))
-    yield Case("RTU clean, uneven times, octet by octet", uneven, (), OCTETS, never=("MB208",))
-    yield Case("RTU clean, two times that an FTDI hides", groups, (), FTDI, never=("MB208",))
-    yield Case("RTU clean, busy now and then", rare, (), never=("MB208",))
-
-
     make: Callable[..., Scenario]
     expect: tuple[tuple[str, str], ...]
     tap: TapModel = EXACT
@@ -75,6 +52,7 @@ def unsteady_cases() -> Iterator[Case]:
     hear: Callable[[Scenario, float, TapModel], Heard] = simulate
     struck: tuple[str, ...] = ()
     also: tuple[str, ...] = ()
+    never: tuple[str, ...] = ()
 
     @property
     def about(self) -> frozenset[str]:
@@ -91,6 +69,18 @@ def clean_cases(seconds: float) -> Iterator[Case]:
             yield Case(
                 f"{protocol} clean, {tap.name}", make, (), tap, seconds if tap in (EXACT, FTDI) else seconds / 10
             )
+
+
+def unsteady_cases() -> Iterator[Case]:
+    """Stations whose times vary, yet nothing is wrong, or the adapter does not let anybody know."""
+    uneven = partial(modbus, change={2: partial(Waits, spread=30 * MS), 3: partial(Waits, spread=8 * MS)})
+    groups = partial(modbus, change={2: partial(Waits, spread=12 * MS, groups=True)})
+    rare = partial(modbus, change={2: partial(Waits, spread=25 * MS, groups=True, share=0.03)})
+    yield Case("RTU clean, uneven times", uneven, (), never=("MB208",))
+    yield Case("RTU clean, uneven times, FTDI 16 ms", uneven, (), FTDI, never=("MB208",))
+    yield Case("RTU clean, uneven times, octet by octet", uneven, (), OCTETS, never=("MB208",))
+    yield Case("RTU clean, two times that an FTDI hides", groups, (), FTDI, never=("MB208",))
+    yield Case("RTU clean, busy now and then", rare, (), never=("MB208",))
 
 
 # ---- what goes wrong in the sniffer
@@ -251,11 +241,6 @@ CASES: tuple[Case, ...] = (
     # Modbus RTU: addresses and masters
     Case("RTU answered twice", partial(modbus, (DuplicateAddress("unit 2", 19 * MS),)), (("MB201", "station 2"),)),
     Case("RTU two stations collide", partial(modbus, (DuplicateAddress("unit 2", 3 * MS),)), (("MB202", "station 2"),)),
-    Case("RTU two masters", partial(modbus, second_master=True), (("MB203", "bus"),)),
-    Case(
-        "RTU answer to a broadcast",
-        partial(modbus, extra=(write_register(0, 3, 7),), change={2: partial(AnswersBroadcasts, unit=2)}),
-        (("MB204", "bus"),),
     Case(
         "RTU two response times",
         partial(modbus, change={2: partial(Waits, spread=12 * MS, groups=True)}),
@@ -271,6 +256,11 @@ CASES: tuple[Case, ...] = (
         partial(_ascii, change={2: partial(Waits, spread=12 * MS, groups=True)}),
         (("MB208", "station 2"),),
     ),
+    Case("RTU two masters", partial(modbus, second_master=True), (("MB203", "bus"),)),
+    Case(
+        "RTU answer to a broadcast",
+        partial(modbus, extra=(write_register(0, 3, 7),), change={2: partial(AnswersBroadcasts, unit=2)}),
+        (("MB204", "bus"),),
     ),
     Case(
         "RTU answer to a broadcast, as 0",
