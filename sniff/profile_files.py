@@ -20,6 +20,7 @@ from pathlib import Path
 from dissectors.profiles import Devices, Profile, ProfileError, packaged, parse_text
 from dissectors.profiles.packaged import SUFFIX, names
 from sniff.config import nearest
+from sniff.session import DEVICES_NOTE, Session
 
 GROUP = "sniff485.profiles"
 FOLDER = "profiles"
@@ -31,6 +32,9 @@ FOREIGN_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]*")
 
 EVERY = "*"
 """The address that stands for every station."""
+
+MOST_NOTED = 256
+"""Devices that a capture may name: as many as there are addresses."""
 
 
 class UnknownProfile(LookupError):
@@ -116,6 +120,34 @@ def devices(assigned: Mapping[str, str]) -> Devices:
         else:
             by_address[address(word)] = profile
     return Devices(by_address, default)
+
+
+def noted(session: Session) -> tuple[dict[str, str], tuple[str, ...]]:
+    """The devices that a capture names: address (or "*") → name, and what it says that nobody here understands.
+
+    The file may be from somebody else: only names of profiles that can be found here count, never a path.
+    """
+    known: dict[str, str] = {}
+    unknown: list[str] = []
+    said = session.notes.get(DEVICES_NOTE, "")
+    for token in said.split(",")[:MOST_NOTED] if said else ():
+        word, _, name = (part.strip() for part in token.partition("="))
+        try:
+            if not FOREIGN_NAME.fullmatch(name):
+                raise ValueError
+            if word != EVERY:
+                address(word)
+            find(name)
+        except (ValueError, UnknownProfile, ProfileError):
+            unknown.append(token.strip())
+        else:
+            known[word] = name
+    return known, tuple(unknown)
+
+
+def noted_devices(session: Session) -> Devices:
+    """The devices that a capture names, as far as their profiles are known here."""
+    return devices(noted(session)[0])
 
 
 def address(word: str) -> int:

@@ -6,11 +6,14 @@ Frozen values without I/O; every source makes them, every format keeps as much o
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings, Timing
+
+DEVICES_NOTE = "devices"
+"""Note of a session: which station is which device, as on the command line: "1=teco-e510,*=teco-f510"."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +33,18 @@ class Adapter:
     detail: str = ""
     serial_number: str = ""
 
+    @property
+    def lineless(self) -> bool:
+        """Whether octets come through no line of this machine, so that all line settings hear the same."""
+        return self.driver in LINELESS or self.name in LINELESS
+
+
+LINELESS = frozenset(("pty", "TCP gateway"))
+"""Drivers and adapters that set no line."""
+
+UNKNOWABLE = ("line", "protocol")
+"""What of a session may be searched for."""
+
 
 @dataclass(frozen=True, slots=True)
 class Session:
@@ -37,6 +52,9 @@ class Session:
 
     `port`: as the user named it. `protocol`: a registry name. `started`: ns since the Unix epoch at the anchor; all
     chunk times are on the monotonic clock from there. `bus`: a short name for topics ("boiler-room").
+    `unknown`: which of UNKNOWABLE nobody knows (yet): `line` is then only where the search for it began, `protocol`
+    a stand-in. `given`: somebody named them after a search in vain, so that octets count wherever the search heard
+    them with `line`.
     """
 
     port: str
@@ -47,11 +65,17 @@ class Session:
     adapter: Adapter = field(default_factory=Adapter)
     program: str = "sniff485"
     notes: Mapping[str, str] = field(default_factory=dict)
+    unknown: tuple[str, ...] = ()
+    given: bool = False
 
     @property
     def timing(self) -> Timing:
         """The line with what the adapter allows."""
         return Timing(self.line, self.adapter.latency)
+
+    def found(self, line: LineSettings | None, protocol: str | None) -> Session:
+        """The session once its search has ended with these settings."""
+        return replace(self, line=line or self.line, protocol=protocol or self.protocol, unknown=())
 
     def to_metadata(self) -> dict[str, str]:
         """Flat text record of everything, for files."""
@@ -70,6 +94,8 @@ class Session:
             "adapter_reports": "unknown" if reports is None else ",".join(reports),
             "adapter_detail": self.adapter.detail,
             "adapter_serial_number": self.adapter.serial_number,
+            **({"unknown": ",".join(self.unknown)} if self.unknown else {}),
+            **({"given": "after the search"} if self.given else {}),
             **{f"note_{key}": value for key, value in self.notes.items()},
         }
 
@@ -98,6 +124,8 @@ class Session:
             ),
             program=record.get("program", ""),
             notes={key[5:]: value for key, value in record.items() if key.startswith("note_")},
+            unknown=tuple(name for name in UNKNOWABLE if name in record.get("unknown", "").split(",")),
+            given=bool(record.get("given")),
         )
 
 
@@ -115,7 +143,7 @@ class LineEventKind(Enum):
     REPLUGGED = "replugged"
     DROPPED = "dropped"  # octets that this host lost; `count` says how many, -1 unknown
     CLOCK = "clock"  # wall clock stepped against the monotonic clock; `count` = new offset, ns
-    SETTINGS = "settings"  # line settings or protocol changed from here on; `text` = "line=19200,8E1"
+    SETTINGS = "settings"  # line settings or protocol changed from here on; `text` as in `SettingsChange`
     ERRORS = "errors"  # errors that the driver counted without saying where; `count` of them, `text` = kind
     NOTE = "note"
 
@@ -128,6 +156,49 @@ class LineEvent:
     kind: LineEventKind
     text: str = ""
     count: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class SettingsChange:
+    """What a SETTINGS event says, as words with spaces between: "line=19200,8E1 protocol=modbus-rtu found".
+
+    `line`, `protocol`: in force from here on; None: as before. `searching`: here a search for them begins, and every
+    later change is one of its attempts. `found`: here it ends with these.
+    """
+
+    line: LineSettings | None = None
+    protocol: str | None = None
+    searching: bool = False
+    found: bool = False
+
+    def __str__(self) -> str:
+        words = [f"line={self.line}"] if self.line is not None else []
+        words += [f"protocol={self.protocol}"] if self.protocol is not None else []
+        words += ["searching"] if self.searching else []
+        return " ".join(words + (["found"] if self.found else []))
+
+    @classmethod
+    def parse(cls, text: str) -> SettingsChange:
+        """Read an event's text; total: words that are not known are passed over."""
+        line, protocol = None, None
+        words = text.split()
+        for word in words:
+            name, _, value = word.partition("=")
+            if name == "line":
+                try:
+                    line = LineSettings.parse(value)
+                except ValueError:
+                    continue
+            elif name == "protocol" and value:
+                protocol = value
+        return cls(line, protocol, "searching" in words, "found" in words)
+
+
+def settings_change(item: Chunk | LineEvent) -> SettingsChange | None:
+    """The change of settings that an item of a capture is; None for everything else."""
+    if isinstance(item, LineEvent) and item.kind is LineEventKind.SETTINGS:
+        return SettingsChange.parse(item.text)
+    return None
 
 
 Item = Chunk | LineEvent

@@ -99,7 +99,9 @@ def _counted(ring: Ring) -> Iterable[Finding]:
                 if code == "MS102" and (happened.count == 1 or _share(happened.count, node) < LATE_SHARE):
                     severity = Severity.NOTE
                 seen = words.format(times=_times_word(happened.count))
-                yield _of(code, _pair(happened, mac), seen, happened, severity)
+                # a forbidden address is the sender's affair, and may stand for no station
+                subject = _station(mac) if what is What.ILLEGAL and mac is not None else _pair(happened, mac)
+                yield _of(code, subject, seen, happened, severity)
 
 
 def _share(count: int, node: Node | None) -> float:

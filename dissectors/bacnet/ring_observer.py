@@ -19,6 +19,7 @@ from dissectors.bacnet.limits import (
     BROADCAST,
     MAX_DATA,
     MAX_MASTER,
+    N_MIN_OCTETS,
     T_NO_TOKEN,
     T_REPLY_DELAY,
     T_USAGE_DELAY,
@@ -125,7 +126,8 @@ class RingObserver:
     def _see(self, no: int, event: FramerEvent, header: Header | None) -> None:
         if isinstance(event, Noise) or header is None:
             self._noise += len(event.octets)
-            self._see_collision(no, event)
+            if len(event.octets) >= N_MIN_OCTETS:  # fewer prove nothing: who was asked may still answer
+                self._see_collision(no, event)
             self._doubt = True
             return
         self._frames += 1

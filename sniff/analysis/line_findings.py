@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 from dissectors.findings import Finding, Severity, Tally, found
-from dissectors.frame import Event, Frame, LineError, Mark, Noise, Place, Reason, Role
+from dissectors.frame import Damage, Event, Frame, LineError, Mark, Noise, Place, Reason, Role
 from dissectors.line import NS_PER_S
 from dissectors.tracker import Transaction, Verdict
 from sniff.analysis.line_rules import LINE_RULES as RULES
@@ -297,7 +297,9 @@ class LineFindings:
 
 
 def _sender(row: Row) -> str:
-    """Whose frame it is, as a subject."""
+    """Whose frame it is, as a subject; a damaged header names nobody."""
+    if isinstance(row.event, Frame) and row.event.damage is Damage.HEADER:
+        return "bus"
     placement, header = row.placement, row.header
     source = placement.source if placement is not None else header.source if header is not None else None
     if source is not None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
 import sys
 from collections.abc import Callable, Mapping
 
@@ -13,12 +12,6 @@ from dissectors.profiles import Devices, ProfileError
 from sniff.cli import UNREADABLE, USAGE, Failure
 from sniff.formats import Capture, CaptureError, read
 from sniff.session import Session
-
-DEVICES_NOTE = "devices"
-"""Note of a session: its devices, as `Devices.text` writes them."""
-
-MOST_NOTED = 256
-
 
 AUTO = "auto"
 """In place of line settings or a protocol: find them by listening."""
@@ -92,15 +85,13 @@ def devices_of(args: argparse.Namespace, configured: Mapping[str, str] | None = 
 
 
 def noted_devices(args: argparse.Namespace, session: Session) -> Devices:
-    """What -d says, and behind it what the recording says of itself, as far as such profiles are known here."""
-    from sniff.profile_files import FOREIGN_NAME, UnknownProfile, find
+    """What -d says, and behind it what the capture says of itself, as far as such profiles are known here."""
+    from sniff.profile_files import EVERY, noted
 
-    known: dict[str, str] = {}
-    for token in session.notes.get(DEVICES_NOTE, "").split(",")[:MOST_NOTED]:
-        name = token.partition("=")[2]
-        if FOREIGN_NAME.fullmatch(name):  # somebody else's file must not name a path
-            with contextlib.suppress(UnknownProfile, ProfileError, argparse.ArgumentTypeError):
-                known[device(token)[0]] = find(name).name
+    known, unknown = noted(session)
+    if unknown and EVERY not in dict(args.devices):
+        names = ascii(", ".join(unknown)[:200])
+        print(f"sniff485: {names}: a device of the capture that is not known here; say which with -d", file=sys.stderr)
     return devices_of(args, known)
 
 

@@ -7,12 +7,13 @@ from __future__ import annotations
 import argparse
 from dataclasses import replace
 
+from dissectors.profiles import Devices
 from sniff.analysis.judging import Judging
 from sniff.cli import arguments, writing
 from sniff.engine import Output
 from sniff.formats import Capture
 from sniff.reading import dissector_for, outputs
-from sniff.session import Session
+from sniff.session import DEVICES_NOTE, Session
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -37,18 +38,19 @@ def run(args: argparse.Namespace) -> int:
     capture = arguments.open_capture(args.source)
     session = arguments.settings_of(args, capture.session)
     options = {"link-type": str(args.link_type)} if args.link_type is not None else None
-    devices = arguments.noted_devices(args, session) if args.output.lower().endswith(".mcap") else None
+    devices = arguments.noted_devices(args, session)
     if devices:
-        session = replace(session, notes={**session.notes, arguments.DEVICES_NOTE: devices.text()})
-    notes = _evidence(capture, session) if args.output.lower().endswith(".pcapng") else None
-    writing.write(args, session, capture.items(), [args.source], options, devices=devices, notes=notes)
+        session = replace(session, notes={**session.notes, DEVICES_NOTE: devices.text()})
+    values = devices if args.output.lower().endswith(".mcap") else None
+    notes = _evidence(capture, session, devices) if args.output.lower().endswith(".pcapng") else None
+    writing.write(args, session, capture.items(), [args.source], options, devices=values, notes=notes)
     writing.say_incomplete(args.source, capture)
     return 0
 
 
-def _evidence(capture: Capture, session: Session) -> dict[int, str]:
+def _evidence(capture: Capture, session: Session, devices: Devices) -> dict[int, str]:
     """The findings in words, by the rows that show them."""
-    judging = Judging(session, dissector_for(session))
+    judging = Judging(session, dissector_for(session), devices)
     for output in outputs(capture.items(), session):
         if isinstance(output, Output):
             judging.add(output)

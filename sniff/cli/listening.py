@@ -9,26 +9,25 @@ import signal
 import sys
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from dissectors import registry
 from dissectors.line import LineSettings
 from dissectors.profiles import Devices
-from sniff.analysis.detecting import Ending
 from sniff.analysis.summary import Summary
 from sniff.analysis.wording import milliseconds
 from sniff.capture.config import RecordSpec, SourceSpec
 from sniff.capture.link import CaptureLink
 from sniff.capture.wire import Ended, Status
-from sniff.cli import PORT_TROUBLE, UNREADABLE, USAGE, Failure, arguments, rows, searching
+from sniff.cli import INTERRUPTED, PORT_TROUBLE, UNREADABLE, USAGE, Failure, arguments, rows, searching
 from sniff.cli.searching import Unknowns
 from sniff.config import Config, ConfigError, load
 from sniff.engine import Output
 from sniff.formats import CaptureError
 from sniff.live import LiveBus
 from sniff.reading import Settled, Settling
-from sniff.session import LineEvent
+from sniff.session import DEVICES_NOTE, LineEvent, LineEventKind
 from sniff.sources import PortError
 
 
@@ -66,7 +65,8 @@ def target_of(args: argparse.Namespace) -> Target:
         print(f"sniff485: no line settings given (-s): assuming {line} for {protocol}", file=sys.stderr)
     name = bus.name if bus is not None else re.sub(r"[^A-Za-z0-9_-]+", "-", Path(port).name).strip("-") or "bus"
     devices = arguments.devices_of(args, bus.devices if bus is not None else None)
-    source = SourceSpec(port, line, protocol, name, notes_of(devices))
+    unknown = search.names if search is not None else ()
+    source = SourceSpec(port, line, protocol, name, notes_of(devices), unknown)
     return Target(source, bus.record if bus is not None else None, devices, search)
 
 
@@ -85,7 +85,7 @@ def _only_port(config: Config) -> str:
 
 def notes_of(devices: Devices) -> dict[str, str]:
     """What a recording says of its devices."""
-    return {arguments.DEVICES_NOTE: devices.text()} if devices else {}
+    return {DEVICES_NOTE: devices.text()} if devices else {}
 
 
 def start(
@@ -95,35 +95,18 @@ def start(
     devices: Devices | None = None,
     search: Unknowns | None = None,
 ) -> LiveBus:
-    """Start the capture process. Ends with exit code 4 for the port or a search in vain, 3 for the file.
+    """Start the capture process. Ends with exit code 4 for the port, 3 for the file.
 
-    With something to `search` for, the recording and `duration` begin when it is found.
+    Recording and `duration` begin at once, also with something to `search` for; `LiveBus.searching` says how far it is.
     """
-    link = start_link(source, record, duration) if search is None else start_link(source, None)
+    link = start_link(source, record, duration)
     try:
-        if search is not None:
-            _settle(link, source, record, duration, search)
-        return LiveBus(link, devices=devices)
+        adapter = link.session(0).adapter
+        detecting = search.detecting(adapter.latency, adapter.reports) if search is not None else None
+        return LiveBus(link, devices=devices, detecting=detecting)
     except BaseException:
         link.stop()  # a capture outlives its starter unless it is told to end
         raise
-
-
-def _settle(
-    link: CaptureLink, source: SourceSpec, record: RecordSpec | None, duration: float | None, search: Unknowns
-) -> None:
-    """Find what is not known of a bus and go on with it, without opening the port again."""
-    outcome = searching.search(link, search)
-    if outcome.ending is not Ending.FOUND or outcome.reading is None:
-        raise Failure(f"{source.spec}: {searching.sentence(outcome)}", PORT_TROUBLE)
-    print(f"sniff485: {source.spec}: {searching.sentence(outcome)}", file=sys.stderr)
-    for words in outcome.cannot_tell:
-        print(f"sniff485: cannot tell {words}", file=sys.stderr)
-    found = replace(source, line=outcome.reading.line, protocol=outcome.reading.protocol)
-    try:
-        link.settle([found], record, duration)
-    except CaptureError as error:
-        raise Failure(str(error), UNREADABLE) from None
 
 
 def start_link(source: SourceSpec, record: RecordSpec | None, duration: float | None = None) -> CaptureLink:
@@ -167,20 +150,30 @@ class Printer:
         self.quiet = quiet
         self.colour = colour
         self.summary = Summary(live.session.line)
+        self._session = live.session
         self._settling = Settling(live.points)
 
     def take(self, items: list[Output | LineEvent | Status | Ended]) -> None:
         """Print what has come."""
+        if self.live.session is not self._session:
+            self._settle()
         for item in items:
             if isinstance(item, Output):
                 self._take_output(item)
             elif isinstance(item, LineEvent):
                 self.summary.add_line_event(item)
-                self._say(f"{item.kind.value} {item.text}".strip())
+                if item.kind is not LineEventKind.SETTINGS:  # those of a search are said where it is shown
+                    self._say(f"{item.kind.value} {item.text}".strip())
             elif isinstance(item, Ended) and not item.clean:
                 self._say(item.reason)
         if not self.quiet:
             sys.stdout.flush()
+
+    def _settle(self) -> None:
+        """A search has ended: go on with what it found."""
+        self._session = self.live.session
+        self.summary.use(self._session.line)
+        self._settling = Settling(self.live.points)  # what came before belongs to no transaction
 
     def finish(self) -> None:
         """Print what still waits for a verdict."""
@@ -205,25 +198,49 @@ class Printer:
         print(f"sniff485: {self.live.session.port}: {text}", file=sys.stderr)
 
 
-def run(printer: Printer, count: int | None = None, duration: float | None = None, progress: bool = False) -> int:
-    """Listen until something ends it: a signal, `count` frames, `duration` seconds, the port. Gives the exit code."""
+def run(printer: Printer, count: int | None = None, duration: float | None = None, progress: bool = True) -> int:
+    """Listen until something ends it: a signal, `count` frames, `duration` seconds, the port. Gives the exit code.
+
+    `progress`: say on standard error how a search for settings goes, and how it ended.
+    """
     live = printer.live
     until = None if duration is None else time.monotonic() + duration
-    meter = _Meter(printer) if progress and sys.stderr.isatty() else None
+    meter = _Meter(printer) if progress and printer.quiet and sys.stderr.isatty() else None
+    search_meter = searching.Meter() if progress and live.searching is not None else None
     with until_interrupted() as caught:
         while live.ended is None:
-            printer.take(live.poll(0.1))
-            if meter is not None:
+            items = live.poll(0.1)
+            if search_meter is not None:
+                search_meter.follow(live)
+                search_meter = None if live.searching is None else search_meter
+            elif meter is not None:
                 meter.show()
+            printer.take(items)
             full = count is not None and printer.summary.frames >= count
             over = until is not None and time.monotonic() >= until
             if caught or full or over:
                 printer.take(live.stop())
                 break
         printer.finish()
-    if meter is not None:
-        meter.clear()
-    return PORT_TROUBLE if live.ended is not None and not live.ended.clean else 0
+    for shown in (meter, search_meter):
+        if shown is not None:
+            shown.clear()
+    if live.ended is not None and not live.ended.clean:
+        return PORT_TROUBLE
+    if live.engine.searching:
+        say_not_found(live, "interrupted" if caught else "the end")
+        return INTERRUPTED if caught else PORT_TROUBLE
+    return 0
+
+
+def say_not_found(live: LiveBus, how: str) -> None:
+    """Say that a capture ended before its settings were found, and what can be done with its recording."""
+    if live.search is None:
+        return
+    said = searching.sentence(live.search.outcome(), "a longer capture may find them")
+    print(f"sniff485: {live.session.port}: {how} while searching, no settings found: {said}", file=sys.stderr)
+    if live.status.path:
+        print("sniff485: the recording has every octet; read it with -s and -p once they are known", file=sys.stderr)
 
 
 def say_end(printer: Printer) -> None:

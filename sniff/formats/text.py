@@ -19,7 +19,8 @@ quotes (`\\"`, `\\\\`, `\\r`, `\\n` and `\\xNN` inside them). `!P !F !B !O` mark
 the octet before; several may follow one octet.
 
 `#` begins a comment. Two comments are read: header lines before the first chunk (`# key: value`, the keys are in
-`HEADER`, session notes are `# note NAME: value`) and events of the line, `#! +D KIND count=N text`, KIND as in
+`HEADER`; `# device: 3=teco-e510` says which profile a station has, a line a station, `*` for every one; other session
+notes are `# note NAME: value`) and events of the line, `#! +D KIND count=N text`, KIND as in
 `LineEventKind`, D counted from the last *chunk*, so that a reader that skips all comments finds the same times.
 A text that would not survive as it is (control characters, spaces at its ends, empty) is a JSON string.
 
@@ -40,11 +41,13 @@ from dissectors.frame import Chunk
 from dissectors.line import LineSettings
 from sniff.formats import CaptureError
 from sniff.formats.files import NewFile, explain, open_capture
-from sniff.formats.text_line import EPOCH, HEADER, MAGIC, MARKS, VERSION, Line
-from sniff.session import Completeness, Item, LineEvent, LineEventKind, Session
+from sniff.formats.text_line import DEVICE, EPOCH, HEADER, MAGIC, MARKS, VERSION, Line, is_device
+from sniff.session import DEVICES_NOTE, Completeness, Item, LineEvent, LineEventKind, Session
 
+MOST_DEVICES = 256
 LONGEST_LINE = 4 << 20  # octets; a chunk of a megabyte fits
 
+_DEVICES = f"note_{DEVICES_NOTE}"
 _ALWAYS = ("line", "protocol", "start")
 _LINE_END = re.compile(r"\r\n|\n|\r")
 
@@ -106,9 +109,17 @@ class TextCapture:
             if stripped.startswith(MAGIC):
                 reading.version()
             elif not stripped.startswith("#!"):
-                record.update(reading.header())
+                _take(record, reading.header())
         self._speed = LineSettings.parse(record["line"]) if "line" in record else None
         return Session.from_metadata(record)
+
+
+def _take(record: dict[str, str], header: dict[str, str]) -> None:
+    """Add a header line; devices add up as long as there are addresses, of anything else the last line counts."""
+    for key, value in header.items():
+        before = record.get(key, "") if key == _DEVICES else ""
+        if before.count(",") < MOST_DEVICES:
+            record[key] = f"{before},{value}" if before else value
 
 
 class _FileLines:
@@ -207,14 +218,20 @@ def header_lines(session: Session) -> Iterator[str]:
     record = session.to_metadata()
     default = Session.from_metadata({}).to_metadata()
     for key, name in HEADER.items():
-        value = record[name]
+        value = record.get(name, "")
         if key == "start":
             value = iso(session.started)
         elif key == "latency":
             value = milliseconds(session.adapter.latency)
-        if key in _ALWAYS or record[name] != default[name]:
+        if key in _ALWAYS or record.get(name) != default.get(name):
             yield f"# {key}: {_quoted(value)}"
+    devices = session.notes.get(DEVICES_NOTE, "").split(",")
+    as_devices = all(is_device(word) for word in devices)
+    if as_devices:
+        yield from (f"# {DEVICE}: {word}" for word in devices)
     for note, value in session.notes.items():
+        if note == DEVICES_NOTE and as_devices:
+            continue
         name = json.dumps(note) if ":" in note or '"' in note else _quoted(note)
         yield f"# note {name}: {_quoted(value)}"
 

@@ -10,7 +10,7 @@ from typing import NoReturn
 from dissectors.frame import Chunk, LineError, Mark
 from dissectors.line import LineSettings
 from sniff.formats import CaptureError
-from sniff.session import LineEvent, LineEventKind
+from sniff.session import DEVICES_NOTE, LineEvent, LineEventKind
 
 MAGIC = "#!sniff-capture"
 VERSION = 1
@@ -28,8 +28,13 @@ HEADER = {
     "reports": "adapter_reports",  # "unknown", or the line errors it reports with commas between
     "detail": "adapter_detail",
     "serial-number": "adapter_serial_number",
+    "unknown": "unknown",  # "line", "protocol" or both: of a capture whose settings were searched for in vain
+    "given": "given",
 }
 """Header key → key of `Session.to_metadata`."""
+
+DEVICE = "device"
+"""Header key of its own, may stand more than once: `3=teco-e510`, or `*=teco-e510` for every station."""
 
 MARKS = {"P": LineError.PARITY, "F": LineError.FRAMING, "B": LineError.BREAK, "O": LineError.OVERRUN}
 
@@ -43,6 +48,7 @@ _MARK = re.compile(r"!([PFBOpfbo]+)(?![0-9A-Za-z])")
 _SPACE = re.compile(r"\s*")
 _HEADER = re.compile(r'#\s*(?P<note>note\s+)?(?P<key>"(?:[^"\\]|\\.)*"\s*|[^:"]*):\s*')
 _EVENT = re.compile(r"#!\s*(?:(?P<delay>[+-][0-9.]+)\s+)?(?P<kind>[A-Za-z]+)(?:\s+count=(?P<count>-?[0-9]{1,19}))?")
+_DEVICE = re.compile(r"(?:\*|0[xX][0-9A-Fa-f]{1,2}|(?:1?[0-9]?[0-9]|2[0-4][0-9]|25[0-5]))=[A-Za-z0-9][A-Za-z0-9_-]*")
 _START = re.compile(r"(\d{4}-\d\d-\d\d)[Tt ](\d\d:\d\d:\d\d)(?:\.(\d{1,9}))?(Z|z|[+-]\d\d:\d\d)", re.ASCII)
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 
@@ -143,10 +149,13 @@ class Line:
             self.expected(f"version {VERSION}; a newer sniff485 may read this file", self.at + len(MAGIC))
 
     def header(self) -> dict[str, str]:
+        """What a comment before the first chunk says: nothing, or one key of `Session.to_metadata`."""
         match = _HEADER.match(self.text, self.at)
         if match is None:
             return {}
         at = match.end()
+        if not match["note"] and match["key"].strip().lower() == DEVICE:
+            return {f"note_{DEVICES_NOTE}": self.devices(self.text[at:], at)}
         if match["note"]:
             name = self.unquoted(match["key"], match.start("key"))
             return {f"note_{name}": self.unquoted(self.text[at:], at)}
@@ -166,6 +175,14 @@ class Line:
         elif key == "adapter_reports":
             value = ",".join(word.strip() for word in value.split(","))
         return {key: value}
+
+    def devices(self, value: str, at: int) -> str:
+        """One device or several with commas between, as a note of the session keeps them."""
+        words = [word.strip() for word in value.split(",")]
+        for word in words:
+            if not is_device(word):
+                self.expected("ADDRESS=PROFILE such as 3=teco-e510, ADDRESS 0 … 255 or * for every station", at)
+        return ",".join(words)
 
     def start(self, value: str, at: int) -> int:
         match = _START.fullmatch(value)
@@ -217,6 +234,11 @@ class Line:
         if rest and not rest[0].isspace():
             self.expected("a space", match.end())
         return LineEvent(time, kind, self.unquoted(rest, match.end()), int(match["count"] or 0))
+
+
+def is_device(word: str) -> bool:
+    """Whether a word is an address and a profile's name, `3=teco-e510`."""
+    return _DEVICE.fullmatch(word) is not None
 
 
 def _unescape(match: re.Match[str]) -> str:

@@ -31,11 +31,10 @@ from sniff.reporting.numbers import (
     seconds_since,
 )
 from sniff.reporting.timeline import Timeline
-from sniff.session import LineEvent, Session
+from sniff.session import DEVICES_NOTE, LineEvent, Session
 
 EVIDENCE_SHOWN, EVIDENCE_OF_NOTES = 5, 2
 HAPPENINGS_SHOWN = 200
-DEVICES_NOTE = "devices"
 GOOD = frozenset((Verdict.ANSWERED, Verdict.BROADCAST, Verdict.DATA, Verdict.OPEN))
 
 
@@ -58,9 +57,11 @@ def collect(source: str, capture: Capture, session: Session, devices: Devices) -
             continue
         judging.add(item)
         summary.add(item)
-        if timeline is None and item.rows:
-            timeline = Timeline(item.rows[0].event.start, session.line.char)
+        if timeline is None and summary.load.first is not None:
+            timeline = Timeline(summary.load.first, session.line.char)
         for row in item.rows:
+            if row.searched is not None:
+                continue
             if timeline is not None:
                 timeline.add_row(row)
             if ring is not None:

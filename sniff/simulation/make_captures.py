@@ -13,7 +13,7 @@ from pathlib import Path
 
 from sniff.formats import create
 from sniff.simulation.faults import BitFlips, Break, DuplicateAddress, EarlyRelease, Fault, LostResponse, NoiseInGaps
-from sniff.simulation.scenarios import scenario, simulate
+from sniff.simulation.scenarios import NS_PER_S, scenario, simulate
 from sniff.simulation.tap import EXACT, FTDI, UART, TapModel
 
 STARTED = 1_772_359_200 * 1_000_000_000
@@ -22,13 +22,17 @@ STARTED = 1_772_359_200 * 1_000_000_000
 
 @dataclass(frozen=True, slots=True)
 class Made:
-    """One capture: which bus, for how long (s), with which faults (None: the scenario's own), through what."""
+    """One capture: which bus, for how long (s), with which faults (None: the scenario's own), through what.
+
+    `skip`: s of the run before it begins.
+    """
 
     scenario: str
     seconds: float
     faults: tuple[Fault, ...] | None = ()
     tap: TapModel = EXACT
     seed: int = 485
+    skip: float = 0
 
 
 NOISY = (NoiseInGaps(0.3), BitFlips(0.002))
@@ -47,6 +51,7 @@ CAPTURES: Mapping[str, Made] = {
     "mstp-clean": Made("mstp", 2),
     "mstp-usual-faults": Made("mstp", 6, None),
     "mstp-noisy-ftdi": Made("mstp", 2, (NoiseInGaps(0.05), BitFlips(0.001), LostResponse(0.02)), FTDI),
+    "mstp-exceptions": Made("mstp", 0.6, skip=10.2),
     "mstp-breaks": Made("mstp", 2, (Break(0.02),), UART),
 }
 
@@ -58,11 +63,13 @@ def make(folder: Path) -> list[Path]:
         plan = scenario(made.scenario, made.seed, faults=made.faults is None)
         if made.faults is not None:
             plan = replace(plan, faults=made.faults)
-        session, items = simulate(plan, made.seconds, made.tap, STARTED)
+        session, items = simulate(plan, made.skip + made.seconds, made.tap, STARTED)
+        begin = STARTED + int(made.skip * NS_PER_S)
         path = folder / f"{name}.cap.txt"
-        with create(path, replace(session, notes={})) as writer:
+        with create(path, replace(session, started=begin, notes={})) as writer:
             for item in items:
-                writer.write(item)
+                if item.time >= begin:
+                    writer.write(item)
         paths.append(path)
     return paths
 

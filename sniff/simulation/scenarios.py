@@ -13,7 +13,7 @@ from itertools import cycle
 
 from dissectors.frame import Place
 from dissectors.line import LineSettings, Timing
-from sniff.session import Item, Session
+from sniff.session import DEVICES_NOTE, Item, Session
 from sniff.simulation.faults import (
     BitFlips,
     Break,
@@ -88,10 +88,15 @@ def simulate(plan: Scenario, seconds: float, tap: TapModel = EXACT, started: int
         protocol=plan.protocol,
         started=started,
         adapter=tap.adapter(plan.line),
-        notes={"scenario": plan.name, "seed": str(plan.seed)},
+        notes={"scenario": plan.name, "seed": str(plan.seed), **_devices_note(plan)},
     )
     items = Tap(plan.line, tap, plan.seed).tap(plan.wire().run(int(seconds * NS_PER_S)))
     return session, (replace(item, time=item.time + started) for item in items) if started else items
+
+
+def _devices_note(plan: Scenario) -> dict[str, str]:
+    said = ",".join(f"{address}={profile}" for address, profile in plan.devices.items())
+    return {DEVICES_NOTE: said} if said else {}
 
 
 def bursts(plan: Scenario, seconds: float) -> Iterator[Burst]:

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from dissectors.findings import Finding
 from dissectors.frame import Frame
-from dissectors.profiles import Devices
 from dissectors.registry import Dissector
 from dissectors.tracker import Transaction
 from sniff.analysis.points import Point, PointReader, PointTable
 from sniff.analysis.summary import Summary
 from sniff.engine import Output, Row
 from sniff.formats import read
+from sniff.profile_files import devices as devices_of
+from sniff.profile_files import noted
 from sniff.reading import Settled, dissector_for, outputs
 from sniff.session import Completeness, LineEvent, Session
 
@@ -24,7 +26,9 @@ class CaptureReading:
     """Everything that this program finds in a capture.
 
     `rows`: frames and noise in the order of the wire, each with its transaction. `transactions`: in the order of
-    closing. `nodes`, `counts`: statistics. `findings`, `points`: as `check` and `points` give them.
+    closing. `nodes`, `counts`: statistics. `findings`, `points`: as `check` and `points` give them. `devices`: profiles
+    by address, as the capture names them (`# device: 3=teco-e510` of a text capture); `unknown_devices`: those among
+    them that are not known here.
     """
 
     path: Path
@@ -37,6 +41,8 @@ class CaptureReading:
     completeness: Completeness
     findings: tuple[Finding, ...] = ()
     points: tuple[Point, ...] = ()
+    devices: Mapping[str, str] = field(default_factory=dict)
+    unknown_devices: tuple[str, ...] = ()
 
     @property
     def frames(self) -> tuple[Row, ...]:
@@ -58,8 +64,10 @@ def read_capture(path: str | Path) -> CaptureReading:
     session = capture.session
     dissector = dissector_for(session)
     counts = Summary(session.line)
-    judge = Judging(session, dissector)
-    reader, points = PointReader(dissector, Devices()), PointTable()
+    known, unknown = noted(session)
+    devices = devices_of(known)
+    judge = Judging(session, dissector, devices)
+    reader, points = PointReader(dissector, devices), PointTable()
     rows: list[Row] = []
     closed: dict[int, Transaction] = {}
     events: list[LineEvent] = []
@@ -84,4 +92,6 @@ def read_capture(path: str | Path) -> CaptureReading:
         completeness=capture.completeness(),
         findings=tuple(judge.findings()),
         points=tuple(points),
+        devices=known,
+        unknown_devices=unknown,
     )

@@ -35,6 +35,10 @@ def _lines(reading: CaptureReading) -> Iterator[str]:
     yield MAGIC
     yield f"# {session.protocol} {session.line}, adapter holds octets up to {session.adapter.latency / 1e6:g} ms"
     yield f"# {counts.frames} frames, {counts.damaged} damaged, {counts.noise} octets of noise"
+    if reading.devices:
+        yield f"# devices: {', '.join(f'{word}={name}' for word, name in reading.devices.items())}"
+    if reading.unknown_devices:
+        yield f"# devices not known here: {', '.join(map(ascii, reading.unknown_devices))}"
     if not reading.completeness.whole:
         yield f"# cut: {reading.completeness.text}"
     yield ""
@@ -68,8 +72,10 @@ def _lines(reading: CaptureReading) -> Iterator[str]:
 def _point(point: Point) -> str:
     value = point.sample.value
     unit = f" {value.unit}" if value.unit else ""
+    means = f": {value.words}" if value.words else ""
     times = "once" if point.count == 1 else f"{point.count} times"
-    return f"{point.sample.station} {point.sample.name} = {value.value}{unit} (quality {int(value.quality)}, {times})"
+    shown = f"{value.value}{unit}{means} (quality {int(value.quality)}, {times})"
+    return f"{point.sample.station} {point.sample.name} = {shown}"
 
 
 def _row(reading: CaptureReading, item: Settled) -> str:

@@ -106,6 +106,33 @@ def _modbus_parties(
     return parties
 
 
+def drives(
+    faults: Sequence[Fault] = (),
+    *,
+    extra: Sequence[bytes] = (),
+    delay: int = 6 * MS,
+    change: dict[int, Change] | None = None,
+    seed: int = 0,
+) -> Scenario:
+    """A master that asks two TECO E510 drives, which are known to be such."""
+    parties = partial(_drives_parties, tuple(extra), delay, change or {})
+    devices = {1: "teco-e510", 2: "teco-e510"}
+    return Scenario("drives", "modbus-rtu", RTU_LINE, parties, tuple(faults), seed, Timing(RTU_LINE).t35, devices)
+
+
+def _drives_parties(extra: tuple[bytes, ...], delay: int, change: dict[int, Change]) -> list[Party]:
+    from dissectors.modbus.simulated_e510 import SimulatedE510
+
+    status, speed, alarm = (0x2520, 4), (0x2524, 1), (0x2528, 1)
+    asked = [read_holding(unit, *block) for unit in (1, 2) for block in (status, speed, alarm)]
+    master = PollingMaster([*extra, *asked], RTU_LINE, interval=0, pause=25 * MS, timeout=200 * MS, retries=1)
+    parties = [Party("master", master, answers=False)]
+    for unit in (1, 2):
+        drive: Station = SimulatedE510(unit, delay=delay)
+        parties.append(Party(f"drive {unit}", change[unit](drive) if unit in change else drive))
+    return parties
+
+
 def n2(
     faults: Sequence[Fault] = (),
     *,
@@ -114,18 +141,30 @@ def n2(
     change: dict[int, Change] | None = None,
     no_such_point: bool = False,
     second_master: bool = False,
+    overrides: bool = False,
+    pause: int = 60 * MS,
+    timeout: int = 250 * MS,
     seed: int = 0,
 ) -> Scenario:
-    """A supervisor that polls and reads two followers."""
-    parties = partial(_n2_parties, absent, delays or {}, change or {}, no_such_point, second_master)
+    """A supervisor that polls and reads two followers. `overrides`: first it overrides two points, and releases one."""
+    parties = partial(
+        _n2_parties, absent, delays or {}, change or {}, no_such_point, second_master, overrides, pause, timeout
+    )
     return Scenario("n2", "n2", N2_LINE, parties, tuple(faults), seed)
 
 
 def _n2_parties(
-    absent: bool, delays: dict[int, int], change: dict[int, Change], no_such_point: bool, second_master: bool
+    absent: bool,
+    delays: dict[int, int],
+    change: dict[int, Change],
+    no_such_point: bool,
+    second_master: bool,
+    overrides: bool,
+    pause: int,
+    timeout: int,
 ) -> list[Party]:
     from dissectors.n2.f510 import POINTS
-    from dissectors.n2.simulated import Follower, Master, reading, readings
+    from dissectors.n2.simulated import Follower, Master, overriding, reading, readings, releasing
 
     monitored = [point for point in POINTS if point.region in (1, 2)][:8]
     jobs = [*readings(1, monitored), *readings(2, monitored)]
@@ -133,9 +172,14 @@ def _n2_parties(
         jobs.insert(5, reading(3, 1, 9))
     if no_such_point:
         jobs.insert(5, reading(1, 1, 200))
-    parties = [Party("supervisor", Master(jobs, line=N2_LINE, delay=60 * MS, timeout=250 * MS), answers=False)]
+    supervisor = Master(jobs, line=N2_LINE, delay=pause, timeout=timeout)
+    if overrides:
+        supervisor.ask(overriding(1, 3, 1, 42.5), overriding(1, 4, 1, 1), releasing(1, 4, 1))
+    parties = [Party("supervisor", supervisor, answers=False)]
     for address, delay in ((1, 10 * MS), (2, 18 * MS)):
-        follower: Station = Follower(address, points=monitored, delay=delays.get(address, delay))
+        follower: Station = Follower(
+            address, points=POINTS if overrides else monitored, delay=delays.get(address, delay)
+        )
         if address in change:
             follower = change[address](follower)
         parties.append(Party(f"drive {address}", follower))
@@ -148,32 +192,62 @@ def _n2_parties(
 def mstp(
     faults: Sequence[Fault] = (),
     *,
+    present: Sequence[int] = (1, 2, 5, 9),
     node_faults: dict[int, dict[str, object]] | None = None,
+    change: dict[int, Change] | None = None,
     twin_of: int | None = None,
+    polls_every: int = 50,
+    requests: int = 1,
     seed: int = 0,
 ) -> Scenario:
-    """A ring of four masters: a controller that asks, a logger, two drives. `node_faults`: as `simulated.Faults`."""
-    return Scenario("mstp", "mstp", MSTP_LINE, partial(_mstp_parties, node_faults or {}, twin_of), tuple(faults), seed)
+    """A ring of four masters: a controller that asks, a logger, two drives; those `present` of them.
+
+    `node_faults`: as `simulated.Faults`. `twin_of`: a second drive with this address. `polls_every`: tokens from poll
+    to poll. `requests`: what controller and logger ask with each token, once a second unless there are several.
+    """
+    parties = partial(
+        _mstp_parties, tuple(present), node_faults or {}, change or {}, twin_of, polls_every, max(1, requests)
+    )
+    return Scenario("mstp", "mstp", MSTP_LINE, parties, tuple(faults), seed)
 
 
-def _mstp_parties(node_faults: dict[int, dict[str, object]], twin_of: int | None) -> list[Party]:
+def _mstp_parties(
+    present: tuple[int, ...],
+    node_faults: dict[int, dict[str, object]],
+    change: dict[int, Change],
+    twin_of: int | None,
+    polls_every: int,
+    requests: int,
+) -> list[Party]:
+    from dissectors.bacnet.application import Application
     from dissectors.bacnet.f510 import f510
     from dissectors.bacnet.simulated import Faults, Node, Poller
+    from tests.faults.ring_nodes import Greedy
 
     timing = Timing(MSTP_LINE)
-
-    def faults(mac: int) -> Faults:
-        return Faults(**node_faults.get(mac, {}))  # type: ignore[arg-type]
-
     readings = [(mac, f"analog-input,{number}", "present-value") for number in (4, 5) for mac in (5, 9)]
-    logger = Poller([(5, "analog-output,0", "present-value"), (9, "analog-output,0", "present-value")])
-    nodes = [
-        Node(1, timing, Poller(readings), max_master=31, max_info_frames=2, faults=faults(1)),
-        Node(2, timing, logger, max_master=31, faults=faults(2)),
-        Node(5, timing, f510(5), max_master=31, faults=faults(5)),
-        Node(9, timing, f510(9, name="fan"), max_master=31, faults=faults(9)),
-    ]
-    parties = [Party(f"mac {node.mac}", node, answers=False) for node in nodes]
+    logged = [(mac, "analog-output,0", "present-value") for mac in (5, 9)]
+    applications: dict[int, Application] = {
+        1: Poller(readings) if requests == 1 else Greedy(readings, requests),
+        2: Poller(logged) if requests == 1 else Greedy(logged, requests),
+        5: f510(5),
+        9: f510(9, name="fan"),
+    }
+    parties = []
+    for mac in present:
+        frames = max(requests, 2 if mac == 1 else 1)
+        faults = Faults(**node_faults.get(mac, {}))  # type: ignore[arg-type]
+        node: Station = Node(
+            mac,
+            timing,
+            applications[mac],
+            max_master=31,
+            max_info_frames=frames,
+            polls_every=polls_every,
+            faults=faults,
+        )
+        parties.append(Party(f"mac {mac}", change[mac](node) if mac in change else node, answers=False))
     if twin_of is not None:
-        parties.append(Party("twin", Node(twin_of, timing, f510(twin_of), max_master=31), answers=False))
+        twin = Node(twin_of, timing, f510(777), max_master=31, faults=Faults(use_delay=4 * MS))
+        parties.append(Party("twin", twin, answers=False))
     return parties

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
 from random import Random
 
 from dissectors.frame import Chunk, LineError, Mark, Place
 from dissectors.line import LineSettings
 from dissectors.modbus.simulated_master import read_holding, write_register
-from sniff.session import Item, LineEvent, LineEventKind, Session
+from sniff.session import Item, LineEvent, LineEventKind
 from sniff.simulation.faults import (
     BitFlips,
     Break,
@@ -26,38 +26,23 @@ from sniff.simulation.line_mix import low_times, receive
 from sniff.simulation.scenarios import Scenario, simulate
 from sniff.simulation.tap import CH340, EXACT, FTDI, FTDI_LOW_LATENCY, OCTETS, UART, TapModel
 from tests.faults.buses import modbus, mstp, n2
-from tests.faults.stations import AnswersAs, AnswersBroadcasts, Dies, Drifts, Ignores, Of, Pauses
+from tests.faults.case import Case, Heard
+from tests.faults.drive_cases import DRIVE_CASES
+from tests.faults.ring_cases import RING_CASES
+from tests.faults.stations import (
+    AnswersAs,
+    AnswersBroadcasts,
+    Dies,
+    Drifts,
+    Ignores,
+    Of,
+    Pauses,
+    Resets,
+)
 from tests.faults.uneven_stations import TakesTurns, Waits
 
 MS = 1_000_000
 S = 1_000_000_000
-
-Heard = tuple[Session, Iterable[Item]]
-
-
-@dataclass(frozen=True, slots=True)
-class Case:
-    """One fault. `make(seed=…)`: the bus. `expect`: code and subject that must be found, all of them.
-
-    `struck`: further subjects that may be named; `also`: further codes that may be errors.
-    `never`: codes that must not be found, not even as a note.
-    `hear`: what the sniffer gets of the bus, `simulate` unless the fault is in the sniffer itself.
-    """
-
-    name: str
-    make: Callable[..., Scenario]
-    expect: tuple[tuple[str, str], ...]
-    tap: TapModel = EXACT
-    seconds: float = 60
-    hear: Callable[[Scenario, float, TapModel], Heard] = simulate
-    struck: tuple[str, ...] = ()
-    also: tuple[str, ...] = ()
-    never: tuple[str, ...] = ()
-
-    @property
-    def about(self) -> frozenset[str]:
-        """Subjects that may be named at warning or above: those struck, and what they share."""
-        return frozenset(("bus", "master", "adapter", *self.struck, *(subject for _, subject in self.expect)))
 
 
 def clean_cases(seconds: float) -> Iterator[Case]:
@@ -166,6 +151,36 @@ def _echoing(plan: Scenario, seconds: float, tap: TapModel) -> Heard:
                 yield Chunk(burst.end + len(burst.octets) * plan.line.char + 200_000, burst.octets)
 
     return session, items()
+
+
+def _stepping(plan: Scenario, seconds: float, tap: TapModel) -> Heard:
+    """A computer whose wall clock is put right by two minutes after a while."""
+    session, items = simulate(plan, seconds, tap)
+
+    def stepped() -> Iterator[Item]:
+        waiting = True
+        for item in items:
+            if waiting and item.time > S // 2:
+                yield LineEvent(item.time, LineEventKind.CLOCK, "", 120 * S)
+                waiting = False
+            yield item
+
+    return session, stepped()
+
+
+def _counting(plan: Scenario, seconds: float, tap: TapModel) -> Heard:
+    """A driver that counts line errors and does not say where they were."""
+    session, items = simulate(plan, seconds, tap)
+
+    def counted() -> Iterator[Item]:
+        for item in items:
+            if isinstance(item, Chunk) and item.marks:
+                yield Chunk(item.time, item.octets)
+                yield LineEvent(item.time, LineEventKind.ERRORS, "parity", len(item.marks))
+            else:
+                yield item
+
+    return session, counted()
 
 
 def _silent(plan: Scenario, seconds: float, tap: TapModel) -> Heard:
@@ -279,6 +294,8 @@ CASES: tuple[Case, ...] = (
     Case("octets lost in the adapter", modbus, (("LN104", "adapter"),), hear=_overrunning),
     Case("adapter unplugged", modbus, (("LN006", "adapter"),), replace(EXACT, unplugged=((20 * S, 22 * S),))),
     Case("silent bus", modbus, (("LN002", "bus"),), hear=_silent),
+    Case("clock stepped", modbus, (("LN007", "adapter"),), hear=_stepping),
+    Case("line errors counted", partial(modbus, (MarkParity(0.01),)), (("LN102", "bus"),), hear=_counting),
     # through a USB adapter that holds octets back for 16 ms
     Case("FTDI station absent", partial(modbus, absent=(4,)), (("MB001", "station 4"),), FTDI),
     Case("FTDI answers lost", partial(modbus, (LostResponse(0.08, ("unit 2",)),)), (("MB002", "station 2"),), FTDI),
@@ -316,16 +333,13 @@ CASES: tuple[Case, ...] = (
         struck=("station 1", "station 2"),
         also=("N2008",),
     ),
-    # BACnet MS/TP
-    Case("MS/TP lost token", partial(mstp, node_faults={9: {"loses_token_every": 400}}), (("MS101", "MAC 9"),)),
-    Case("MS/TP slow to use the token", partial(mstp, node_faults={5: {"use_delay": 18 * MS}}), (("MS103", "MAC 5"),)),
-    Case("MS/TP silent drive", partial(mstp, node_faults={9: {"silent": True}}), (("MS301", "MAC 9"),)),
+    Case("N2 station resets", partial(n2, change={2: partial(Resets, at=2 * S)}), (("N2001", "station 2"),)),
     Case(
-        "MS/TP damaged frames of one",
-        partial(mstp, node_faults={5: {"damages_every": 40}}),
-        (("MS401", "bus"),),
-        struck=("MAC 5",),
+        "N2 slow station", partial(n2, delays={2: 300 * MS}, pause=20 * MS, timeout=800 * MS), (("N2003", "station 2"),)
     ),
-    Case("MS/TP bit errors everywhere", partial(mstp, (BitFlips(3e-4),)), (("MS401", "bus"),)),
-    Case("MS/TP postponed replies", partial(mstp, node_faults={9: {"postpones": True}}), (("MS303", "MAC 9"),)),
+    Case("N2 override forgotten", partial(n2, overrides=True, pause=20 * S), (("N2006", "station 1"),), seconds=700),
+    Case("N2 late answers", partial(n2, (LateResponse(0.06, 270 * MS, ("drive 1",)),)), (("N2011", "station 1"),)),
+    # device profiles, BACnet MS/TP
+    *DRIVE_CASES,
+    *RING_CASES,
 )

@@ -1,13 +1,15 @@
 """Makes `captures/findings`: for each case of the matrix the shortest run that shows its findings.
 
 python -m tests.faults.make_captures captures/findings && pytest --sniff-update captures
+
+Further words choose cases by name. The same code gives the same files.
 """
 
 from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,18 +17,19 @@ from dissectors.findings import Finding
 from sniff.analysis.judging import Judging
 from sniff.engine import Output
 from sniff.formats import create
+from sniff.profile_files import noted_devices
 from sniff.reading import dissector_for, outputs
-from sniff.session import Item, Session
+from sniff.session import DEVICES_NOTE, Item, Session
 from tests.faults.cases import CASES, Case
 
-SECONDS = (1, 2, 3, 5, 8, 12, 20, 30, 45, 60)
+SECONDS = (1, 2, 3, 5, 8, 12, 20, 30, 45, 60, 120, 300, 660)
 STARTED = 1_772_359_200 * 1_000_000_000
 LARGEST = 150_000
 """Octets of a capture file: a larger one is left to the matrix."""
 
 
 def findings_of(items: Iterable[Item], session: Session) -> tuple[Finding, ...]:
-    judging = Judging(session, dissector_for(session))
+    judging = Judging(session, dissector_for(session), noted_devices(session))
     for item in outputs(items, session):
         if isinstance(item, Output):
             judging.add(item)
@@ -39,9 +42,7 @@ def shortest(case: Case) -> tuple[Session, list[Item]] | None:
     """The session and the items of the shortest stretch from the start that shows all that is expected."""
     session, heard = case.hear(case.make(seed=1), case.seconds, case.tap)
     everything = list(heard)
-    if not everything:
-        return None
-    first = everything[0].time
+    first = everything[0].time if everything else 0
     for seconds in SECONDS:
         limit = first + seconds * 1_000_000_000
         items = [item for item in everything if item.time <= limit]
@@ -51,25 +52,32 @@ def shortest(case: Case) -> tuple[Session, list[Item]] | None:
     return None
 
 
-def make(folder: Path) -> None:
+def file_name(case: Case) -> str:
+    """Name of the capture of a case."""
+    return re.sub(r"[^a-z0-9]+", "-", case.name.lower()).strip("-") + ".cap.txt"
+
+
+def make(folder: Path, words: Sequence[str] = ()) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for case in CASES:
+        if words and not any(word.lower() in case.name.lower() for word in words):
+            continue
         found = shortest(case)
-        name = re.sub(r"[^a-z0-9]+", "-", case.name.lower()).strip("-")
+        path = folder / file_name(case)
         if found is None:
-            print(f"{name}: not shown within {SECONDS[-1]} s")
+            print(f"{path.name}: not shown within {SECONDS[-1]} s")
             continue
         session, items = found
-        path = folder / f"{name}.cap.txt"
         shift = STARTED - session.started
-        with create(path, replace(session, started=STARTED, notes={})) as writer:
+        devices = {key: value for key, value in session.notes.items() if key == DEVICES_NOTE}
+        with create(path, replace(session, started=STARTED, notes=devices)) as writer:
             for item in items:
                 writer.write(replace(item, time=item.time + shift))
         size = path.stat().st_size
         if size > LARGEST:
             path.unlink()
-        print(f"{name}: {size} octets{' (too large, left out)' if size > LARGEST else ''}", flush=True)
+        print(f"{path.name}: {size} octets{' (too large, left out)' if size > LARGEST else ''}", flush=True)
 
 
 if __name__ == "__main__":
-    make(Path(sys.argv[1]))
+    make(Path(sys.argv[1]), sys.argv[2:])

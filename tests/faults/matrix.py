@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from dissectors.findings import Finding, Severity
 from sniff.analysis.judging import Judging
 from sniff.engine import Output
+from sniff.profile_files import noted_devices
 from sniff.reading import dissector_for, outputs
 from tests.faults.cases import CASES, Case, clean_cases, unsteady_cases
 
@@ -34,7 +35,7 @@ def run(case: Case, seed: int = 1) -> Outcome:
     """Simulate, listen, judge."""
     plan = case.make(seed=seed)
     session, items = case.hear(plan, case.seconds, case.tap)
-    judging = Judging(session, dissector_for(session))
+    judging = Judging(session, dissector_for(session), noted_devices(session))
     for item in outputs(items, session):
         if isinstance(item, Output):
             judging.add(item)

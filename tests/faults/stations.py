@@ -8,6 +8,8 @@ from typing import ClassVar
 
 from dissectors.line import LineSettings
 from dissectors.modbus.adu import seal_ascii, seal_rtu, unseal
+from dissectors.modbus.simulated import Bank, ModbusServer
+from dissectors.n2.simulated import Follower
 from dissectors.simulated import Send, Station
 from sniff.simulation.faults import Fault, Transmission
 
@@ -54,6 +56,39 @@ class Drifts(Wrapped):
     def change(self, now: int, octets: bytes, sends: tuple[Send, ...]) -> tuple[Send, ...]:
         more = now * self.per_second // 1_000_000_000
         return tuple(replace(send, at=send.at + more) for send in sends)
+
+
+class Resets(Wrapped):
+    """An N2 follower that loses power for a moment at a time."""
+
+    def __init__(self, inner: Follower, at: int) -> None:
+        super().__init__(inner)
+        self.follower, self.at, self.done = inner, at, False
+
+    def hear(self, now: int, octets: bytes, quiet: bool) -> tuple[Send, ...]:
+        if now >= self.at and not self.done:
+            self.follower.reset()
+            self.done = True
+        return super().hear(now, octets, quiet)
+
+
+class Shows(ModbusServer):
+    """A server whose holding registers are those of another one, but for some that show what they are told."""
+
+    def __init__(self, inner: ModbusServer, values: dict[int, int]) -> None:
+        super().__init__(inner.unit, _Shown(inner.holding, values), delay=inner.delay, functions=inner.functions)
+
+
+@dataclass(frozen=True, slots=True)
+class _Shown:
+    bank: Bank
+    values: dict[int, int]
+
+    def read(self, address: int) -> int:
+        return self.values[address] if address in self.values else self.bank.read(address)
+
+    def write(self, address: int, value: int) -> None:
+        self.bank.write(address, value)
 
 
 class Ignores(Wrapped):
@@ -115,6 +150,21 @@ class Of:
 
     def strike(self, sent: Transmission, now: int, line: LineSettings, dice: Random) -> tuple[Transmission, ...]:
         return self.fault.strike(sent, now, line, dice) if sent.party == self.party else (sent,)
+
+
+@dataclass(frozen=True, slots=True)
+class OfLong:
+    """A fault that strikes only what is longer than `over` octets."""
+
+    over: int
+    fault: Fault
+
+    @property
+    def name(self) -> str:
+        return self.fault.name
+
+    def strike(self, sent: Transmission, now: int, line: LineSettings, dice: Random) -> tuple[Transmission, ...]:
+        return self.fault.strike(sent, now, line, dice) if len(sent.octets) > self.over else (sent,)
 
 
 @dataclass(frozen=True, slots=True)

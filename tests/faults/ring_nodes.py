@@ -1,0 +1,81 @@
+"""Nodes of an MS/TP ring that misbehave in ways `simulated.Faults` has no value for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+from dissectors.bacnet.application import Outgoing, Poller
+from dissectors.bacnet.frame_types import FrameType
+from dissectors.bacnet.simulated import Faults, Node
+from dissectors.line import LineSettings
+from dissectors.simulated import Send
+from tests.faults.stations import Wrapped
+
+
+class Greedy(Poller):
+    """Asks `count` things with each token."""
+
+    def __init__(self, targets: Iterable[tuple[int, str, str]], count: int) -> None:
+        super().__init__(targets, every=0)
+        self.count = count
+
+    def on_token(self, now: int) -> Iterable[Outgoing]:
+        return tuple(asked for _ in range(self.count) for asked in super(Greedy, self).on_token(now))
+
+
+class FailsFor(Wrapped):
+    """A node with other faults from `at` on, and without any from `until` on."""
+
+    def __init__(self, inner: Node, at: int, until: int | None, faults: Faults) -> None:
+        super().__init__(inner)
+        self.node, self.at, self.until, self.faults = inner, at, until, faults
+
+    def hear(self, now: int, octets: bytes, quiet: bool) -> tuple[Send, ...]:
+        self._set(now)
+        return self.inner.hear(now, octets, quiet)
+
+    def wake(self, now: int) -> tuple[Send, ...]:
+        self._set(now)
+        return self.inner.wake(now)
+
+    def _set(self, now: int) -> None:
+        failing = now >= self.at and (self.until is None or now < self.until)
+        self.node.faults = self.faults if failing else Faults()
+
+
+class SlowToBeFound(Wrapped):
+    """Answers a Poll For Master `by` ns later than it wants."""
+
+    def __init__(self, inner: Node, by: int) -> None:
+        super().__init__(inner)
+        self.by = by
+
+    def change(self, now: int, octets: bytes, sends: tuple[Send, ...]) -> tuple[Send, ...]:
+        return tuple(
+            replace(send, at=send.at + self.by) if send.octets[2] == FrameType.REPLY_TO_POLL_FOR_MASTER else send
+            for send in sends
+        )
+
+
+class AlsoSends(Wrapped):
+    """Sends `extra` too, before each n-th token or poll: an error of its program."""
+
+    def __init__(self, inner: Node, line: LineSettings, every: int, extra: bytes) -> None:
+        super().__init__(inner)
+        self.every, self.extra, self.counted = every, extra, 0
+        self.more = (len(extra) + 6) * line.char  # with a pause behind it
+
+    def wake(self, now: int) -> tuple[Send, ...]:
+        return self.change(now, b"", self.inner.wake(now))
+
+    def change(self, now: int, octets: bytes, sends: tuple[Send, ...]) -> tuple[Send, ...]:
+        sent: list[Send] = []
+        for send in sends:
+            if send.octets[2] in (FrameType.TOKEN, FrameType.POLL_FOR_MASTER):
+                self.counted += 1
+                if self.counted % self.every == 0:
+                    sent += (Send(send.at, self.extra), replace(send, at=send.at + self.more))
+                    continue
+            sent.append(send)
+        return tuple(sent)
