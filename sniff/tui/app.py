@@ -85,13 +85,26 @@ class SnifferApp(App[None]):
         if not self.screen_stack:  # the app is ending
             return
         changed = self.feed.poll()
-        self.status = self.feed.status()
+        was_searching, self.status = self.status.searching, self.feed.status()
+        if was_searching and not self.status.searching:
+            self._take_what_was_found()
         if self.status.ended and not self._told_end:
             self._told_end = True
             self.notify(plain(self.status.ended), title="the capture has ended", severity="warning", markup=False)
         if changed:
             self.draw_screen()
         self._draw_header()
+
+    def _take_what_was_found(self) -> None:
+        """A search for settings has ended: say so, and read the filter with what was found."""
+        if self.status.ended:
+            return
+        said = plain(f"found: {self.status.protocol}, {self.status.line}")
+        self.notify(said, title="the search has ended", markup=False)
+        try:
+            self.viewing.set_filter(self.viewing.filter)
+        except FilterError:  # it names fields of another protocol
+            self.viewing.set_filter("")
 
     def draw_screen(self) -> None:
         """Bring the shown screen up to date."""
@@ -151,8 +164,9 @@ class SnifferApp(App[None]):
         self.draw_screen()
 
     def action_follow(self) -> None:
-        """Follow the newest row or stay."""
-        self.viewing.follow = not self.viewing.follow
+        """Follow the newest row or stay; a frozen view goes on and follows."""
+        self.viewing.follow = self.viewing.frozen or not self.viewing.follow
+        self.viewing.freeze(False)
         self.draw_screen()
 
     def action_time(self) -> None:

@@ -17,6 +17,7 @@ class FeedStatus:
     read. `dropped`: octets or rows that were lost on the way here. `live`: whether rows still come from a port.
     `ended`: why nothing more comes ("unplugged", "file ends inside a record"), empty while all is well.
     `priority`: what the system allowed the capture process, in words ("real-time", "normal"), empty when unknown.
+    `searching`: with which settings a search listens at the moment, empty when there is none.
     """
 
     port: str
@@ -28,6 +29,7 @@ class FeedStatus:
     live: bool = False
     ended: str = ""
     priority: str = ""
+    searching: str = ""
 
 
 class Feed(Protocol):

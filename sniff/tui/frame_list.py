@@ -4,13 +4,10 @@ from __future__ import annotations
 
 from dissectors.frame import Event, Found, Frame, LineError
 from sniff.engine import Row
-from sniff.store import Store
-from sniff.tui.columns import Cell, Column, lay_out
-from sniff.tui.linelist import LineList
+from sniff.tui.columns import Cell, Column
 from sniff.tui.plain import plain
-from sniff.tui.times import TimeMode, clock, seconds
-from sniff.tui.verdicts import latency_cell, latency_width, verdict_cell
-from sniff.tui.viewing import Viewing
+from sniff.tui.store_list import StoreList
+from sniff.tui.verdicts import latency_cell, verdict_cell
 
 COLUMNS = (
     Column("no", "no", 6, right=True),
@@ -23,9 +20,6 @@ COLUMNS = (
     Column("len", "len", 4, right=True, needs=98),
     Column("flags", "flag", 4),
 )
-WIDE = 110
-"""From this width on the verdict is written in full."""
-
 FOUND_LETTERS = {Found.SPLIT: "s", Found.JOINED: "j"}
 
 
@@ -51,22 +45,10 @@ def flags(event: Event) -> str:
     return ("" if event.ok else "!") + "".join(letters) + ("n" if event.skipped else "") + found
 
 
-class FrameList(LineList):
+class FrameList(StoreList):
     """Rows of the store by number."""
 
-    def __init__(self, store: Store, viewing: Viewing, *, id: str | None = None) -> None:
-        super().__init__(viewing, id=id)
-        self.store = store
-
-    def lay_out_columns(self, width: int) -> list[Column]:
-        """Addresses and length give way first; the text takes what is left."""
-        return lay_out(
-            COLUMNS,
-            width,
-            no=max(4, len(str(self.index.last))),
-            verdict=15 if width >= WIDE else 9,
-            latency=max(10, latency_width(self.store.session.adapter.latency)),
-        )
+    COLUMNS = COLUMNS
 
     def row_of(self, number: int) -> int | None:
         """The row itself."""
@@ -97,7 +79,6 @@ class FrameList(LineList):
             return {"no": Cell(str(number), "dim"), "text": Cell("no longer in memory", "dim")}
         event = row.event
         transaction = self.store.transaction(row)
-        verdict_width = next(column.width for column in self.columns if column.name == "verdict")
         style = "doubt" if not isinstance(event, Frame) else "" if event.ok else "bad"
         source, destination = self._addresses(row)
         answers = transaction is not None and (transaction.response in (number, None))
@@ -107,22 +88,15 @@ class FrameList(LineList):
             "src": Cell("" if source is None else str(source)),
             "dst": Cell("" if destination is None else str(destination)),
             "text": Cell(plain(self.store.text(row)), style),
-            "verdict": verdict_cell(transaction, verdict_width),
+            "verdict": verdict_cell(transaction, self.width_of("verdict")),
             "latency": latency_cell(transaction.latency if transaction is not None and answers else None),
             "len": Cell(str(len(event.octets)), "dim"),
             "flags": Cell(flags(event), style or "dim"),
         }
 
     def _time(self, row: Row, line: int) -> str:
-        start = row.event.start
-        mode = self.viewing.time_mode
-        if mode is TimeMode.ABSOLUTE:
-            return clock(start)
-        if mode is TimeMode.RELATIVE:
-            first = self.store.load.first
-            return seconds(start - (start if first is None else first), 6 if start - (first or 0) < 10**14 else 3)
         before = self.store.by_no(self.index[line - 1]) if line else None
-        return seconds(0 if before is None else start - before.event.start)
+        return self.time_text(row.event.start, None if before is None else before.event.start)
 
     @staticmethod
     def _addresses(row: Row) -> tuple[int | None, int | None]:

@@ -29,8 +29,8 @@ def status_line(status: FeedStatus, store: Store, viewing: Viewing, width: int) 
     """Pieces of text with a style name each, together at most `width` cells: the port gives way first."""
     state = record_state(status)
     pieces = [
-        (plain(status.line), ""),
-        (plain(status.protocol), ""),
+        *([(f"searching {plain(status.searching)} …", "doubt")] if status.searching else []),
+        *([] if status.searching else [(plain(status.line), ""), (plain(status.protocol), "")]),
         (f"load {store.load.share():.0%}", ""),
         (f"err {store.error_total}", "bad" if store.error_total else ""),
         (state, {"REC": "bad", "NOT REC": "doubt", "ENDED": "doubt"}.get(state, "")),

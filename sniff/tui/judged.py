@@ -13,6 +13,7 @@ class Judged:
 
     def __init__(self, store: Store) -> None:
         self.store = store
+        self._session = store.session
         self.judging = Judging(store.session, store.dissector)
         self._row = 0  # number of the last row taken
         self._closed = 0  # number of the last closed transaction taken
@@ -24,7 +25,12 @@ class Judged:
 
     def step(self, count: int, last: int) -> None:
         """Take some rows, at most up to number `last`, and what closed with them."""
-        store, judging = self.store, self.judging
+        store = self.store
+        if store.session is not self._session:  # its settings were found: nothing was judged before
+            self._session = store.session
+            self.judging = Judging(store.session, store.dissector)
+            self._events = 0
+        judging = self.judging
         self._row = max(self._row, store.first_no - 1)
         end = min(last, self._row + count)
         while self._row < end:

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from dissectors.tracker import Transaction, Verdict
-from sniff.store import BAD_VERDICTS, Store
-from sniff.tui.columns import Cell, Column, lay_out
-from sniff.tui.linelist import LineList
+from sniff.store import BAD_VERDICTS
+from sniff.tui.columns import Cell, Column
 from sniff.tui.plain import plain
-from sniff.tui.times import TimeMode, clock, seconds
-from sniff.tui.verdicts import latency_cell, latency_width, verdict_cell
-from sniff.tui.viewing import Viewing
+from sniff.tui.store_list import StoreList
+from sniff.tui.verdicts import latency_cell, verdict_cell
 
 COLUMNS = (
     Column("tx", "tx", 6, right=True),
@@ -22,25 +20,12 @@ COLUMNS = (
     Column("request", "request", 8, right=True, needs=128),
     Column("response", "response", 8, right=True, needs=128),
 )
-WIDE = 110
 
 
-class TransactionList(LineList):
+class TransactionList(StoreList):
     """Closed transactions by the number of their closing."""
 
-    def __init__(self, store: Store, viewing: Viewing, *, id: str | None = None) -> None:
-        super().__init__(viewing, id=id)
-        self.store = store
-
-    def lay_out_columns(self, width: int) -> list[Column]:
-        """Frame numbers give way first; the kind takes what is left."""
-        return lay_out(
-            COLUMNS,
-            width,
-            tx=max(4, len(str(self.index.last))),
-            verdict=15 if width >= WIDE else 9,
-            latency=max(10, latency_width(self.store.session.adapter.latency)),
-        )
+    COLUMNS = COLUMNS
 
     def row_of(self, number: int) -> int | None:
         """Its request, or its response where no request was seen."""
@@ -62,13 +47,12 @@ class TransactionList(LineList):
         transaction = self.store.closed_by_no(number)
         if transaction is None:
             return {"kind": Cell("no longer in memory", "dim")}
-        width = next(column.width for column in self.columns if column.name == "verdict")
         return {
             "tx": Cell(str(transaction.id), "dim"),
             "time": Cell(self._time(transaction, line)),
             "station": Cell("" if transaction.station is None else str(transaction.station)),
             "kind": Cell(self._what(transaction)),
-            "verdict": verdict_cell(transaction, width, attempts=False),
+            "verdict": verdict_cell(transaction, self.width_of("verdict"), attempts=False),
             "latency": latency_cell(transaction.latency),
             "attempt": Cell(str(transaction.attempt), "doubt" if transaction.attempt > 1 else "dim"),
             "request": Cell("–" if transaction.request is None else str(transaction.request), "dim"),
@@ -87,14 +71,8 @@ class TransactionList(LineList):
         return " · ".join(parts)
 
     def _time(self, transaction: Transaction, line: int) -> str:
-        start = transaction.start
-        if self.viewing.time_mode is TimeMode.ABSOLUTE:
-            return clock(start)
-        if self.viewing.time_mode is TimeMode.RELATIVE:
-            first = self.store.load.first
-            return seconds(start - (start if first is None else first))
         before = self.store.closed_by_no(self.index[line - 1]) if line else None
-        return seconds(0 if before is None else start - before.start)
+        return self.time_text(transaction.start, None if before is None else before.start)
 
     def empty_text(self) -> str:
         """Why nothing is shown."""

@@ -64,7 +64,6 @@ class FindingsScreen(ViewScreen):
         for name in COLUMNS:
             table.add_column(Text("" if name == "severity" else name), key=name)
         table.cell_padding = 1
-        self._titles = {code: rule.title for code, rule in rules_over(self.store.dissector).items()}
 
     # -- keeping up --------------------------------------------------------------------------------------------
 
@@ -103,6 +102,7 @@ class FindingsScreen(ViewScreen):
         if judged is None:
             return
         self._looked = time.monotonic()
+        self._titles = {code: rule.title for code, rule in rules_over(self.store.dissector).items()}
         if self.viewing.last_row >= self.store.last_no:
             judged.step(0, self.viewing.last_row)  # what closed since
         found = [f for f in judged.findings() if self._all or f.severity >= Severity.WARNING]
