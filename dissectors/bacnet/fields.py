@@ -18,9 +18,11 @@ from dissectors.bacnet.tags import Tag
 from dissectors.bacnet.values import (
     BitString,
     Date,
+    Double,
     Enumerated,
     ObjectId,
     Record,
+    Signed,
     Time,
     escape,
 )
@@ -85,10 +87,19 @@ def _network(npdu: Npdu, message: Message, found: dict[str, list[Value]]) -> Non
         payload = message.data[npdu.body :]
         if npdu.message == 0x03 and payload:
             _add(found, "bacnet.rejectreason", payload[0])
-        if npdu.message == 0x02 and len(payload) >= 3:
-            _add(found, "bacnet.perf", payload[2])
+        third = _THIRD_OCTET.get(npdu.message)
+        if third is not None and len(payload) >= 3:
+            _add(found, third, payload[2])
         for number in npdus.networks(npdu, message.data):
-            _add(found, "bacnet.netno" if npdu.message == 0x13 else "bacnet.dnet", number)
+            _add(found, "bacnet.dnet", number)
+        for _, port, info in npdus.routes(payload) if npdu.message in (0x06, 0x07) else ():
+            _add(found, "bacnet.portid", port)
+            _add(found, "bacnet.pinfolen", len(info))
+            _add(found, "bacnet.pinfo", info.hex())
+
+
+_THIRD_OCTET = {0x02: "bacnet.perf", 0x08: "bacnet.term_time_value", 0x13: "bacnet.netno_status"}
+"""What follows the network number, by message."""
 
 
 def _address(end: str, net: int | None, address: bytes | None, found: dict[str, list[Value]]) -> None:
@@ -101,7 +112,7 @@ def _address(end: str, net: int | None, address: bytes | None, found: dict[str, 
     elif len(address) == 6:
         _add(found, f"bacnet.{end}adr_eth", address.hex(":"))
     elif address:
-        _add(found, f"bacnet.{end}adr_tmp", address.hex(":"))
+        _add(found, f"bacnet.{end}adr_tmp", address.hex())
 
 
 def _application(apdu: Apdu, parameters: bytes, found: dict[str, list[Value]]) -> None:
@@ -143,7 +154,16 @@ _NAMED: dict[str, str] = {
     "device-instance-range-low-limit": "bacapp.who_is.low_limit",
     "device-instance-range-high-limit": "bacapp.who_is.high_limit",
     "object-name": "bacapp.object_name",
+    "process-identifier": "bacapp.processId",
+    "subscriber-process-identifier": "bacapp.processId",
+    "acknowledging-process-identifier": "bacapp.processId",
+    "requesting-process-identifier": "bacapp.processId",
+    "from-state": "bacapp.from_state",
+    "to-state": "bacapp.to_state",
 }
+_PROPERTY_VALUES = {"property-value", "value", "read-result", "list-of-elements", "item-data"}
+"""Parameters that hold what the property spoken of holds."""
+
 _PRESENT_VALUE = 85
 _VENDOR_IDENTIFIER = 120
 _OBJECT_NAME = 77
@@ -157,9 +177,9 @@ def _parameters(record: Record, about: int | None, found: dict[str, list[Value]]
         if isinstance(value, Enumerated) and value.enumeration == "PropertyIdentifier":
             about = value.value
         named = _NAMED.get(name)
-        if named is not None and isinstance(value, (int, str)):
+        if named is not None and isinstance(value, (int, str, Enumerated)):
             _add(found, named, escape(value) if isinstance(value, str) else int(value))
-        elif name in ("property-value", "value", "read-result"):
+        elif name in _PROPERTY_VALUES:
             _held(value, about, found, depth + 1)
         else:
             _value(value, about, found, depth + 1)
@@ -186,6 +206,9 @@ _ENUMERATED: dict[str, str] = {
     "PropertyIdentifier": "bacapp.property_identifier",
     "ErrorClass": "bacapp.error_class",
     "ErrorCode": "bacapp.error_code",
+    "EventType": "bacapp.event_type",
+    "NotifyType": "bacapp.notify_type",
+    "RestartReason": "bacapp.restart_reason",
 }
 
 
@@ -204,19 +227,19 @@ def _held(value: Any, about: int | None, found: dict[str, list[Value]], depth: i
 
 def _kind(value: Any) -> tuple[str, Value] | None:
     if value is None:
-        return "null", ""
+        return "null", "NULL"
     if isinstance(value, bool):
         return "boolean", int(value)
     if isinstance(value, int):
-        return "uint", int(value)
+        return "int" if isinstance(value, Signed) else "uint", int(value)
     if isinstance(value, float):
-        return "real", float(value)
+        return "double" if isinstance(value, Double) else "real", float(value)
     if isinstance(value, bytes):
         return "octet_string", value.hex()
     if isinstance(value, str):
         return "char_string", escape(value)
     if isinstance(value, BitString):
-        return "bit_string", str(BitString(value.bits))
+        return "bit_string", "".join("T" if bit else "F" for bit in value.bits)
     if isinstance(value, Enumerated):
         return "enum_index", value.value
     if isinstance(value, (Date, Time)):

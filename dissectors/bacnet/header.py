@@ -170,6 +170,8 @@ def error_text(data: bytes, at: int) -> str:
     """Class and code of an Error-PDU whose parameters begin at `at`: "object unknown-object"."""
     if at < len(data) and data[at] == 0x0E:
         at += 1
+    elif at < len(data) and data[at] == 0x1E:  # SubscribeCOVPropertyMultiple names what failed instead
+        return "one subscription failed"
     words = []
     for enumeration in ("ErrorClass", "ErrorCode"):
         tag = tagging.header_at(data, at)

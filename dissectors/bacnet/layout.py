@@ -12,7 +12,8 @@ import re
 from dataclasses import dataclass
 from functools import cache
 
-from dissectors.bacnet.constructed import CHOICES, SEQUENCES
+from dissectors.bacnet.choices import CHOICES
+from dissectors.bacnet.sequences import SEQUENCES
 from dissectors.bacnet.values import base
 
 _FIELD = re.compile(r"(?:\[(?P<tag>\d+)\])?(?P<optional>\?)?\s*(?P<name>[a-z0-9-]+) (?P<type>\{?[A-Za-z0-9]+\}?)")

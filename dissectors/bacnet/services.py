@@ -22,6 +22,11 @@ _EVENT = (
     "[9]? ack-required Boolean, [10]? from-state EventState, [11] to-state EventState, "
     "[12]? event-values NotificationParameters"
 )
+_COV_MULTIPLE = (
+    "[0] subscriber-process-identifier Unsigned, [1] initiating-device-identifier ObjectIdentifier, "
+    "[2] time-remaining Unsigned, [3]? timestamp DateTime, [4] list-of-cov-notifications {COVNotification}"
+)
+_AUDIT = "[0] notifications {AuditNotification}"
 _TEXT_MESSAGE = (
     "[0] text-message-source-device ObjectIdentifier, "
     "[1]? message-class ConfirmedTextMessageRequestMessageClass, "
@@ -74,6 +79,13 @@ CONFIRMED: dict[int, str] = {
     "[2]? issue-confirmed-notifications Boolean, [3]? lifetime Unsigned, "
     "[4] monitored-property-identifier PropertyReference, [5]? cov-increment Real",
     29: "[0]? last-received-object-identifier ObjectIdentifier",
+    30: "[0] subscriber-process-identifier Unsigned, [1]? issue-confirmed-notifications Boolean, "
+    "[2]? lifetime Unsigned, [3]? max-notification-delay Unsigned, "
+    "[4] list-of-cov-subscription-specifications {COVMultipleSubscriptionList}",
+    31: _COV_MULTIPLE,
+    32: _AUDIT,
+    33: "[0] audit-log ObjectIdentifier, [1] query-parameters AuditLogQueryParameters, "
+    "[2]? start-at-sequence-number Unsigned, [3] requested-count Unsigned",
 }
 
 ACK: dict[int, str] = {
@@ -91,6 +103,7 @@ ACK: dict[int, str] = {
     26: _TARGET + ", [3] result-flags ResultFlags, [4] item-count Unsigned, [5] item-data Any, "
     "[6]? first-sequence-number Unsigned",
     29: "[0] list-of-event-summaries {GetEventInformationEventSummary}, [1] more-events Boolean",
+    33: "[0] audit-log ObjectIdentifier, [1] records {AuditLogRecordResult}, [2] no-more-items Boolean",
 }
 
 UNCONFIRMED: dict[int, str] = {
@@ -108,6 +121,8 @@ UNCONFIRMED: dict[int, str] = {
     9: "time DateTime",
     10: "[0] group-number Unsigned, [1] write-priority Unsigned, [2] change-list {GroupChannelValue}, "
     "[3]? inhibit-delay Boolean",
+    11: _COV_MULTIPLE,
+    12: _AUDIT,
     13: "vendor-id Unsigned, model-name CharacterString, serial-number CharacterString",
     14: "vendor-id Unsigned, model-name CharacterString, serial-number CharacterString, "
     "? device-identifier ObjectIdentifier, ? device-mac-address OctetString",
@@ -123,6 +138,7 @@ ERROR: dict[int, str] = {
     16: "[0] error-type ErrorType, [1] first-failed-write-attempt ObjectPropertyReference",
     18: "[0] error-type ErrorType, [1] vendor-id Unsigned, [2] service-number Unsigned, [3]? error-parameters Any",
     22: "[0] error-type ErrorType, [1]? list-of-vt-session-identifiers {Unsigned}",
+    30: "[0]? error-type ErrorType, [1]? first-failed-subscription COVSubscriptionFailure",
 }
 """Services whose Error-PDU is more than class and code."""
 

@@ -1,6 +1,6 @@
 """Write the BACnet tables of dissectors/bacnet from bacpypes3's classes (MIT), which only tests need.
 
-    python tests/dissectors/bacnet/generate_tables.py        writes enumerations.py, constructed.py, property_types.py
+    python tests/dissectors/bacnet/generate_tables.py        writes the four files of `render`
 
 tests/dissectors/bacnet/test_tables.py fails when the committed files and bacpypes3 differ.
 """
@@ -35,6 +35,113 @@ MISSPELT = {
     "http-not-aserver": "http-not-a-server",
 }
 """Slips in bacpypes3's names, and words that its capitals do not divide."""
+
+
+_PRIMITIVES = (
+    "null Null, real Real, unsigned Unsigned, boolean Boolean, integer Signed, double Double, "
+    "octet-string OctetString, character-string CharacterString, bit-string BitString, "
+    "enumerated Enumerated, date Date, time Time, object-identifier ObjectIdentifier"
+)
+CORRECTED: dict[str, tuple[str, str]] = {
+    "AuditLogRecordLogDatum": (
+        "choice",
+        "[0] log-status LogStatus, [1] audit-notification AuditNotification, [2] time-change Real",
+    ),
+    "COVMultipleSubscriptionListOfCOVReference": (
+        "sequence",
+        "[0] monitored-property PropertyReference, [1]? cov-increment Real, [2]? timestamped Boolean",
+    ),
+    "COVNotification": (
+        "sequence",
+        "[0] monitored-object-identifier ObjectIdentifier, [1] list-of-values {COVNotificationValue}",
+    ),
+    "COVNotificationValue": (
+        "sequence",
+        "[0] property-identifier PropertyIdentifier, [1]? property-array-index Unsigned, [2] value Any, "
+        "[3]? time-of-change Time",
+    ),
+    "COVSubscriptionFailure": (
+        "sequence",
+        "[0] monitored-object-identifier ObjectIdentifier, [1] monitored-property-reference PropertyReference, "
+        "[2] error-type ErrorType",
+    ),
+    "EventParameterAccessEvent": (
+        "sequence",
+        "[0] list-of-access-events {AccessEvent}, [1] access-event-time-reference DeviceObjectPropertyReference",
+    ),
+    "EventParameterExtendedParameters": ("choice", _PRIMITIVES + ", [0] reference DeviceObjectPropertyReference"),
+    "FaultParametersFaultListed": ("sequence", "[0] fault-list-reference DeviceObjectPropertyReference"),
+    "NotificationParametersAccessEventType": (
+        "sequence",
+        "[0] access-event AccessEvent, [1] status-flags StatusFlags, [2] access-event-tag Unsigned, "
+        "[3] access-event-time TimeStamp, [4] access-credential DeviceObjectReference, "
+        "[5]? authentication-factor AuthenticationFactor",
+    ),
+    "NotificationParametersChangeOfDiscreteValueType": (
+        "sequence",
+        "[0] new-value NotificationParametersChangeOfDiscreteValueNewValue, [1] status-flags StatusFlags",
+    ),
+    "NotificationParametersChangeOfDiscreteValueNewValue": (
+        "choice",
+        "boolean Boolean, unsigned Unsigned, integer Signed, enumerated Enumerated, character-string CharacterString, "
+        "octet-string OctetString, date Date, time Time, object-identifier ObjectIdentifier, [0] date-time DateTime",
+    ),
+    "NotificationParametersChangeOfStatusFlagsType": (
+        "sequence",
+        "[0]? present-value Any, [1] referenced-flags StatusFlags",
+    ),
+    "NotificationParametersChangeOfTimerType": (
+        "sequence",
+        "[0] new-state TimerState, [1] status-flags StatusFlags, [2] update-time DateTime, "
+        "[3]? last-state-change TimerTransition, [4]? initial-timeout Unsigned, [5]? expiration-time DateTime",
+    ),
+    "NotificationParametersExtended": (
+        "sequence",
+        "[0] vendor-id Unsigned, [1] extended-event-type Unsigned, "
+        "[2] parameters {NotificationParametersExtendedParametersType}",
+    ),
+    "NotificationParametersExtendedParametersType": (
+        "choice",
+        _PRIMITIVES + ", [0] property-value DeviceObjectPropertyValue",
+    ),
+}
+"""Layouts as clause 21 of the standard has them, where bacpypes3 0.0.110 differs or has none.
+
+{name: (kind, layout)}
+"""
+
+REPLACED: dict[str, tuple[tuple[str, str], ...]] = {
+    "NotificationParameters": (
+        ("[6] complex-event-type NotificationParametersComplexEventType", "[6] complex-event-type {PropertyValue}"),
+        (
+            "[19] change-of-reliability NotificationParametersChangeOfReliabilityType",
+            "[19] change-of-reliability NotificationParametersChangeOfReliabilityType, "
+            "[21] change-of-discrete-value NotificationParametersChangeOfDiscreteValueType, "
+            "[22] change-of-timer NotificationParametersChangeOfTimerType",
+        ),
+    ),
+    "PropertyStates": (
+        ("[370] write-status", "[37] write-status"),
+        (
+            "[40] lighting-transition LightingTransition",
+            "[40] lighting-transition LightingTransition, [41] integer-value Signed, "
+            "[42] binary-lighting-value BinaryLightingPV, [43] timer-state TimerState, "
+            "[44] timer-transition TimerTransition, [45] bacnet-ip-mode IPMode, "
+            "[46] network-port-command NetworkPortCommand, [47] network-type NetworkType, "
+            "[48] network-number-quality NetworkNumberQuality, "
+            "[49] escalator-operation-direction EscalatorOperationDirection, [50] escalator-fault EscalatorFault, "
+            "[51] escalator-mode EscalatorMode, [52] lift-car-direction LiftCarDirection, "
+            "[53] lift-car-door-command LiftCarDoorCommand, [54] lift-car-drive-status LiftCarDriveStatus, "
+            "[55] lift-car-mode LiftCarMode, [56] lift-group-mode LiftGroupMode, [57] lift-fault LiftFault, "
+            "[58] protocol-level ProtocolLevel, [59] audit-level AuditLevel, [60] audit-operation AuditOperation, "
+            "[63] extended-value Unsigned",
+        ),
+    ),
+}
+"""Parts of layouts of theirs that are replaced, for the same reason."""
+
+DROPPED = {"EventParameterAccessEventAccessEvent", "NotificationParametersComplexEventType"}
+"""Types of theirs that the standard does not have."""
 
 
 def kebab(name: str) -> str:
@@ -113,11 +220,18 @@ def constructed_types() -> dict[str, tuple[str, str]]:
         order = list(cls._elements) if choice else list(cls._order)
         layout = ", ".join(_element(n, cls._elements[n]) for n in order)
         found[RENAMED.get(name, name)] = ("choice" if choice else "sequence", layout)
-    return found
+    for name, replacements in REPLACED.items():
+        kind, layout = found[name]
+        for wrong, right in replacements:
+            assert wrong in layout, f"{name}: bacpypes3 no longer has {wrong!r}"
+            layout = layout.replace(wrong, right)
+        found[name] = (kind, layout)
+    kept = {name: entry for name, entry in {**found, **CORRECTED}.items() if name not in DROPPED}
+    return dict(sorted(kept.items()))
 
 
-def property_types() -> tuple[dict[int, str], dict[tuple[int, int], str]]:
-    """Type by property, and by (object type, property) where object types differ from the most common one."""
+def types_by_object() -> dict[int, dict[int, str]]:
+    """{property: {object type: name of its type}} of every standard object."""
     by_property: dict[int, dict[int, str]] = {}
     for cls in vars(objects).values():
         if not (isinstance(cls, type) and issubclass(cls, objects.Object) and cls is not objects.Object):
@@ -128,6 +242,12 @@ def property_types() -> tuple[dict[int, str], dict[tuple[int, int], str]]:
         for name, element in cls._elements.items():
             number = int(primitive.PropertyIdentifier(name))
             by_property.setdefault(number, {})[int(object_type)] = type_name(element)
+    return by_property
+
+
+def property_types() -> tuple[dict[int, str], dict[tuple[int, int], str]]:
+    """Type by property, and by (object type, property) where object types differ from the most common one."""
+    by_property = types_by_object()
     common: dict[int, str] = {}
     special: dict[tuple[int, int], str] = {}
     for number, types in sorted(by_property.items()):
@@ -177,7 +297,7 @@ def _table(text: str) -> dict[int, str]:
 
 
 def render() -> dict[str, str]:
-    """The three files: {name: text}."""
+    """The files: {name: text}."""
     common, special = property_types()
     plain = "".join(f"    {number}: {_quoted(name)},\n" for number, name in common.items())
     by_object = "".join(f"    ({t}, {p}): {_quoted(name)},\n" for (t, p), name in special.items())
@@ -200,10 +320,12 @@ def render() -> dict[str, str]:
         + "}\n\nBIT_STRINGS: dict[str, dict[int, str]] = {\n"
         + _packed(bit_strings())
         + "}\n",
-        "constructed.py": _HEADING.format(what="BACnet sequences and choices in the notation of layout.py")
+        "sequences.py": _HEADING.format(what="BACnet sequences in the notation of layout.py")
         + "\nfrom __future__ import annotations\n\nSEQUENCES: dict[str, str] = {\n"
         + layouts["sequence"]
-        + "}\n\nCHOICES: dict[str, str] = {\n"
+        + "}\n",
+        "choices.py": _HEADING.format(what="BACnet choices in the notation of layout.py")
+        + "\nfrom __future__ import annotations\n\nCHOICES: dict[str, str] = {\n"
         + layouts["choice"]
         + "}\n",
         "property_types.py": _HEADING.format(what="The type of each BACnet property")

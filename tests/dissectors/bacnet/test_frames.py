@@ -118,6 +118,8 @@ def test_header_of_every_kind():
         assert (header.kind, header.role, header.function) == (kind, role, octets[2]), octets.hex()
     assert peek(frame_of(frame(5, 1, 2, bytes.fromhex("010400050c0c0c020004d2194d")))).address == 1234
     assert peek(frame_of(cases[12][0])).error == "object unknown-property"
+    failed = "010050071e1e0c000000011e09551f2e910291202f1f"
+    assert peek(frame_of(frame(6, 7, 2, bytes.fromhex(failed)))).error == "one subscription failed"
 
 
 def test_long_npdus_travel_in_extended_frames():
