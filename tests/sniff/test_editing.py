@@ -11,6 +11,7 @@ import pytest
 from dissectors.frame import Chunk, Frame
 from sniff.editing.anonymising import anonymised, anonymous_session
 from sniff.formats import create, read
+from sniff.formats.text import parse
 from sniff.reading import settled
 from sniff.session import Item, Session
 from sniff.simulation.scenarios import scenario, simulate
@@ -90,6 +91,15 @@ def test_no_name_survives(tmp_path: Path, sniff485: Callable[..., tuple[int, str
         assert row.event.ok
         assert b"\x04\xd2" not in row.event.octets
         assert secret not in octets(list(read(out).items()))
+
+
+def test_known_devices_stay_known_under_their_new_addresses() -> None:
+    text = "# line: 19200,8E1\n# device: 40=teco-e510\n# device: 7=acme-pump\n# device: *=teco-f510\n"
+    capture = parse(text + "+0 28 03 25 21 00 01 D8 F5\n+20 28 03 02 00 11 25 8E\n")
+    session = anonymous_session(capture.session)
+    assert session.notes == {"devices": "1=teco-e510,*=teco-f510"}
+    chunks = [item for item in anonymised(capture.items(), capture.session) if isinstance(item, Chunk)]
+    assert {chunk.octets[0] for chunk in chunks} == {1}
 
 
 def test_session_without_names() -> None:

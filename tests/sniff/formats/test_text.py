@@ -135,6 +135,9 @@ def test_events_do_not_move_the_chunks() -> None:
         ("# start: 9999-02-03T10:00:00Z", "1:10", "before the year 2262"),
         ("# latency: -4", "1:12", "milliseconds"),
         ('# port: "half', "1:9", "a JSON string"),
+        ("# device: pump", "1:11", "ADDRESS=PROFILE such as 3=teco-e510"),
+        ("# device: 256=teco-e510", "1:11", "ADDRESS 0 … 255"),
+        ("# device: 3=../secret", "1:11", "ADDRESS=PROFILE"),
         ("#!sniff-capture 2", "1:16", "version 1"),
         ("#!sniff-capture", "1:16", "version 1"),
         ("#! +1 exploded", "1:7", "one of unplugged, replugged"),
@@ -185,6 +188,34 @@ CANONICAL = r"""#!sniff-capture 1
 #! +12.5 dropped count=-1 "\u001b[31m"
 -0.000001 00!B
 """
+
+
+def test_devices_have_lines_of_their_own() -> None:
+    text = "# device: 3=teco-e510\n#device:  0x10=acme_7 , *=teco-f510\n# note devices: 9=old\n# note site: a\n+0 01\n"
+    session = parse(text).session
+    assert session.notes == {"devices": "3=teco-e510,0x10=acme_7,*=teco-f510,9=old", "site": "a"}
+    lines = render(session, []).splitlines()
+    assert lines[4:] == [
+        "# device: 3=teco-e510",
+        "# device: 0x10=acme_7",
+        "# device: *=teco-f510",
+        "# device: 9=old",
+        "# note site: a",
+    ]
+    assert parse("\n".join(lines)).session == session
+
+
+@pytest.mark.parametrize("note", ["", "3", "3=a b", "3=teco-e510,", " 3=teco-e510", "300=teco-e510", "3=\x1b[m"])
+def test_a_note_that_is_no_list_of_devices_stays_a_note(note: str) -> None:
+    session = Session("", LineSettings(), "modbus-rtu", program="", notes={"devices": note})
+    text = render(session, [])
+    assert "# device:" not in text
+    assert parse(text).session == session
+
+
+def test_no_more_devices_than_addresses() -> None:
+    session = parse("# device: 3=teco-e510\n" * 5000).session
+    assert session.notes["devices"].count(",") < 300
 
 
 def test_the_canonical_form(tmp_path: Path) -> None:
