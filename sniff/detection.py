@@ -1,16 +1,21 @@
-"""The search for line settings and protocol on a running capture: the port is opened once and never closed for it."""
+"""The search for line settings and protocol on a running capture: the port is opened once and never closed for it.
+
+The capture process reads, records and changes the settings when it is told to; what is heard is judged here. Each
+change, and the end, is a SETTINGS event in the recording (`sniff.session.SettingsChange`).
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from dissectors import registry
 from dissectors.frame import Chunk
 from dissectors.line import NS_PER_S, LineSettings
 from sniff.analysis.detecting import Detecting, Outcome
 from sniff.capture.link import CaptureLink
-from sniff.capture.wire import Ended, Received, Tick
-from sniff.session import LineEvent, LineEventKind
+from sniff.capture.wire import Ended, Message, Received, Tick
+from sniff.session import LineEvent, LineEventKind, settings_change
 
 ANSWER_PATIENCE = 3 * NS_PER_S
 """How long a change of settings may take to be confirmed, ns, before it is asked for again."""
@@ -30,39 +35,59 @@ class Progress:
 
 
 class Search:
-    """Listens through a CaptureLink and changes its settings until the evidence suffices.
+    """Fed what a CaptureLink receives, it changes the settings until the evidence suffices.
 
-    `timeout`: s on the capture's clock. `ended`: how the capture ended, if it did.
+    `ended`: how the capture ended, if it did. `line_known`: whether only the protocol is searched for.
     """
 
-    def __init__(self, link: CaptureLink, detecting: Detecting, timeout: float, bus: int = 0) -> None:
+    def __init__(self, link: CaptureLink, detecting: Detecting, line_known: bool = False, bus: int = 0) -> None:
         self.link = link
         self.detecting = detecting
         self.bus = bus
         self.ended: Ended | None = None
-        self._in_force: LineSettings | None = link.session(bus).line
+        session = link.session(bus)
+        self._lineless = session.adapter.lineless
+        self._line_known = line_known
+        self._in_force: LineSettings | None = session.line
         self._asked: LineSettings | None = None
         self._asked_at = 0
-        self._timeout = int(timeout * NS_PER_S)
         self._began: int | None = None
         self._now = 0
+        self._told = False
 
     def run(
-        self, stopped: Callable[[], bool] = lambda: False, show: Callable[[Progress], None] = lambda _: None
+        self,
+        timeout: float,
+        stopped: Callable[[], bool] = lambda: False,
+        show: Callable[[Progress], None] = lambda _: None,
     ) -> Outcome:
-        """Search until found, until time is over, until `stopped` says so or the capture ends."""
+        """Search until found, for `timeout` s of the capture's clock, until `stopped` says so or the capture ends."""
         while self.detecting.found is None and self.ended is None and not stopped():
             for message in self.link.receive(POLL):
-                if isinstance(message, Ended):
-                    self.ended = message
-                elif isinstance(message, Received) and message.bus == self.bus:
-                    self._take(message.item)
-                elif isinstance(message, Tick) and message.bus == self.bus:
-                    self._tick(message.now)
+                self.take(message)
             show(self.progress)
-            if self._began is not None and self._now - self._began >= self._timeout:
+            if self.progress.seconds >= timeout:
                 break
-        return self.detecting.outcome()
+        return self.outcome()
+
+    def take(self, message: Message) -> None:
+        """Take what the capture sent; once settings are found, says so to the capture."""
+        if isinstance(message, Ended):
+            self.ended = message
+        elif isinstance(message, Received) and message.bus == self.bus:
+            self._take(message.item)
+        elif isinstance(message, Tick) and message.bus == self.bus:
+            self._tick(message.now)
+        if self.detecting.found is not None and not self._told:
+            self._told = True
+            reading = self.outcome().reading
+            assert reading is not None
+            self.link.found(self.bus, reading.line, reading.protocol)
+
+    def outcome(self) -> Outcome:
+        """What can be said when it ends here."""
+        outcome = self.detecting.outcome()
+        return without_line(outcome) if self._lineless and not self._line_known else outcome
 
     @property
     def progress(self) -> Progress:
@@ -72,31 +97,43 @@ class Search:
         return Progress(current.line, seconds, current.octets, current.best().frames)
 
     def _take(self, item: Chunk | LineEvent) -> None:
-        if isinstance(item, LineEvent):
-            if item.kind is LineEventKind.SETTINGS and item.text.startswith("line="):
-                self._in_force = LineSettings.parse(item.text.removeprefix("line="))
-            elif (
-                item.kind is LineEventKind.NOTE
-                and str(self._asked) in item.text
-                and self._asked == self.detecting.wanted
-            ):
+        change = settings_change(item)
+        if change is not None:
+            self._in_force = change.line or self._in_force
+        elif isinstance(item, LineEvent):
+            refused = item.kind is LineEventKind.NOTE and str(self._asked) in item.text
+            if refused and self._asked == self.detecting.wanted:
                 self.detecting.refuse()
-        elif self._in_force == self.detecting.wanted:  # anything else was heard with settings that nobody asks about
+        elif self._hears_what_is_wanted:  # anything else was heard with settings that nobody asks about
             self.detecting.feed(item)
         self._ask(item.time)
 
     def _tick(self, now: int) -> None:
         self._began = now if self._began is None else self._began
         self._now = now
-        if self._in_force == self.detecting.wanted:
+        if self._hears_what_is_wanted:
             self.detecting.advance(now)
         self._ask(now)
+
+    @property
+    def _hears_what_is_wanted(self) -> bool:
+        return self._lineless or self._in_force == self.detecting.wanted
 
     def _ask(self, now: int) -> None:
         """Have the wanted settings put in force, once, and again where no confirmation comes."""
         wanted = self.detecting.wanted
-        if wanted == self._in_force or self.detecting.found is not None:
+        if self._hears_what_is_wanted or self.detecting.found is not None:
             return
         if wanted != self._asked or now - self._asked_at > ANSWER_PATIENCE:
             self._asked, self._asked_at = wanted, now
             self.link.reconfigure(self.bus, wanted)
+
+
+def without_line(outcome: Outcome) -> Outcome:
+    """The outcome where octets come through no line of this machine, so that all settings hear the same."""
+    reading = outcome.reading
+    if reading is None:
+        return outcome
+    line = LineSettings.parse(registry.get(reading.protocol).default_line)
+    words = f"the line settings: octets come through no line here; {line} is only what such a bus usually runs"
+    return replace(outcome, reading=replace(reading, line=line), cannot_tell=(words,))

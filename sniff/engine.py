@@ -6,10 +6,10 @@ Pure: no I/O, no clock. One engine is one bus. What it gives is numbered from 1 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from dissectors.frame import Chunk, Event, Frame, Header
-from dissectors.line import Timing
+from dissectors.line import LineSettings, Timing
 from dissectors.registry import Dissector
 from dissectors.tracker import Placement, Transaction
 
@@ -19,12 +19,15 @@ class Row:
     """One event of the bus with what is known of it at once.
 
     `header` is None exactly for noise. The verdict comes with the transaction `placement.tx`, perhaps later.
+    `searched`: the settings with which the octets were heard while the right ones were searched for: they say
+    nothing about the bus, `event` only carries them; None for everything else.
     """
 
     no: int
     event: Event
     header: Header | None = None
     placement: Placement | None = None
+    searched: LineSettings | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,14 +45,20 @@ NOTHING = Output()
 
 
 class Engine:
-    """Runs one protocol over one bus. `first` is the number of the first event."""
+    """Runs one protocol over one bus.
 
-    def __init__(self, dissector: Dissector, timing: Timing, first: int = 1) -> None:
+    `next`: the number of the event to come, from `first` on. `last_tx`: of the transactions so far, all later than
+    `before_tx`.
+    """
+
+    def __init__(self, dissector: Dissector, timing: Timing, first: int = 1, before_tx: int = 0) -> None:
         self.dissector = dissector
         self.timing = timing
+        self.next = first
+        self.last_tx = before_tx
+        self._before_tx = before_tx
         self.framer = dissector.framer(timing)
         self.tracker = dissector.tracker(timing)
-        self._next = first
 
     def feed(self, chunk: Chunk) -> Output:
         """Take one read."""
@@ -60,13 +69,13 @@ class Engine:
         output = self._track(self.framer.advance(now))
         if self.framer.deadline() is not None:
             return output  # octets still held may be the answer that the tracker waits for
-        closed = self.tracker.advance(now)
+        closed = self._renumbered(self.tracker.advance(now))
         return Output(output.rows, output.transactions + closed) if closed else output
 
     def close(self) -> Output:
         """End of capture."""
         output = self._track(self.framer.close())
-        return Output(output.rows, output.transactions + self.tracker.close())
+        return Output(output.rows, output.transactions + self._renumbered(self.tracker.close()))
 
     def deadline(self) -> int | None:
         """When to call `advance` next (ns), or None."""
@@ -76,12 +85,24 @@ class Engine:
         rows: list[Row] = []
         closed: list[Transaction] = []
         for event in events:
-            no = self._next
-            self._next += 1
+            no = self.next
+            self.next += 1
             header = self.dissector.peek(event) if isinstance(event, Frame) else None
             tracked = self.tracker.track(no, event, header)
-            rows.append(Row(no, event, header, tracked.placement))
-            closed.extend(tracked.closed)
+            placement = tracked.placement
+            if placement is not None:
+                if self._before_tx:
+                    placement = replace(placement, tx=placement.tx + self._before_tx)
+                self.last_tx = max(self.last_tx, placement.tx)
+            rows.append(Row(no, event, header, placement))
+            closed.extend(self._renumbered(tracked.closed))
         if not rows:
             return NOTHING
         return Output(tuple(rows), tuple(closed))
+
+    def _renumbered(self, closed: tuple[Transaction, ...]) -> tuple[Transaction, ...]:
+        """Transactions with their numbers on the whole bus, where another engine has numbered before this one."""
+        before = self._before_tx
+        if not before:
+            return closed
+        return tuple(replace(one, id=one.id + before, of=None if one.of is None else one.of + before) for one in closed)

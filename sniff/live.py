@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from dissectors.frame import Chunk
 from dissectors.profiles import Devices
+from dissectors.registry import Dissector
 from sniff.analysis.channels import BusChannels, DerivedMessage
+from sniff.analysis.detecting import Detecting
 from sniff.analysis.points import PointReader, Sample
 from sniff.capture.link import CaptureLink
 from sniff.capture.wire import Ended, Received, Status, Tick
-from sniff.engine import Engine, Output
-from sniff.reading import dissector_for
+from sniff.detection import Progress, Search
+from sniff.engine import Output
+from sniff.reading import engine_for
 from sniff.recording.frames import METADATA, SCHEMA, FrameLog
 from sniff.recording.topics import FRAMES
-from sniff.session import LineEvent
+from sniff.session import LineEvent, Session
 from sniff.value_channels import ValueChannels
 
 LiveItem = Output | LineEvent | Status | Ended
@@ -22,22 +24,41 @@ class LiveBus:
     """One bus of a running capture. Not thread-safe; nothing here can hold up the recording.
 
     `session`: of the bus; `status`: the newest report; `ended`: why it is over, None while it runs. `points`: takes
-    values out of what was heard; they go back into the recording.
+    values out of what was heard; they go back into the recording. `search`: finds what `session.unknown` names, None
+    when everything is given; its octets are recorded like all others. When it ends, `session`, `dissector` and
+    `points` become others, before the event and the outputs that this gives are handed out.
     """
 
-    def __init__(self, link: CaptureLink, bus: int = 0, devices: Devices | None = None) -> None:
+    def __init__(
+        self, link: CaptureLink, bus: int = 0, devices: Devices | None = None, detecting: Detecting | None = None
+    ) -> None:
         self.link = link
         self.bus = bus
-        self.session = link.session(bus)
-        self.dissector = dissector_for(self.session)
-        self.engine = Engine(self.dissector, self.session.timing)
+        self.engine = engine_for(link.session(bus))
+        self.search = None
+        if detecting is not None:
+            self.search = Search(link, detecting, "line" not in self.session.unknown, bus)
         self.status = Status(bus, path=link.paths[bus] if bus < len(link.paths) else "", priority=link.priority)
         self.ended: Ended | None = None
         self.devices = devices or Devices()
-        self.points = PointReader(self.dissector, self.devices)
         self._channels = ValueChannels(self.session.bus, self.devices) if link.paths else None
-        self._bus_channels = BusChannels(self.session, self.dissector) if link.paths else None
         self._frames = FrameLog()
+        self._settle()
+
+    @property
+    def session(self) -> Session:
+        """The bus; during a search with what it began with."""
+        return self.engine.session
+
+    @property
+    def dissector(self) -> Dissector:
+        """The protocol; during a search for it a stand-in."""
+        return self.engine.dissector
+
+    @property
+    def searching(self) -> Progress | None:
+        """What a search is at; None when there is none (any more)."""
+        return self.search.progress if self.search is not None and self.engine.searching else None
 
     def poll(self, timeout: float = 0.0) -> list[LiveItem]:
         """What has come, in order; waits up to `timeout` seconds. The end closes the engine and comes last."""
@@ -53,7 +74,15 @@ class LiveBus:
             items += self._take(message)
         return items
 
+    def _settle(self) -> None:
+        """What depends on the settings, anew."""
+        self.points = PointReader(self.dissector, self.devices)
+        recorded = self.link.paths and not self.engine.searching
+        self._bus_channels = BusChannels(self.session, self.dissector) if recorded else None
+
     def _take(self, message: Received | Tick | Status | Ended) -> list[LiveItem]:
+        if self.search is not None and self.engine.searching:
+            self.search.take(message)
         if isinstance(message, Ended):
             self.ended = message
             return [*self._some(self.engine.close()), message]
@@ -66,20 +95,27 @@ class LiveBus:
             if self._bus_channels is not None and (messages := self._bus_channels.due(message.now)):
                 self._send(messages)
                 self._send_frames()
+            elif self.engine.searching:
+                self._send_frames()
             deadline = self.engine.deadline()
             due = deadline is not None and message.now >= deadline
             return self._some(self.engine.advance(message.now)) if due or deadline is None else []
-        if isinstance(message.item, Chunk):
-            return self._some(self.engine.feed(message.item))
+        was_searching = self.engine.searching
+        output = self.engine.take(message.item)
+        if was_searching and not self.engine.searching:
+            self._settle()
+        if not isinstance(message.item, LineEvent):
+            return self._some(output)
         if self._bus_channels is not None:
             self._bus_channels.add_line_event(message.item)
-        return [message.item]
+        return [message.item, *self._some(output)]
 
     def _some(self, output: Output) -> list[LiveItem]:
         if not output:
             return []
         if self._bus_channels is not None:
             self._bus_channels.add(output)
+        if self.link.paths:
             self._frames.add(output)
         for sample in self.points.add(output):
             self._record(sample)

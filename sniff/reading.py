@@ -7,17 +7,19 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 from dissectors import registry
-from dissectors.frame import Chunk
 from dissectors.line import LineSettings
 from dissectors.profiles import Devices
 from dissectors.registry import Dissector
 from dissectors.tracker import Transaction
 from sniff.analysis.points import PointReader
-from sniff.engine import Engine, Output, Row
+from sniff.engine import Output, Row
 from sniff.session import Item, LineEvent, Session
+from sniff.session_engine import SessionEngine
 
 HELD = 20_000
 """Rows held back at most while waiting for the verdict of the oldest."""
+REMEMBERED = 1000
+"""Rows for which a closed transaction is still known after its last one: a row may be placed in it afterwards."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,17 +39,16 @@ class Settling:
         self._points = points
         self._rows: deque[Row] = deque()
         self._closed: dict[int, Transaction] = {}
+        self._in_order: deque[Transaction] = deque()  # the same, as they closed
 
     def add(self, output: Output) -> Iterator[Settled]:
         """Take what the engine gave; give the rows that are settled by it."""
         self._rows.extend(output.rows)
         for transaction in output.transactions:
             self._closed[transaction.id] = transaction
+            self._in_order.append(transaction)
         while self._rows and (len(self._rows) > HELD or self._is_settled(self._rows[0])):
             yield self._pop()
-        if len(self._closed) > 4 * HELD:  # of those none older than this is asked for again
-            for key in sorted(self._closed)[: 2 * HELD]:
-                del self._closed[key]
 
     def flush(self) -> Iterator[Settled]:
         """Give all that is left."""
@@ -60,23 +61,37 @@ class Settling:
     def _pop(self) -> Settled:
         row = self._rows.popleft()
         said = "" if self._points is None else self._points.words(row)
-        return Settled(row, None if row.placement is None else self._closed.get(row.placement.tx), said)
+        transaction = None if row.placement is None else self._closed.get(row.placement.tx)
+        self._forget(row.no - REMEMBERED)
+        return Settled(row, transaction, said)
+
+    def _forget(self, before: int) -> None:
+        """Let go of what closed and has no row left that could ask for it."""
+        while self._in_order and max(self._in_order[0].request or 0, self._in_order[0].response or 0) < before:
+            del self._closed[self._in_order.popleft().id]
 
 
 def with_settings(session: Session, protocol: str | None = None, line: LineSettings | None = None) -> Session:
     """The session with what the user says instead of what the file says."""
-    return replace(session, protocol=protocol or session.protocol, line=line or session.line)
+    said = [name for name, value in (("line", line), ("protocol", protocol)) if value is not None]
+    unknown = tuple(name for name in session.unknown if name not in said)
+    return replace(
+        session,
+        protocol=protocol or session.protocol,
+        line=line or session.line,
+        unknown=unknown,
+        given=session.given or (bool(session.unknown) and not unknown),
+    )
 
 
 def outputs(items: Iterable[Item], session: Session) -> Iterator[Output | LineEvent]:
     """Run items through a new engine; line events pass through at their place."""
     engine = engine_for(session)
     for item in items:
-        if isinstance(item, Chunk):
-            output = engine.feed(item)
-            if output:
-                yield output
-        else:
+        output = engine.take(item)
+        if output:
+            yield output
+        if isinstance(item, LineEvent):
             yield item
     yield engine.close()
 
@@ -98,6 +113,6 @@ def dissector_for(session: Session) -> Dissector:
     return registry.get(session.protocol)
 
 
-def engine_for(session: Session) -> Engine:
+def engine_for(session: Session) -> SessionEngine:
     """A new engine for a session. Raises registry.UnknownProtocol."""
-    return Engine(dissector_for(session), session.timing)
+    return SessionEngine(session)

@@ -45,6 +45,9 @@ LINELESS = frozenset(("pty", "TCP gateway"))
 UNKNOWABLE = ("line", "protocol")
 """What of a session may be searched for."""
 
+OPTIONS = {"line": "-s", "protocol": "-p"}
+"""How it is named on the command line."""
+
 
 @dataclass(frozen=True, slots=True)
 class Session:
@@ -76,6 +79,16 @@ class Session:
     def found(self, line: LineSettings | None, protocol: str | None) -> Session:
         """The session once its search has ended with these settings."""
         return replace(self, line=line or self.line, protocol=protocol or self.protocol, unknown=())
+
+    @property
+    def line_words(self) -> str:
+        """The line settings, "unknown" when nobody knows them."""
+        return "unknown" if "line" in self.unknown else str(self.line)
+
+    @property
+    def protocol_words(self) -> str:
+        """The protocol's name, "unknown" when nobody knows it."""
+        return "unknown" if "protocol" in self.unknown else self.protocol
 
     def to_metadata(self) -> dict[str, str]:
         """Flat text record of everything, for files."""

@@ -34,21 +34,16 @@ class Store:
     def __init__(
         self, session: Session, dissector: Dissector, keep: int = KEPT_ROWS, devices: Devices | None = None
     ) -> None:
-        self.session = session
-        self.dissector = dissector
         self.keep = keep
+        self.devices = devices or Devices()
+        self._use(session, dissector)
         self.rows: list[Row] = []
         self.transactions: dict[int, Transaction] = {}
         self.closed: list[int] = []  # transaction ids in the order of closing
         self.errors: list[int] = []  # numbers of rows that are damaged frames or noise, or that have a bad verdict
         self.line_events: list[LineEvent] = []
         self.nodes = NodeTable()
-        self.load = Load(session.line)
-        self.devices = devices or Devices()
-        self.reader = PointReader(dissector, self.devices)
         self.points = PointTable()
-        observe = dissector.extras.get("ring")
-        self.ring = observe(session.timing) if observe is not None else None  # of a protocol that passes a token
         self.error_total = 0  # like `errors`, with those that were dropped
         self.marks: Counter[LineError] = Counter()  # octets by the line errors reported on them
         self.gaps = Histogram()  # silence between one row and the next, ns
@@ -58,13 +53,29 @@ class Store:
 
     # -- writing -----------------------------------------------------------------------------------------------
 
+    def _use(self, session: Session, dissector: Dissector) -> None:
+        self.session = session
+        self.dissector = dissector
+        self.load = Load(session.line)
+        self.reader = PointReader(dissector, self.devices)
+        observe = dissector.extras.get("ring")
+        self.ring = observe(session.timing) if observe is not None else None  # of a protocol that passes a token
+
+    def settle(self, session: Session, dissector: Dissector) -> None:
+        """Go on with settings that were found; the rows so far are what their search heard."""
+        self._use(session, dissector)
+        self.version += 1
+
     def add(self, output: Output) -> None:
         """Take what the engine gave."""
         if not output:
             return
         self.version += 1
         for row in output.rows:
-            if self.rows:
+            if row.searched is not None:
+                self.rows.append(row)
+                continue
+            if self.rows and self.rows[-1].searched is None:
                 self.gaps.add(row.event.start - self.rows[-1].event.end)
             self.rows.append(row)
             self.load.add(row)

@@ -60,7 +60,13 @@ def _of_header(name: str) -> Getter:
 
 
 def _ok(row: Row, _: Transaction | None) -> tuple[Value, ...]:
-    return (int(isinstance(row.event, Frame) and row.event.ok),)
+    return () if row.searched is not None else (int(isinstance(row.event, Frame) and row.event.ok),)
+
+
+def _kind(row: Row, _: Transaction | None) -> tuple[Value, ...]:
+    if row.header is not None:
+        return (row.header.kind,)
+    return ("noise" if row.searched is None else "searching",)
 
 
 def _role(row: Row, _: Transaction | None) -> tuple[Value, ...]:
@@ -76,13 +82,13 @@ COLUMNS: dict[str, Getter] = {
     "addr": lambda row, tx: _source(row, tx) + _destination(row, tx),
     "proto": lambda row, _: (row.header.protocol,) if row.header is not None else (),
     "role": _role,
-    "kind": lambda row, _: (row.header.kind if row.header is not None else "noise",),
+    "kind": _kind,
     "func": _of_header("function"),
     "register": _of_header("address"),
     "count": _of_header("count"),
     "ok": _ok,
     "error": _of_header("error"),
-    "noise": lambda row, _: (int(not isinstance(row.event, Frame)),),
+    "noise": lambda row, _: (int(not isinstance(row.event, Frame) and row.searched is None),),
     "found": lambda row, _: (row.event.found.value,) if isinstance(row.event, Frame) else (),
     "damage": lambda row, _: (
         (row.event.damage.value,) if isinstance(row.event, Frame) and row.event.damage is not None else ()

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import cast
 
 from dissectors import registry
-from dissectors.findings import Finding, Judge, Rule
+from dissectors.findings import Finding, Judge, Rule, with_consequences
 from dissectors.frame import Noise, Place, Reason
 from dissectors.line import Timing
 from dissectors.profiles import Devices
@@ -16,7 +16,7 @@ from sniff.analysis.line_findings import LineFindings
 from sniff.analysis.line_rules import LINE_RULES
 from sniff.analysis.profile_findings import PROFILE_RULES, ProfileFindings
 from sniff.engine import Output
-from sniff.session import LineEvent, LineEventKind, Session
+from sniff.session import LineEvent, LineEventKind, Session, settings_change
 
 _HOLES = frozenset((LineEventKind.DROPPED, LineEventKind.UNPLUGGED, LineEventKind.REPLUGGED))
 _DOUBTFUL = frozenset(
@@ -31,14 +31,20 @@ class Judging:
         make = cast("Callable[[Timing], Judge] | None", dissector.extras.get("findings"))
         self.judge = make(session.timing) if make is not None else None
         self.line = LineFindings(session)
+        self._rules = rules_over(dissector)
         self.devices = ProfileFindings(session.timing, dissector, devices) if devices else None
+        self._searching = False
         self._hole: int | None = None  # when octets were lost, by the newest line event that says so
         self._first_after: int | None = None  # number of the first row that begins after it
 
     def add(self, output: Output) -> None:
-        """Take rows and closed transactions."""
+        """Take rows and closed transactions. What was heard with wrong settings says nothing about the bus."""
         judge, line, devices = self.judge, self.line, self.devices
         for row in output.rows:
+            if row.searched is not None:  # a request may be among it whose answer comes next
+                self._hole, self._first_after = row.event.end, None
+                line.pass_by(row)
+                continue
             line.see(row)
             if self._hole is not None and self._first_after is None and row.event.start >= self._hole:
                 self._first_after = row.no
@@ -60,6 +66,11 @@ class Judging:
 
     def add_line_event(self, event: LineEvent) -> None:
         """Take something that happened to the line."""
+        change = settings_change(event)
+        if change is not None:
+            self._searching = (self._searching or change.searching) and not change.found
+        if self._searching and event.kind is LineEventKind.ERRORS:
+            return  # wrong settings made them
         self.line.add_line_event(event)
         if event.kind in _HOLES:
             self._hole, self._first_after = event.time, None
@@ -81,7 +92,10 @@ class Judging:
         if self.devices is not None and not self.line.rubbish:
             made += self.devices.findings()
         return tuple(
-            sorted(made, key=lambda finding: (-finding.severity, finding.first, finding.code, finding.subject))
+            sorted(
+                with_consequences(made, self._rules),
+                key=lambda finding: (-finding.severity, finding.first, finding.code, finding.subject),
+            )
         )
 
 

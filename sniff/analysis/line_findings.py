@@ -47,7 +47,7 @@ class LineFindings:
         self._counted: dict[str, Tally] = {}
         self._unplugged_at: int | None = None
         self._away = 0
-        self._lost_octets = self._rest_octets = 0
+        self._lost_octets = self._rest_octets = self._only_heard = 0
         self._echo, self._asked = Tally(), 0
         self._values: Counter[int] = Counter()
         self._before: str | None = None  # who sent the frame before
@@ -72,6 +72,10 @@ class LineFindings:
             self._see_frame(row, event)
         else:
             self._see_noise(row.no, event)
+
+    def pass_by(self, row: Row) -> None:
+        """Take a row of a search for settings: the bus was not silent, and that is all it says."""
+        self._only_heard += len(row.event.octets)
 
     def settle(self, transaction: Transaction) -> None:
         """Take a transaction that closed."""
@@ -156,7 +160,7 @@ class LineFindings:
     def findings(self) -> tuple[Finding, ...]:
         """All findings so far."""
         made = [self._can_tell(), *self._of_host()]
-        if not self._octets:
+        if not self._octets and not self._only_heard:
             return (*made, self._whole("LN002", "bus", "not one octet was heard"))
         if self.rubbish:
             return (*made, self._rubbish())

@@ -31,7 +31,9 @@ class Load:
     last: int | None = None
 
     def add(self, row: Row) -> None:
-        """Count one row."""
+        """Count one row; what a search heard with other settings is no load."""
+        if row.searched is not None:
+            return
         event = row.event
         self.first = event.start if self.first is None else min(self.first, event.start)
         self.last = event.end if self.last is None else max(self.last, event.end)

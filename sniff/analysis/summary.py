@@ -24,7 +24,8 @@ class Summary:
     frames: int = 0
     damaged: int = 0
     noise: int = 0  # octets
-    octets: int = 0
+    octets: int = 0  # without those that were only heard
+    searched: int = 0  # octets heard while the settings were searched for
     kinds: Counter[str] = field(default_factory=Counter)
     damages: Counter[str] = field(default_factory=Counter)
     found: Counter[str] = field(default_factory=Counter)
@@ -37,6 +38,10 @@ class Summary:
 
     def __post_init__(self) -> None:
         self.load = Load(self.line)
+
+    def use(self, line: LineSettings) -> None:
+        """Count with other line settings from here on: the right ones were found."""
+        self.line = self.load.line = line
 
     def add(self, output: Output) -> None:
         """Count what the engine gave."""
@@ -51,6 +56,9 @@ class Summary:
 
     def _add_row(self, row: Row) -> None:
         event = row.event
+        if row.searched is not None:
+            self.searched += len(event.octets)
+            return
         self.octets += len(event.octets)
         self.load.add(row)
         self.nodes.add_row(row)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dissectors.frame import Frame, LineError, Noise, Place, Role
+from dissectors.frame import Event, Frame, LineError, Noise, Place, Role
 from dissectors.registry import Dissector
 from dissectors.tracker import Interval
 from sniff.engine import Row
@@ -11,6 +11,8 @@ from sniff.engine import Row
 def describe(dissector: Dissector, row: Row) -> str:
     """One line that says what a row is."""
     event = row.event
+    if row.searched is not None:
+        return f"{_octets(event)} heard while searching for the settings, with {row.searched}"
     if isinstance(event, Noise):
         return describe_noise(event)
     assert row.header is not None  # the engine peeks every frame
@@ -20,9 +22,13 @@ def describe(dissector: Dissector, row: Row) -> str:
 
 def describe_noise(noise: Noise) -> str:
     """One line about octets that are no frame."""
-    count = len(noise.octets)
     where = "between frames" if noise.place is Place.BETWEEN else f"{noise.place.value} a frame"
-    return f"{count} octet{'s' if count != 1 else ''} of noise {where}: {noise.reason.value}"
+    return f"{_octets(noise)} of noise {where}: {noise.reason.value}"
+
+
+def _octets(event: Event) -> str:
+    count = len(event.octets)
+    return f"{count} octet{'s' if count != 1 else ''}"
 
 
 def mark_names(error: LineError) -> str:
@@ -53,5 +59,5 @@ def _short(value: int) -> str:
 
 
 def is_error(row: Row) -> bool:
-    """Whether a row itself is trouble: noise, or a frame that is not good."""
-    return not isinstance(row.event, Frame) or not row.event.ok
+    """Whether a row itself is trouble: noise, or a frame that is not good. What a search heard is neither."""
+    return row.searched is None and (not isinstance(row.event, Frame) or not row.event.ok)

@@ -15,7 +15,8 @@ from dissectors.line import LineSettings
 class SourceSpec:
     """One bus to listen to. `spec`: as `open_source` takes it; `protocol`: a registry name; `bus`: its short name.
 
-    `notes`: of the session, for the recording.
+    `notes`: of the session, for the recording. `unknown`: "line", "protocol" or both, when they are searched for:
+    what stands there is only where the search begins.
     """
 
     spec: str
@@ -23,6 +24,7 @@ class SourceSpec:
     protocol: str = "modbus-rtu"
     bus: str = "bus"
     notes: Mapping[str, str] = field(default_factory=dict)
+    unknown: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +75,7 @@ class CaptureConfig:
                 source["protocol"],
                 source["bus"],
                 dict(source.get("notes", {})),
+                tuple(source.get("unknown", ())),
             )
             for source in value["sources"]
         )

@@ -9,7 +9,6 @@ import subprocess
 import time
 from collections import deque
 from collections.abc import Sequence
-from typing import Any
 
 from dissectors.line import LineSettings
 from sniff.capture.config import CaptureConfig, RecordSpec, SourceSpec
@@ -28,7 +27,7 @@ from sniff.capture.wire import (
     encode_json,
 )
 from sniff.formats import CaptureError
-from sniff.session import Session
+from sniff.session import Session, SettingsChange
 from sniff.sources import PortError
 from sniff.sources.clock import Clock
 
@@ -192,35 +191,10 @@ class CaptureLink:
         self._unsent += encode(Kind.RECONFIGURE, bus, str(line).encode())
         self._send()
 
-    def settle(
-        self, sources: Sequence[SourceSpec], record: RecordSpec | None = None, duration: float | None = None
-    ) -> None:
-        """Say what the buses run with, now that it is known, and begin to record.
-
-        Only for a link that was started without a recording. `duration`: s from now on, None for no end. What came
-        before this is dropped: it was heard while the settings were searched for. Raises CaptureError.
-        """
-        config = CaptureConfig(tuple(sources), record, None if duration is None else int(duration * 1e9))
-        self._unsent += encode_json(Kind.RECORD, config.to_json())
-        until = time.monotonic() + START_PATIENCE
-        while time.monotonic() < until:
-            self._send()
-            alive = self._fill(0.05)
-            while self._waiting:
-                kind, _, body = self._waiting.popleft()
-                if kind == Kind.RECORDING:
-                    return self._settled(decode_json(body))
-                if kind == Kind.ENDED:
-                    raise CaptureError(body.decode("utf-8", "replace"))
-            if not alive:
-                raise CaptureError(self._why_dead())
-        raise CaptureError("capture process does not answer")
-
-    def _settled(self, value: Any) -> None:
-        if "text" in value:
-            raise CaptureError(str(value["text"]))
-        self._sessions = [Session.from_metadata(session) for session in value["sessions"]]
-        self.paths = [str(path) for path in value["paths"]]
+    def found(self, bus: int, line: LineSettings, protocol: str) -> None:
+        """Say what a search came to; a SETTINGS event says from where on it holds, and later parts begin with it."""
+        self._unsent += encode(Kind.FOUND, bus, str(SettingsChange(line, protocol, found=True)).encode())
+        self._send()
 
     def _send(self) -> None:
         while self._unsent and self._sending:

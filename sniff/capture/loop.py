@@ -11,7 +11,7 @@ import contextlib
 import selectors
 import socket
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
@@ -26,7 +26,7 @@ from sniff.capture.wire import (
     encode_tick,
 )
 from sniff.recording.writer import Recorder
-from sniff.session import Item, LineEvent, LineEventKind
+from sniff.session import Item, LineEvent, LineEventKind, Session, SettingsChange
 from sniff.sources import PortError, Source
 from sniff.sources.clock import NS_PER_MS, STEP, Clock
 
@@ -57,7 +57,10 @@ class _Bus:
 
 @dataclass
 class CaptureLoop:
-    """Runs until somebody says `stop`. `commands`: the connection that the main process sends on, None for none."""
+    """Runs until somebody says `stop`. `commands`: the connection that the main process sends on, None for none.
+
+    `sessions`: of the sources, in their order; where settings are searched for, the first item of a bus says so.
+    """
 
     clock: Clock
     sources: list[Source]
@@ -67,7 +70,7 @@ class CaptureLoop:
     waker: socket.socket | None = None  # readable when a signal came
     priority: str = ""
     end_at: int | None = None
-    record: Callable[[bytes], None] | None = None  # begins to record as a message says
+    sessions: list[Session] = field(default_factory=list)
     reason: str | None = None
     _offset: int = 0
     _due: int = _FAR
@@ -78,6 +81,7 @@ class CaptureLoop:
         self._selector = selectors.DefaultSelector()
         self._buses = [_Bus(index, source) for index, source in enumerate(self.sources)]
         self._splitter = MessageSplitter()
+        self._seeking = {index for index, session in enumerate(self.sessions) if "line" in session.unknown}
         now = self.clock.now()
         self._beat_at = self._status_at = now
         self._busy_until = now
@@ -87,6 +91,9 @@ class CaptureLoop:
         if self.waker is not None:
             waker = self.waker
             self._selector.register(waker, selectors.EVENT_READ, lambda: (waker.recv(64), None)[1])
+        for session, bus in zip(self.sessions, self._buses, strict=False):
+            if session.unknown:  # before the first octet: it was heard with settings that are only tried
+                self._settings(bus, SettingsChange(session.line, searching=True))
         for bus in self._buses:
             self._take(bus)
         while self.reason is None:
@@ -239,12 +246,17 @@ class CaptureLoop:
             self.commands = None
             if not self.recorders:
                 self.stop("the main process is gone")
+            elif self._seeking:
+                self.stop("the main process is gone, which searched for the line settings")
 
     def _command(self, kind: int, bus: int, body: bytes) -> None:
         if kind == Kind.STOP:
             self.stop("stopped")
-        elif kind == Kind.RECORD and self.record is not None:
-            self.record(body)
+        elif kind == Kind.FOUND and bus < len(self._buses):
+            change = SettingsChange.parse(body.decode("utf-8", "replace"))
+            self._seeking.discard(bus)
+            self._take(self._buses[bus])
+            self._settings(self._buses[bus], replace(change, searching=False, found=True))
         elif kind == Kind.DERIVED and bus < len(self.recorders):
             derived = decode_derived(bus, body)
             self.recorders[bus].derived(
@@ -257,9 +269,13 @@ class CaptureLoop:
             )
         elif kind == Kind.RECONFIGURE and bus < len(self._buses):
             source = self._buses[bus].source
+            self._take(self._buses[bus])  # what is there was heard with the settings before
             try:
                 source.reconfigure(LineSettings.parse(body.decode("ascii", "replace")))
             except (PortError, ValueError) as error:
-                event = LineEvent(self.clock.now(), LineEventKind.NOTE, str(error))
-                self.outlet.item(bus, event)
+                self._keep(bus, LineEvent(self.clock.now(), LineEventKind.NOTE, str(error)))
             self._take(self._buses[bus])
+
+    def _settings(self, bus: _Bus, change: SettingsChange) -> None:
+        """Say in the recording and to the main process what the settings are from here on."""
+        self._keep(bus.index, LineEvent(bus.source.now(), LineEventKind.SETTINGS, str(change)))

@@ -13,7 +13,6 @@ import signal
 import socket
 import stat
 import sys
-from functools import partial
 from types import FrameType
 
 from sniff.capture.config import CaptureConfig, SourceSpec
@@ -61,7 +60,16 @@ def main() -> int:
 def session_of(spec: SourceSpec, source: Source, clock: Clock) -> Session:
     """What is known of a bus at the start of its capture."""
     started = source.session.started if isinstance(source, CaptureFileSource) else clock.wall
-    return Session(spec.spec, spec.line, spec.protocol, started, spec.bus, source.session_adapter, notes=spec.notes)
+    return Session(
+        spec.spec,
+        spec.line,
+        spec.protocol,
+        started,
+        spec.bus,
+        source.session_adapter,
+        notes=spec.notes,
+        unknown=spec.unknown,
+    )
 
 
 def open_recorders(config: CaptureConfig, sessions: list[Session]) -> list[Recorder]:
@@ -101,10 +109,9 @@ def _capture(
         "paths": paths,
     }
     outlet.post(encode_json(Kind.HELLO, hello))
-    loop = CaptureLoop(clock, sources, recorders, outlet, connection, priority=priority)
+    loop = CaptureLoop(clock, sources, recorders, outlet, connection, priority=priority, sessions=sessions)
     if config.duration is not None:
         loop.end_at = clock.now() + config.duration
-    loop.record = partial(_record, loop, sources, clock)
     waker = _end_on_signals(loop)
     try:
         reason = loop.run()
@@ -116,25 +123,6 @@ def _capture(
     waker.close()
     outlet.finish(encode(Kind.ENDED, 0, reason.encode()), FAREWELL)
     return 0
-
-
-def _record(loop: CaptureLoop, sources: list[Source], clock: Clock, body: bytes) -> None:
-    """Begin to record a capture that was begun without: its settings had to be found first."""
-    try:
-        config = CaptureConfig.from_json(decode_json(body))
-        sessions = [session_of(*pair, clock) for pair in zip(config.sources, sources, strict=True)]
-        if not loop.recorders:
-            loop.recorders.extend(open_recorders(config, sessions))
-        if config.duration is not None:
-            loop.end_at = clock.now() + config.duration
-    except (CaptureError, OSError, ValueError, KeyError, TypeError) as error:
-        loop.outlet.post(encode_json(Kind.RECORDING, {"kind": "capture", "text": str(error)}))
-        return
-    answer = {
-        "sessions": [session.to_metadata() for session in sessions],
-        "paths": [str(recorder.path) for recorder in loop.recorders],
-    }
-    loop.outlet.post(encode_json(Kind.RECORDING, answer))
 
 
 def _end_on_signals(loop: CaptureLoop) -> socket.socket:

@@ -35,13 +35,12 @@ class Kind(IntEnum):
     TICK = 5
     STATUS = 6  # JSON
     ENDED = 7  # text
-    RECORDING = 8  # JSON: sessions, paths; or kind and text of what prevents it
 
     CONFIG = 32  # JSON
     DERIVED = 33
     RECONFIGURE = 34  # text: line settings
     STOP = 35
-    RECORD = 36  # JSON: the settings that were found, and where to record
+    FOUND = 36  # text: the settings that a search came to, as in `SettingsChange`
 
 
 class Received(NamedTuple):

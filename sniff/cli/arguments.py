@@ -11,7 +11,7 @@ from dissectors.line import LineSettings
 from dissectors.profiles import Devices, ProfileError
 from sniff.cli import UNREADABLE, USAGE, Failure
 from sniff.formats import Capture, CaptureError, read
-from sniff.session import Session
+from sniff.session import OPTIONS, Session
 
 AUTO = "auto"
 """In place of line settings or a protocol: find them by listening."""
@@ -141,6 +141,11 @@ def settings_of(args: argparse.Namespace, session: Session) -> Session:
     except registry.UnknownProtocol as error:
         raise Failure(f"{error}; say which with -p", USAGE) from None
     return session
+
+
+def options(session: Session) -> list[str]:
+    """The options that name what is not known of a session."""
+    return [OPTIONS[name] for name in session.unknown]
 
 
 def colour() -> bool:

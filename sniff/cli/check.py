@@ -8,6 +8,7 @@ import argparse
 import sys
 from array import array
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from dissectors.findings import Finding, Severity
 from dissectors.profiles import Devices
@@ -15,12 +16,15 @@ from dissectors.registry import Dissector
 from sniff.analysis.health import Health, bus_health, station_health
 from sniff.analysis.judging import Judging
 from sniff.analysis.summary import Summary
-from sniff.cli import UNREADABLE, USAGE, Failure, arguments, check_output
+from sniff.cli import INTERRUPTED, PORT_TROUBLE, UNREADABLE, USAGE, Failure, arguments, check_output
 from sniff.cli.check_output import Checked
 from sniff.engine import Output
 from sniff.formats import READERS
 from sniff.reading import dissector_for, outputs
 from sniff.session import LineEvent, Session
+
+if TYPE_CHECKING:
+    from sniff.live import LiveBus
 
 DEFAULT_DURATION = 30.0
 SEVERITIES = tuple(severity.label for severity in Severity)
@@ -71,7 +75,11 @@ def _check(source: str, args: argparse.Namespace) -> Checked:
         for item in outputs(capture.items(), session):
             run_of.take(item)
         complete = capture.completeness()
-        return run_of.result(source, "" if complete.whole else complete.text)
+        notes = [] if complete.whole else [complete.text]
+        if session.unknown:
+            name = " and ".join(arguments.options(session))
+            notes.append(f"no settings were found while this was recorded, so nothing is judged; name them with {name}")
+        return run_of.result(source, "; ".join(notes))
     if not source.startswith(("/dev/", "COM", "\\\\")) and "://" not in source and ("." in source or "/" in source):
         raise Failure(f"{source}: no such file", UNREADABLE)
     if len(args.sources) > 1:
@@ -89,15 +97,40 @@ def _listen(port: str, args: argparse.Namespace) -> Checked:
     duration = args.duration or DEFAULT_DURATION
     print(f"sniff485: listening to {port} for {duration:g} s", file=sys.stderr)
     live = listening.start(target.source, None, None, target.devices, target.search)
-    run_of = Checking(live.session, live.dissector, target.devices)
-    until = time.monotonic() + duration
     with listening.until_interrupted() as caught:
+        early = _found_first(live, caught)
+        run_of = Checking(live.session, live.dissector, target.devices)
+        for item in early:
+            run_of.take(item)
+        until = time.monotonic() + duration
         while live.ended is None:
             over = caught or time.monotonic() >= until
             for item in live.stop() if over else live.poll(0.1):
                 run_of.take(item)
     note = "" if live.ended.clean else live.ended.reason
     return run_of.result(port, note)
+
+
+def _found_first(live: LiveBus, caught: list[int]) -> list[object]:
+    """What comes until a search for settings has ended well. Ends with exit code 4 when it does not, 130 for Ctrl-C."""
+    from sniff.cli import searching
+
+    items: list[object] = []
+    meter = searching.Meter()
+    while live.searching is not None:
+        meter.show(live.searching)
+        in_vain = live.ended is not None or live.searching.seconds >= searching.TIMEOUT
+        if caught or in_vain:
+            meter.clear()
+            live.stop()
+            assert live.search is not None
+            if live.ended is not None and not live.ended.clean:
+                raise Failure(f"{live.session.port}: {live.ended.reason}", PORT_TROUBLE)
+            said = searching.sentence(live.search.outcome(), "-s and -p name them")
+            raise Failure(f"{live.session.port}: {said}", INTERRUPTED if caught else PORT_TROUBLE)
+        items += live.poll(0.1)
+    meter.follow(live)
+    return items
 
 
 class Checking:

@@ -70,7 +70,7 @@ def write_text(checked: Sequence[Checked], colour: bool) -> None:
 
 def _write_head(one: Checked, width: int) -> None:
     session = one.session
-    print(f"{one.source}: {session.protocol}, {session.line}, {_span(one.seconds)}, {one.frames} frames")
+    print(f"{one.source}: {session.protocol_words}, {session.line_words}, {_span(one.seconds)}, {one.frames} frames")
     if one.note:
         print(f"  incomplete: {one.note}")
     if one.frames:

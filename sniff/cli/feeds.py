@@ -34,7 +34,10 @@ class LiveFeed:
     def poll(self) -> bool:
         """Take what has come."""
         before = self._store.version
-        for item in self.live.poll():
+        items = self.live.poll()
+        if self.live.session is not self._store.session:  # a search has ended
+            self._store.settle(self.live.session, self.live.dissector)
+        for item in items:
             if isinstance(item, Output):
                 self._store.add(item)
             elif isinstance(item, LineEvent):
@@ -45,16 +48,18 @@ class LiveFeed:
         """How the capture is doing."""
         status, ended = self.live.status, self.live.ended
         trouble = status.error or (ended.reason if ended is not None else "")
+        searching = self.live.searching
         return FeedStatus(
             port=self.live.session.port,
-            line=str(self.live.session.line),
-            protocol=self.live.session.protocol,
+            line=self.live.session.line_words,
+            protocol=self.live.session.protocol_words,
             recording=status.path or None,
             file_size=status.size,
             dropped=status.dropped + status.lost,
             live=True,
             ended=trouble,
             priority=status.priority,
+            searching="" if searching is None else f"{searching.line}",
         )
 
     def close(self) -> None:
@@ -70,6 +75,7 @@ class FileFeed:
         self.capture = capture
         self._store = Store(session, dissector_for(session), devices=devices)
         self._outputs: Iterator[Output | LineEvent] | None = outputs(capture.items(), session)
+        self._ended = ""
         try:
             self._size = Path(path).stat().st_size
         except OSError:
@@ -93,16 +99,14 @@ class FileFeed:
             if time.monotonic() > until:
                 return True
         self._outputs = None
+        complete = self.capture.completeness()
+        self._ended = "" if complete.whole else complete.text
         return True
 
     def status(self) -> FeedStatus:
         """Where the file ends, once it has been read."""
-        ended = ""
-        if self._outputs is None:
-            complete = self.capture.completeness()
-            ended = "" if complete.whole else complete.text
         session = self._store.session
-        return FeedStatus(self.path, str(session.line), session.protocol, None, self._size, ended=ended)
+        return FeedStatus(self.path, session.line_words, session.protocol_words, None, self._size, ended=self._ended)
 
     def close(self) -> None:
         """Nothing to stop."""

@@ -15,7 +15,7 @@ from sniff.cli.rows import iso
 from sniff.engine import Output
 from sniff.formats import Capture
 from sniff.reading import dissector_for, outputs
-from sniff.session import LineEvent, Session
+from sniff.session import LineEvent, Session, settings_change
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -62,12 +62,14 @@ def _as_json(path: str, capture: Capture, session: Session, summary: Summary) ->
         "first": iso(summary.load.first) if summary.load.first is not None else None,
         "last": iso(summary.load.last) if summary.load.last is not None else None,
         "seconds": summary.seconds,
-        "protocol": session.protocol,
-        "line": str(session.line),
+        "protocol": None if "protocol" in session.unknown else session.protocol,
+        "line": None if "line" in session.unknown else str(session.line),
         "port": session.port,
         "adapter": session.adapter.name,
         "adapter_latency_ms": session.adapter.latency / 1e6,
-        "octets": summary.octets,
+        "unknown": list(session.unknown),
+        "octets": summary.octets + summary.searched,
+        "searched_octets": summary.searched,
         "frames": summary.frames,
         "damaged": summary.damaged,
         "noise_octets": summary.noise,
@@ -109,18 +111,22 @@ def _print(path: str, capture: Capture, session: Session, summary: Summary, even
     print(plain(path))
     _line("file", complete.text if complete.whole else f"CUT: {complete.text}")
     if summary.load.first is None or summary.load.last is None:
-        _line("content", "no octets")
+        _line("content", "no octets" if not summary.searched else "only what was heard while searching for settings")
     else:
         _line("from", iso(summary.load.first))
         _line("to", f"{iso(summary.load.last)} ({_span(summary.seconds)})")
-    _line("protocol", f"{dissector_for(session).title}, {session.line}")
+    _line("protocol", _settings(session))
+    if summary.searched or session.unknown:
+        _line("search", _search(session, summary, events))
     _line("port", session.port or "unknown")
     _line(
         "adapter", f"{adapter.name}; holds octets back up to {milliseconds(adapter.latency)} ({adapter.latency_from})"
     )
     reports = "unknown" if adapter.reports is None else ", ".join(adapter.reports) or "none (zero errors mean nothing)"
     _line("reports", f"line errors: {reports}{'; ' + adapter.detail if adapter.detail else ''}")
-    _line("octets", f"{summary.octets}, {summary.noise} of them noise; bus load {summary.load.overall():.1%}")
+    searched = f"{summary.searched} of them while searching, " if summary.searched else ""
+    octets = summary.octets + summary.searched
+    _line("octets", f"{octets}, {searched}{summary.noise} of them noise; bus load {summary.load.overall():.1%}")
     _line("frames", f"{summary.frames}, {summary.damaged} damaged{_counts(summary.damages)}")
     _line("found by", _listed(summary.found))
     _line("kinds", _listed(summary.kinds))
@@ -150,6 +156,22 @@ def _print(path: str, capture: Capture, session: Session, summary: Summary, even
     if len(events) > 20:
         _line("event", f"and {sum(summary.events.values()) - 20} more")
     sys.stdout.flush()
+
+
+def _settings(session: Session) -> str:
+    title = "unknown" if "protocol" in session.unknown else dissector_for(session).title
+    return f"{title}, line settings unknown" if "line" in session.unknown else f"{title}, {session.line}"
+
+
+def _search(session: Session, summary: Summary, events: list[LineEvent]) -> str:
+    """How the search for settings went while this was recorded."""
+    tried = dict.fromkeys(
+        str(change.line) for event in events if (change := settings_change(event)) is not None and change.line
+    )
+    heard = f"{summary.searched} octets heard meanwhile say nothing about the bus; listened with {', '.join(tried)}"
+    if not session.unknown:
+        return heard
+    return f"no settings found; {heard}; once they are known, read it with {' and '.join(arguments.options(session))}"
 
 
 def _line(name: str, text: str) -> None:

@@ -228,7 +228,7 @@ def run(printer: Printer, count: int | None = None, duration: float | None = Non
     if live.ended is not None and not live.ended.clean:
         return PORT_TROUBLE
     if live.engine.searching:
-        say_not_found(live, "interrupted" if caught else "the end")
+        say_not_found(live, "interrupted" if caught else "ended")
         return INTERRUPTED if caught else PORT_TROUBLE
     return 0
 
@@ -247,8 +247,9 @@ def say_end(printer: Printer) -> None:
     """The closing lines on standard error: what was heard, what was lost, where it is."""
     summary, status = printer.summary, printer.live.status
     noise = f", {summary.noise} octets of noise" if summary.noise else ""
+    searched = f", {summary.searched} octets heard while searching" if summary.searched else ""
     print(
-        f"sniff485: {summary.frames} frames ({summary.damaged} damaged), {summary.octets} octets{noise}, "
+        f"sniff485: {summary.frames} frames ({summary.damaged} damaged), {summary.octets} octets{noise}{searched}, "
         f"bus load {summary.load.overall():.1%}",
         file=sys.stderr,
     )

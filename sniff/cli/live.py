@@ -50,6 +50,8 @@ def show(live: LiveBus, as_json: bool, as_lines: bool) -> int:
         print(
             f"sniff485: {total.frames} frames ({total.damaged} damaged), {total.noise} octets of noise", file=sys.stderr
         )
+        if live.engine.searching:
+            listening.say_not_found(live, "ended")
         return 0
     printer = listening.Printer(live, as_json=as_json, colour=arguments.colour())
     code = listening.run(printer)

@@ -33,7 +33,7 @@ def run(args: argparse.Namespace) -> int:
         target.source, RecordSpec(path, args.rotate, args.keep), devices=target.devices, search=target.search
     )
     printer = listening.Printer(live, quiet=True)
-    code = listening.run(printer, args.count, args.duration, progress=not args.quiet)
+    code = listening.run(printer, args.count, args.duration, not args.quiet)
     if not args.quiet:
         listening.say_end(printer)
     return code

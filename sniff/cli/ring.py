@@ -19,7 +19,8 @@ def ring_of(items: Iterable[Item], session: Session) -> Ring:
     for output in outputs(items, session):
         if isinstance(output, Output):
             for row in output.rows:
-                observer.see(row.no, row.event, row.header)
+                if row.searched is None:
+                    observer.see(row.no, row.event, row.header)
     return observer.ring()
 
 

@@ -9,7 +9,7 @@ from typing import Any
 from dissectors.frame import Frame, Role
 from dissectors.line import NS_PER_S
 from dissectors.registry import Dissector
-from sniff.analysis.wording import describe, duration
+from sniff.analysis.wording import describe, duration, is_error
 from sniff.reading import Settled
 from sniff.session import Session
 
@@ -33,7 +33,10 @@ def iso(time: int) -> str:
 
 
 def to_json(item: Settled, dissector: Dissector, session: Session, with_fields: bool = False) -> dict[str, Any]:
-    """One object a frame; the keys and their order are a promise. Noise has null where it has no such thing."""
+    """One object a frame; the keys and their order are a promise. Noise has null where it has no such thing.
+
+    What a search heard is an object too: "kind" is "searching", and "ok" null, for it is neither.
+    """
     row, transaction = item.row, item.transaction
     event, header, placement = row.event, row.header, row.placement
     frame = event if isinstance(event, Frame) else None
@@ -47,8 +50,8 @@ def to_json(item: Settled, dissector: Dissector, session: Session, with_fields: 
         "src": placement.source if placement else header.source if header else None,
         "dst": placement.destination if placement else header.destination if header else None,
         "role": role_of(item).value if header else None,
-        "kind": header.kind if header else "noise",
-        "ok": frame.ok if frame is not None else False,
+        "kind": header.kind if header else "noise" if row.searched is None else "searching",
+        "ok": frame.ok if frame is not None else None if row.searched is not None else False,
         "error": header.error if header else None,
         "found": frame.found.value if frame is not None else None,
         "noise_before": frame.skipped if frame is not None else 0,
@@ -100,7 +103,7 @@ def text_line(item: Settled, dissector: Dissector, session: Session, colour: boo
     row, transaction = item.row, item.transaction
     seconds = (row.event.start - session.started) / NS_PER_S
     notes: list[str] = []
-    bad = not isinstance(row.event, Frame) or not row.event.ok
+    bad = is_error(row)
     if row.event.marks:
         notes.append(f"{len(row.event.marks)} line error{'s' if len(row.event.marks) != 1 else ''}")
     if transaction is not None and (transaction.response or transaction.request) == row.no:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from dissectors import registry
 from dissectors.line import LineSettings
@@ -11,12 +11,11 @@ from sniff.analysis.detecting import Detecting, Ending, Outcome, candidates
 from sniff.capture.link import CaptureLink
 from sniff.cli import INTERRUPTED, PORT_TROUBLE, Failure
 from sniff.detection import Progress, Search
+from sniff.live import LiveBus
+from sniff.session import UNKNOWABLE
 
 TIMEOUT = 120.0
 """s after which a search gives up, unless told otherwise."""
-
-LINELESS = frozenset(("pty", "TCP gateway"))
-"""Drivers and adapters that set no line."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,6 +24,11 @@ class Unknowns:
 
     line: LineSettings | None = None
     protocol: str | None = None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What is searched for, as `Session.unknown` has it."""
+        return tuple(name for name in UNKNOWABLE if getattr(self, name) is None)
 
     def detecting(self, latency: int = 0, reports: tuple[str, ...] | None = None) -> Detecting:
         """A search over everything that is not given; the protocol's own settings first."""
@@ -38,32 +42,21 @@ def search(link: CaptureLink, unknowns: Unknowns, timeout: float = TIMEOUT) -> O
     from sniff.cli.listening import until_interrupted
 
     session = link.session(0)
-    running = Search(link, unknowns.detecting(session.adapter.latency, session.adapter.reports), timeout)
+    detecting = unknowns.detecting(session.adapter.latency, session.adapter.reports)
+    running = Search(link, detecting, unknowns.line is not None)
     meter = Meter()
     with until_interrupted() as caught:
-        outcome = running.run(lambda: bool(caught), meter.show)
+        outcome = running.run(timeout, lambda: bool(caught), meter.show)
     meter.clear()
     if running.ended is not None and not running.ended.clean:
         raise Failure(f"{session.port}: {running.ended.reason}", PORT_TROUBLE)
     if caught and outcome.ending is not Ending.FOUND:
         raise Failure("interrupted", INTERRUPTED)
-    if session.adapter.driver in LINELESS or session.adapter.name in LINELESS:
-        return without_line(outcome, unknowns)
     return outcome
 
 
-def without_line(outcome: Outcome, unknowns: Unknowns) -> Outcome:
-    """The outcome where octets come through no line of this machine, so that all settings hear the same."""
-    reading = outcome.reading
-    if reading is None or unknowns.line is not None:
-        return outcome
-    line = LineSettings.parse(registry.get(reading.protocol).default_line)
-    words = f"the line settings: octets come through no line here; {line} is only what such a bus usually runs"
-    return replace(outcome, reading=replace(reading, line=line), cannot_tell=(words,))
-
-
-def sentence(outcome: Outcome) -> str:
-    """The outcome in words."""
+def sentence(outcome: Outcome, advice: str = "--timeout gives the search longer") -> str:
+    """The outcome in words; `advice`: what to do where nothing made sense."""
     reading = outcome.reading
     if reading is not None:
         name = f"{registry.get(reading.protocol).title}, {reading.line}"
@@ -72,7 +65,7 @@ def sentence(outcome: Outcome) -> str:
         return "silent: not one octet came; is the bus powered, A and B connected, the master polling?"
     return (
         f"{outcome.octets} octets came, but with none of {outcome.tried} settings tried do they make sense: A and B "
-        "swapped, a protocol or rate that is not known here, or noise; --timeout gives the search longer"
+        f"swapped, a protocol or rate that is not known here, or noise; {advice}"
     )
 
 
@@ -86,13 +79,31 @@ class Meter:
     def show(self, progress: Progress) -> None:
         """Say it, where it is news."""
         if self._live:
-            text = f"{progress.seconds:.0f} s  {progress.line}  {progress.octets} octets  {progress.frames} frames"
+            text = (
+                f"{progress.seconds:.0f} s  searching: {progress.line}  "
+                f"{progress.octets} octets  {progress.frames} frames"
+            )
             print(f"\r\x1b[K{text}\r", end="", file=sys.stderr, flush=True)
         elif progress.line != self._last:
             self._last = progress.line
-            print(f"sniff485: {progress.seconds:.1f} s: listening with {progress.line}", file=sys.stderr)
+            print(f"sniff485: {progress.seconds:.1f} s: searching, listening with {progress.line}", file=sys.stderr)
+
+    def follow(self, live: LiveBus) -> None:
+        """Say what the search of a bus is at, or what it came to."""
+        if live.searching is not None:
+            self.show(live.searching)
+        elif live.search is not None:
+            self.clear()
+            say_found(live.session.port, live.search.outcome())
 
     def clear(self) -> None:
         """Leave the terminal as it was."""
         if self._live:
             print("\r\x1b[K", end="", file=sys.stderr, flush=True)
+
+
+def say_found(port: str, outcome: Outcome) -> None:
+    """Say on standard error what a search came to, and what it cannot tell."""
+    print(f"sniff485: {port}: {sentence(outcome)}", file=sys.stderr)
+    for words in outcome.cannot_tell:
+        print(f"sniff485: cannot tell {words}", file=sys.stderr)

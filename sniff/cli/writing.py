@@ -54,13 +54,13 @@ def write(
             values = _Values(writer, session, devices) if devices else None
             for item in items:
                 writer.write(item)
+                if frames is not None:
+                    frames.add(item)
+                if values is not None:
+                    values.add(item)
                 if isinstance(item, Chunk):
                     chunks += 1
                     octets += len(item.octets)
-                    if frames is not None:
-                        frames.add(item)
-                    if values is not None:
-                        values.add(item)
                     progress.show(chunks)
             if frames is not None:
                 frames.close()
@@ -101,8 +101,8 @@ class _Frames:
         self._topic, self._schema = FRAMES, SCHEMA.name
         self._count = 0
 
-    def add(self, chunk: Chunk) -> None:
-        output = self._engine.feed(chunk)
+    def add(self, item: Item) -> None:
+        output = self._engine.take(item)
         self._log.add(output)
         self._count += len(output.rows)
         if self._count >= self.AT_ONCE:
@@ -134,8 +134,8 @@ class _Values:
         self._points = PointReader(self._engine.dissector, devices)
         self._channels = ValueChannels(session.bus, devices)
 
-    def add(self, chunk: Chunk) -> None:
-        self._take(self._engine.feed(chunk))
+    def add(self, item: Item) -> None:
+        self._take(self._engine.take(item))
 
     def close(self) -> None:
         self._take(self._engine.close())

@@ -13,7 +13,7 @@ from sniff.analysis.judging import Judging
 from sniff.engine import Output
 from sniff.formats import Capture
 from sniff.reading import dissector_for, outputs
-from sniff.session import Item, Session
+from sniff.session import Item, LineEvent, LineEventKind, Session, SettingsChange, settings_change
 
 _SECONDS = re.compile(r"\+?(\d+(?:\.\d{1,9})?)")
 _FRAMES = re.compile(r"(\d+)?(?:[-–:](\d+)?)?")
@@ -89,8 +89,19 @@ def around_finding(capture: Capture, session: Session, code: str) -> Stretch:
 
 
 def cut(items: Iterable[Item], stretch: Stretch, char: int) -> Iterator[Item]:
-    """The items that lie in a stretch; a read counts when any octet of it does (`char`: ns an octet)."""
+    """The items that lie in a stretch; a read counts when any octet of it does (`char`: ns an octet).
+
+    A stretch that begins within a search for settings begins with an event that says so.
+    """
+    searching: SettingsChange | None = None  # as it stands before the stretch
     for item in items:
         octets = len(getattr(item, "octets", b""))
-        if stretch.first <= item.time and item.time - octets * char <= stretch.last:
+        change = settings_change(item)
+        if item.time < stretch.first:
+            if change is not None and (change.searching or searching is not None):
+                searching = None if change.found else SettingsChange(change.line, searching=True)
+        elif item.time - octets * char <= stretch.last:
+            if searching is not None and not (change is not None and change.searching):
+                yield LineEvent(item.time, LineEventKind.SETTINGS, str(searching))
+            searching = None
             yield item

@@ -12,10 +12,10 @@ from sniff.session import Item, Session
 
 def merged_session(captures: Sequence[Capture], names: Sequence[str]) -> Session:
     """The session of all together: the earliest start, the worst adapter. Raises CaptureError where they differ."""
-    first = captures[0].session
+    first = next((capture.session for capture in captures if not capture.session.unknown), captures[0].session)
     for capture, name in zip(captures[1:], names[1:], strict=True):
         other = capture.session
-        if (other.protocol, other.line) != (first.protocol, first.line):
+        if not other.unknown and (other.protocol, other.line) != (first.protocol, first.line):
             raise CaptureError(
                 f"{name}: {other.protocol} {other.line}, but {names[0]} is {first.protocol} {first.line}; "
                 "captures of one bus with the same settings can be merged"

@@ -17,7 +17,7 @@ from typing import BinaryIO
 from sniff.formats import CaptureError
 from sniff.formats.files import NewFile, open_capture
 from sniff.formats.linktypes import LINK_TYPES, USER1
-from sniff.formats.records import Record, RecordMaker, foreign_session, items_of, protocol_of
+from sniff.formats.records import Record, RecordMaker, SearchMarks, foreign_session, items_of, protocol_of
 from sniff.session import Completeness, Item, Session
 
 SECTION, INTERFACE, SIMPLE, ENHANCED = 0x0A0D0D0A, 1, 3, 6
@@ -74,9 +74,11 @@ class PcapngCapture:
     def items(self) -> Iterator[Item]:
         """Chunks in the order of the file."""
         self._other = 0
+        marks = SearchMarks(self.session)
         with open_capture(self.path) as stream:
             for record in self._records(stream):
                 found = False
+                yield from marks.before(record)
                 for item in items_of(record, self.session.protocol):
                     found = True
                     yield item

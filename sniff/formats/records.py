@@ -6,8 +6,9 @@ are as good as that program and its host were, which nobody knows: `FOREIGN_LATE
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from dissectors import registry
 from dissectors.frame import Chunk, Frame
@@ -16,7 +17,7 @@ from sniff.analysis.wording import describe, duration
 from sniff.engine import Output
 from sniff.formats.linktypes import LINK_TYPES, RTAC, RTAC_ERRORS, USER1, link_type_for, rtac_record
 from sniff.reading import Settled, Settling, engine_for
-from sniff.session import Adapter, Item, LineEvent, LineEventKind, Session
+from sniff.session import Adapter, Item, LineEvent, LineEventKind, Session, SettingsChange
 
 FOREIGN_LATENCY = 20_000_000
 """ns; a usual USB adapter's latency timer and some scheduling."""
@@ -44,6 +45,29 @@ def foreign_session(path: str, protocol: str | None, started: int, kind: str) ->
         adapter=Adapter(name=f"another program's {kind}", latency=FOREIGN_LATENCY, latency_from="assumed"),
         notes={"line": "assumed: the file does not say"},
     )
+
+
+_SEARCHED = re.compile(r"heard while searching for the settings, with (\S+?)(?:;|$)")
+"""What `describe` says of a row of a search, in the comment of its packet."""
+
+
+class SearchMarks:
+    """Gives back to a file's items the settings that a search listened with, which packets keep as comments."""
+
+    def __init__(self, session: Session) -> None:
+        self._found = SettingsChange(session.line, session.protocol, found=True)
+        self._with: str | None = None
+
+    def before(self, record: Record) -> Iterator[LineEvent]:
+        """What happened before a record."""
+        match = _SEARCHED.search(record.comment)
+        searched = match[1] if match is not None else None
+        if searched != self._with:
+            change = (
+                self._found if searched is None else replace(SettingsChange.parse(f"line={searched}"), searching=True)
+            )
+            yield LineEvent(record.time, LineEventKind.SETTINGS, str(change))
+        self._with = searched
 
 
 def items_of(record: Record, protocol: str) -> Iterator[Item]:
@@ -86,11 +110,9 @@ class RecordMaker:
 
     def add(self, item: Item) -> Iterator[Record]:
         """Take one item; give the records that it completes."""
-        if not isinstance(item, Chunk):
-            if self.link_type == RTAC and item.kind is LineEventKind.DROPPED:
-                yield Record(item.time, RTAC, rtac_record(item.time - self.session.started, 5, b""))
-            return
-        yield from self._settled(self.engine.feed(item))
+        yield from self._settled(self.engine.take(item))
+        if isinstance(item, LineEvent) and self.link_type == RTAC and item.kind is LineEventKind.DROPPED:
+            yield Record(item.time, RTAC, rtac_record(item.time - self.session.started, 5, b""))
 
     def advance(self, now: int) -> Iterator[Record]:
         """Say that no read returned up to `now` (ns)."""

@@ -278,12 +278,7 @@ class Joiner:
             return
         kind, number, record = parsed
         if kind in _EVENT_KINDS:
-            time = _integer(record.get("time_ns"), log_time)
-            text = record.get("text")
-            event = LineEvent(
-                time, _EVENT_KINDS[kind], text if isinstance(text, str) else "", _integer(record.get("count"), 0)
-            )
-            self._events.append((number, event))
+            self._events.append((number, _event(kind, record, log_time)))
         elif kind == CONTINUED:
             self._continued.add(number)
             self._order.append(number)
@@ -374,6 +369,24 @@ class Joiner:
             late = self._order.popleft()
             self._continued.discard(late)
             self.strange += len(self._marks.pop(late, ()))
+
+
+def line_event(data: bytes, log_time: int) -> LineEvent | None:
+    """The event that a /line message is; None for marks, and for what is nothing."""
+    parsed = _parse(data)
+    if parsed is None or parsed[0] not in _EVENT_KINDS:
+        return None
+    return _event(parsed[0], parsed[2], log_time)
+
+
+def _event(kind: str, record: dict[str, object], log_time: int) -> LineEvent:
+    text = record.get("text")
+    return LineEvent(
+        _integer(record.get("time_ns"), log_time),
+        _EVENT_KINDS[kind],
+        text if isinstance(text, str) else "",
+        _integer(record.get("count"), 0),
+    )
 
 
 def _parse(data: bytes) -> tuple[str, int, dict[str, object]] | None:

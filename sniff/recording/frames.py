@@ -17,6 +17,7 @@ from enum import Enum
 from typing import TYPE_CHECKING, Any
 
 from dissectors.frame import Check, Damage, Found, Frame, Header, LineError, Mark, Noise, Place, Reason, Role
+from dissectors.line import LineSettings
 from dissectors.tracker import Interval, Placement, Transaction, Verdict
 from sniff import __version__
 from sniff.engine import Output, Row
@@ -79,6 +80,7 @@ EVENTS = (
     Column("placed_role", "<u1", Role),
     Column("placed_source", "<i4", "optional"),
     Column("placed_destination", "<i4", "optional"),
+    Column("searched", "<u2", "text"),  # settings with which a search heard it; None for everything else
 )
 MARKS = (
     Column("event", "<u4"),  # place in EVENTS
@@ -109,7 +111,7 @@ _TEXT_END = b"\0"
 
 def _layout() -> str:
     lines = [
-        "sniff485 /frames, version 1. Derived from /raw; used only by the version of the program that wrote it.",
+        "sniff485 /frames, version 2. Derived from /raw; used only by the version of the program that wrote it.",
         "Little-endian, no padding: u32 octets of the string table, u32 rows of each of the three tables; the string",
         "table (UTF-8, each string ends with NUL); the tables, one column after the other.",
         "text: place in the string table, from 1, 0 is none. Enums: place in the list, from 1, 0 is none.",
@@ -187,9 +189,10 @@ def _event_values(row: Row, offset: int) -> tuple[Any, ...]:
     else:
         values += (header.source, header.destination, header.role, header.kind, header.function)
         values += (header.address, header.count, int(header.ok), header.error)
+    searched = None if row.searched is None else str(row.searched)
     if placement is None:
-        return (*values, 0, None, None, None)
-    return (*values, placement.tx, placement.role, placement.source, placement.destination)
+        return (*values, 0, None, None, None, searched)
+    return (*values, placement.tx, placement.role, placement.source, placement.destination, searched)
 
 
 def _transaction_values(one: Transaction) -> tuple[Any, ...]:
@@ -313,11 +316,18 @@ def _highest(column: Column, strings: int) -> int:
     return column.most if isinstance(column.kind, str) else len(column.kind)
 
 
+def _settings(token: str | None) -> LineSettings | None:
+    try:
+        return None if token is None else LineSettings.parse(token)
+    except ValueError:
+        return None
+
+
 def _row(values: dict[str, Any], octets: bytes, marks: tuple[Mark, ...]) -> Row:
     no, start, end = values["no"], values["start"], values["end"]
     if values["protocol"] is None:
         place, reason = values["place"] or Place.BETWEEN, values["reason"] or Reason.NO_FRAME
-        return Row(no, Noise(octets, start, end, place, reason, marks))
+        return Row(no, Noise(octets, start, end, place, reason, marks), searched=_settings(values["searched"]))
     frame = Frame(
         values["protocol"],
         octets,

@@ -57,7 +57,7 @@ class Keeper:
     """Opens the first file at once (raises CaptureError); `run` is the thread, until it is told to CLOSE."""
 
     def __init__(self, path: Path, session: Session, rotation: Rotation | None, keep: int | None) -> None:
-        self.orders: SimpleQueue[Parcel | Order] = SimpleQueue()
+        self.orders: SimpleQueue[Parcel | Order | Session] = SimpleQueue()
         self.paths: list[Path] = []
         self.trouble: str | None = None
         self.taken = 0
@@ -85,11 +85,13 @@ class Keeper:
     def run(self) -> None:
         """Do what comes through `orders`. Never raises."""
         steps = {FLUSH: self._flush, SYNC: self._sync, CLOSE: self._finish}
-        order: Parcel | Order | None = None
+        order: Parcel | Order | Session | None = None
         while order is not CLOSE:
             order = self.orders.get()
             if isinstance(order, Parcel):
                 self._try("take", partial(self._take, order), order.octets)
+            elif isinstance(order, Session):
+                self._session = order  # of the parts to come
             else:
                 self._try(order.name, steps[order])
 

@@ -18,11 +18,11 @@ from sniff.formats import CaptureError
 from sniff.formats.files import explain, open_capture
 from sniff.formats.text import iso
 from sniff.recording import scan
-from sniff.recording.batch import Batch, Joiner
+from sniff.recording.batch import Batch, Joiner, line_event
 from sniff.recording.frames import METADATA, SCHEMA, FrameBatch
 from sniff.recording.messages import MessagePass
 from sniff.recording.topics import FRAMES, LINE, PART_RECORD, PROFILE, RAW, SESSION_RECORD, VERSION
-from sniff.session import Completeness, Item, Session
+from sniff.session import Completeness, Item, LineEvent, LineEventKind, Session, SettingsChange, settings_change
 
 
 def read(path: str | Path) -> McapCapture:
@@ -48,6 +48,9 @@ class McapCapture:
         self._index = scan.ChunkIndex()
         try:
             self._read_start()
+            self._began = self.session
+            if self.session.unknown:
+                self._look_for_what_was_found()
         except OSError as error:
             raise explain(path, error) from None
 
@@ -60,7 +63,21 @@ class McapCapture:
         Raises CaptureError only when the file cannot be read any more at all.
         """
         items = self._items(since)
+        if self._began.unknown:
+            items = self._searching_first(items)
         return items if since is None else (item for item in items if item.time >= since)
+
+    def _searching_first(self, items: Iterator[Item]) -> Iterator[Item]:
+        """Items of a recording that begins within a search for settings: the first one says so."""
+        first = next(items, None)
+        if first is None:
+            return
+        change = settings_change(first)
+        if change is None or not change.searching:
+            began = SettingsChange(self._began.line, searching=True)
+            yield LineEvent(first.time, LineEventKind.SETTINGS, str(began))
+        yield first
+        yield from items
 
     def _items(self, since: int | None) -> Iterator[Item]:
         joiner = self._joiner(since)
@@ -162,6 +179,15 @@ class McapCapture:
             ours = self._read_first_records(stream, scan.Report(status.st_size))
         if not ours:
             raise CaptureError(f"{self.path}: an MCAP file, but not a recording of a serial line (no {RAW} in it)")
+
+    def _look_for_what_was_found(self) -> None:
+        """The session with what a search found, if it did: said on /line, since it was not known at the start."""
+        for _, _, data in self.messages(LINE):
+            event = line_event(data, 0)
+            change = None if event is None else settings_change(event)
+            if change is not None and change.found:
+                self.session = self.session.found(change.line, change.protocol)
+                return
 
     def _read_first_records(self, stream: BinaryIO, report: scan.Report) -> bool:
         """Take the session from the records before the first chunk; whether this is a recording of ours."""

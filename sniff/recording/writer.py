@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from dissectors.frame import Chunk
@@ -21,7 +22,7 @@ from sniff.recording.keeper import CLOSE, FLUSH, SYNC, Keeper, Parcel
 from sniff.recording.part import PartFile
 from sniff.recording.rotation import Rotation
 from sniff.recording.topics import LINE, RAW
-from sniff.session import Item, LineEvent, Session
+from sniff.session import UNKNOWABLE, Item, LineEvent, Session, SettingsChange, settings_change
 
 FLUSH_AFTER = 700_000_000
 """ns that something may wait before it is written: with a tick each 0.25 s, all is in the file within 1 s."""
@@ -130,6 +131,7 @@ class Recorder:
         self._dropped_octets = 0
         self._closed = False
         self._stuck: str | None = None
+        self._session = session
         self._keeper = Keeper(Path(path), session, rotation, keep)
         self._thread = threading.Thread(target=self._keeper.run, name="recorder", daemon=True)
         self._thread.start()
@@ -151,10 +153,16 @@ class Recorder:
 
     def line(self, event: LineEvent) -> None:
         """Record what happened to the line."""
-        if not self._closed:
-            self._batcher.add_event(event)
-            self._note(event.time)
-            self._step(event.time)
+        if self._closed:
+            return
+        change = settings_change(event)
+        if change is not None:  # what was heard before stays in the part that says so
+            self._close_batch()
+            self._session = changed(self._session, change)
+            self._keeper.orders.put(self._session)
+        self._batcher.add_event(event)
+        self._note(event.time)
+        self._step(event.time)
 
     def derived(
         self,
@@ -251,6 +259,16 @@ class Recorder:
             return
         self._sent += parcel.weight
         self._keeper.orders.put(parcel)
+
+
+def changed(session: Session, change: SettingsChange) -> Session:
+    """The session as a part of a recording that begins after a change of settings says it."""
+    if change.found:
+        return session.found(change.line, change.protocol)
+    unknown = session.unknown or (UNKNOWABLE if change.searching else ())
+    return replace(
+        session, line=change.line or session.line, protocol=change.protocol or session.protocol, unknown=unknown
+    )
 
 
 def _due(since: int, now: int, limit: int) -> bool:

@@ -110,6 +110,8 @@ def collect(source: str, capture: Capture, session: Session, devices: Devices) -
 
 def verdict(health: Health | None, findings: tuple[Found, ...], stations: tuple[Station, ...], summary: Summary) -> str:
     """The whole capture in a sentence or two."""
+    if health is None and summary.searched:
+        return "Octets were heard, but the settings of the bus were not found while this was recorded."
     if health is None:
         return "Nothing was heard: the capture holds no octet."
     if not summary.frames:
@@ -261,7 +263,7 @@ def _measurement(session: Session, dissector: Dissector) -> Measurement:
         limits.append(f"Of what it reports: {adapter.detail}.")
     return Measurement(
         protocol=dissector.name,
-        line=str(session.line),
+        line=session.line_words,
         port=session.port,
         bus=session.bus,
         program=session.program,
