@@ -9,7 +9,8 @@ A protocol brings its rules as `Dissector.extras["findings"]`, a function Timing
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from typing import Protocol
 
@@ -18,6 +19,9 @@ from dissectors.tracker import Placement, Transaction
 
 EVIDENCE_MAX = 16
 """Most frame numbers that a finding carries."""
+
+WHOLE_BUS = frozenset(("bus", "master"))
+"""Subjects that are no single station."""
 
 
 class Severity(IntEnum):
@@ -39,7 +43,8 @@ class Rule:
     """One entry of a protocol's catalogue.
 
     `title`: some words for a list. `explanation`: plain text for `rule CODE`: what is measured, against which limit,
-    from which source. `means`, `next`: the defaults of its findings.
+    from which source. `means`, `next`: the defaults of its findings. `explains`: codes, or begins of codes, of what is
+    most likely a mere consequence where this rule finds an error.
     """
 
     code: str
@@ -48,6 +53,7 @@ class Rule:
     explanation: str
     means: str = ""
     next: str = ""
+    explains: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,6 +126,51 @@ class Tally:
             evidence=tuple(sorted(self.evidence)),
             severity=severity,
         )
+
+
+def with_consequences(findings: Iterable[Finding], rules: Mapping[str, Rule]) -> tuple[Finding, ...]:
+    """The same findings; those that an error explains (`Rule.explains`) are notes that name it.
+
+    An error about a station explains what is said of that station, of the bus and of the master; an error about the
+    bus explains it of everybody.
+    """
+    made = tuple(findings)
+    causes = [
+        (finding, rules[finding.code].explains)
+        for finding in made
+        if finding.severity is Severity.ERROR and finding.code in rules and rules[finding.code].explains
+    ]
+    return tuple(_as_consequence(finding, causes, rules) for finding in made)
+
+
+def _as_consequence(
+    finding: Finding, causes: Sequence[tuple[Finding, tuple[str, ...]]], rules: Mapping[str, Rule]
+) -> Finding:
+    for cause, codes in causes:
+        everybody = cause.subject in WHOLE_BUS or finding.subject in WHOLE_BUS
+        if (
+            cause is finding
+            or not finding.code.startswith(codes)
+            or not (everybody or finding.subject == cause.subject)
+        ):
+            continue
+        return replace(
+            finding,
+            severity=min(finding.severity, Severity.NOTE),
+            means=f"most likely a consequence of {cause.code} ({cause.subject}: {rules[cause.code].title})",
+            next=f"settle {cause.code} first, then see whether this is still there",
+        )
+    return finding
+
+
+def times(count: int) -> str:
+    """How often, in words: "once", "twice", "12 times"."""
+    return {1: "once", 2: "twice"}.get(count, f"{count} times")
+
+
+def counted(count: int, thing: str, several: str | None = None) -> str:
+    """A number of things: "1 answer", "12 answers"; `several`: the plural, where it is not made with an s."""
+    return f"{count} {thing if count == 1 else several or thing + 's'}"
 
 
 def found(

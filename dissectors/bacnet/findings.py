@@ -8,7 +8,7 @@ from dissectors.bacnet.limits import MAX_MASTER, N_POLL, T_REPLY_DELAY, T_USAGE_
 from dissectors.bacnet.ring import Happened, Node, Ring, What
 from dissectors.bacnet.ring_observer import RingObserver
 from dissectors.bacnet.rules import RULES
-from dissectors.findings import EVIDENCE_MAX, Finding, Severity, found
+from dissectors.findings import EVIDENCE_MAX, Finding, Severity, counted, found, times
 from dissectors.frame import Event, Header
 from dissectors.line import Timing
 from dissectors.tracker import Placement, Transaction
@@ -32,7 +32,7 @@ _SIMPLE: tuple[tuple[str, What, int, str], ...] = (
     ("MS102", What.RETRY, 1, "token repeated {times}"),
     ("MS105", What.REJOINED, 1, "answered a Poll For Master {times} though it had been in the ring"),
     ("MS107", What.SELF_TOKEN, 1, "passed the token to itself {times}"),
-    ("MS301", What.NO_REPLY, 1, "a request stayed without an answer {times}"),
+    ("MS301", What.NO_REPLY, 1, "no answer to {requests}"),
     ("MS304", What.BROADCAST_REQUEST, 1, "sent a broadcast that expects a reply {times}"),
     ("MS404", What.ILLEGAL, 1, "sent a forbidden address or length {times}"),
 )
@@ -60,10 +60,10 @@ def _tokens(ring: Ring) -> Iterable[Finding]:
             subject = "bus" if mac is None else _station(mac)
             longest = max((event.value or 0 for event in happened.events), default=0)
             makers = sorted({event.other for event in happened.events if event.other is not None})
-            held = "the holder is not known" if mac is None else f"station {mac} had it"
+            held = "the holder is not known" if mac is None else f"MAC {mac} had it"
             seen = (
-                f"the token was lost {_times_word(happened.count)}; {held}; silence up to {_ms(longest)}; "
-                f"begun anew by {_list(makers)}"
+                f"the token was lost {times(happened.count)}; {held}; silence up to {_ms(longest)}; "
+                f"begun anew by MAC {_list(makers)}"
             )
             yield _of("MS101", subject, seen, happened)
         elif what is What.LEFT and mac is not None and ring.of(What.REJOINED, mac).last <= happened.last:
@@ -71,23 +71,27 @@ def _tokens(ring: Ring) -> Iterable[Finding]:
             if node is not None and node.last <= happened.last:
                 seen = "did not use its token, was passed over, and has been silent since"
                 yield _of("MS106", _station(mac), seen, happened)
-    stray = [happened for (what, _), happened in ring.happened.items() if what is What.TWO_TOKENS]
+    stray = [
+        happened for (what, _), happened in ring.happened.items() if what is What.TWO_TOKENS and _shows_tokens(ring)
+    ]
     total = sum(happened.count for happened in stray)
     if total >= 2:
         together = stray[0]
         for happened in stray[1:]:
             together = together.merge(happened)
         who = sorted({event.mac for event in together.events if event.mac is not None})
-        seen = f"stations {_list(who)} sent {_times_word(total)} while another one had the token"
+        seen = f"MAC {_list(who)} sent {times(total)} while another one had the token"
         yield _of("MS104", "bus", seen, together)
     for mac in ring.masters:
         loop = ring.nodes[mac].loop
         slow = loop.percentile(0.95)
         if slow is not None and loop.count >= LEAST_FRAMES and slow > SLOW_ROUND:
-            yield _plain("MS108", ring, _station(mac), f"95 of 100 rounds took up to {_ms(slow)}")
+            yield _plain("MS108", ring, _station(mac), f"95% of the rounds took up to {_ms(slow)}")
     for mac, node in ring.nodes.items():
         if node.polls_sent > ALONE_POLLS and not node.tokens_sent and not node.tokens_received:
-            yield _plain("MS109", ring, _station(mac), f"{node.polls_sent} polls for masters and not one token")
+            yield _plain(
+                "MS109", ring, _station(mac), f"{counted(node.polls_sent, 'poll')} for masters and not one token"
+            )
 
 
 def _counted(ring: Ring) -> Iterable[Finding]:
@@ -98,7 +102,9 @@ def _counted(ring: Ring) -> Iterable[Finding]:
                 node = ring.nodes.get(mac) if mac is not None else None
                 if code == "MS102" and (happened.count == 1 or _share(happened.count, node) < LATE_SHARE):
                     severity = Severity.NOTE
-                seen = words.format(times=_times_word(happened.count))
+                if code == "MS301" and happened.count == 1:
+                    severity = Severity.NOTE
+                seen = words.format(times=times(happened.count), requests=counted(happened.count, "request"))
                 # a forbidden address is the sender's affair, and may stand for no station
                 subject = _station(mac) if what is What.ILLEGAL and mac is not None else _pair(happened, mac)
                 yield _of(code, subject, seen, happened, severity)
@@ -115,7 +121,7 @@ def _times(ring: Ring) -> Iterable[Finding]:
         for (what, mac), happened in ring.happened.items():
             if what is kind:
                 most = max((event.value or 0 for event in happened.events), default=0)
-                seen = words.format(times=_times_word(happened.count), most=_ms(most))
+                seen = words.format(times=times(happened.count), most=_ms(most))
                 yield _of(code, _pair(happened, mac), seen, happened)
     if not ring.measurable(T_USAGE_DELAY):
         return
@@ -123,7 +129,7 @@ def _times(ring: Ring) -> Iterable[Finding]:
         late = ring.of(What.LATE_USE, mac)
         if node.use.count >= LEAST_FRAMES and late.count >= max(2, LATE_SHARE * node.use.count):
             seen = (
-                f"used the token later than {_ms(T_USAGE_DELAY)} {_times_word(late.count)} of {node.use.count}; "
+                f"{late.count} of {node.use.count} times it used the token over {_ms(T_USAGE_DELAY)} after it came; "
                 f"median {_ms(node.use.percentile(0.5))}, longest {_ms(node.use.most)}"
             )
             yield _of("MS103", _station(mac), seen, late)
@@ -149,7 +155,7 @@ def _polls(ring: Ring) -> Iterable[Finding]:
 def _answers(ring: Ring) -> Iterable[Finding]:
     for mac, node in ring.nodes.items():
         if node.postponed >= 5 and node.postponed > POSTPONED_SHARE * node.requests_received:
-            seen = f"{node.postponed} of {node.requests_received} requests answered with Reply Postponed"
+            seen = f"{node.postponed} of {counted(node.requests_received, 'request')} answered with Reply Postponed"
             if node.service.count:
                 seen += f"; the real answers took {_ms(node.service.percentile(0.5))}, up to {_ms(node.service.most)}"
             yield _plain("MS303", ring, _station(mac), seen, node.postponed)
@@ -158,9 +164,14 @@ def _answers(ring: Ring) -> Iterable[Finding]:
 def _damage(ring: Ring) -> Iterable[Finding]:
     damaged = ring.header_errors + ring.data_errors + ring.cut
     if damaged >= 3 and damaged > DAMAGED_SHARE * ring.frames:
+        kinds = (
+            (ring.header_errors, "with a wrong header CRC"),
+            (ring.data_errors, "with a wrong data CRC"),
+            (ring.cut, "cut off"),
+        )
         seen = (
-            f"{damaged} of {ring.frames} frames: {ring.header_errors} with a wrong header CRC, "
-            f"{ring.data_errors} with a wrong data CRC, {ring.cut} cut off"
+            f"{damaged} of {counted(ring.frames, 'frame')} damaged: "
+            f"{', '.join(f'{count} {what}' for count, what in kinds if count)}"
         )
         yield _plain("MS401", ring, "bus", seen, damaged)
     for mac, node in ring.nodes.items():
@@ -178,27 +189,27 @@ def _duplicates(ring: Ring) -> Iterable[Finding]:
     hasty = {mac: happened for (what, mac), happened in ring.happened.items() if what is What.TOO_SOON}
     for mac in sorted({mac for _, mac in ring.happened if mac is not None}):
         second = ring.of(What.SECOND_DEVICE, mac)
-        stray = ring.of(What.TWO_TOKENS, mac)
+        stray = ring.of(What.TWO_TOKENS, mac) if _shows_tokens(ring) else Happened()
         collided = ring.of(What.COLLIDED_REPLY, mac)
         reasons, evidence = [], Happened()
         if second.count:
             devices = ring.nodes[mac].devices if mac in ring.nodes else ()
-            reasons.append(f"I-Am of devices {_list(devices)} from this address")
+            reasons.append(f"devices {_list(devices)} said I-Am from this address")
             evidence = evidence.merge(second)
         if stray.count > 2:
-            reasons.append(f"sent {_times_word(stray.count)} without the token")
+            reasons.append(f"sent {times(stray.count)} without the token")
             evidence = evidence.merge(stray)
         node = ring.nodes.get(mac, Node())
         chances = node.tokens_received + node.requests_received + node.polls_received
         often = collided.count > 2 and collided.count > COLLIDED_SHARE * chances
         if often:
-            reasons.append(f"damaged octets in place of its answer {_times_word(collided.count)}")
+            reasons.append(f"damaged octets in place of its answer {times(collided.count)}")
             evidence = evidence.merge(collided)
         # where several stations seem hasty, the times are to blame
         alone = list(hasty) == [mac] and ring.measurable(T_USAGE_DELAY)
         soon = hasty[mac] if alone else Happened()
         if soon.count > 2:
-            reasons.append(f"sent again {_times_word(soon.count)} before its own poll could be answered")
+            reasons.append(f"sent again {times(soon.count)} before its own poll could be answered")
             evidence = evidence.merge(soon)
         if second.count or soon.count > 2 or (stray.count > 2 and often):
             yield _of("MS501", _station(mac), "; ".join(reasons), evidence)
@@ -224,6 +235,11 @@ def _plain(code: str, ring: Ring, subject: str, seen: str, count: int = 1) -> Fi
     return found(RULES[code], subject, seen, first=ring.first or 0, last=ring.last or 0, count=count)
 
 
+def _shows_tokens(ring: Ring) -> bool:
+    """Whether tokens are in the capture at all: some programs save it without them."""
+    return any(node.tokens_sent for node in ring.nodes.values())
+
+
 def _station(mac: int) -> str:
     return f"MAC {mac}"
 
@@ -235,10 +251,6 @@ def _pair(happened: Happened, mac: int | None) -> str:
     if len(others) == 1 and (other := others.pop()) is not None:
         return f"{other} → {mac}"
     return _station(mac)
-
-
-def _times_word(count: int) -> str:
-    return "once" if count == 1 else f"{count} times"
 
 
 def _ms(duration: int | None) -> str:

@@ -342,10 +342,11 @@ class RingObserver:
     def _take_turn(self, no: int, frame: Frame, source: int, node: _Node) -> None:
         """A frame that only the holder of the token may send."""
         if source == self._holder:
-            if self._token is not None:  # its first frame with this token
+            if self._token is not None:  # its first frame with this token, or the first that was not damaged
                 gap = frame.start - self._token.end
-                node.use.add(gap)
-                if self._surely_over(frame, self._token, T_USAGE_DELAY):
+                if not self._doubt:
+                    node.use.add(gap)
+                if not self._doubt and self._surely_over(frame, self._token, T_USAGE_DELAY):
                     self._note(What.LATE_USE, frame.start, no, source, self._passed_by, gap)
                 self._token = self._passed_by = None
             return

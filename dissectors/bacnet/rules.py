@@ -12,7 +12,7 @@ _ALL = (
     Rule(
         "MS101",
         Severity.ERROR,
-        "Lost token",
+        "lost token",
         "Nothing was sent for 500 ms (Tno_token) and then a station began anew: the token was lost "
         "(ASHRAE 135, 9.5.6). The one with the lowest address begins first, 10 ms (Tslot) per address later.",
         "the station that had the token was reset, switched off or disturbed while it passed the token on",
@@ -21,7 +21,7 @@ _ALL = (
     Rule(
         "MS102",
         Severity.WARNING,
-        "Token repeated",
+        "token repeated",
         "A station sent the same token again because nobody used it within 20 … 35 ms (Tusage_timeout); "
         "Nretry_token is 1.",
         "the next station is deaf, slow, gone, or shares its address with another",
@@ -30,7 +30,7 @@ _ALL = (
     Rule(
         "MS103",
         Severity.WARNING,
-        "Slow to use the token",
+        "slow to use the token",
         "A station began to send later than 15 ms (Tusage_delay) after the token reached it. Judged only where the "
         "adapter's timing allows it.",
         "an overloaded or old station; each round takes longer, and above 20 ms its neighbour repeats the token",
@@ -39,15 +39,16 @@ _ALL = (
     Rule(
         "MS104",
         Severity.ERROR,
-        "Two tokens on the bus",
-        "A station sent although another one had the token, and nothing was damaged or missed before.",
+        "two tokens on the bus",
+        "A station sent although another one had the token, and nothing was damaged or missed before. At least twice, "
+        "and only where tokens are in the capture.",
         "a second token after a disturbance, two stations with one address, or a ring joined while running",
         "the stations named: address switches, and whether two segments were joined",
     ),
     Rule(
         "MS105",
         Severity.WARNING,
-        "Station fell out and came back",
+        "station fell out and came back",
         "A station that had been in the ring answered a Poll For Master, so its neighbour had given it up before.",
         "it resets, loses power, or misses its token again and again",
         "its supply, its connection, and the tokens repeated to it",
@@ -55,7 +56,7 @@ _ALL = (
     Rule(
         "MS106",
         Severity.ERROR,
-        "Station left the ring",
+        "station left the ring",
         "A station did not use its token, was passed over, and has not come back.",
         "it is off, disconnected or has crashed",
         "the station's supply and wiring",
@@ -63,7 +64,7 @@ _ALL = (
     Rule(
         "MS107",
         Severity.NOTE,
-        "Token passed to itself",
+        "token passed to itself",
         "A station sent a token with its own address as destination; a sole master has no need to.",
         "an old station that is or believes to be alone",
         "its firmware; whether it hears the others",
@@ -71,7 +72,7 @@ _ALL = (
     Rule(
         "MS108",
         Severity.WARNING,
-        "Slow round",
+        "slow round",
         "95 of 100 rounds of the token may take up to 2 s; above that, masters appear off-line to many systems.",
         "too many stations, too low a baud rate, large Max_Info_Frames, or slow stations",
         "the use time of each station, and how many frames each sends on one token",
@@ -79,7 +80,7 @@ _ALL = (
     Rule(
         "MS109",
         Severity.WARNING,
-        "Alone on the bus",
+        "alone on the bus",
         "A station polls for masters all the time and never passes a token: nobody answers it.",
         "it is the only master, or it does not hear the others",
         "wiring and polarity between this station and the next; baud rates",
@@ -87,7 +88,7 @@ _ALL = (
     Rule(
         "MS201",
         Severity.WARNING,
-        "Too many polls for masters",
+        "too many polls for masters",
         "A station polls for a new master once in 50 tokens (Npoll); more than one in 10 is counted here, "
         "with the share of time that unanswered polls take.",
         "a station that does not count to Npoll, searches a lost successor, or polls far beyond the last address",
@@ -96,7 +97,7 @@ _ALL = (
     Rule(
         "MS202",
         Severity.WARNING,
-        "Slow to answer a poll",
+        "slow to answer a poll",
         "A Reply To Poll For Master came later than 15 ms (Tusage_delay) after the poll.",
         "the station risks not being taken into the ring",
         "load and firmware of the station",
@@ -104,15 +105,15 @@ _ALL = (
     Rule(
         "MS301",
         Severity.WARNING,
-        "No answer",
-        "A Data Expecting Reply was followed neither by data nor by Reply Postponed.",
+        "no answer",
+        "A Data Expecting Reply was followed neither by data nor by Reply Postponed. A single one is only noted.",
         "the station is off, busy or at another address; or the answer was lost on the line",
         "whether it answers other requests; damaged frames at the same time",
     ),
     Rule(
         "MS302",
         Severity.WARNING,
-        "Late answer",
+        "late answer",
         "An answer came later than 250 ms (Treply_delay) after the request; the asker gives up at 255 … 300 ms.",
         "the station should send Reply Postponed; its late answer collides with the next token",
         "load and firmware of the station",
@@ -120,7 +121,7 @@ _ALL = (
     Rule(
         "MS303",
         Severity.NOTE,
-        "Many postponed replies",
+        "many postponed replies",
         "More than one request in 10 was answered with Reply Postponed.",
         "the station, or the network behind a router, cannot answer within 250 ms",
         "how long the real answers take; polling rate of the clients",
@@ -128,7 +129,7 @@ _ALL = (
     Rule(
         "MS304",
         Severity.NOTE,
-        "Broadcast that asks for a reply",
+        "broadcast that asks for a reply",
         "A Data Expecting Reply to address 255: nobody may answer it.",
         "an error in the sending station's software",
         "its firmware",
@@ -136,7 +137,7 @@ _ALL = (
     Rule(
         "MS401",
         Severity.WARNING,
-        "Damaged frames",
+        "damaged frames",
         "Frames whose header or data CRC is wrong, or that end early, more than one in 1000 and at least three.",
         "noise, collisions, wrong termination or bias, or two stations that send at once",
         _WIRING,
@@ -144,7 +145,7 @@ _ALL = (
     Rule(
         "MS402",
         Severity.WARNING,
-        "Damaged frames of one station",
+        "damaged frames of one station",
         "Data CRC errors in frames whose header names the sender: at least three and one in 100 of its frames.",
         "the sender's transceiver, its connection, or somebody who talks over it",
         "that station's connection, and its address",
@@ -152,7 +153,7 @@ _ALL = (
     Rule(
         "MS403",
         Severity.NOTE,
-        "Noise between frames",
+        "noise between frames",
         "More than one octet in 200 belongs to no frame.",
         "weak bias: the idle line floats when drivers switch off",
         _WIRING,
@@ -160,7 +161,7 @@ _ALL = (
     Rule(
         "MS404",
         Severity.ERROR,
-        "Forbidden address or length",
+        "forbidden address or length",
         "A token or poll to or from an address above 127, a frame from 255, or more than 501 octets of plain data.",
         "an error in the sending station, or another protocol on the line",
         "the station's settings",
@@ -168,12 +169,13 @@ _ALL = (
     Rule(
         "MS501",
         Severity.ERROR,
-        "Two stations with one address",
+        "two stations with one address",
         "Two devices gave their instance from one address; or an address sent again before its own poll could be "
         "answered (8 ms); or it sent without the token more than twice; or damaged octets came again and again where "
         "it was to answer.",
         "two stations with the same MS/TP address: both answer and both use the token",
         "switch one of the suspects off and see whether the address stays alive",
+        explains=("MS4", "LN101", "LN103", "LN2"),
     ),
 )
 

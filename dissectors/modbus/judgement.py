@@ -5,35 +5,25 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
-from dissectors.findings import Finding, Severity, Tally, found
+from dissectors.findings import Finding, Severity, Tally, counted, found, times
 from dissectors.modbus.evidence import Evidence
 from dissectors.modbus.functions import FUNCTIONS
-from dissectors.modbus.judgement_words import MS, ms, note_if, seconds, times, units, wilson
+from dissectors.modbus.judgement_words import MS, ms, note_if, seconds, units, wilson
 from dissectors.modbus.rules import RULES
 from dissectors.modbus.station_judgement import is_absent, of_station
 
 _HASTE = 100 * MS  # no master gives up sooner on a station that is alive, unless it always waits as long
-_COLLATERAL = frozenset(
-    ("MB002", "MB003", "MB005", "MB007", "MB009", "MB103", "MB104", "MB201", "MB202", "MB208", "MB302")
-)
 _WASTE = 0.05
 
 
 def judge(seen: Evidence, timeout: int | None) -> tuple[Finding, ...]:
     """All findings: the bus first, then station by station. `timeout`: the master's, ns, None while unlearnt."""
-    masters = [*_of_masters(seen)]
-    made = [*_of_bus(seen), *masters, *_of_gaps(seen)]
+    made = [*_of_bus(seen), *_of_masters(seen), *_of_gaps(seen)]
     common = _common_damage(seen)
     made += common
     for unit in sorted(seen.stations):
         made += of_station(seen, f"station {unit}", seen.stations[unit], timeout, bool(common))
-    if masters:  # they collide, and what comes of it is no finding of its own
-        return tuple(_as_note(finding) if finding.code in _COLLATERAL else finding for finding in made)
     return tuple(made)
-
-
-def _as_note(finding: Finding) -> Finding:
-    return replace(finding, severity=min(finding.severity, Severity.NOTE))
 
 
 # ---- the bus
@@ -43,9 +33,11 @@ def _of_bus(seen: Evidence) -> Iterator[Finding]:
     requests = sum(station.asked for station in seen.stations.values()) + seen.damaged_requests.count
     damaged = seen.damaged_requests
     if damaged.count:
-        words = f"{damaged.count} of {requests} requests were damaged"
+        words = f"{damaged.count} of {counted(requests, 'request')} damaged"
         yield damaged.found(RULES["MB009"], "master", words, note_if(seen.rare(damaged.count, requests)))
-    absent = {unit: station for unit, station in seen.stations.items() if is_absent(station)}
+    absent = {
+        unit: station for unit, station in seen.stations.items() if is_absent(station) and station.missing.count > 1
+    }
     waited = sum(station.waited for station in absent.values())
     if waited:
         share = waited / seen.span
@@ -61,16 +53,16 @@ def _of_bus(seen: Evidence) -> Iterator[Finding]:
     broadcast = seen.answers_to_broadcast
     if broadcast.count or seen.noise_after_broadcast.count >= 3:
         tally = broadcast if broadcast.count else seen.noise_after_broadcast
-        what = "a frame" if broadcast.count else "octets that are no frame"
-        words = f"{what} {times(tally.count)} directly after a broadcast"
+        what = counted(tally.count, "frame") if broadcast.count else f"octets that are no frame, {times(tally.count)},"
+        words = f"{what} directly after a broadcast"
         yield tally.found(RULES["MB204"], "bus", words, note_if(tally.count == 1))
     for (asked, answered), tally in sorted(seen.pairs.items()):
         if tally.count >= 2:
-            words = f"{tally.count} requests to {asked} were answered by {answered}"
+            words = f"{tally.count} requests to station {asked} answered by station {answered}"
             yield tally.found(RULES["MB206"], f"station {asked}", words)
     unasked = seen.unasked
     if unasked.count:
-        words = f"{unasked.count} of {seen.answers} answers came unasked"
+        words = f"{unasked.count} of {counted(seen.answers, 'answer')} came unasked"
         many = unasked.count >= 3 and 100 * unasked.count >= seen.answers
         yield unasked.found(RULES["MB207"], "bus", words, Severity.WARNING if many else None)
     yield from _cycle(seen)
@@ -131,9 +123,9 @@ def _common_damage(seen: Evidence) -> list[Finding]:
     for station in struck.values():
         for no in station.damaged.evidence:
             tally.add(station.damaged.first, no)
-    words = f"{damaged} of {total} answers are damaged ({rate:.1%}), alike on {units(struck)}"
+    words = f"{damaged} of {total} answers damaged ({rate:.1%}), of {units(struck)} alike"
     if seen.damaged_requests.count:
-        words += f"; {times(seen.damaged_requests.count)} a request too"
+        words += f"; {counted(seen.damaged_requests.count, 'request')} too"
     finding = tally.found(RULES["MB007"], "bus", words, note_if(seen.rare(damaged, total)))
     last = max(station.damaged.last for station in struck.values())
     return [replace(finding, count=damaged, last=last)]
@@ -148,5 +140,5 @@ def _cycle(seen: Evidence) -> Iterator[Finding]:
     name = FUNCTIONS[octets[1]].name.replace("-", " ") if octets[1] in FUNCTIONS else f"function {octets[1]}"
     words = f"the master comes back to station {octets[0]} ({name}) every {seconds(median)}"
     if high - low > max(median // 50, 2 * seen.timing.latency, MS):
-        words += f"; 90 of 100 times {seconds(low)} to {seconds(high)}"
+        words += f"; 9 of 10 times after {seconds(low)} to {seconds(high)}"
     yield found(RULES["MB401"], "bus", words, first=seen.first or 0, last=seen.now, count=len(periods))

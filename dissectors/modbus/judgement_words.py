@@ -29,11 +29,6 @@ def request_words(key: Key) -> str:
     return kind.replace("-", " ") + (f" from 0x{address:04X}" if address is not None else "")
 
 
-def times(count: int) -> str:
-    """ "once", "12 times"."""
-    return "once" if count == 1 else f"{count} times"
-
-
 def ms(duration: int) -> str:
     """ns as "8.2 ms"."""
     value = duration / MS

@@ -7,22 +7,28 @@ from __future__ import annotations
 
 from dissectors.findings import Rule, Severity
 
+_OF_COLLISIONS = (
+    *("MB005", "MB007", "MB008", "MB009", "MB010", "MB103", "MB104", "MB207", "MB208"),
+    *("LN101", "LN103", "LN201", "LN202", "LN203", "LN204"),
+)
+"""What two senders at once make of good frames."""
+
 _ALL = (
     Rule(
         "MB001",
         Severity.ERROR,
-        "never answers",
+        "no answer",
         "Requests to a station of which no good frame was ever heard, and at most 1 in 4 of them followed by octets "
-        "that are no frame. At least two requests.",
+        "that are no frame. After a single request it is only noted.",
         "no station at this address: off, set to another address or baud rate, or cut off",
         "its supply, address switch and baud rate; if it is gone, take it out of the master's list",
     ),
     Rule(
         "MB002",
         Severity.WARNING,
-        "answers missing",
+        "some requests without answer",
         "Requests that no octet followed before the master went on, to a station that answers others. A single one, or "
-        "fewer than 1 in 100 and at most two a minute, is only noted. ",
+        "fewer than 1 in 100 and at most two a minute, is only noted.",
         "requests or answers get lost: a loose wire, a missing ground, a station too busy to answer",
         "whether requests or answers are damaged at the same times; the station's terminals and supply",
     ),
@@ -37,7 +43,7 @@ _ALL = (
     Rule(
         "MB004",
         Severity.WARNING,
-        "one request is never answered",
+        "one request without answer",
         "A station answers other requests but never this one (function and first register), asked three times or more.",
         "the station drops what it does not support instead of answering with an exception",
         "the device's register map; take the request out of the master's list",
@@ -97,7 +103,7 @@ _ALL = (
         "MB101",
         Severity.WARNING,
         "slow station",
-        "Response times, less all that the adapter may have added, above 70 in 100 of the master's timeout as seen on "
+        "Response times, less all that the adapter may have added, above 70% of the master's timeout as seen on "
         "the bus, or above 500 ms while no timeout is known. At least three and 1 in 100 of its answers.",
         "a busy station, a gateway behind it, or a response delay set too high",
         "the station's response-delay setting and load; a longer timeout in the master",
@@ -124,7 +130,7 @@ _ALL = (
         Severity.NOTE,
         "repeats",
         "Requests to a station that answers, sent again because the first try got no good answer, and the time that "
-        "passed from each failed try to the next. A warning when it is over 2 in 100 of the time.",
+        "passed from each failed try to the next. A warning from three on, when it is over 2% of the time.",
         "each lost or damaged frame costs a whole timeout",
         "the cause of the losses first; then a shorter timeout, well above the slowest answer",
     ),
@@ -132,8 +138,8 @@ _ALL = (
         "MB105",
         Severity.NOTE,
         "time spent on absent stations",
-        "Share of the time in which the master waited for stations that never answered anything. A warning above 5 in "
-        "100.",
+        "Share of the time in which the master waited for stations that never answered anything, asked twice or more. "
+        "A warning above 5%.",
         "every poll of an absent station costs a timeout, and its repeats too; all others are read less often",
         "take absent stations out of the poll list, or let the master ask them seldom",
     ),
@@ -145,6 +151,7 @@ _ALL = (
         "is only noted, and so are no more than the station's late answers.",
         "two stations have the same address, the second one slower",
         "switch the station off and see whether something still answers; give one another address",
+        explains=(*_OF_COLLISIONS, "MB301", "MB401"),
     ),
     Rule(
         "MB202",
@@ -154,15 +161,17 @@ _ALL = (
         "asked for or octets with framing errors inside, while answers of other stations are not so damaged.",
         "two stations with this address talk over each other; or that station's driver is faulty",
         "switch the station off and see whether something still answers",
+        explains=_OF_COLLISIONS,
     ),
     Rule(
         "MB203",
         Severity.ERROR,
         "two masters",
         "Requests that come while another one waits for a station that is alive, sooner than that station can answer "
-        "or than any timeout seen. At least three. What their collisions cause at single stations is only noted then.",
+        "or than any timeout seen. At least three.",
         "two masters on one bus, or a commissioning tool left connected",
         "find the second master; a bus has one, use a gateway or multiplexer for more",
+        explains=(*_OF_COLLISIONS, "MB002", "MB003", "MB201", "MB202", "MB302"),
     ),
     Rule(
         "MB204",

@@ -6,10 +6,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
-from dissectors.findings import Finding, Severity, Tally, found
+from dissectors.findings import Finding, Severity, Tally, counted, found, times
 from dissectors.modbus.evidence import Evidence
 from dissectors.modbus.functions import EXCEPTIONS as EXCEPTION_NAMES
-from dissectors.modbus.judgement_words import MS, ms, note_if, request_words, seconds, times, wilson
+from dissectors.modbus.judgement_words import MS, ms, note_if, request_words, seconds, wilson
 from dissectors.modbus.response_groups import Answered
 from dissectors.modbus.rules import EXCEPTIONS, RULES, VENDOR_EXCEPTION
 from dissectors.modbus.station_record import Key, Requested, Station
@@ -18,6 +18,7 @@ SILENT_AT_END = 5
 """Unanswered requests in a row to the end, from which on a station that used to answer has fallen silent."""
 
 _REPEATS_COST = 0.02
+_REPEATS_LEAST = 3  # fewer are no habit, however short the capture
 
 
 def of_station(seen: Evidence, name: str, station: Station, timeout: int | None, is_common: bool) -> Iterator[Finding]:
@@ -27,16 +28,18 @@ def of_station(seen: Evidence, name: str, station: Station, timeout: int | None,
         yield _exception(name, station, key, code, tally)
     if station.unfit.count:
         why, _ = station.unfit_words.most_common(1)[0] if station.unfit_words else ("", 0)
-        words = f"{station.unfit.count} of {station.answered} answers do not fit their requests: {why}"
+        words = f"{station.unfit.count} of {counted(station.answered, 'answer')} not as asked for: {why}"
         yield station.unfit.found(RULES["MB010"], name, words, note_if(station.unfit.count == 1))
     yield from _times(name, station, timeout, seen, is_common)
     if station.twice.count:
-        words = f"two answers to one request {times(station.twice.count)}"
+        words = f"a second answer came to {counted(station.twice.count, 'request')}"
         slow = station.twice.count <= station.late.count  # two tries, two answers: the first one came late
         yield station.twice.found(RULES["MB201"], name, words, note_if(station.twice.count == 1 or slow))
     yield from _two_times(name, station)
     if station.reserved.count:
-        yield station.reserved.found(RULES["MB205"], name, f"{station.reserved.count} frames name it")
+        yield station.reserved.found(
+            RULES["MB205"], name, f"{counted(station.reserved.count, 'frame')} from or to this address"
+        )
 
 
 def _missing(seen: Evidence, name: str, station: Station) -> Iterator[Finding]:
@@ -47,7 +50,7 @@ def _missing(seen: Evidence, name: str, station: Station) -> Iterator[Finding]:
         if missing.count >= 2:
             words = f"no answer to any of {station.asked} requests"
             stray = station.damaged.count
-            words += f"; noise followed {times(stray)}" if stray else ""
+            words += f"; octets that are no good answer followed {times(stray)}" if stray else ""
             yield missing.found(RULES["MB001"], name, words)
         else:
             yield missing.found(RULES["MB001"], name, "no answer to the only request", Severity.NOTE)
@@ -60,7 +63,7 @@ def _missing(seen: Evidence, name: str, station: Station) -> Iterator[Finding]:
     ignored = [(key, request) for key, request in sorted(station.requests.items(), key=str) if _is_ignored(request)]
     if station.answered >= 3 and silent.count < SILENT_AT_END:
         for key, request in ignored:
-            words = f"{request.tries} times asked to {request_words(key)}, never answered; it answers other requests"
+            words = f"no answer to any of {request.tries} requests to {request_words(key)}; it answers others"
             yield request.missing.found(RULES["MB004"], name, words)
     else:
         ignored = []
@@ -69,7 +72,7 @@ def _missing(seen: Evidence, name: str, station: Station) -> Iterator[Finding]:
         explained += silent.count
     left = missing.count - explained
     if left > 0:
-        words = f"{left} of {station.asked} requests were followed by nothing"
+        words = f"no answer to {left} of {counted(station.asked, 'request')}"
         finding = missing.found(RULES["MB002"], name, words, note_if(seen.rare(left, station.asked)))
         yield replace(finding, count=left)
 
@@ -90,25 +93,25 @@ def _damaged(seen: Evidence, name: str, station: Station, is_common: bool) -> It
         return
     rare = seen.rare(damaged.count, station.asked)
     if ends.count >= 3 and 2 * ends.count >= damaged.count:
-        words = f"{ends.count} of {station.asked} answers are right up to their last octet, which is not"
+        words = f"{ends.count} of {counted(station.asked, 'answer')} right but for the last octet"
         yield ends.found(RULES["MB006"], name, words, note_if(rare))
         if 4 * ends.count >= 3 * damaged.count:
             return
     over = station.talked_over.count + station.garbled
     if over >= 3 and 4 * over >= station.asked and not is_common:
-        words = f"{over} of {station.asked} answers are longer than asked for, or garbled inside"
+        words = f"{over} of {counted(station.asked, 'answer')} longer than asked for, or garbled inside"
         tally = station.talked_over if station.talked_over.count else damaged
         yield replace(tally.found(RULES["MB202"], name, words), count=over)
     details = []
     if station.cut:
         details.append(f"{station.cut} ended early")
     if station.garbled:
-        details.append(f"{station.garbled} were no frame at all")
-    words = f"{damaged.count} of {station.asked} answers are damaged"
+        details.append(f"{station.garbled} no frame at all")
+    words = f"{damaged.count} of {counted(station.asked, 'answer')} damaged"
     words += f" ({', '.join(details)})" if details else ""
     low, high = wilson(damaged.count, station.asked)
     if station.asked >= 20:
-        words += f"; {low:.1%} to {high:.1%} of all with 95 % confidence"
+        words += f"; that is {low:.1%} to {high:.1%} of all, with 95% confidence"
     yield damaged.found(RULES["MB005"], name, words, note_if(rare or is_common))
 
 
@@ -116,17 +119,18 @@ def _exception(name: str, station: Station, key: Key, code: int, tally: Tally) -
     severity, means, following = EXCEPTIONS.get(code, VENDOR_EXCEPTION)
     meaning = EXCEPTION_NAMES.get(code) or f"code 0x{code:02X} of the vendor's"
     request = station.requests.get(key)
-    of = f" of {request.tries}" if request is not None else ""
-    words = f"exception {code} ({meaning}) to {tally.count}{of} requests to {request_words(key)}"
+    of = tally.count if request is None else request.tries
+    some = "the only request" if of == 1 else f"{tally.count} of {of} requests"
+    words = f"exception {code} ({meaning}) to {some} to {request_words(key)}"
     return replace(tally.found(RULES["MB008"], name, words, severity), means=means, next=following)
 
 
 def _times(name: str, station: Station, timeout: int | None, seen: Evidence, is_common: bool) -> Iterator[Finding]:
     times_, slow = station.times, station.slow
     if slow.count >= 3 and 100 * slow.count >= station.answered:
-        against = "500 ms" if timeout is None else f"70 in 100 of the master's timeout of {ms(timeout)}"
+        against = "500 ms" if timeout is None else f"70% of the master's timeout of {ms(timeout)}"
         words = (
-            f"{slow.count} of {station.answered} answers took longer than {against}; the longest at least "
+            f"{slow.count} of {counted(station.answered, 'answer')} took longer than {against}, the longest at least "
             f"{ms(times_.longest)}"
         )
         yield slow.found(RULES["MB101"], name, words)
@@ -140,15 +144,16 @@ def _times(name: str, station: Station, timeout: int | None, seen: Evidence, is_
                 RULES["MB102"], name, words, first=seen.first or 0, last=station.last_heard or 0, count=times_.count
             )
     if station.late.count:
-        words = f"answered {times(station.late.count)} after the master had gone on"
-        waits = f", which waits {ms(timeout)}" if timeout is not None else ""
+        words = f"{counted(station.late.count, 'answer')} came after the master had given up"
+        waits = f"; it waits {ms(timeout)}" if timeout is not None else ""
         yield station.late.found(RULES["MB103"], name, words + waits, note_if(station.late.count == 1))
     if station.answered and station.repeats.count:
         share = station.repeats_cost / seen.span
         words = (
-            f"{station.repeats.count} repeats cost {seconds(station.repeats_cost)}, {share:.1%} of the time of the bus"
+            f"{counted(station.repeats.count, 'request')} sent again; each cost the time that the master had waited: "
+            f"{seconds(station.repeats_cost)} in all, {share:.1%} of the time of the bus"
         )
-        costly = share > _REPEATS_COST and not is_common
+        costly = share > _REPEATS_COST and station.repeats.count >= _REPEATS_LEAST and not is_common
         yield station.repeats.found(RULES["MB104"], name, words, Severity.WARNING if costly else None)
 
 
@@ -160,12 +165,12 @@ def _two_times(name: str, station: Station) -> Iterator[Finding]:
     key, groups = max(found_, key=lambda pair: (pair[1].apart, pair[1].smaller))
     quick, slow = groups.quick, groups.slow
     words = (
-        f"answers to one request ({request_words(key)}) take either {_range(quick)} ({len(quick)} times) or "
-        f"{_range(slow)} ({len(slow)} times), in turns"
+        f"answers to one request ({request_words(key)}) take either {_range(quick)} ({times(len(quick))}) or "
+        f"{_range(slow)} ({times(len(slow))}), in turns"
     )
     agreeing = ["the slow ones never say what the quick ones say"] if groups.apart else []
     if station.twice.count:
-        agreeing.append(f"two answers came to one request {times(station.twice.count)}")
+        agreeing.append(f"a second answer came to {counted(station.twice.count, 'request')}")
     mixed = station.talked_over.count + station.garbled
     if mixed >= 2:
         agreeing.append(f"{mixed} answers had other octets mixed in")

@@ -6,11 +6,12 @@ from typing import Any
 
 from dissectors.frame import Frame, Role
 from dissectors.n2.fields import fields
-from dissectors.n2.findings import RULES, N2Findings
+from dissectors.n2.findings import N2Findings
 from dissectors.n2.framing import N2Framer
 from dissectors.n2.header import peek
 from dissectors.n2.interpretation import Interpretation, interpret
 from dissectors.n2.readings import readings, refusal
+from dissectors.n2.rules import RULES
 from dissectors.n2.text import text
 from dissectors.n2.tracker import N2Tracker
 from dissectors.registry import Dissector

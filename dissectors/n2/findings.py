@@ -11,12 +11,13 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
-from dissectors.findings import EVIDENCE_MAX, Finding, Rule, Severity, found
+from dissectors.findings import EVIDENCE_MAX, Finding, Severity, counted, found, times
 from dissectors.frame import Damage, Event, Frame, Header, Noise
 from dissectors.line import NS_PER_S, Timing
 from dissectors.n2.commands import Command, error_name, parse_command
 from dissectors.n2.header import BROADCAST
 from dissectors.n2.objects import attribute_name, number, object_name
+from dissectors.n2.rules import RULES
 from dissectors.tracker import Placement, Transaction, Verdict
 
 MS = 1_000_000
@@ -30,108 +31,6 @@ HASTE = 100 * MS
 """No master gives up sooner; a command that comes sooner is of another one, or its answer was not heard."""
 
 _SAME = 6  # octets of two commands: start, address, command and what it asks
-
-RULES: dict[str, Rule] = {
-    rule.code: rule
-    for rule in (
-        Rule(
-            "N2001",
-            Severity.WARNING,
-            "station has reset",
-            "A station answers N00 to everything after power-up or reset, until it is identified (TECO F510 manual "
-            "1.2.4). Answers N00 without an identify between them count as one reset.",
-            "power loss, watchdog or a warm reset; its overrides may be lost",
-            "look at its supply and its fault memory at that time",
-        ),
-        Rule(
-            "N2002",
-            Severity.WARNING,
-            "point does not exist",
-            "A station refuses a read, write or override with N11: undefined object, or an attribute that is reserved "
-            "or absent (TECO F510 manual 1.2.4; Danfoss MG.11.G1).",
-            "the master's point list does not fit this device",
-            "compare the master's object numbers with the device's table; some count from 0, some from 1",
-        ),
-        Rule(
-            "N2003",
-            Severity.WARNING,
-            "slow station",
-            "Time from the end of a command to the begin of its answer, over 250 ms even when all that the adapter may "
-            "have added is taken off. 250 ms is the shortest message timeout of an NAE; the standard's own limit is "
-            "not public.",
-            "a station busy with other work, or a gateway in between",
-            "raise the master's message timeout, or relieve the station",
-        ),
-        Rule(
-            "N2004",
-            Severity.WARNING,
-            "damaged frames",
-            "Frames of or to a station whose checksum is wrong or whose form is spoilt. An answer carries no address: "
-            "it is counted at the station that was asked. Johnson Controls calls up to two a minute tolerable.",
-            "noise, wrong termination or bias, or two stations that talk at once",
-            "if one station only: its stub, its connector; if all: termination, bias, ground",
-        ),
-        Rule(
-            "N2005",
-            Severity.WARNING,
-            "no answer",
-            "Commands that no answer followed before the next command. A station that never answered is an error.",
-            "station off, wrong address or wrong baud rate, or a broken wire",
-            "check its supply, address and wiring; take it out of the master's list when it is gone",
-        ),
-        Rule(
-            "N2006",
-            Severity.NOTE,
-            "override left on a point",
-            "A point was overridden and acknowledged, and for over 10 minutes neither overridden again nor released. "
-            "Seen from the first override in the capture; a reset of the station ends it.",
-            "someone commanded the point by hand and forgot it; the station's own control does not act on it",
-            "release it at the master if it is not meant; an F510 keeps the value even then",
-        ),
-        Rule(
-            "N2007",
-            Severity.ERROR,
-            "two masters",
-            "Commands that break into another command, or follow an unanswered one sooner than 100 ms although it is "
-            "no repeat: no master gives up so soon. At least two such.",
-            "two masters on one bus, or a commissioning tool beside the controller",
-            "find the second master and take it off",
-        ),
-        Rule(
-            "N2008",
-            Severity.ERROR,
-            "answered twice",
-            "A second answer came to one command that was sent once.",
-            "two stations have the same address",
-            "switch the station off and see whether something still answers",
-        ),
-        Rule(
-            "N2009",
-            Severity.NOTE,
-            "command refused",
-            "A station refuses commands with an error code other than N00 and N11.",
-            "the master asks for what the device does not do",
-            "look at the error code and at the command that was refused",
-        ),
-        Rule(
-            "N2010",
-            Severity.NOTE,
-            "identified again",
-            "A station was identified anew although it had not reported a reset.",
-            "the master has restarted, or had lost the station",
-            "look at the master's log at that time",
-        ),
-        Rule(
-            "N2011",
-            Severity.WARNING,
-            "answer that nobody asked for",
-            "Answers without a command before them, or after the master had gone on.",
-            "a master that is not heard at this place of the bus, or a station far slower than the master's timeout",
-            "compare the answer times with the master's timeout; move the tap",
-        ),
-    )
-}
-"""The catalogue, by code."""
 
 
 @dataclass(slots=True)
@@ -197,6 +96,7 @@ class N2Findings:
 
     def __init__(self, timing: Timing) -> None:
         self._timing = timing
+        self._first: int | None = None
         self._now = 0
         self._stations: dict[int, _Station] = {}
         self._asked: dict[int, _Asked] = {}  # by transaction
@@ -207,6 +107,7 @@ class N2Findings:
 
     def see(self, no: int, event: Event, header: Header | None, placement: Placement | None) -> None:
         """Take the next row: event, its header and placement (None for noise)."""
+        self._first = event.start if self._first is None else self._first
         self._now = max(self._now, event.end)
         if isinstance(event, Noise) or header is None or placement is None:
             if len(event.octets.strip(b"\r\n")):
@@ -270,10 +171,10 @@ class N2Findings:
         """All findings so far: the bus first, then station by station."""
         bus = []
         if self._masters.count >= 2:
-            seen = f"{self._masters.count} commands broke into another or came too soon after it"
+            seen = f"{self._masters.count} commands broke into another one or came too soon after it"
             bus.append(_found("N2007", "bus", seen, self._masters))
         if self._stray.count:
-            bus.append(_found("N2011", "bus", f"an answer came unasked {_times(self._stray.count)}", self._stray))
+            bus.append(_found("N2011", "bus", f"{counted(self._stray.count, 'answer')} came unasked", self._stray))
         for address in sorted(self._stations):
             bus.extend(self._of_station(f"station {address}", self._stations[address]))
         return tuple(bus)
@@ -342,17 +243,17 @@ class N2Findings:
 
     def _of_station(self, name: str, station: _Station) -> Iterable[Finding]:
         if station.resets.count:
-            seen = f"answered N00 {_times(station.refused_while_reset)}: {_times(station.resets.count)} reset"
+            seen = f"answered N00 {times(station.refused_while_reset)}: {times(station.resets.count)} reset"
             yield _found("N2001", name, seen, station.resets)
         for (region, point, attribute), tally in sorted(station.points.items(), key=lambda item: str(item[0])):
             what = object_name(region, point)
             if attribute is not None:
                 known = attribute_name(region, attribute)
                 what += f" attribute {attribute}" + (f" ({known})" if known else "")
-            yield _found("N2002", f"{name}, {object_name(region, point)}", f"{what}: N11 {_times(tally.count)}", tally)
+            yield _found("N2002", f"{name}, {object_name(region, point)}", f"{what}: N11 {times(tally.count)}", tally)
         if station.slow.count:
             seen = (
-                f"{station.slow.count} of {station.answered} answers took over {SLOW // MS} ms, "
+                f"{station.slow.count} of {counted(station.answered, 'answer')} took over {SLOW // MS} ms, "
                 f"the longest at least {station.slowest // MS} ms"
             )
             yield _found("N2003", name, seen, station.slow)
@@ -368,30 +269,52 @@ class N2Findings:
                 tally = _Tally(1, override.time, self._now, [override.row])
                 yield _found("N2006", f"{name}, {object_name(region, point)}", seen, tally)
         if station.twice.count:
-            yield _found("N2008", name, f"two answers to one command {_times(station.twice.count)}", station.twice)
+            yield _found(
+                "N2008", name, f"a second answer came to {counted(station.twice.count, 'command')}", station.twice
+            )
         if station.late.count:
-            yield _found("N2011", name, f"answered late {_times(station.late.count)}", station.late)
+            yield _found(
+                "N2011",
+                name,
+                f"{counted(station.late.count, 'answer')} came after the master had gone on",
+                station.late,
+            )
         for (code, title), tally in sorted(station.refused.items()):
             words = f"N{code} {error_name(code)}".rstrip()
-            yield _found("N2009", name, f"{title} refused {_times(tally.count)}: {words}", tally)
+            yield _found("N2009", name, f"{title} refused {times(tally.count)}: {words}", tally)
         if station.again.count:
-            yield _found("N2010", name, f"identified again {_times(station.again.count)}", station.again)
+            yield _found("N2010", name, f"identified again {times(station.again.count)}", station.again)
 
     def _damaged(self, name: str, station: _Station) -> Finding:
-        seen = (
-            f"{station.damaged_answers} damaged answers and {station.damaged_commands} damaged commands "
-            f"in {station.asked + station.damaged_commands} exchanges"
-        )
+        seen = f"{_damaged_words(station)} in {counted(station.asked + station.damaged_commands, 'exchange')}"
         finding = _found("N2004", name, seen, station.damaged)
-        minutes = max(1, -(-(self._now - station.damaged.first) // (60 * NS_PER_S)))
-        rare = station.damaged.count <= 2 * minutes and 100 * station.damaged.count < station.asked
-        return replace(finding, severity=Severity.NOTE) if rare else finding
+        return replace(finding, severity=Severity.NOTE) if self._rare(station.damaged, station) else finding
 
     def _missing(self, name: str, station: _Station) -> Finding:
         if not station.answered:
-            finding = _found("N2005", name, f"never answered {station.asked} commands", station.missing)
+            if station.asked == 1:
+                return replace(
+                    _found("N2005", name, "no answer to the only command", station.missing), severity=Severity.NOTE
+                )
+            finding = _found("N2005", name, f"no answer to any of {station.asked} commands", station.missing)
             return replace(finding, severity=Severity.ERROR)
-        return _found("N2005", name, f"{station.missing.count} of {station.asked} commands unanswered", station.missing)
+        words = f"no answer to {station.missing.count} of {counted(station.asked, 'command')}"
+        finding = _found("N2005", name, words, station.missing)
+        return replace(finding, severity=Severity.NOTE) if self._rare(station.missing, station) else finding
+
+    def _rare(self, tally: _Tally, station: _Station) -> bool:
+        """Whether so few are not worth a warning: one, or under 1 in 100 and at most two a minute."""
+        minutes = max(1, -(-(self._now - (self._first or 0)) // (60 * NS_PER_S)))
+        return tally.count == 1 or (tally.count <= 2 * minutes and 100 * tally.count < station.asked)
+
+
+def _damaged_words(station: _Station) -> str:
+    parts = [
+        counted(count, f"damaged {what}")
+        for count, what in ((station.damaged_answers, "answer"), (station.damaged_commands, "command"))
+        if count
+    ]
+    return " and ".join(parts)
 
 
 def _found(code: str, subject: str, seen: str, tally: _Tally) -> Finding:
@@ -404,7 +327,3 @@ def _found(code: str, subject: str, seen: str, tally: _Tally) -> Finding:
         count=tally.count,
         evidence=tuple(tally.evidence),
     )
-
-
-def _times(count: int) -> str:
-    return "once" if count == 1 else f"{count} times"

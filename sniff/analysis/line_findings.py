@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
-from dissectors.findings import Finding, Severity, Tally, found
+from dissectors.findings import Finding, Severity, Tally, counted, found, times
 from dissectors.frame import Damage, Event, Frame, LineError, Mark, Noise, Place, Reason, Role
 from dissectors.line import NS_PER_S
 from dissectors.tracker import Transaction, Verdict
@@ -183,27 +183,30 @@ class LineFindings:
         if adapter.detail:
             words += f" ({adapter.detail})"
         words += f"; octets are held back for {milliseconds(adapter.latency)} at most" if adapter.latency else ""
-        words += "; times are exact" if not adapter.latency else f" ({adapter.latency_from})"
+        words += "; times are taken as exact" if not adapter.latency else ""
+        words += f" ({adapter.latency_from})"
         return self._whole("LN001", "adapter", words)
 
     def _of_host(self) -> Iterator[Finding]:
         if self._lost.count:
-            many = f"{self._lost_octets} octets" if self._lost_octets else "an unknown number of octets"
-            yield self._lost.found(RULES["LN005"], "adapter", f"{many} lost {_times(self._lost.count)}")
+            many = counted(self._lost_octets, "octet") if self._lost_octets else "an unknown number of octets"
+            yield self._lost.found(RULES["LN005"], "adapter", f"{many} lost {times(self._lost.count)}")
         if self._unplugged.count:
-            words = f"unplugged {_times(self._unplugged.count)}, away for {self._away / NS_PER_S:.1f} s together"
+            words = f"unplugged {times(self._unplugged.count)}"
+            words += f", away for {self._away / NS_PER_S:.1f} s in all" if self._away else ""
             words += "; it did not come back" if self._unplugged_at is not None else ""
             severity = Severity.ERROR if self._unplugged_at is not None else None
             yield self._unplugged.found(RULES["LN006"], "adapter", words, severity)
         if self._stepped.count:
-            yield self._stepped.found(RULES["LN007"], "adapter", f"the clock stepped {_times(self._stepped.count)}")
+            yield self._stepped.found(RULES["LN007"], "adapter", f"the clock stepped {times(self._stepped.count)}")
         if self._overruns.count:
-            words = f"overrun reported {_times(self._overruns.count)}"
+            words = f"overrun reported {times(self._overruns.count)}"
             yield self._overruns.found(RULES["LN104"], "adapter", words)
 
     def _rubbish(self) -> Finding:
         share = self._in_frames / self._octets
-        words = f"only {share:.0%} of {self._octets} octets belong to good frames"
+        how_many = "not one" if not self._in_frames else "hardly one" if share < 0.005 else f"only {share:.0%}"
+        words = f"{how_many} of {self._octets} octets is part of a good frame"
         extremes = sum(self._values[value] for value in (0x00, 0x80, 0xC0, 0xE0, 0xF0, 0xF8, 0xFC, 0xFE, 0xFF))
         total = max(1, sum(self._values.values()))
         reports = self._session.adapter.reports
@@ -233,7 +236,7 @@ class LineFindings:
             struck = {}
         for name, record in struck.items():
             kinds = "line errors somewhere in" if self._packets else "parity or framing errors in"
-            words = f"{kinds} {record.wrong.count} of {record.frames} frames"
+            words = f"{kinds} {record.wrong.count} of {counted(record.frames, 'frame')}"
             if record.at:
                 words += f" ({', '.join(f'{count} {place}' for place, count in record.at.most_common())})"
             finding = record.wrong.found(RULES["LN101"], name, words, self._note_if(record.wrong.count, record.frames))
@@ -245,7 +248,8 @@ class LineFindings:
                 )
             yield finding
         for kind, tally in sorted(self._counted.items()):
-            yield tally.found(RULES["LN102"], "bus", f"{tally.count} {kind or 'line'} errors counted by the driver")
+            words = counted(tally.count, f"{kind or 'line'} error") + " counted by the driver"
+            yield tally.found(RULES["LN102"], "bus", words)
 
     def _wrong_everywhere(self, struck: dict[str, _Sender]) -> Finding:
         """One finding in place of one for each sender."""
@@ -267,7 +271,7 @@ class LineFindings:
 
     def _of_bus(self) -> Iterator[Finding]:
         if self._breaks.count:
-            words = f"the line was held low {_times(self._breaks.count)}"
+            words = f"the line was held low {times(self._breaks.count)}"
             yield self._breaks.found(RULES["LN103"], "bus", words, self._note_if(self._breaks.count, self._frames))
         for name, record in sorted(self._senders.items()):
             for code, tally in sorted(record.stray.items()):
@@ -275,18 +279,19 @@ class LineFindings:
                 yield self._stray_finding(RULES[code].code, name, record, tally, frames)
         if self._rest.count:
             share = self._rest_octets / self._octets
-            words = f"{self._rest_octets} octets in {self._rest.count} stretches are no frame, {share:.1%} of all"
+            stretches = counted(self._rest.count, "stretch", "stretches")
+            words = f"{self._rest_octets} octets in {stretches} are no frame, {share:.1%} of all"
             severity = None if share >= 0.02 and self._rest.count > 1 else Severity.NOTE
             yield self._rest.found(RULES["LN204"], "bus", words, severity)
         if self._echo.count:
-            words = f"{self._echo.count} of {self._asked} requests came twice, the copy directly behind"
+            words = f"{self._echo.count} of {counted(self._asked, 'request')} came twice, the copy directly behind"
             severity = Severity.WARNING if 10 * self._echo.count >= self._asked else None
             yield self._echo.found(RULES["LN205"], "bus", words, severity)
 
     def _stray_finding(self, code: str, name: str, record: _Sender, tally: Tally, frames: int) -> Finding:
         where = {"LN201": "before", "LN202": "after"}.get(code)
-        words = f"stray octets {_times(tally.count)}"
-        words += f" {where} {frames} frames" if where else f" in the silence between {frames} frames"
+        words = f"stray octets {times(tally.count)}"
+        words += f" {where} {counted(frames, 'frame')}" if where else f" in the silence between {frames} frames"
         most = [value for (rule, value), _ in record.values.most_common() if rule == code][:4]
         words += f" (mostly {', '.join(f'{value:02X}' for value in most)})"
         return tally.found(RULES[code], name, words, self._note_if(tally.count, frames))
@@ -321,7 +326,3 @@ def _place(frame: Frame, mark: Mark) -> str:
 def _stray(record: _Sender, code: str, no: int, noise: Noise) -> None:
     record.stray.setdefault(code, Tally()).add(noise.start, no)
     record.values.update((code, octet) for octet in noise.octets)
-
-
-def _times(count: int) -> str:
-    return "once" if count == 1 else f"{count} times"

@@ -98,7 +98,7 @@ def test_a_lost_token_names_the_holder_and_who_began_anew():
     finding = heard.finding("MS101")
     assert finding.severity is Severity.ERROR
     assert finding.subject == "MAC 9"
-    assert "begun anew by 2" in finding.seen
+    assert "begun anew by MAC 2" in finding.seen
     lost = heard.ring.of(What.LOST_TOKEN, 9)
     assert lost.count >= 2
     assert all(event.value is not None and event.value >= 500 * MS for event in lost.events)

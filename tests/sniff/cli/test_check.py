@@ -30,7 +30,7 @@ def absent(tmp_path: Path) -> str:
 def test_a_finding_fails_and_is_told_with_its_evidence(absent, capsys):
     assert main(["check", absent]) == 1
     said = capsys.readouterr().out
-    assert "ERROR    station 4: never answers  [MB001]" in said
+    assert "ERROR    station 4: no answer  [MB001]" in said
     assert "rows:" in said
     assert "station 4: 0 (100% of its requests without answer (−100))" in said
 
