@@ -9,6 +9,10 @@ from dissectors.line import NS_PER_S, LineSettings
 from sniff.engine import Row
 
 
+KEPT_SECONDS = 86_400
+"""Seconds that are known one by one; a day of them takes some 20 MB."""
+
+
 @dataclass(slots=True)
 class Second:
     """One second of a bus. `busy`: ns with octets on the wire, as the octets' number gives it."""
@@ -22,13 +26,14 @@ class Second:
 
 @dataclass(slots=True)
 class Load:
-    """Totals, and the last seconds one by one (at most `KEPT_SECONDS` of them)."""
+    """Totals, and the last seconds one by one (at most `kept` of them)."""
 
     line: LineSettings
     total: Second = field(default_factory=Second)
     seconds: dict[int, Second] = field(default_factory=dict)
     first: int | None = None  # ns
     last: int | None = None
+    kept: int = KEPT_SECONDS
 
     def add(self, row: Row) -> None:
         """Count one row; what a search heard with other settings is no load."""
@@ -52,7 +57,7 @@ class Load:
         second = self.seconds.get(number)
         if second is None:
             second = self.seconds[number] = Second()
-            if len(self.seconds) > KEPT_SECONDS:
+            if len(self.seconds) > self.kept:
                 del self.seconds[min(self.seconds)]
         return second
 
@@ -71,6 +76,3 @@ class Load:
         if self.last is None or self.first is None or self.last <= self.first:
             return 0.0
         return min(1.0, self.total.busy / (self.last - self.first))
-
-
-KEPT_SECONDS = 86_400

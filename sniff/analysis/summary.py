@@ -9,7 +9,7 @@ from dissectors.frame import Frame, LineError
 from dissectors.line import LineSettings
 from dissectors.tracker import Transaction, Verdict
 from sniff.analysis.histogram import Histogram
-from sniff.analysis.load import Load
+from sniff.analysis.load import KEPT_SECONDS, Load
 from sniff.analysis.nodes import NodeTable
 from sniff.analysis.wording import mark_names
 from sniff.engine import Output, Row
@@ -18,7 +18,7 @@ from sniff.session import LineEvent, LineEventKind
 
 @dataclass(slots=True)
 class Summary:
-    """Counts over a whole capture or a stretch of one. Durations are ns."""
+    """Counts over a whole capture or a stretch of one. Durations are ns, but for `kept_seconds`."""
 
     line: LineSettings
     frames: int = 0
@@ -35,9 +35,10 @@ class Summary:
     latency: Histogram = field(default_factory=Histogram)
     nodes: NodeTable = field(default_factory=NodeTable)
     load: Load = field(init=False)
+    kept_seconds: int = KEPT_SECONDS  # of the load, one by one
 
     def __post_init__(self) -> None:
-        self.load = Load(self.line)
+        self.load = Load(self.line, kept=self.kept_seconds)
 
     def use(self, line: LineSettings) -> None:
         """Count with other line settings from here on: the right ones were found."""

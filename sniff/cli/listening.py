@@ -149,7 +149,7 @@ class Printer:
         self.as_json = as_json
         self.quiet = quiet
         self.colour = colour
-        self.summary = Summary(live.session.line)
+        self.summary = Summary(live.session.line, kept_seconds=60)
         self._session = live.session
         self._settling = Settling(live.points)
 
