@@ -13,6 +13,7 @@ from dissectors.registry import Dissector
 from dissectors.tracker import Transaction
 from sniff.analysis.points import PointReader
 from sniff.engine import Output, Row
+from sniff.formats import CaptureError
 from sniff.session import Item, LineEvent, Session
 from sniff.session_engine import SessionEngine
 
@@ -85,26 +86,36 @@ def with_settings(session: Session, protocol: str | None = None, line: LineSetti
 
 
 def outputs(items: Iterable[Item], session: Session) -> Iterator[Output | LineEvent]:
-    """Run items through a new engine; line events pass through at their place."""
+    """Run items through a new engine; line events pass through at their place. Raises CaptureError as `items` does,
+    when all that was whole before the damage has been given."""
     engine = engine_for(session)
-    for item in items:
-        output = engine.take(item)
-        if output:
-            yield output
-        if isinstance(item, LineEvent):
-            yield item
+    try:
+        for item in items:
+            output = engine.take(item)
+            if output:
+                yield output
+            if isinstance(item, LineEvent):
+                yield item
+    except CaptureError:
+        yield engine.close()
+        raise
     yield engine.close()
 
 
 def settled(items: Iterable[Item], session: Session, devices: Devices | None = None) -> Iterator[Settled]:
-    """Run items through a new engine; give every row with its verdict, and in words where its device is known."""
+    """Run items through a new engine; give every row with its verdict, and in words where its device is known.
+    Raises CaptureError as `outputs` does."""
     points = PointReader(dissector_for(session), devices) if devices else None
     settling = Settling(points)
-    for output in outputs(items, session):
-        if isinstance(output, Output):
-            if points is not None:
-                points.add(output)
-            yield from settling.add(output)
+    try:
+        for output in outputs(items, session):
+            if isinstance(output, Output):
+                if points is not None:
+                    points.add(output)
+                yield from settling.add(output)
+    except CaptureError:
+        yield from settling.flush()
+        raise
     yield from settling.flush()
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from dissectors.profiles import Devices
 from sniff.engine import Output
-from sniff.formats import Capture
+from sniff.formats import Capture, CaptureError
 from sniff.live import LiveBus
 from sniff.reading import dissector_for, outputs
 from sniff.session import LineEvent, Session
@@ -91,16 +91,19 @@ class FileFeed:
         if self._outputs is None:
             return False
         until = time.monotonic() + SLICE
-        for output in self._outputs:
-            if isinstance(output, Output):
-                self._store.add(output)
-            else:
-                self._store.add_line_event(output)
-            if time.monotonic() > until:
-                return True
+        try:
+            for output in self._outputs:
+                if isinstance(output, Output):
+                    self._store.add(output)
+                else:
+                    self._store.add_line_event(output)
+                if time.monotonic() > until:
+                    return True
+            complete = self.capture.completeness()
+            self._ended = "" if complete.whole else complete.text
+        except CaptureError as error:  # what was read before it stays
+            self._ended = str(error)
         self._outputs = None
-        complete = self.capture.completeness()
-        self._ended = "" if complete.whole else complete.text
         return True
 
     def status(self) -> FeedStatus:

@@ -12,15 +12,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
+from typing import Protocol
 
 from dissectors.bacnet import apdu as apdus
 from dissectors.bacnet import npdu as npdus
 from dissectors.bacnet.tags import header_at
 from dissectors.checksums import crc8_mstp, crc16_modbus, crc16_x25, lrc, sum8
 from dissectors.frame import Chunk, Frame, Noise
+from dissectors.profiles.packaged import names
 from sniff.engine import Output
+from sniff.profile_files import EVERY, address, noted
 from sniff.reading import engine_for
-from sniff.session import Adapter, Item, Session
+from sniff.session import DEVICES_NOTE, Adapter, Item, Session
 
 BLANK = ord("x")
 CHARACTER_STRING, OBJECT_IDENTIFIER = 7, 12
@@ -43,12 +46,43 @@ class Pseudonyms:
         return self._known[number]
 
 
+class Rewriter(Protocol):
+    """What renames the frames of one protocol."""
+
+    stations: Pseudonyms
+
+    def __call__(self, frame: Frame) -> bytes:
+        """The frame under another name."""
+        ...
+
+
 def anonymous_session(session: Session) -> Session:
     """The session without the names of ports, devices and places."""
     adapter = replace(session.adapter, serial_number="")
     if adapter.name.startswith("another program's"):
         adapter = Adapter("another program's file", latency=adapter.latency, latency_from=adapter.latency_from)
-    return replace(session, port="anonymised", bus="bus", adapter=adapter, notes={})
+    return replace(session, port="anonymised", bus="bus", adapter=adapter, notes=_renamed_devices(session))
+
+
+def _renamed_devices(session: Session) -> dict[str, str]:
+    """Who is which device, under the new addresses; a profile of somebody's own may name its owner and is left out."""
+    known, _ = noted(session)
+    stations = _rewriter(session).stations
+    said = [
+        f"{word if word == EVERY else stations.of(address(word))}={name}"
+        for word, name in known.items()
+        if name in names()
+    ]
+    return {DEVICES_NOTE: ",".join(said)} if said else {}
+
+
+def _rewriter(session: Session) -> Rewriter:
+    """What renames frames: known devices get the first addresses, so that they are known before the first frame."""
+    rewrite = _REWRITERS[session.protocol]()
+    for word in noted(session)[0]:
+        if word != EVERY:
+            rewrite.stations.of(address(word))
+    return rewrite
 
 
 def knows(protocol: str) -> bool:
@@ -58,14 +92,13 @@ def knows(protocol: str) -> bool:
 
 def anonymised(items: Iterable[Item], session: Session) -> Iterator[Item]:
     """The items with the same times and lengths, renamed. The engine decides what is a frame."""
-    rewrite = _REWRITERS[session.protocol]()
+    rewrite = _rewriter(session)
     engine = engine_for(session)
     waiting: list[Item] = []
     made = bytearray()
     for item in items:
         waiting.append(item)
-        if isinstance(item, Chunk):
-            made += _rewritten(engine.feed(item), rewrite)
+        made += _rewritten(engine.take(item), rewrite)
         yield from _filled(waiting, made)
     made += _rewritten(engine.close(), rewrite)
     yield from _filled(waiting, made)
@@ -113,13 +146,13 @@ class ModbusRtu:
     """Rewrites RTU frames."""
 
     def __init__(self) -> None:
-        self.units = Pseudonyms([*range(1, 248), *range(248, 256)], kept=(0,))
+        self.stations = Pseudonyms([*range(1, 248), *range(248, 256)], kept=(0,))
 
     def __call__(self, frame: Frame) -> bytes:
         """The frame under another name."""
         octets = frame.octets
         if not frame.ok:
-            return bytes([self.units.of(octets[0])]) + octets[1:] if octets else octets
+            return bytes([self.stations.of(octets[0])]) + octets[1:] if octets else octets
         body = self.pdu(octets[:-2])
         return body + crc16_modbus(body).to_bytes(2, "little")
 
@@ -128,7 +161,7 @@ class ModbusRtu:
         unit, pdu = body[:1], body[1:]
         if pdu[:1] in (b"\x11", b"\x2b"):
             pdu = pdu[:1] + _without_text(pdu[1:])
-        return bytes([self.units.of(unit[0])]) + pdu
+        return bytes([self.stations.of(unit[0])]) + pdu
 
 
 class ModbusAscii:
@@ -136,6 +169,7 @@ class ModbusAscii:
 
     def __init__(self) -> None:
         self.rtu = ModbusRtu()
+        self.stations = self.rtu.stations
 
     def __call__(self, frame: Frame) -> bytes:
         """The frame under another name; what is after the hexadecimal digits stays."""
@@ -144,7 +178,7 @@ class ModbusAscii:
         end = text.find(b"\r") if b"\r" in text else len(text)
         if not frame.ok:
             address = _hex(text[1:3])
-            renamed = b"" if address is None else b"%02X" % self.rtu.units.of(address)
+            renamed = b"" if address is None else b"%02X" % self.stations.of(address)
             return octets[:1] + renamed + octets[1 + len(renamed) :]
         body = self.rtu.pdu(bytes.fromhex(text[1:end].decode())[:-1])
         return octets[:1] + (body + bytes([lrc(body)])).hex().upper().encode() + octets[end:]
@@ -179,7 +213,7 @@ class Mstp:
     """Rewrites MS/TP frames: MAC addresses, device instances, network addresses, texts."""
 
     def __init__(self) -> None:
-        self.macs = Pseudonyms(range(255), kept=(255,))
+        self.stations = Pseudonyms(range(255), kept=(255,))
         self.devices = Pseudonyms(range(1, 4_194_303), kept=(4_194_303,))
 
     def __call__(self, frame: Frame) -> bytes:
@@ -187,7 +221,7 @@ class Mstp:
         octets = frame.octets
         if len(octets) < 8:
             return octets
-        header = bytes([octets[2], self.macs.of(octets[3]), self.macs.of(octets[4]), octets[5], octets[6]])
+        header = bytes([octets[2], self.stations.of(octets[3]), self.stations.of(octets[4]), octets[5], octets[6]])
         good_header = crc8_mstp(octets[2:7]) == octets[7]
         head = octets[:2] + header + (bytes([crc8_mstp(header)]) if good_header else octets[7:8])
         length = octets[5] << 8 | octets[6]
@@ -205,10 +239,10 @@ class Mstp:
         if header is None or header.error is not None:
             return _without_text(data)
         front = bytearray(data[: header.body])
-        for address in (header.dadr, header.sadr):
-            if address:
-                place = bytes(front).find(address)
-                front[place : place + len(address)] = bytes(len(address) - 1) + bytes([self.macs.of(address[-1])])
+        for named in (header.dadr, header.sadr):
+            if named:
+                place = bytes(front).find(named)
+                front[place : place + len(named)] = bytes(len(named) - 1) + bytes([self.stations.of(named[-1])])
         body = data[header.body :]
         if header.is_network_message:
             return bytes(front) + body
@@ -242,7 +276,7 @@ class Mstp:
         return _without_text(content) if context else content
 
 
-_REWRITERS: dict[str, Callable[[], Callable[[Frame], bytes]]] = {
+_REWRITERS: dict[str, Callable[[], Rewriter]] = {
     "modbus-rtu": ModbusRtu,
     "modbus-ascii": ModbusAscii,
     "n2": N2,

@@ -2,15 +2,19 @@
 
 | kind | a line | time is |
 |---|---|---|
-| candump-like | `(12.345678) bus 01 03 00 00 00 02 C4 0B`, `(12.3) rs485 123#0103` | end of the record |
+| candump-like | `(12.345678) bus 01 03 00 00 00 02 C4 0B`, `(12.3) rs485 123#0103`, `(12.3) can0 123 [2] 01 03` | \
+end of the record |
 | Docklight | `2/13/2006 12:23:47.123 [RX] - 01 03 00 <NUL>`, `13.02.2006 …`, `2006-02-13 …` | end of the record |
 | jpnevulator | `2006-05-30 13:23:49.461075: /dev/ttyS0`, then lines of pairs | of the heading, for all below it |
-| time and pairs | `0.031127 01 01 00 03 ; note` | end of the record |
+| times and pairs | `0.031127 01 01 00 03 ; note` | end of the record |
+| clock and pairs | `[12:23:47.123] RX: 01 03 00`, `2006-02-13 12:23:47.123 01 03 00` | end of the record |
 | hexdump | `00000010  01 03 00 00 |....|`, `00000010: 0103 0000  ....` | none: back to back |
-| CSV | headings with a column of octets (octet, data, value, hex) and of times (start, end, time) | as it says |
+| pairs | `01 03 00 00`, `0x01, 0x03`, `01030000` | none: back to back |
+| CSV | headings with a column of octets and of times: `octet_table.py` | as it says |
 
 Neither line settings nor protocol are in such a file: give them with -s and -p. Times of logs are those of another
-program: `FOREIGN_LATENCY` is assumed, except for a CSV that has both begin and end of each octet.
+program: `FOREIGN_LATENCY` is assumed, except for a CSV that has the begin of each octet (`octet_table.py`). Lines of no
+known form are passed over, counted, and said: a log that was cut or damaged gives what is whole.
 """
 
 from __future__ import annotations
@@ -26,6 +30,7 @@ from dissectors.frame import Chunk
 from dissectors.line import NS_PER_S
 from sniff.formats import CaptureError
 from sniff.formats.files import open_capture
+from sniff.formats.octet_table import columns, octets_of, seconds
 from sniff.formats.records import foreign_session
 from sniff.session import Adapter, Completeness, Item, Session
 
@@ -34,22 +39,37 @@ SAMPLE = 200
 """Lines looked at to tell the kind."""
 
 _PAIRS = r"(?P<pairs>(?:[0-9A-Fa-f]{2}[ \t,]*)+)"
-_STAMP = r"(?P<date>\d{1,4}[-./]\d{1,2}[-./]\d{1,4})[ T](?P<clock>\d{1,2}:\d{2}:\d{2}(?:[.,]\d{1,9})?)"
+_DATE = r"(?P<date>\d{1,4}[-./]\d{1,2}[-./]\d{1,4})"
+_CLOCK = r"(?P<clock>\d{1,2}:\d{2}:\d{2}(?:[.,]\d{1,9})?)"
+_STAMP = rf"{_DATE}[ T]{_CLOCK}"
+_WAY = r"\[?(?:TX|RX|IN|OUT|C1|C2|>>|<<|->|<-|>|<)\]?"
 KINDS: dict[str, re.Pattern[str]] = {
-    "candump": re.compile(rf"\s*\((?P<seconds>\d+(?:\.\d{{1,9}})?)\)\s+\S+\s+(?:[0-9A-Fa-f]+#)?{_PAIRS}\s*"),
+    "candump": re.compile(
+        rf"\s*\((?P<seconds>\d+(?:\.\d{{1,9}})?)\)\s+\S+\s+(?:[0-9A-Fa-f]+(?:#|\s+\[\d+\]\s+))?{_PAIRS}\s*"
+    ),
     "Docklight": re.compile(rf"\s*{_STAMP}\s+\[(?:TX|RX|C1|C2)\]\s*-?\s*{_PAIRS}.*", re.IGNORECASE),
     "jpnevulator": re.compile(rf"\s*{_STAMP}:.*"),
     "times and pairs": re.compile(rf"\s*(?P<seconds>\d+\.\d{{1,9}})\s*[:;,]?\s+{_PAIRS}(?:[;#|].*)?"),
+    "clock and pairs": re.compile(
+        rf"\s*\[?(?:{_DATE}[ T])?{_CLOCK}\]?\s*[;,]?\s*(?:{_WAY}\s*:?\s*)?{_PAIRS}(?:[;#|].*)?", re.IGNORECASE
+    ),
     "hexdump": re.compile(
         r"\s*[0-9A-Fa-f]{4,16}(?:"
         r":\s*(?P<pairs>(?:[0-9A-Fa-f]{2,4} )*[0-9A-Fa-f]{2,4})(?:  .*)?"  # as xxd: text after two spaces
         r"|\s+(?P<canonical>(?:[0-9A-Fa-f]{2}\s{1,2})*[0-9A-Fa-f]{2})\s*(?:\|.*)?)"  # as hexdump -C: text after |
     ),
 }
+BARE = "pairs"
+KNOWN = (*KINDS, BARE, "CSV")
+TIMELESS = ("hexdump", BARE)
+_BARE = re.compile(r"\s*(?P<pairs>(?:(?:0[xX])?[0-9A-Fa-f]{2}(?:[ \t,;]+|(?=[0-9A-Fa-f])|$))+)")
 _CONTINUED = re.compile(r"\s*(?P<pairs>(?:[0-9A-Fa-f]{2}[ \t]+)*[0-9A-Fa-f]{2})(?:\s{2,}.*)?\s*")
-OCTET_COLUMNS = ("octet", "byte", "data", "value", "hex")
-START_COLUMNS = ("t_start_s", "start", "start_s", "begin")
-END_COLUMNS = ("t_end_s", "end", "end_s", "time", "time_s", "timestamp", "t", "time [s]", "start_time")
+_NOTHING = {  # lines that are as they should be, and hold no octets
+    "hexdump": re.compile(r"\s*[0-9A-Fa-f]{4,16}:?\s*"),  # the offset at the end
+    "Docklight": re.compile(r"\s*Docklight.*"),
+}
+_SPACES = re.compile(r"\s{4,}")
+_REMARK = ("#", ";", "//")
 
 
 def read(path: Path) -> ByteLog:
@@ -63,113 +83,122 @@ class ByteLog:
     def __init__(self, path: Path) -> None:
         self.path = path
         self._passed = 0
+        self._first_passed = 0  # number of the first such line
         lines = [line for _, line in zip(range(SAMPLE), self._lines(), strict=False)]
         self.kind = _kind_of(lines)
         if self.kind is None:
-            known = ", ".join((*KINDS, "CSV"))
-            raise CaptureError(f"{path}: no byte log that this program reads; it knows {known}")
+            raise CaptureError(f"{path}: no byte log that this program reads; it knows {', '.join(KNOWN)}")
         session = foreign_session(str(path), None, 0, f"{self.kind} log")
         self.session: Session = session
         first = next(self.items(), None)
-        exact = self.kind == "CSV" and _columns(lines[0])[1] is not None
+        table = columns(lines[0]) if self.kind == "CSV" else None
+        exact = table is not None and table.exact
         adapter = Adapter("logic analyser", latency_from="exact times") if exact else session.adapter
         self.session = replace(session, started=first.time if first is not None else 0, adapter=adapter)
 
     def items(self) -> Iterator[Item]:
         """The octets in the order of the file."""
-        self._passed = 0
-        give: Callable[[], Iterator[Item]] = self._csv if self.kind == "CSV" else self._text
+        self._passed = self._first_passed = 0
+        give: Callable[[], Iterator[Item]] = self._table if self.kind == "CSV" else self._text
         return give()
 
     def completeness(self) -> Completeness:
-        """Always whole: a text has no end mark. Says how many lines were not understood, as far as `items` has read."""
-        note = f"; {self._passed} lines were not understood" if self._passed else ""
-        return Completeness(True, f"complete ({self.kind} log{note})")
+        """Whether every line was understood, as far as `items` has read; a text has no end mark."""
+        if not self._passed:
+            return Completeness(True, f"complete ({self.kind} log)")
+        many = "1 line was" if self._passed == 1 else f"{self._passed} lines were"
+        text = f"{many} not understood, the first is line {self._first_passed} ({self.kind} log)"
+        return Completeness(False, text)
 
     def _lines(self) -> Iterator[str]:
         with open_capture(self.path) as stream:
             while line := stream.readline(LONGEST_LINE):
-                yield line.decode("utf-8", "replace").rstrip("\r\n")
+                yield line.decode("utf-8", "replace").rstrip("\r\n").removeprefix("\ufeff")
+
+    def _pass(self, number: int) -> None:
+        self._passed += 1
+        self._first_passed = self._first_passed or number
 
     def _text(self) -> Iterator[Item]:
         assert self.kind is not None
-        pattern = KINDS[self.kind]
+        pattern = KINDS.get(self.kind, _BARE)
+        nothing = _NOTHING.get(self.kind)
+        is_timed = self.kind not in TIMELESS
         time = 0
-        for line in self._lines():
-            if not line.strip() or line.lstrip().startswith("#"):
+        for number, line in enumerate(self._lines(), 1):
+            if not line.strip() or line.lstrip().startswith(_REMARK):
                 continue
+            line = _narrow(line)
             match = pattern.fullmatch(line)
+            is_heading = match is not None
             if match is None and self.kind == "jpnevulator":
                 match = _CONTINUED.fullmatch(line)
-            elif match is not None:
-                time = _time(match) if self.kind != "hexdump" else time
             found = match.groupdict() if match is not None else {}
-            octets = _octets(found.get("pairs") or found.get("canonical"))
+            try:
+                if match is not None and is_heading and is_timed:
+                    time = _time(match)
+                octets = octets_of(found.get("pairs") or found.get("canonical") or "")
+            except ValueError:  # half a pair, or a time that is none
+                octets, match = b"", None
             if octets:
-                if self.kind == "hexdump":
+                if not is_timed:
                     time += len(octets) * self.session.line.char
                 yield Chunk(time, octets)
-            elif match is None:
-                self._passed += 1
+            elif match is None and (nothing is None or not nothing.fullmatch(line)):
+                self._pass(number)
 
-    def _csv(self) -> Iterator[Item]:
+    def _table(self) -> Iterator[Item]:
         rows = csv.reader(self._lines())
-        octet_at, start_at, end_at = _columns(",".join(next(rows, [])))
-        assert octet_at is not None
+        table = columns(",".join(next(rows, [])))
         found: list[Chunk] = []
-        for row in rows:
-            try:
-                octets = _octets(row[octet_at].strip().removeprefix("0x"))
-                end = _seconds(row[end_at]) if end_at is not None else None
-                start = _seconds(row[start_at]) if start_at is not None else None
-            except (IndexError, ValueError):
-                octets, end, start = b"", None, None
-            time = end if end is not None else start + self.session.line.char if start is not None else None
-            if not octets or time is None:
-                self._passed += 1
-                continue
-            found.append(Chunk(time, octets))
+        try:
+            for row in rows:
+                if not any(row) or table is None:
+                    continue
+                try:
+                    found.append(table.chunk(row, self.session.line.char))
+                except ValueError:
+                    self._pass(rows.line_num)
+        except csv.Error:  # a field that never ends, a zero octet
+            self._pass(rows.line_num)
         yield from sorted(found, key=lambda chunk: chunk.time)  # two lines of a bus are listed one after the other
 
 
 def _kind_of(lines: list[str]) -> str | None:
-    if lines and _columns(lines[0])[0] is not None:
+    if lines and columns(lines[0]) is not None:
         return "CSV"
+    lines = [_narrow(line) for line in lines]
     counts = {kind: sum(1 for line in lines if pattern.fullmatch(line)) for kind, pattern in KINDS.items()}
     best = max(counts, key=lambda kind: counts[kind])
-    return best if counts[best] else None
+    if counts[best]:
+        return best
+    written = [line for line in lines if line.strip() and not line.lstrip().startswith(_REMARK)]
+    bare = sum(1 for line in written if _BARE.fullmatch(line))
+    return BARE if bare and 2 * bare >= len(written) else None
 
 
-def _columns(heading: str) -> tuple[int | None, int | None, int | None]:
-    """Where octet, start and end stand in a CSV; all None when it is none."""
-    names = [name.strip().strip('"').lower() for name in heading.split(",")]
-
-    def place(known: tuple[str, ...]) -> int | None:
-        return next((names.index(name) for name in known if name in names), None)
-
-    octet, start, end = place(OCTET_COLUMNS), place(START_COLUMNS), place(END_COLUMNS)
-    return (octet, start, end) if octet is not None and (start is not None or end is not None) else (None, None, None)
-
-
-def _octets(pairs: str | None) -> bytes:
-    text = re.sub(r"[ \t,]", "", pairs or "")
-    return bytes.fromhex(text) if len(text) % 2 == 0 else b""
+def _narrow(line: str) -> str:
+    """The line without long runs of spaces, which would make matching slow."""
+    return _SPACES.sub("   ", line)
 
 
 def _time(match: re.Match[str]) -> int:
     found = match.groupdict()
     if found.get("seconds"):
-        return _seconds(found["seconds"])
-    return _clock(found["date"], found["clock"])
+        return seconds(found["seconds"])
+    return _midnight(found.get("date") or "") + _of_day(found["clock"])
 
 
-def _seconds(text: str) -> int:
-    whole, _, fraction = text.strip().partition(".")
-    return int(whole or 0) * NS_PER_S + int(fraction[:9].ljust(9, "0") or 0)
+def _of_day(clock: str) -> int:
+    """ns since midnight."""
+    hours, minutes, rest = clock.replace(",", ".").split(":")
+    return (int(hours) * 60 + int(minutes)) * 60 * NS_PER_S + seconds(rest)
 
 
-def _clock(date: str, clock: str) -> int:
+def _midnight(date: str) -> int:
     """ns since the epoch, as UTC; 13.02.2006 is day first, 2/13/2006 is month first, 2006-02-13 year first."""
+    if not date:
+        return 0
     parts = [int(part) for part in re.split(r"[-./]", date)]
     if parts[0] > 31:
         year, month, day = parts
@@ -177,9 +206,8 @@ def _clock(date: str, clock: str) -> int:
         day, month, year = parts
     else:
         month, day, year = parts
-    hours, minutes, rest = clock.replace(",", ".").split(":")
     try:
         midnight = datetime(year if year > 99 else 2000 + year, month, day, tzinfo=UTC)
     except ValueError:
         return 0
-    return int(midnight.timestamp()) * NS_PER_S + (int(hours) * 60 + int(minutes)) * 60 * NS_PER_S + _seconds(rest)
+    return int(midnight.timestamp()) * NS_PER_S

@@ -8,12 +8,13 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from dissectors.frame import Chunk, Frame
+from dissectors.frame import Chunk, Frame, LineError, Mark
 from dissectors.line import LineSettings
 from sniff.formats import CaptureError, read
 from sniff.reading import settled, with_settings
 
 REQUEST, ANSWER = bytes.fromhex("010300000002C40B"), bytes.fromhex("01030400D7001ACBC0")
+CHAR = LineSettings.parse("19200,8E1").char
 DAY = 1_139_833_427  # 2006-02-13T12:23:47Z
 
 LOGS = {
@@ -29,7 +30,13 @@ LOGS = {
     "times and pairs": (
         "# a note\n0.100000 01 03 00 00 00 02 c4 0b ; request\n0.110000 01 03 04 00 d7 00 1a cb c0 ; answer\n"
     ),
-    "hexdump": ("00000000  01 03 00 00 00 02 c4 0b  01 03 04 00 d7 00 1a cb  |................|\n00000010  c0  |.|\n"),
+    "clock and pairs": (
+        "[12:23:47.100] TX: 01 03 00 00 00 02 C4 0B\n2006-02-13 12:23:47,110 << 01 03 04 00 D7 00 1A CB C0\n"
+    ),
+    "pairs": "; from the terminal program\n01 03 00 00 00 02 C4 0B\n0x01, 0x03, 0x04, 0x00, 0xD7, 0x00, 0x1A,\nCBC0\n",
+    "hexdump": (
+        "00000000  01 03 00 00 00 02 c4 0b  01 03 04 00 d7 00 1a cb  |................|\n00000010  c0  |.|\n00000011\n"
+    ),
 }
 
 
@@ -42,13 +49,60 @@ def test_every_kind_is_told_and_read(kind: str, tmp_path: Path) -> None:
     assert kind in log.completeness().text
     assert b"".join(chunk.octets for chunk in chunks) == REQUEST + ANSWER
     assert "not understood" not in log.completeness().text
-    if kind != "hexdump":
+    if kind == "clock and pairs":
+        assert chunks[0].time == ((12 * 60 + 23) * 60 + 47) * 10**9 + 100_000_000  # no date: of no day
+        assert chunks[1].time == DAY * 10**9 + 110_000_000
+    elif kind not in ("hexdump", "pairs"):
         assert chunks[1].time - chunks[0].time == 10_000_000
     if kind in {"candump", "Docklight", "jpnevulator"}:
         assert chunks[0].time == DAY * 10**9 + 100_000_000
     frames = [item.row.event for item in settled(chunks, log.session)]
     assert [frame.octets for frame in frames] == [REQUEST, ANSWER]
     assert all(isinstance(frame, Frame) and frame.ok for frame in frames)
+
+
+def test_candump_as_it_prints_to_a_terminal(tmp_path: Path) -> None:
+    path = tmp_path / "x.log"
+    path.write_text(" (1139833427.100000)  can0  123   [8]  01 03 00 00 00 02 C4 0B\n")
+    (chunk,) = read(path).items()
+    assert chunk == Chunk(DAY * 10**9 + 100_000_000, REQUEST)
+
+
+@pytest.mark.parametrize(
+    ("table", "first", "second"),
+    [
+        (
+            "Time [s],Value,Parity Error,Framing Error\n-0.5,0x01,,\n1e-3,'A' (0x41),Error,\n",
+            Chunk(-500_000_000 + CHAR, b"\x01"),
+            Chunk(1_000_000 + CHAR, b"A", (Mark(0, LineError.PARITY),)),
+        ),
+        (
+            'name,type,start_time,duration,"data",error\nA,data,0.5,0.0005,0x01,\nA,data,0.6,0.0005,0x03,framing\n',
+            Chunk(500_500_000, b"\x01"),
+            Chunk(600_500_000, b"\x03", (Mark(0, LineError.FRAMING),)),
+        ),
+        (
+            "time,hex\n0.5,01 03 00\n0.25,0x02 0x03\n",
+            Chunk(250_000_000, b"\x02\x03"),
+            Chunk(500_000_000, b"\x01\x03\0"),
+        ),
+    ],
+    ids=["Saleae Logic 1", "Saleae Logic 2", "ends only"],
+)
+def test_tables_of_other_programs(table: str, first: Chunk, second: Chunk, tmp_path: Path) -> None:
+    path = tmp_path / "x.csv"
+    path.write_text(table)
+    log = read(path)
+    assert list(log.items()) == [first, second]
+    assert log.completeness().whole
+
+
+def test_only_a_begin_on_the_line_is_an_exact_time(tmp_path: Path) -> None:
+    path = tmp_path / "x.csv"
+    path.write_text("start,octet\n0.5,01\n")
+    assert read(path).session.adapter.latency == 0
+    path.write_text("time,octet\n0.5,01\n")
+    assert read(path).session.adapter.latency > 0
 
 
 def test_xxd_is_a_hexdump_too(tmp_path: Path) -> None:
