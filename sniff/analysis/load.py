@@ -8,7 +8,6 @@ from dissectors.frame import Frame
 from dissectors.line import NS_PER_S, LineSettings
 from sniff.engine import Row
 
-
 KEPT_SECONDS = 86_400
 """Seconds that are known one by one; a day of them takes some 20 MB."""
 
@@ -22,6 +21,16 @@ class Second:
     frames: int = 0
     damaged: int = 0
     noise: int = 0  # octets
+
+    def merge(self, other: Second) -> Second:
+        """Both together, as a new value."""
+        return Second(
+            self.busy + other.busy,
+            self.octets + other.octets,
+            self.frames + other.frames,
+            self.damaged + other.damaged,
+            self.noise + other.noise,
+        )
 
 
 @dataclass(slots=True)
@@ -52,6 +61,17 @@ class Load:
                 part.damaged += not event.ok
             else:
                 part.noise += octets
+
+    def merge(self, other: Load) -> Load:
+        """Both together, as a new value; of the seconds the newest are kept."""
+        seconds = {
+            number: self.seconds.get(number, Second()).merge(other.seconds.get(number, Second()))
+            for number in sorted(self.seconds.keys() | other.seconds.keys())[-self.kept :]
+        }
+        firsts = [time for time in (self.first, other.first) if time is not None]
+        lasts = [time for time in (self.last, other.last) if time is not None]
+        first, last = min(firsts, default=None), max(lasts, default=None)
+        return Load(self.line, self.total.merge(other.total), seconds, first, last, self.kept)
 
     def _second(self, number: int) -> Second:
         second = self.seconds.get(number)

@@ -40,6 +40,28 @@ class Summary:
     def __post_init__(self) -> None:
         self.load = Load(self.line, kept=self.kept_seconds)
 
+    def merge(self, other: Summary) -> Summary:
+        """Both together, as a new value."""
+        whole = Summary(
+            self.line,
+            self.frames + other.frames,
+            self.damaged + other.damaged,
+            self.noise + other.noise,
+            self.octets + other.octets,
+            self.searched + other.searched,
+            self.kinds + other.kinds,
+            self.damages + other.damages,
+            self.found + other.found,
+            self.marks + other.marks,
+            self.verdicts + other.verdicts,
+            self.events + other.events,
+            self.latency.merge(other.latency),
+            self.nodes.merge(other.nodes),
+            self.kept_seconds,
+        )
+        whole.load = self.load.merge(other.load)
+        return whole
+
     def use(self, line: LineSettings) -> None:
         """Count with other line settings from here on: the right ones were found."""
         self.line = self.load.line = line
