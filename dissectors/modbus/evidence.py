@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, field
 
 from dissectors.findings import Tally
@@ -16,7 +17,8 @@ class Evidence:
     """What was seen on the bus. Times are ns.
 
     `hasty`: requests after another that nothing had followed: (longest reading of the silence between, unit asked
-    before, time, frame before, frame). `close`, `paused`: by sender. `pairs`: (unit asked, unit that answered).
+    before, time, frame before, frame). `close`, `paused`: by sender. `pairs`: (unit asked, unit that answered);
+    `repeated_elsewhere`: repeats of requests that such a pair is about, by unit asked.
     """
 
     timing: Timing
@@ -34,6 +36,7 @@ class Evidence:
     close: dict[str, Tally] = field(default_factory=dict)
     paused: dict[str, Tally] = field(default_factory=dict)
     pairs: dict[tuple[int, int], Tally] = field(default_factory=dict)
+    repeated_elsewhere: Counter[int] = field(default_factory=Counter)
     cycles: Cycles = field(default_factory=Cycles)
 
     @property

@@ -101,7 +101,7 @@ class ModbusFindings:
         if verdict in _SETTLED_ELSEWHERE:
             self._seen.echoes += verdict is Verdict.ECHO
             if verdict is Verdict.BROADCAST and asked is not None:
-                self._seen.cycles.add(asked.octets, transaction.start)
+                self._seen.cycles.add(asked.octets, asked.key, transaction.start)
             return
         if verdict is Verdict.DAMAGED_REQUEST:
             self._seen.damaged_requests.add(transaction.start, transaction.request)
@@ -247,7 +247,7 @@ class ModbusFindings:
             pair = (other.unit, transaction.station)
             self._seen.pair(pair).add(transaction.start, other.no, transaction.response)
             return
-        if not self._seen.stations and not self._seen.requests:
+        if not self._seen.requests and self._seen.answers == 1:
             return  # the capture began between a request and its answer
         if transaction.id in self._damaged:  # more likely a request, when nobody was asked
             self._seen.damaged_requests.add(transaction.start, transaction.response)
@@ -262,12 +262,13 @@ class ModbusFindings:
             return
         if verdict is Verdict.NO_RESPONSE and asked.no in self._elsewhere:
             del self._elsewhere[asked.no]  # the pair is reported instead
+            self._seen.repeated_elsewhere[asked.unit] += transaction.attempt > 1
             return
         request = station.request(asked.key)
         request.tries += 1
         if transaction.attempt == 1:
             request.turns += 1
-            self._seen.cycles.add(asked.octets, transaction.start)
+            self._seen.cycles.add(asked.octets, asked.key, transaction.start)
         else:
             station.repeats.add(transaction.start, transaction.request)
             station.repeats_cost += max(0, transaction.start - station.last_start)

@@ -7,8 +7,7 @@ from dataclasses import replace
 
 from dissectors.findings import Finding, Severity, Tally, counted, found, times
 from dissectors.modbus.evidence import Evidence
-from dissectors.modbus.functions import FUNCTIONS
-from dissectors.modbus.judgement_words import MS, ms, note_if, seconds, units, wilson
+from dissectors.modbus.judgement_words import MS, ms, note_if, request_words, seconds, units, wilson
 from dissectors.modbus.rules import RULES
 from dissectors.modbus.station_judgement import is_absent, of_station
 
@@ -59,7 +58,9 @@ def _of_bus(seen: Evidence) -> Iterator[Finding]:
     for (asked, answered), tally in sorted(seen.pairs.items()):
         if tally.count >= 2:
             words = f"{tally.count} requests to station {asked} answered by station {answered}"
-            yield tally.found(RULES["MB206"], f"station {asked}", words)
+            repeated = seen.repeated_elsewhere[asked]
+            words += f"; the master asked again {times(repeated)}" if repeated else "; the master never asked again"
+            yield tally.found(RULES["MB206"], f"station {asked}", words, note_if(not repeated))
     unasked = seen.unasked
     if unasked.count:
         words = f"{unasked.count} of {counted(seen.answers, 'answer')} came unasked"
@@ -133,12 +134,11 @@ def _common_damage(seen: Evidence) -> list[Finding]:
 
 def _cycle(seen: Evidence) -> Iterator[Finding]:
     usual = seen.cycles.usual()
-    if usual is None or len(usual[1]) < 4:
+    if usual is None or len(usual[2]) < 4:
         return
-    octets, periods = usual
+    unit, key, periods = usual
     low, median, high = (periods[len(periods) * part // 100] for part in (5, 50, 95))
-    name = FUNCTIONS[octets[1]].name.replace("-", " ") if octets[1] in FUNCTIONS else f"function {octets[1]}"
-    words = f"the master comes back to station {octets[0]} ({name}) every {seconds(median)}"
+    words = f"the master comes back to station {unit} ({request_words(key)}) every {seconds(median)}"
     if high - low > max(median // 50, 2 * seen.timing.latency, MS):
         words += f"; 9 of 10 times after {seconds(low)} to {seconds(high)}"
     yield found(RULES["MB401"], "bus", words, first=seen.first or 0, last=seen.now, count=len(periods))

@@ -194,8 +194,9 @@ _ALL = (
         "MB206",
         Severity.WARNING,
         "answered from another address",
-        "Requests to one address that a station with another address answers. At least two.",
-        "devices that always answer so, or a wrong address in the master's list",
+        "Requests to one address that a station with another address answers. At least two. A note where the master "
+        "never repeats such a request: it takes the answers.",
+        "a device that always answers so (some battery systems do), or a wrong address in the master's list",
         "if the master takes these answers, nothing; else the address in its list",
     ),
     Rule(

@@ -162,20 +162,22 @@ class Cycles:
     """Time from a request to the same request again, of the most frequent ones."""
 
     _last: dict[bytes, int] = field(default_factory=dict)
+    _keys: dict[bytes, Key] = field(default_factory=dict)
     _periods: dict[bytes, deque[int]] = field(default_factory=dict)
 
-    def add(self, octets: bytes, start: int) -> None:
-        """Take a request that is no repeat of an unanswered one."""
+    def add(self, octets: bytes, key: Key, start: int) -> None:
+        """Take a request (unit and PDU) that is no repeat of an unanswered one."""
         before = self._last.get(octets)
         if before is None and len(self._last) >= KEYS_KEPT:
             return
         self._last[octets] = start
+        self._keys[octets] = key
         if before is not None and start > before:
             self._periods.setdefault(octets, deque(maxlen=256)).append(start - before)
 
-    def usual(self) -> tuple[bytes, list[int]] | None:
-        """The request with the most periods, and those in ascending order; None where nothing repeats."""
+    def usual(self) -> tuple[int, Key, list[int]] | None:
+        """Unit and kind of the request with the most periods, and those in ascending order; None where none repeats."""
         if not self._periods:
             return None
         octets, periods = max(self._periods.items(), key=lambda pair: len(pair[1]))
-        return octets, sorted(periods)
+        return octets[0], self._keys[octets], sorted(periods)
