@@ -1,7 +1,7 @@
 """The framer contract, and the mechanics that protocols share.
 
 A framer turns chunks into events. It is sans-I/O: it reads no clock; silence is told to it.
-Every framer obeys, and one shared property suite (tests/property/framer_contract.py) checks:
+Every framer obeys, and one shared property suite (sniff/testing/framer_contract.py) checks:
 
 1. Conservation: the octets of all events, in order, are exactly the octets fed.
 2. Cut invariance: the same octets and times, cut into other chunks, give the same events.

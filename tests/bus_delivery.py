@@ -5,8 +5,7 @@ from __future__ import annotations
 import random
 from collections.abc import Iterable, Sequence
 
-from dissectors.frame import Chunk, Event
-from dissectors.framer import Framer
+from dissectors.frame import Chunk
 from dissectors.line import Timing
 
 MS = 1_000_000
@@ -15,14 +14,6 @@ FTDI_LATENCY = 17 * MS
 
 Wire = list[tuple[int, int]]
 """Octets on the wire: (end in ns, octet), ascending."""
-
-
-def drive(framer: Framer, chunks: Iterable[Chunk]) -> list[Event]:
-    """All events of a whole capture."""
-    events: list[Event] = []
-    for chunk in chunks:
-        events += framer.feed(chunk)
-    return events + framer.close()
 
 
 def exact(wire: Iterable[tuple[int, int]]) -> list[Chunk]:

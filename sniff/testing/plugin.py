@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 INI = "sniff_captures"
 
+pytest.register_assert_rewrite("sniff.testing.framer_contract")  # imports nothing: its failures will show their values
+
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     """--sniff-update, --sniff-strict, and where captures are."""

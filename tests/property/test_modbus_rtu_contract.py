@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dissectors.modbus.framing import RtuFramer
-from tests.property.framer_contract import framer_contract
+from sniff.testing.framer_contract import framer_contract
 from tests.property.modbus_adus import rtu_frames
 
 TestRtuContract = framer_contract(RtuFramer, rtu_frames, examples=60)

@@ -13,7 +13,7 @@ from dissectors.bacnet.framing import MstpFramer
 from dissectors.checksums import crc8_mstp, crc16_x25
 from dissectors.frame import Check, Chunk, Damage, Event, Found, Frame, Noise
 from dissectors.line import LineSettings, Timing
-from tests.property.framer_contract import framer_contract
+from sniff.testing.framer_contract import framer_contract
 
 MS = 1_000_000
 START = 10**18

@@ -11,7 +11,7 @@ from dissectors.checksums import sum8
 from dissectors.frame import Check, Chunk, Event, Frame, LineError, Mark, Noise
 from dissectors.line import Timing
 from dissectors.n2.framing import MAX_LENGTH, N2Framer
-from tests.property.framer_contract import framer_contract
+from sniff.testing.framer_contract import framer_contract
 
 relaxed = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
 MS = 1_000_000

@@ -13,7 +13,8 @@ from dissectors.checksums import lrc
 from dissectors.frame import Check, Chunk, Damage, Event, Found, Frame, LineError, Mark, Noise, Place, Reason
 from dissectors.line import NS_PER_S, LineSettings, Timing
 from dissectors.modbus.ascii_framing import MAX_CHARACTERS, MAX_NOISE, AsciiFramer
-from tests.bus_delivery import FTDI_LATENCY, MS, drive, exact, ftdi, laid_out
+from sniff.testing.driving import drive
+from tests.bus_delivery import FTDI_LATENCY, MS, exact, ftdi, laid_out
 from tests.captures_shared import listed
 
 TIMING = Timing(LineSettings.parse("9600,8N1"))

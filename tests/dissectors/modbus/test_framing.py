@@ -12,7 +12,8 @@ from dissectors.checksums import crc16_modbus
 from dissectors.frame import Check, Chunk, Damage, Event, Found, Frame, LineError, Mark, Noise, Place, Reason
 from dissectors.line import LineSettings, Timing
 from dissectors.modbus.framing import WINDOW, RtuFramer
-from tests.bus_delivery import FTDI_LATENCY, MS, Wire, drive, exact, ftdi, laid_out
+from sniff.testing.driving import drive
+from tests.bus_delivery import FTDI_LATENCY, MS, Wire, exact, ftdi, laid_out
 
 TIMING = Timing(LineSettings.parse("9600"))
 PROTOCOLS = Path(__file__).parents[3] / "../shared/protocols"

@@ -12,7 +12,8 @@ from dissectors.checksums import crc16_modbus
 from dissectors.frame import Check, Chunk, Event, Frame, Noise, Reason
 from dissectors.line import LineSettings, Timing
 from dissectors.modbus.framing import RtuFramer
-from tests.bus_delivery import FTDI_LATENCY, MS, Wire, drive, exact, ftdi, laid_out, with_noise
+from sniff.testing.driving import drive
+from tests.bus_delivery import FTDI_LATENCY, MS, Wire, exact, ftdi, laid_out, with_noise
 from tests.captures_shared import listed, timed
 
 TIMED = {

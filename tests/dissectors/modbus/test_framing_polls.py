@@ -12,7 +12,8 @@ from dissectors.checksums import crc16_modbus
 from dissectors.frame import Check, Chunk, Event, Frame
 from dissectors.line import LineSettings, Timing
 from dissectors.modbus.framing import RtuFramer
-from tests.bus_delivery import FTDI_LATENCY, MS, Wire, drive, exact, ftdi, stalled, with_noise
+from sniff.testing.driving import drive
+from tests.bus_delivery import FTDI_LATENCY, MS, Wire, exact, ftdi, stalled, with_noise
 
 UNITS = (1, 2, 3, 7, 17)
 ADAPTERS = {"exact": 0, "1 ms": 2 * MS, "16 ms": FTDI_LATENCY}

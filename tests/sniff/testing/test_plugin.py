@@ -73,7 +73,7 @@ def test_captures_elsewhere_are_left_alone(project: Path, run: Run) -> None:
 
 def test_loading_the_plugin_loads_nothing_heavy() -> None:
     code = (
-        "import sys, sniff.testing.plugin; print([n for n in ('textual','numpy','scapy','mcap') if n in sys.modules])"
+        "import sys, sniff.testing.plugin; print([n for n in ('textual','numpy','scapy','mcap','hypothesis') if n in sys.modules])"
     )
     ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)
     assert ran.stdout.strip() == "[]"

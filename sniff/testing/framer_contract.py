@@ -1,10 +1,13 @@
 """The framer contract as a property suite: every framer passes it, built-in or plug-in (dissectors/framer.py).
 
-Use, in a test module of its own:
+Use, in a test module of its own (it needs hypothesis, which is no dependency of the program):
+
+    from sniff.testing.framer_contract import framer_contract
 
     TestN2Contract = framer_contract(N2Framer, good_frames())
 
-where `good_frames()` is a strategy of octets that are one good frame each. The suite makes the line noise: it lays
+where `good_frames()` is a strategy of octets that are one good frame each. pytest then runs a test for each clause of
+the contract; a failure shows the smallest capture that breaks it. The suite makes the line noise: it lays
 frames, broken frames and rubbish on a wire with gaps of every size, lets an adapter deliver the octets late and in
 lumps, and cuts what was delivered in other ways.
 """
@@ -21,7 +24,7 @@ from hypothesis import strategies as st
 from dissectors.frame import Check, Chunk, Event, Frame, LineError, Mark, Noise
 from dissectors.framer import Framer
 from dissectors.line import LineSettings, Timing
-from tests.bus_delivery import drive
+from sniff.testing.driving import drive
 
 MS = 1_000_000
 EPOCH = 1_767_225_600 * 1_000_000_000
