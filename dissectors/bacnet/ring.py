@@ -132,7 +132,7 @@ class Node:
         holds = dict(self.holds)
         for frames, count in other.holds.items():
             holds[frames] = holds.get(frames, 0) + count
-        merged: dict[str, Any] = {name: getattr(self, name) + getattr(other, name) for name in _SUMS}
+        merged: dict[str, Any] = {name: getattr(self, name) + getattr(other, name) for name in SUMS}
         merged |= {name: getattr(self, name).merge(getattr(other, name)) for name in _DISTRIBUTIONS}
         return Node(
             **merged,
@@ -145,7 +145,7 @@ class Node:
         )
 
 
-_SUMS = (
+SUMS = (
     "tokens_received",
     "tokens_sent",
     "polls_sent",

@@ -1,0 +1,129 @@
+"""A ring while it is being counted: what `RingObserver` adds to, and what becomes a `Ring` value at any time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+from dissectors.bacnet.durations import DurationTally
+from dissectors.bacnet.ring import SUMS, Edge, Event, Happened, Node, Ring, What
+from dissectors.line import Timing
+
+
+@dataclass(slots=True)
+class NodeTally:
+    """One address; counts and distributions as in `Node`."""
+
+    tokens_received: int = 0
+    tokens_sent: int = 0
+    polls_sent: int = 0
+    polls_before_token: int = 0
+    polls_unanswered: int = 0
+    polls_received: int = 0
+    poll_replies_sent: int = 0
+    requests_sent: int = 0
+    requests_received: int = 0
+    data_sent: int = 0
+    postponed: int = 0
+    replies: int = 0
+    damaged: int = 0
+    octets: int = 0
+    highest_polled: int = -1
+    first: int = 0
+    last: int = 0
+    last_token: int = 0
+    got: int | None = None  # when it last got the token
+    use: DurationTally = field(default_factory=DurationTally)
+    loop: DurationTally = field(default_factory=DurationTally)
+    reply: DurationTally = field(default_factory=DurationTally)
+    service: DurationTally = field(default_factory=DurationTally)
+    poll_reply: DurationTally = field(default_factory=DurationTally)
+    holds: dict[int, int] = field(default_factory=dict)
+    devices: list[int] = field(default_factory=list)
+    gone: bool = False  # it was passed over
+
+    def value(self) -> Node:
+        """What was counted so far."""
+        return Node(
+            **{name: getattr(self, name) for name in SUMS},
+            highest_polled=self.highest_polled,
+            first=self.first,
+            last=self.last,
+            last_token=self.last_token,
+            use=self.use.value(),
+            loop=self.loop.value(),
+            reply=self.reply.value(),
+            service=self.service.value(),
+            poll_reply=self.poll_reply.value(),
+            holds=MappingProxyType(dict(self.holds)),
+            devices=tuple(self.devices),
+        )
+
+
+@dataclass(slots=True)
+class EdgeTally:
+    """Tokens from one station to another."""
+
+    tokens: int = 0
+    retries: int = 0
+    last: int = 0
+
+
+@dataclass(slots=True)
+class RingTally:
+    """Counts as in `Ring`."""
+
+    timing: Timing
+    first: int | None = None
+    last: int = 0
+    frames: int = 0
+    octets: int = 0
+    noise: int = 0
+    header_errors: int = 0
+    data_errors: int = 0
+    cut: int = 0
+    poll_waste: int = 0
+    impossible: int = 0
+    nodes: dict[int, NodeTally] = field(default_factory=dict)
+    edges: dict[tuple[int, int], EdgeTally] = field(default_factory=dict)
+    happened: dict[tuple[What, int | None], Happened] = field(default_factory=dict)
+
+    def node(self, mac: int) -> NodeTally:
+        """The node of an address, a new one when it was not known."""
+        found = self.nodes.get(mac)
+        if found is None:
+            found = self.nodes[mac] = NodeTally()
+        return found
+
+    def edge(self, source: int, destination: int) -> EdgeTally:
+        """The tokens between two addresses."""
+        found = self.edges.get((source, destination))
+        if found is None:
+            found = self.edges[source, destination] = EdgeTally()
+        return found
+
+    def note(
+        self, what: What, time: int, no: int, mac: int | None, other: int | None = None, value: int | None = None
+    ) -> None:
+        """Something happened: arguments as in `Event`."""
+        key = (what, mac)
+        self.happened[key] = self.happened.get(key, Happened()).add(Event(what, time, no, mac, other, value))
+
+    def value(self) -> Ring:
+        """All that was counted so far."""
+        return Ring(
+            self.timing,
+            self.first,
+            None if self.first is None else self.last,
+            self.frames,
+            self.octets,
+            self.noise,
+            self.header_errors,
+            self.data_errors,
+            self.cut,
+            self.poll_waste,
+            self.impossible,
+            MappingProxyType({mac: node.value() for mac, node in sorted(self.nodes.items())}),
+            MappingProxyType({pair: Edge(one.tokens, one.retries, one.last) for pair, one in self.edges.items()}),
+            MappingProxyType(dict(self.happened)),
+        )
