@@ -70,7 +70,9 @@ class VirtualBus:
         return cls(plan.line, plan.stations, plan.faults, plan.seed, plan.gap, slice, paused)
 
     def open(self) -> None:
-        """Start the process. Raises BusFailed."""
+        """Start the process; harmless when it runs already. Raises BusFailed."""
+        if self._process is not None:
+            return
         context = multiprocessing.get_context("spawn")
         self._control, other = context.Pipe()
         self._process = context.Process(target=hub.main, args=(self._plan, other), name="virtual-bus", daemon=True)

@@ -33,7 +33,7 @@ def run(project: Path) -> Run:
 def test_the_example_project_passes(run: Run) -> None:
     ran = run("--sniff-strict")
     assert ran.returncode == 0, ran.stdout
-    assert "4 passed" in ran.stdout
+    assert "6 passed" in ran.stdout
 
 
 def test_a_changed_capture_fails_with_a_diff_and_update_accepts_it(project: Path, run: Run) -> None:
@@ -51,7 +51,7 @@ def test_a_changed_capture_fails_with_a_diff_and_update_accepts_it(project: Path
 
 def test_a_capture_without_expectation_is_an_error_only_when_strict(project: Path, run: Run) -> None:
     (project / "captures" / "poll.expect.txt").unlink()
-    assert "3 passed" in run().stdout
+    assert "5 passed" in run().stdout
     ran = run("--sniff-strict")
     assert ran.returncode == 1
     assert "no expectation" in ran.stdout
@@ -68,20 +68,22 @@ def test_a_damaged_capture_is_said_without_a_traceback(project: Path, run: Run) 
 def test_captures_elsewhere_are_left_alone(project: Path, run: Run) -> None:
     other = project / "other"
     shutil.copytree(project / "captures", other)
-    assert "4 passed" in run().stdout
+    assert "6 passed" in run().stdout
 
 
 def test_loading_the_plugin_loads_nothing_heavy() -> None:
-    code = (
-        "import sys, sniff.testing.plugin; print([n for n in ('textual','numpy','scapy','mcap','hypothesis') if n in sys.modules])"
-    )
+    heavy = ("textual", "numpy", "scapy", "mcap", "hypothesis")
+    code = f"import sys, sniff.testing.plugin; print([name for name in {heavy} if name in sys.modules])"
     ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)
     assert ran.stdout.strip() == "[]"
 
 
 def test_virtual_bus_and_replay_give_ports(virtual_bus: Callable, replay: Callable, tmp_path: Path) -> None:
-    with virtual_bus("modbus-rtu", faults=False) as bus:
-        assert Path(bus.tap()).exists()
+    bus = virtual_bus("modbus-rtu", faults=False)
+    pid = bus.pid
+    assert Path(bus.tap()).exists()
+    with bus:  # it runs already
+        assert bus.pid == pid
     path = tmp_path / "poll.cap.txt"
     path.write_text((EXAMPLE / "captures" / "poll.cap.txt").read_text())
     assert b"".join(_read(replay(path, speed=100), 31)) == bytes.fromhex(

@@ -1,0 +1,80 @@
+"""The example of a plug-in dissector, as its author would use it: found by its entry point, held to the contract."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+EXAMPLE = Path(__file__).parent / "example_plugin"
+GROUP = "sniff485.dissectors"
+Run = Callable[..., subprocess.CompletedProcess[str]]
+
+CAPTURE = """\
+#!sniff-capture 1
+# line: 4800,8N1
+# protocol: nmea
+# start: 2026-03-01T10:00:00Z
++50 "$SDDBT,12.0*74\\r\\n"
++50 "$SDDBT,12.1*74\\r\\n"
++50 "$SDDBT,12.0*74\\r\\n"
+"""
+
+
+@pytest.fixture
+def installed(tmp_path: Path) -> Path:
+    """A folder with the plug-in as an installer would leave it: modules, and a record of its entry points."""
+    place = shutil.copytree(EXAMPLE, tmp_path / "site", ignore=shutil.ignore_patterns("__pycache__", ".*"))
+    project = tomllib.loads((EXAMPLE / "pyproject.toml").read_text())["project"]
+    record = place / "sniff485_nmea-1.dist-info"
+    record.mkdir()
+    (record / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {project['name']}\nVersion: {project['version']}\n")
+    points = "".join(f"{name} = {target}\n" for name, target in project["entry-points"][GROUP].items())
+    (record / "entry_points.txt").write_text(f"[{GROUP}]\n{points}")
+    return place
+
+
+@pytest.fixture
+def run(installed: Path) -> Run:
+    environment = {key: value for key, value in os.environ.items() if not key.startswith(("PYTEST", "COV"))}
+    environment["PYTHONPATH"] = str(installed)
+
+    def python(*arguments: object) -> subprocess.CompletedProcess[str]:
+        command = [sys.executable, "-m", *map(str, arguments)]
+        return subprocess.run(command, cwd=installed, env=environment, capture_output=True, text=True, timeout=100)
+
+    return python
+
+
+def test_its_framer_passes_the_contract(run: Run) -> None:
+    ran = run("pytest", "-q", "-p", "no:cacheprovider", "-p", "no:benchmark", "test_sniff485_nmea.py")
+    assert ran.returncode == 0, ran.stdout
+    assert "8 passed" in ran.stdout
+
+
+def test_a_broken_framer_fails_it_and_says_why(run: Run, installed: Path) -> None:
+    module = installed / "sniff485_nmea.py"
+    broken = module.read_text().replace("== check_of(", "!= check_of(")
+    assert broken != module.read_text()
+    module.write_text(broken)
+    ran = run("pytest", "-q", "-p", "no:cacheprovider", "-p", "no:benchmark", "-k", "clean", "test_sniff485_nmea.py")
+    assert ran.returncode == 1, ran.stdout
+    assert "AssertionError: assert [" in ran.stdout, "a failure inside the suite shows its values"
+
+
+def test_commands_know_the_protocol(run: Run, installed: Path) -> None:
+    (installed / "boat.cap.txt").write_text(CAPTURE)
+    shown = run("sniff", "show", "boat.cap.txt")
+    assert shown.returncode == 0, shown.stderr
+    assert shown.stdout.count("$SDDBT,12.0*74") == 2
+    assert run("sniff", "check", "boat.cap.txt").returncode == 0
+    written = run("sniff", "snapshot", "boat.cap.txt")
+    assert written.returncode == 0, written.stderr
+    assert "DAMAGED check" in (installed / "boat.expect.txt").read_text()
+    assert "nmea" in run("sniff", "show", "-p", "no-such", "boat.cap.txt").stderr
