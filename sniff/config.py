@@ -24,12 +24,13 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Final, Literal
 
 from dissectors import registry
 from dissectors.line import LineSettings
 
 FILE = "sniff485.toml"
+AUTO: Final = "auto"
 BUS_KEYS = ("port", "line", "protocol", "record", "devices")
 TOP_KEYS = ("bus",)
 
@@ -40,11 +41,14 @@ class ConfigError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Bus:
-    """One bus of the configuration; None where the file is silent. `devices`: address (or "*") → profile."""
+    """One bus of the configuration; None where the file is silent. `devices`: address (or "*") → profile.
+
+    `line` and `protocol` may be AUTO: found by listening.
+    """
 
     name: str
     port: str | None = None
-    line: LineSettings | None = None
+    line: LineSettings | Literal["auto"] | None = None
     protocol: str | None = None
     record: str | None = None
     devices: Mapping[str, str] = field(default_factory=dict)
@@ -101,12 +105,14 @@ class _Reader:
         section = f"bus.{name}"
         self.check_keys(entry, BUS_KEYS, section)
         line, protocol = self.text(entry, "line", section), self.text(entry, "protocol", section)
+        settings: LineSettings | Literal["auto"] | None
         try:
-            settings = LineSettings.parse(line) if line is not None else None
+            settings = AUTO if line == AUTO else LineSettings.parse(line) if line is not None else None
         except ValueError as error:
-            raise self.error("line", section, str(error)) from None
-        if protocol is not None and protocol not in (*registry.names(), "auto"):
-            raise self.error("protocol", section, f"unknown protocol {protocol!r}{nearest(protocol, registry.names())}")
+            raise self.error("line", section, f"{error}, or {AUTO}") from None
+        known = (*registry.names(), AUTO)
+        if protocol is not None and protocol not in known:
+            raise self.error("protocol", section, f"unknown protocol {protocol!r}{nearest(protocol, known)}")
         devices = self.table(entry.get("devices", {}), f"{section}.devices")
         return Bus(
             name,

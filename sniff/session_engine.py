@@ -17,6 +17,8 @@ do not matter to what is heard (`Adapter.lineless`) all attempts are one.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from dissectors import registry
 from dissectors.frame import Chunk, Noise, Place, Reason
 from dissectors.line import LineSettings, Timing
@@ -86,9 +88,11 @@ class SessionEngine:
         return session.given and (session.adapter.lineless or self._in_force == session.line)
 
     def _change(self, change: SettingsChange, now: int) -> Output:
+        line = change.line or self._in_force
+        if change.protocol not in (None, *registry.names()):  # a file may say anything
+            change = replace(change, protocol=None)
         if change.found and self.searching:
             return self._find(change)
-        line = change.line or self._in_force
         if self.searching or change.searching:
             if self.searching and (line == self._in_force or self.session.adapter.lineless):
                 return NOTHING

@@ -10,11 +10,9 @@ from dissectors import registry
 from dissectors.line import LineSettings
 from dissectors.profiles import Devices, ProfileError
 from sniff.cli import UNREADABLE, USAGE, Failure
+from sniff.config import AUTO
 from sniff.formats import Capture, CaptureError, read
 from sniff.session import OPTIONS, Session
-
-AUTO = "auto"
-"""In place of line settings or a protocol: find them by listening."""
 
 
 def add_line(parser: argparse.ArgumentParser, auto: bool = False) -> None:

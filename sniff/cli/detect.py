@@ -9,8 +9,8 @@ import json
 
 from sniff.analysis.detecting import Ending, Outcome, Reading, sureness
 from sniff.cli import PORT_TROUBLE, arguments, listening
-from sniff.cli.arguments import AUTO
 from sniff.cli.searching import TIMEOUT, search, sentence
+from sniff.config import AUTO
 
 
 def configure(parser: argparse.ArgumentParser) -> None:

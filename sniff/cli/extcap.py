@@ -12,7 +12,7 @@ from dissectors import registry
 from dissectors.line import LineSettings
 from sniff import __version__
 from sniff.cli import PORT_TROUBLE, USAGE, Failure, arguments
-from sniff.config import Config, ConfigError, load
+from sniff.config import AUTO, Config, ConfigError, load
 from sniff.formats.linktypes import link_type_for
 
 PREFIX = "sniff485:"
@@ -84,7 +84,10 @@ def _bus(args: argparse.Namespace) -> _Bus:
     name = args.extcap_interface.removeprefix(PREFIX)
     known = _load().buses.get(name)
     protocol = args.protocol or (known.protocol if known is not None else None) or "modbus-rtu"
-    line = args.line or (known.line if known is not None else None)
+    said = args.line or (known.line if known is not None else None)
+    line = said if isinstance(said, LineSettings) else None
+    if protocol == AUTO:  # Wireshark asks for a link type before anything is heard
+        protocol = "modbus-rtu"
     port = known.port if known is not None and known.port else name
     return _Bus(port, line or LineSettings.parse(registry.get(protocol).default_line), protocol)
 

@@ -22,7 +22,7 @@ from sniff.capture.link import CaptureLink
 from sniff.capture.wire import Ended, Status
 from sniff.cli import INTERRUPTED, PORT_TROUBLE, UNREADABLE, USAGE, Failure, arguments, rows, searching
 from sniff.cli.searching import Unknowns
-from sniff.config import Config, ConfigError, load
+from sniff.config import AUTO, Config, ConfigError, load
 from sniff.engine import Output
 from sniff.formats import CaptureError
 from sniff.live import LiveBus
@@ -52,12 +52,13 @@ def target_of(args: argparse.Namespace) -> Target:
     bus = config.buses.get(wanted)
     port = (bus.port or wanted) if bus is not None else wanted
     configured = args.protocol or (bus.protocol if bus is not None else None)
-    auto = arguments.AUTO in (args.line, configured)
-    protocol = configured or (arguments.AUTO if auto else "modbus-rtu")
-    line = args.line or (bus.line if bus is not None else None)
+    said: LineSettings | str | None = args.line or (bus.line if bus is not None else None)
+    auto = AUTO in (said, configured)
+    line = said if isinstance(said, LineSettings) else None
+    protocol = configured or (AUTO if auto else "modbus-rtu")
     search = None
     if auto:
-        search = Unknowns(None if line == arguments.AUTO else line, None if protocol == arguments.AUTO else protocol)
+        search = Unknowns(line, None if protocol == AUTO else protocol)
         trying = search.detecting()
         line, protocol = trying.wanted, trying.protocols[0]
     if line is None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from dissectors import registry
 from dissectors.frame import Chunk, Frame
@@ -55,17 +55,21 @@ class SearchMarks:
     """Gives back to a file's items the settings that a search listened with, which packets keep as comments."""
 
     def __init__(self, session: Session) -> None:
-        self._found = SettingsChange(session.line, session.protocol, found=True)
+        self._session = session
         self._with: str | None = None
 
     def before(self, record: Record) -> Iterator[LineEvent]:
         """What happened before a record."""
         match = _SEARCHED.search(record.comment)
         searched = match[1] if match is not None else None
-        if searched != self._with:
-            change = (
-                self._found if searched is None else replace(SettingsChange.parse(f"line={searched}"), searching=True)
-            )
+        if searched == self._with:
+            return
+        line = self._session.line
+        if searched is None:
+            changes = [SettingsChange(line), SettingsChange(line, self._session.protocol, found=True)]
+        else:
+            changes = [SettingsChange(SettingsChange.parse(f"line={searched}").line, searching=True)]
+        for change in changes:
             yield LineEvent(record.time, LineEventKind.SETTINGS, str(change))
         self._with = searched
 

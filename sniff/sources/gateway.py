@@ -5,21 +5,20 @@ Their times are the network's: `latency` says how far they may be wrong, and onl
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable
-from functools import partial
+from dataclasses import dataclass
 from typing import Protocol
 from urllib.parse import urlsplit
 
 from dissectors.line import NS_PER_S, LineSettings
 from sniff.session import Adapter, Item, LineEvent, LineEventKind
 from sniff.sources import PortError
-from sniff.sources.attempt import Attempt
 from sniff.sources.clock import NS_PER_MS, Clock
+from sniff.sources.reconnecting import Reconnecting
 
 LATENCY = 50 * NS_PER_MS
 RETRY_EVERY = 2 * NS_PER_S
-LOOK_EVERY = 50 * NS_PER_MS
-"""Between looks at a connection that is being made."""
 
 EXPECTED = "expected a serial port, socket://HOST:PORT, rfc2217://HOST:PORT or a capture file"
 
@@ -80,11 +79,10 @@ class GatewaySource:
         self.spec = spec
         self.line = line
         self._clock = clock
-        self._connect = connect
         self._pending: list[Item] = []
         self._ended = False
-        self._retry_at = 0
-        self._attempt: Attempt[Stream] | None = None
+        self._connect = connect
+        self._again: Reconnecting[_Connected] = Reconnecting(clock, self._make, (OSError, ValueError), RETRY_EVERY)
         try:
             self._stream: Stream | None = connect(line)
         except (OSError, ValueError) as error:
@@ -112,9 +110,7 @@ class GatewaySource:
 
     def deadline(self) -> int | None:
         """When to look for a new connection."""
-        if self._ended or self._stream is not None:
-            return None
-        return self._retry_at if self._attempt is None else self._clock.now() + LOOK_EVERY
+        return None if self._ended or self._stream is not None else self._again.deadline()
 
     def now(self) -> int:
         """The time on the clock."""
@@ -126,15 +122,16 @@ class GatewaySource:
         if self._ended:
             return items
         if self._stream is None:
-            return items + self._again()
+            return items + self._look()
         try:
             return items + self._stream.read(self._clock)
         except OSError as error:
             self._stream.close()
             self._stream = None
-            now = self._clock.now()
-            self._retry_at = now + RETRY_EVERY
-            return [*items, LineEvent(now, LineEventKind.UNPLUGGED, f"{self.spec} is gone ({_reason(error)})")]
+            return [
+                *items,
+                LineEvent(self._again.lost(), LineEventKind.UNPLUGGED, f"{self.spec} is gone ({_reason(error)})"),
+            ]
 
     def reconfigure(self, line: LineSettings) -> None:
         """Change the line through the gateway, if it can. Raises PortError."""
@@ -142,7 +139,11 @@ class GatewaySource:
             try:
                 self._stream.reconfigure(line)
             except (OSError, ValueError) as error:
+                with contextlib.suppress(OSError, ValueError, PortError):  # half of it may be in force
+                    self._stream.reconfigure(self.line)
                 raise PortError(f"{self.spec}: cannot be set to {line}: {_reason(error)}") from error
+            with contextlib.suppress(OSError):  # what came during the dialogue; a loss shows at the next read
+                self._pending += self._stream.read(self._clock)
         self.line = line
         self._pending.append(LineEvent(self._clock.now(), LineEventKind.SETTINGS, f"line={line}"))
 
@@ -153,20 +154,28 @@ class GatewaySource:
         if stream is not None:
             stream.close()
 
-    def _again(self) -> list[Item]:
-        now = self._clock.now()
-        if self._attempt is None:
-            if now >= self._retry_at:
-                self._attempt = Attempt(partial(self._connect, self.line), (OSError, ValueError))
+    def _make(self) -> _Connected:
+        line = self.line
+        return _Connected(self._connect(line), line)
+
+    def _look(self) -> list[Item]:
+        """Whether there is a connection again."""
+        made = self._again.look()
+        if made is None:
             return []
-        if not self._attempt.done:
-            return []
-        stream, self._attempt = self._attempt.result, None
-        self._retry_at = now + RETRY_EVERY
-        if stream is None:
-            return []
-        self._stream = stream
-        return [LineEvent(now, LineEventKind.REPLUGGED, f"{self.spec} is back")]
+        self._stream = made.stream
+        if made.line != self.line:  # changed while the connection was made
+            with contextlib.suppress(PortError):
+                self.reconfigure(self.line)
+        return [LineEvent(self._clock.now(), LineEventKind.REPLUGGED, f"{self.spec} is back")]
+
+
+@dataclass(frozen=True, slots=True)
+class _Connected:
+    """A connection that was made again, and with which settings."""
+
+    stream: Stream
+    line: LineSettings
 
 
 def _reason(error: Exception) -> str:

@@ -6,24 +6,21 @@ import contextlib
 import errno
 import os
 from dataclasses import dataclass
-from functools import partial
 
 from dissectors.frame import Chunk
 from dissectors.line import NS_PER_S, LineSettings
 from sniff.session import Adapter, Item, LineEvent, LineEventKind
 from sniff.sources import PortError
-from sniff.sources.attempt import Attempt
 from sniff.sources.clock import NS_PER_MS, Clock
 from sniff.sources.identity import PortIdentity
 from sniff.sources.parmrk import ParmrkDecoder
 from sniff.sources.ports import Holder, describe_port, find_holders, is_pty, is_tty, list_ports
+from sniff.sources.reconnecting import Reconnecting
 from sniff.sources.tty import ListeningPort, error_counters, marks_errors, open_listening
 
 READ_SIZE = 65536
 COUNTERS_EVERY = 1 * NS_PER_S
 RETRY_EVERY = 1 * NS_PER_S
-LOOK_EVERY = 50 * NS_PER_MS
-"""Between looks at a port that is being opened again."""
 
 POLL_EVERY = 1 * NS_PER_MS
 """Between looks at a port that cannot be waited on (Windows)."""
@@ -42,12 +39,13 @@ class SerialSource:
         self._clock = clock
         self._pending: list[Item] = []
         self._ended = False
-        self._attempt: Attempt[_Found] | None = None
+        self._again: Reconnecting[_Found] = Reconnecting(
+            clock, lambda: _find(self._identity, self.line), (PortError, OSError), RETRY_EVERY
+        )
         self._adopt(open_port(device, line), line)
         self._pty = is_pty(device)
         self._adapter = describe_port(device, line)
         self._identity = PortIdentity.of(device)
-        self._retry_at = 0
 
     # -- the source contract -----------------------------------------------------------------------------------
 
@@ -70,7 +68,7 @@ class SerialSource:
         if self._ended:
             return None
         if self._port is None:
-            return self._retry_at if self._attempt is None else self._clock.now() + LOOK_EVERY
+            return self._again.deadline()
         if self._fd is None:
             return self._clock.now() + POLL_EVERY
         return self._counters_at
@@ -85,7 +83,7 @@ class SerialSource:
         if self._ended:
             return items
         if self._port is None:
-            return items + self._try_again()
+            return items + self._look()
         try:
             data = self._read_port()
         except OSError as error:  # includes serial.SerialException
@@ -105,9 +103,13 @@ class SerialSource:
     def reconfigure(self, line: LineSettings) -> None:
         """Change the settings in place, without closing: RTS and DTR do not move."""
         if self._port is not None:
+            if self._counters_at is not None:  # errors up to here were made with the settings before
+                self._pending.extend(self._count_errors(self._clock.now()))
             try:
                 self._port.apply(line)
             except (OSError, ValueError) as error:
+                with contextlib.suppress(OSError, ValueError):  # half of it may be in force
+                    self._port.apply(self.line)
                 raise PortError(f"{self.device}: cannot be set to {line}: {_reason(error)}") from error
             self._finish_escape()
             self._set_decoder(line)
@@ -178,22 +180,14 @@ class SerialSource:
         items, self._pending = self._pending, []
         reason = _reason(error) if error is not None else "hung up"
         self._release()
-        now = self._clock.now()
-        self._retry_at = now + RETRY_EVERY
+        now = self._again.lost()
         # The number of a pseudo-terminal is soon given to somebody else's terminal: only a link made anew is followed.
         self._ended = self._pty and self._identity.link is None
         return [*items, LineEvent(now, LineEventKind.UNPLUGGED, f"{self.device} is gone ({reason})")]
 
-    def _try_again(self) -> list[Item]:
-        now = self._clock.now()
-        if self._attempt is None:
-            if now >= self._retry_at:
-                self._attempt = Attempt(partial(_find, self._identity, self.line), (PortError, OSError))
-            return []
-        if not self._attempt.done:
-            return []
-        found, self._attempt = self._attempt.result, None
-        self._retry_at = now + RETRY_EVERY
+    def _look(self) -> list[Item]:
+        """Whether the port is there again."""
+        found = self._again.look()
         if found is None:
             return []
         self._adopt(found.port, found.line)

@@ -13,6 +13,8 @@ from dissectors.frame import Chunk
 from dissectors.line import LineSettings
 from sniff.session import Item, LineEvent, LineEventKind
 from sniff.sources import PortError, Source, gateway, open_source
+from sniff.sources.clock import Clock
+from sniff.sources.telnet import Data, Subnegotiation, TelnetDecoder
 
 LINE = LineSettings.parse("19200,8E1")
 
@@ -121,11 +123,12 @@ def test_nobody_there(raw) -> None:
 
 
 class Rfc2217Gateway(Gateway):
-    """pyserial's own server side. `sent_out`: data that would have gone out on the bus."""
+    """pyserial's own server side. `sent_out`: data that would have gone out on the bus; `heard_octets`: everything."""
 
     def __init__(self) -> None:
         super().__init__()
         self.sent_out = b""
+        self.heard_octets = b""
         self.masks: list[bytes] = []
         self.port_behind = serial.serial_for_url("loop://")
         self.ready = threading.Event()
@@ -150,6 +153,7 @@ class Rfc2217Gateway(Gateway):
         self.manager = Manager(self.port_behind, Connection())
         try:
             while data := client.recv(1024):
+                self.heard_octets += data
                 self.sent_out += b"".join(self.manager.filter(data))
         except OSError:
             pass
@@ -197,6 +201,91 @@ def test_rfc2217_sets_the_line_reports_errors_and_sends_no_data(smart) -> None:
         source._stream._gateway.write(b"x")
     assert smart.sent_out == b""
     source.close()
+
+
+CONTROL = {rfc2217.SET_CONTROL_USE_NO_FLOW_CONTROL, rfc2217.SET_CONTROL_DTR_OFF, rfc2217.SET_CONTROL_RTS_OFF}
+SETTINGS = {rfc2217.SET_BAUDRATE, rfc2217.SET_DATASIZE, rfc2217.SET_PARITY, rfc2217.SET_STOPSIZE}
+
+
+def test_rfc2217_sends_nothing_but_telnet_options_and_settings(smart) -> None:
+    """Read from the wire by our own decoder: no data octet, no purge of buffers, no control line raised, no break."""
+    source = open_source(f"rfc2217://127.0.0.1:{smart.port}", LineSettings.parse("38400,8E2"))
+    assert smart.ready.wait(5)
+    asked = (
+        bytes(range(256)) + b"\xff\xf6\xff\xf3\xff\xfb\x01\xff\xfd\x18\xff\xfd\x22\xff\xfe\x00\xff\xfa\x2c\x08\xff\xf0"
+    )
+    smart.client.sendall(asked.replace(b"\xff\xff", b"\xff"))  # every octet, AYT, BREAK, options, "flow control off"
+    for token in ("9600,7O2", "115200,8N1"):
+        source.reconfigure(LineSettings.parse(token))
+        gather(source, lambda items: any(isinstance(item, LineEvent) for item in items))
+    source.close()
+    smart.thread.join(5)
+    said = TelnetDecoder().feed(smart.heard_octets)
+    assert said
+    assert not [token for token in said if isinstance(token, Data)]
+    for token in said:
+        if isinstance(token, Subnegotiation):
+            assert token.octets[:1] == rfc2217.COM_PORT_OPTION
+            command, value = token.octets[1:2], token.octets[2:]
+            assert command in SETTINGS or command == rfc2217.SET_LINESTATE_MASK or value in CONTROL, token
+            assert command in {*SETTINGS, rfc2217.SET_LINESTATE_MASK, rfc2217.SET_CONTROL}, token
+    assert smart.sent_out == b""
+
+
+def test_rfc2217_what_came_before_a_change_stays_before_it(smart) -> None:
+    source = open_source(f"rfc2217://127.0.0.1:{smart.port}", LineSettings.parse("38400,8E2"))
+    assert smart.ready.wait(5)
+    smart.feed(b"before")
+    time.sleep(0.2)
+    source.reconfigure(LINE)
+    items = gather(source, lambda items: any(isinstance(item, LineEvent) for item in items))
+    assert octets(items) == b"before"
+    assert isinstance(items[-1], LineEvent)
+    source.close()
+
+
+def test_a_connection_made_while_the_settings_change_gets_the_new_ones(monkeypatch) -> None:
+    monkeypatch.setattr(gateway, "RETRY_EVERY", 1)
+    streams: list[SlowStream] = []
+
+    def connect(line: LineSettings) -> SlowStream:
+        streams.append(SlowStream(line))
+        if len(streams) > 1:
+            assert streams[0].go.wait(5)
+        return streams[-1]
+
+    source = gateway.GatewaySource("slow", LINE, Clock.start(), connect)
+    assert [item.kind for item in source.read()] == [LineEventKind.UNPLUGGED]
+    while len(streams) < 2:
+        assert source.read() == []
+    source.reconfigure(LineSettings(1200))
+    source.read()
+    streams[0].go.set()
+    gather(source, lambda items: any(item.kind is LineEventKind.REPLUGGED for item in items))
+    assert streams[1].line == LineSettings(1200)
+
+
+class SlowStream:
+    """A connection that breaks at the first read and comes again when `go` is set."""
+
+    name = detail = ""
+    reports = None
+
+    def __init__(self, line: LineSettings) -> None:
+        self.line = line
+        self.go = threading.Event()
+
+    def fileno(self) -> int:
+        return 0
+
+    def read(self, clock: Clock) -> list[Item]:
+        raise ConnectionResetError
+
+    def reconfigure(self, line: LineSettings) -> None:
+        self.line = line
+
+    def close(self) -> None:
+        pass
 
 
 def test_rfc2217_octets_before_a_loss_are_kept(smart) -> None:
