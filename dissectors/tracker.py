@@ -31,6 +31,14 @@ class Verdict(Enum):
     BROADCAST = "broadcast"  # no answer expected
     DATA = "data"  # passed without expecting an answer (tokens, unconfirmed data)
 
+    @property
+    def words(self) -> str:
+        """What a person reads; the value is for programs and stays."""
+        return _WORDS.get(self, self.value.replace("-", " "))
+
+
+_WORDS = {Verdict.NO_RESPONSE: "no answer", Verdict.DATA: "one-way", Verdict.UNSOLICITED: "unasked"}
+
 
 @dataclass(frozen=True, slots=True)
 class Interval:

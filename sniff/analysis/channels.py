@@ -15,7 +15,7 @@ from dissectors.findings import Finding, Severity
 from dissectors.line import NS_PER_S
 from dissectors.registry import Dissector
 from dissectors.tracker import Verdict
-from sniff.analysis.health import bus_health, station_health
+from sniff.analysis.health import health_of, station_health
 from sniff.analysis.histogram import Histogram
 from sniff.analysis.judging import Judging
 from sniff.analysis.nodes import Node
@@ -108,7 +108,7 @@ class BusChannels:
             "octets": window.octets,
             "errors": errors,
             "error_rate": min(1.0, errors / window.frames) if window.frames else 0.0,
-            "health": bus_health(window).score,
+            "health": health_of(window).bus.score,
             **_latency(window.latency),
         }
         yield DerivedMessage(f"/bus/{self._bus}", BUS, end, begin, _json(content))

@@ -19,7 +19,7 @@ from typing import Any
 
 from dissectors.frame import Frame, Role
 from dissectors.registry import Dissector
-from dissectors.tracker import Transaction
+from dissectors.tracker import Transaction, Verdict
 from sniff.analysis.wording import describe
 from sniff.engine import Row
 
@@ -105,6 +105,7 @@ ALIASES = {"frame.number": "no", "frame.len": "len", "tx.verdict": "verdict", "t
 FIELDS: tuple[str, ...] = (*COLUMNS, "text", *ALIASES)
 """Names for completion; the dotted fields of the protocol come on top."""
 
+_VERDICTS = {verdict.words: verdict.value for verdict in Verdict}
 _COMPARE: dict[str, Callable[[Any, Any], bool]] = {
     "==": operator.eq,
     "!=": operator.ne,
@@ -219,26 +220,33 @@ class _Parser:
         if self._now.kind == "op" and self._now.text in _COMPARE:
             compare = _COMPARE[self._now.text]
             self.at += 1
-            wanted = self._value()
+            wanted = self._value_of(token.text)
             return lambda row, tx: any(_compare(compare, found, wanted) for found in get(row, tx))
         if (self._now.kind == "word" and self._now.text in {"contains", "matches", "in"}) or self._now.text == "~":
             how = self._now.text
             self.at += 1
             if how == "in":
-                return self._among(get)
+                return self._among(token.text, get)
             column = self._now.column
             wanted_text = str(self._value())
             return _contains(get, wanted_text) if how == "contains" else _matches(get, wanted_text, column)
         return lambda row, tx: any(found not in (0, "") for found in get(row, tx))
 
-    def _among(self, get: Getter) -> Predicate:
+    def _among(self, name: str, get: Getter) -> Predicate:
         if not self._take("{"):
             raise FilterError("expected { after in", self._now.column)
-        values = [self._value()]
+        values = [self._value_of(name)]
         while not self._take("}"):
             self._take(",")
-            values.append(self._value())
+            values.append(self._value_of(name))
         return lambda row, tx: any(_compare(operator.eq, found, wanted) for found in get(row, tx) for wanted in values)
+
+    def _value_of(self, name: str) -> Value:
+        """The next value to compare a name with; a verdict may stand as people read it, "no answer"."""
+        value = self._value()
+        if ALIASES.get(name, name) == "verdict" and isinstance(value, str):
+            return _VERDICTS.get(value.lower(), value)
+        return value
 
     def _value(self) -> Value:
         token = self._now

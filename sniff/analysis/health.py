@@ -2,34 +2,37 @@
 
 Points are taken off 100, never below 0:
 
-    of a station                                              points                  at most
-      requests that nothing followed in time                  200 × share of requests   100
-      damaged frames from or to it, or damaged answers        300 × share                60
-      late answers, second answers, answers after a repeat    100 × share of requests    30
-      exceptions                                               50 × share of requests    20
+    of a station                                              points                     at most
+      requests without answer                                 200 × share of requests      100
+      damaged frames from or to it, or damaged answers        300 × share                   60
+      late answers, second answers, answers after a repeat    100 × share of requests       30
+      exceptions                                               50 × share of requests       20
+      findings about it                                       30 an error, 10 a warning     60
     of a bus
-      requests that nothing followed in time                  100 × share of requests    50
-      damaged frames                                          300 × share of frames      60
-      octets that are no frame                                200 × share of octets      30
-      octets with line errors                                 200 × share of octets      30
-      findings about the bus or its masters       20 an error, 5 a warning               40
+      requests without answer                                 100 × share of requests       50
+      damaged frames                                          300 × share of frames         60
+      octets that are no frame                                200 × share of octets         30
+      octets with line errors                                 200 × share of octets         30
+      findings about the bus or its masters                   30 an error, 10 a warning     60
+      and it is never better than half way between 100 and the worst station that an error or warning is about
 
-So half of the requests lost, or every fifth frame damaged, is a station at 0 or 40. A station that was never asked and
-sent nothing has no health. What one deduction counts, a finding explains.
+So half of the requests lost, or every fifth frame damaged, is a station at 0 or 40, and a bus with a dead station has
+50 at best. A station that was never asked and sent nothing has no health. README.md has the formula for users.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 
-from dissectors.findings import Finding, Severity
+from dissectors.findings import WHOLE_BUS, Finding, Severity
 from dissectors.tracker import Verdict
 from sniff.analysis.nodes import Node
 from sniff.analysis.summary import Summary
 
-BUS_SUBJECTS = frozenset(("bus", "master"))
-_ERROR_POINTS, _WARNING_POINTS, _FINDINGS_MOST = 20, 5, 40
+ERROR_POINTS, WARNING_POINTS, FINDINGS_MOST = 30, 10, 60
+_STATION = re.compile(r"(?:^station |^MAC |→ )(\d+)")
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,8 +46,43 @@ class Health:
         return f"{self.score}" + (f" ({'; '.join(self.reasons)})" if self.reasons else "")
 
 
-def station_health(node: Node) -> Health | None:
-    """Health of one station; None where it was never asked and sent nothing."""
+@dataclass(frozen=True, slots=True)
+class HealthReport:
+    """The health of a bus and of each station on it that has one, by address."""
+
+    bus: Health
+    stations: Mapping[int, Health] = field(default_factory=dict)
+
+
+def health_of(summary: Summary, findings: Iterable[Finding] = ()) -> HealthReport:
+    """Health of the bus and of its stations; `findings`: all that are about this bus."""
+    grave = [finding for finding in findings if finding.severity >= Severity.WARNING]
+    about: dict[int, list[Finding]] = {}
+    for finding in grave:
+        address = station_of(finding)
+        if address is not None:
+            about.setdefault(address, []).append(finding)
+    stations = {
+        node.address: health
+        for node in summary.nodes.present()
+        if (health := station_health(node, about.get(node.address, ()))) is not None
+    }
+    bus = _bus_health(summary, [finding for finding in grave if finding.subject in WHOLE_BUS])
+    worst = min((address for address in about if address in stations), key=lambda a: stations[a].score, default=None)
+    if worst is not None and (limit := (100 + stations[worst].score) // 2) < bus.score:
+        reason = f"station {worst} is at {stations[worst].score}, so the bus is at {limit} at best"
+        bus = Health(limit, (*bus.reasons, reason))
+    return HealthReport(bus, stations)
+
+
+def station_of(finding: Finding) -> int | None:
+    """The station that a finding is about, by its subject: "station 3", "MAC 5", "station 1, AI 200", "0 → 27"."""
+    match = _STATION.search(finding.subject)
+    return int(match[1]) if match else None
+
+
+def station_health(node: Node, findings: Iterable[Finding] = ()) -> Health | None:
+    """Health of one station, with the findings about it; None where it was never asked and sent nothing."""
     if not node.seen:
         return None
     asked, frames = node.asked, node.sent + node.received
@@ -52,6 +90,7 @@ def station_health(node: Node) -> Health | None:
     damaged = max(_share(verdicts[Verdict.DAMAGED_ANSWER], asked), _share(node.damaged, frames))
     again = verdicts[Verdict.LATE] + verdicts[Verdict.ANSWERED_TWICE] + verdicts[Verdict.RETRY]
     return _sum(
+        findings,
         (_share(node.unanswered, asked), 200, 100, "of its requests without answer"),
         (damaged, 300, 60, "of its frames damaged"),
         (_share(again, asked), 100, 30, "answered late, twice or after a repeat"),
@@ -59,27 +98,19 @@ def station_health(node: Node) -> Health | None:
     )
 
 
-def bus_health(summary: Summary, findings: Iterable[Finding] = ()) -> Health:
-    """Health of the whole bus; `findings` about stations do not count here."""
+def _bus_health(summary: Summary, findings: Iterable[Finding]) -> Health:
     asked = sum(node.asked for node in summary.nodes)
     unanswered = sum(node.unanswered for node in summary.nodes)
-    health = _sum(
+    return _sum(
+        findings,
         (_share(unanswered, asked), 100, 50, "of all requests without answer"),
         (_share(summary.damaged, summary.frames), 300, 60, "of all frames damaged"),
         (_share(summary.noise, summary.octets), 200, 30, "of all octets are no frame"),
         (_share(sum(summary.marks.values()), summary.octets), 200, 30, "of all octets with line errors"),
     )
-    about = [finding for finding in findings if finding.subject in BUS_SUBJECTS]
-    errors = sum(finding.severity >= Severity.ERROR for finding in about)
-    warnings = sum(finding.severity is Severity.WARNING for finding in about)
-    points = min(_FINDINGS_MOST, _ERROR_POINTS * errors + _WARNING_POINTS * warnings)
-    if not points:
-        return health
-    named = ", ".join(sorted({finding.code for finding in about if finding.severity >= Severity.WARNING}))
-    return Health(max(0, health.score - points), (*health.reasons, f"findings {named} (−{points})"))
 
 
-def _sum(*parts: tuple[float, int, int, str]) -> Health:
+def _sum(findings: Iterable[Finding], *parts: tuple[float, int, int, str]) -> Health:
     score, reasons = 100.0, []
     for share, weight, most, words in parts:
         points = min(float(most), weight * share)
@@ -88,6 +119,13 @@ def _sum(*parts: tuple[float, int, int, str]) -> Health:
             reasons.append(
                 f"{_percent(share)} {words} (−{points:.0f})" if points >= 0.5 else f"{_percent(share)} {words}"
             )
+    graves = [finding for finding in findings if finding.severity >= Severity.WARNING]
+    if graves:
+        errors = sum(finding.severity is Severity.ERROR for finding in graves)
+        taken = min(FINDINGS_MOST, ERROR_POINTS * errors + WARNING_POINTS * (len(graves) - errors))
+        score -= taken
+        named = ", ".join(sorted({finding.code for finding in graves}))
+        reasons.append(f"finding{'s' if ', ' in named else ''} {named} (−{taken})")
     rounded = max(0, round(score))
     return Health(min(rounded, 99) if reasons else rounded, tuple(reasons))
 

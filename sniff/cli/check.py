@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from dissectors.findings import Finding, Severity
 from dissectors.profiles import Devices
 from dissectors.registry import Dissector
-from sniff.analysis.health import Health, bus_health, station_health
+from sniff.analysis.health import health_of
 from sniff.analysis.judging import Judging
 from sniff.analysis.summary import Summary
 from sniff.cli import INTERRUPTED, PORT_TROUBLE, UNREADABLE, USAGE, Failure, arguments, check_output
@@ -156,11 +156,7 @@ class Checking:
     def result(self, source: str, note: str) -> Checked:
         """What was found."""
         findings = self.judging.findings()
-        stations: dict[int, Health] = {}
-        for node in self.summary.nodes.present():
-            health = station_health(node)
-            if health is not None:
-                stations[node.address] = health
+        health = health_of(self.summary, findings)
         return Checked(
             source=source,
             session=self.session,
@@ -168,8 +164,8 @@ class Checking:
             seconds=self.summary.seconds,
             frames=self.summary.frames,
             findings=findings,
-            health=bus_health(self.summary, findings),
-            stations=stations,
+            health=health.bus,
+            stations=health.stations,
             starts=self._starts,
         )
 

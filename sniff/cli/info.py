@@ -132,7 +132,7 @@ def _print(path: str, capture: Capture, session: Session, summary: Summary, even
     _line("kinds", _listed(summary.kinds))
     if summary.marks:
         _line("line errors", _listed(summary.marks))
-    verdicts = {verdict.value: count for verdict, count in summary.verdicts.items()}
+    verdicts = {verdict.words: count for verdict, count in summary.verdicts.items()}
     _line("transactions", _listed(verdicts))
     if summary.latency.count:
         quantiles = (
@@ -144,7 +144,7 @@ def _print(path: str, capture: Capture, session: Session, summary: Summary, even
         bound = f" (each known to ±{milliseconds(adapter.latency)})" if adapter.latency else ""
         _line("response", shown + bound)
     for node in summary.nodes.present():
-        verdicts = {verdict.value: count for verdict, count in node.verdicts.items()}
+        verdicts = {verdict.words: count for verdict, count in node.verdicts.items()}
         _line(f"node {node.address}", f"{node.sent} frames from, {node.received} to; {_listed(verdicts)}")
         if node.errors:
             _line("", _listed(node.errors))

@@ -108,7 +108,7 @@ def text_line(item: Settled, dissector: Dissector, session: Session, colour: boo
         notes.append(f"{len(row.event.marks)} line error{'s' if len(row.event.marks) != 1 else ''}")
     if transaction is not None and (transaction.response or transaction.request) == row.no:
         if transaction.verdict.value not in GOOD_VERDICTS:
-            notes.append(transaction.verdict.value)
+            notes.append(transaction.verdict.words)
             bad = True
         if transaction.latency is not None:
             notes.append(duration(transaction.latency))

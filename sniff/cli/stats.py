@@ -1,5 +1,6 @@
-"""Tables: nodes (each station), transactions (by kind and verdict), latency (each station's response times), load (by
-second or --every), ring (MS/TP). Response times are uncertain by what the adapter may hold back: see `info`.
+"""Tables: nodes (each station), health (bus and stations, and why), transactions (by kind and verdict), latency (each
+station's response times), load (by second or --every), ring (MS/TP). Response times are uncertain by what the adapter
+may hold back: see `info`.
 """
 
 from __future__ import annotations
@@ -9,7 +10,10 @@ from collections import Counter
 from pathlib import Path
 
 from dissectors.line import NS_PER_S
+from dissectors.tracker import Transaction
+from sniff.analysis.health import HealthReport, health_of
 from sniff.analysis.histogram import Histogram
+from sniff.analysis.judging import Judging
 from sniff.analysis.load import Second
 from sniff.analysis.nodes import Node
 from sniff.analysis.summary import Summary
@@ -18,9 +22,10 @@ from sniff.cli.rows import iso
 from sniff.cli.tables import Cell
 from sniff.editing.merging import merged, merged_session
 from sniff.engine import Output
+from sniff.profile_files import noted_devices
 from sniff.reading import dissector_for, outputs
 
-TABLES = ("nodes", "transactions", "latency", "load", "ring")
+TABLES = ("nodes", "health", "transactions", "latency", "load", "ring")
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -55,11 +60,18 @@ def run(args: argparse.Namespace) -> int:
         return ring.show(items, session, args.style)
     summary = Summary(session.line)
     kinds: Counter[tuple[str, str]] = Counter()
+    judging = Judging(session, dissector_for(session), noted_devices(session)) if table == "health" else None
     for output in outputs(items, session):
         if isinstance(output, Output):
             summary.add(output)
-            kinds.update((transaction.kind, transaction.verdict.value) for transaction in output.transactions)
-    if table == "nodes":
+            kinds.update((transaction.kind, _verdict(transaction, args)) for transaction in output.transactions)
+            if judging is not None:
+                judging.add(output)
+        elif judging is not None:
+            judging.add_line_event(output)
+    if judging is not None:
+        tables.write(HEALTH_HEADINGS, _health(health_of(summary, judging.findings())), args.style)
+    elif table == "nodes":
         tables.write(NODE_HEADINGS, [_node(node) for node in summary.nodes.present()], args.style)
     elif table == "transactions":
         ordered = sorted(kinds.items(), key=lambda pair: (pair[0][0], -pair[1]))
@@ -80,7 +92,7 @@ NODE_HEADINGS = (
     "asked",
     "answered",
     "exceptions",
-    "no response",
+    "no answer",
     "late",
     "twice",
     "damaged",
@@ -88,8 +100,19 @@ NODE_HEADINGS = (
     "p95 ms",
     "max ms",
 )
+HEALTH_HEADINGS = ("subject", "health", "why")
 LATENCY_HEADINGS = ("address", "answers", "least ms", "p50 ms", "p95 ms", "max ms", "± ms")
 LOAD_HEADINGS = ("from", "load %", "frames", "damaged", "noise octets", "octets")
+
+
+def _verdict(transaction: Transaction, args: argparse.Namespace) -> str:
+    """In words for people, as the stable value for programs."""
+    return transaction.verdict.words if args.style == "text" else transaction.verdict.value
+
+
+def _health(health: HealthReport) -> list[tuple[Cell, ...]]:
+    rows = [("bus", health.bus), *((f"station {address}", one) for address, one in sorted(health.stations.items()))]
+    return [(subject, one.score, "; ".join(one.reasons)) for subject, one in rows]
 
 
 def _node(node: Node) -> tuple[Cell, ...]:

@@ -69,7 +69,7 @@ def _node(subject: str, old: Node, new: Node, doubt: int) -> Iterator[Difference
     for verdict in COMPARED_VERDICTS:
         was, now = _share(old.verdicts[verdict], old.asked), _share(new.verdicts[verdict], new.asked)
         if abs(was - now) >= NOTICEABLE or (was == 0) != (now == 0):
-            yield Difference(subject, verdict.value, f"{was:.1%} of {old.asked}", f"{now:.1%} of {new.asked}")
+            yield Difference(subject, verdict.words, f"{was:.1%} of {old.asked}", f"{now:.1%} of {new.asked}")
     for name, share in (("response p50", 0.5), ("response p95", 0.95)):
         was_time, now_time = old.latency.quantile(share), new.latency.quantile(share)
         if was_time is None or now_time is None:

@@ -162,7 +162,7 @@ class RecordMaker:
         if row.header is not None and row.header.error:
             notes.append(row.header.error)
         if transaction is not None and row.no in (transaction.request, transaction.response):
-            shown = transaction.verdict.value
+            shown = transaction.verdict.words
             if transaction.latency is not None:
                 shown += f", response after {duration(transaction.latency)}"
             if shown not in {"answered", "data", "broadcast"}:

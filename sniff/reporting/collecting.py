@@ -8,7 +8,7 @@ from dissectors.findings import Finding, Severity
 from dissectors.profiles import Devices
 from dissectors.registry import Dissector
 from dissectors.tracker import Transaction, Verdict
-from sniff.analysis.health import Health, bus_health, station_health
+from sniff.analysis.health import Health, health_of
 from sniff.analysis.judging import Judging, rules_over
 from sniff.analysis.nodes import Node
 from sniff.analysis.summary import Summary
@@ -72,8 +72,12 @@ def collect(source: str, capture: Capture, session: Session, devices: Devices) -
             if transaction.station is not None and transaction.verdict not in GOOD:
                 trouble.setdefault(transaction.station, Counter())[_trouble(transaction)] += 1
     findings = judging.findings()
-    health = bus_health(summary, findings) if summary.octets else None
-    stations = tuple(_station(node, trouble.get(node.address, Counter())) for node in summary.nodes.present())
+    healths = health_of(summary, findings)
+    health = healths.bus if summary.octets else None
+    stations = tuple(
+        _station(node, trouble.get(node.address, Counter()), healths.stations.get(node.address))
+        for node in summary.nodes.present()
+    )
     found = _found(findings, _words(capture, session, dissector, findings), session, dissector)
     complete = capture.completeness()
     load = summary.load
@@ -149,14 +153,13 @@ def _trouble(transaction: Transaction) -> str:
     """What kind of trouble: an exception by its name, else how the exchange ended."""
     if transaction.verdict is Verdict.EXCEPTION and transaction.error:
         return transaction.error
-    return transaction.verdict.value
+    return transaction.verdict.words
 
 
-def _station(node: Node, kinds: Counter[str]) -> Station:
+def _station(node: Node, kinds: Counter[str], health: Health | None) -> Station:
     trouble = dict(kinds.most_common())
     if node.damaged:
         trouble["damaged frame"] = node.damaged
-    health = station_health(node)
     failed = sum(node.verdicts[verdict] for verdict in (Verdict.NO_RESPONSE, Verdict.LATE, Verdict.DAMAGED_ANSWER))
     return Station(
         address=node.address,

@@ -7,8 +7,6 @@ from sniff.analysis.wording import duration, milliseconds
 from sniff.tui.columns import Cell
 
 SHORT: dict[Verdict, str] = {
-    Verdict.NO_RESPONSE: "no answer",
-    Verdict.UNSOLICITED: "unasked",
     Verdict.ANSWERED_TWICE: "twice",
     Verdict.DAMAGED_ANSWER: "bad answ.",
     Verdict.DAMAGED_REQUEST: "bad requ.",
@@ -38,7 +36,7 @@ def verdict_cell(transaction: Transaction | None, width: int, attempts: bool = T
     if transaction is None:
         return Cell("")
     verdict = transaction.verdict
-    text = verdict.value if width >= len(verdict.value) else SHORT.get(verdict, verdict.value)
+    text = verdict.words if width >= len(verdict.words) else SHORT.get(verdict, verdict.words)
     if attempts and transaction.attempt > 1 and width >= len(text) + 3:
         text += f" ×{transaction.attempt}"
     return Cell(text, STYLE.get(verdict, ""))

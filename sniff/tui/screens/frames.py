@@ -158,7 +158,7 @@ class FramesScreen(ListingScreen):
         partner = None if row is None else self.store.partner(row)
         if partner is None:
             transaction = None if row is None else self.store.transaction(row)
-            self.notify("no partner" + (f": {transaction.verdict.value}" if transaction else ""), timeout=2)
+            self.notify("no partner" + (f": {transaction.verdict.words}" if transaction else ""), timeout=2)
         elif partner not in self.lines.index:
             self.notify(f"frame {partner} is hidden by the filter or no longer in memory", timeout=3)
         else:

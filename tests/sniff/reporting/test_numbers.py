@@ -34,7 +34,7 @@ def test_the_verdict_names_what_fails(numbers_of: Callable[[Path], Numbers]) -> 
     assert numbers.findings[0].severity == "error"
     assert "4 ← read holding" in numbers.findings[0].evidence[0].text
     four = next(station for station in numbers.stations if station.address == 4)
-    assert (four.asked, four.answered, four.trouble) == (4, 0, {"no-response": 4})
+    assert (four.asked, four.answered, four.trouble) == (4, 0, {"no answer": 4})
     assert four.health is not None
     assert four.health.score == 0
 

@@ -44,7 +44,7 @@ def test_partner(look: Any, busy_bus: Any) -> None:
         assert see.main.cursor == 1
         await see.press("e", "e", "x")  # no answer: nothing to jump to
         assert see.main.cursor == 6
-        assert see.notices() == ["no partner: no-response"]
+        assert see.notices() == ["no partner: no answer"]
 
     look(busy_bus.store, script)
 
