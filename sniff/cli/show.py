@@ -8,11 +8,12 @@ from __future__ import annotations
 import argparse
 import csv
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
-from dissectors.frame import Frame
 from dissectors.registry import Dissector
 from sniff.analysis.filtering import PREFIXES, FilterError, compile_filter
+from sniff.analysis.packet_tree import Field
+from sniff.analysis.row_tree import tree_of
 from sniff.cli import USAGE, Failure, arguments, rows
 from sniff.cli.tables import safe_cell
 from sniff.config import nearest
@@ -36,15 +37,14 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Show every capture in turn."""
+    """Show every capture in turn, the parts of one recording as one."""
     if args.table and not args.names:
         raise Failure("-T fields: say which with -e NAME (repeatable), for instance -e modbus.func_code", USAGE)
     for name in args.names:
         if name not in rows.JSON_KEYS and not name.startswith((*PREFIXES, "frame.", "tx.", "line.")):
             raise Failure(f"-e {name}: unknown field{nearest(name, rows.JSON_KEYS)}; --fields lists a capture's", USAGE)
     left = args.count
-    for path in args.files:
-        capture = arguments.open_capture(path)
+    for path, capture in arguments.open_captures(args.files):
         session = arguments.settings_of(args, capture.session)
         dissector = dissector_for(session)
         devices = arguments.noted_devices(args, session)
@@ -103,10 +103,10 @@ def _cell(value: object) -> str:
 
 
 def _tree(item: Settled, dissector: Dissector) -> str:
-    event = item.row.event
-    if not isinstance(event, Frame):
-        return f"        {event.place.value}: {event.reason.value}"
-    packet = dissector.packet(event, rows.role_of(item))
-    text = str(packet.show(dump=True))
-    lines = ["".join(c if c.isprintable() else "." for c in line) for line in text.splitlines()]
-    return "\n".join("        " + line for line in lines if line.strip())
+    return "\n".join(_tree_lines(tree_of(dissector, item.row, item.transaction, rows.iso), "        "))
+
+
+def _tree_lines(fields: Iterable[Field], indent: str) -> Iterator[str]:
+    for field in fields:
+        yield f"{indent}{field.name}: {field.value}" if field.value else f"{indent}{field.name}"
+        yield from _tree_lines(field.children, indent + "  ")

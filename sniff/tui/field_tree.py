@@ -15,7 +15,7 @@ from textual.message import Message
 from textual.scroll_view import ScrollView
 from textual.strip import Strip
 
-from sniff.tui.spans import Field
+from sniff.analysis.packet_tree import Field
 
 FOLDED = ((("frame", 0),), (("transaction", 0),))
 """What is known besides the packet begins folded: its first line says the most."""

@@ -11,6 +11,7 @@ from textual.timer import Timer
 
 from dissectors.frame import Frame
 from dissectors.tracker import Transaction
+from sniff.analysis.row_tree import tree_of
 from sniff.engine import Row
 from sniff.tui import places
 from sniff.tui.field_tree import FieldTree
@@ -20,7 +21,7 @@ from sniff.tui.hex_pane import HexPane
 from sniff.tui.linelist import LineList
 from sniff.tui.prompt import Prompt
 from sniff.tui.screens.listing import ListingScreen
-from sniff.tui.summary import tree_of
+from sniff.tui.times import date_and_clock
 
 DETAIL_SECONDS = 0.05
 """How long the cursor must rest before fields and octets are shown: holding a key down stays fluent."""
@@ -130,9 +131,9 @@ class FramesScreen(ListingScreen):
             octets.show(b"", ())
             tree.show(())
             return
-        row = self._detail[0]
+        row, transaction = self._detail
         octets.show(row.event.octets, row.event.marks)
-        kept = tree.show(tree_of(self.store, row))
+        kept = tree.show(tree_of(self.store.dissector, row, transaction, date_and_clock))
         if kept is not None:
             octets.select(kept.begin, kept.end, kept.name)
 

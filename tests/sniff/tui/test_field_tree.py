@@ -8,8 +8,8 @@ from collections.abc import Callable
 import pytest
 from textual.app import App, ComposeResult
 
+from sniff.analysis.packet_tree import Field
 from sniff.tui.field_tree import FieldTree
-from sniff.tui.spans import Field
 
 TAG = tuple(Field("Tag", "", begin, begin + 2, (Field("number", str(begin), begin, begin + 1),)) for begin in (2, 4, 6))
 FIELDS = (

@@ -8,12 +8,13 @@ from typing import Any
 import pytest
 
 from dissectors.frame import Frame
+from sniff.analysis.packet_tree import Field
+from sniff.analysis.row_tree import tree_of
 from sniff.engine import Output
 from sniff.reading import dissector_for, outputs
 from sniff.simulation.scenarios import scenario, simulate
 from sniff.store import Store
-from sniff.tui.spans import Field
-from sniff.tui.summary import tree_of
+from sniff.tui.times import date_and_clock
 
 START = 1_772_359_200_000_000_000
 PROTOCOLS = ("modbus-rtu", "modbus-ascii", "n2", "mstp")
@@ -45,7 +46,7 @@ def test_every_frame_opens_and_its_octets_have_fields(stores: dict[str, Store], 
     good = [row for row in store.rows if isinstance(row.event, Frame) and row.event.ok][:150]
     assert len(good) > 50
     for row in [*store.rows[:50], *good]:
-        fields = tuple(flat(tree_of(store, row)))
+        fields = tuple(flat(tree_of(store.dissector, row, store.transaction(row), date_and_clock)))
         assert all((field.name + field.value).isprintable() for field in fields)
         if row in good:
             leaves = [field for field in fields if not field.children and field.begin is not None]
@@ -73,3 +74,14 @@ def test_all_screens_show_it(look: Any, stores: dict[str, Store], name: str) -> 
         assert [see.main.index[line] for line in range(len(see.main.index))] == wanted
 
     look(store, script, (160, 40))
+
+
+def test_bit_fields_share_their_octet(busy_bus: Any) -> None:
+    row = busy_bus.store.by_no(2)
+    fields = tree_of(busy_bus.store.dissector, row, None, date_and_clock)
+    found = {field.name: (field.begin, field.end) for field in flat(fields)}
+    assert found["station"] == (0, 1)
+    assert found["high"] == found["low"] == (2, 3)
+    assert found["rest"] == (3, 5)
+    assert found["[1]"] == (4, 5)
+    assert found["sum"] == (5, 6)

@@ -14,7 +14,7 @@ from typing import Any
 
 from dissectors.frame import Frame, Role
 from dissectors.registry import Dissector
-from sniff.tui.plain import plain
+from sniff.analysis.plain import plain
 
 DEEPEST = 20
 """Layers and nested packets deeper than this are not shown; no honest frame has them."""
@@ -154,9 +154,9 @@ class _Walk:
                 inner = tuple(_layers(packet, self.octets, first, first + size, self.depth + 1))
                 children.extend(_without_spans(inner) if self.lost else inner)
                 first += size
-            return Field(name, "", *span, tuple(children))
+            return Field(name, "", span[0], span[1], tuple(children))
         if isinstance(value, list) and hasattr(description, "field"):
-            return Field(name, f"{len(value)}", *span, tuple(self._items(description.field, value, first)))
+            return Field(name, str(len(value)), span[0], span[1], tuple(self._items(description.field, value, first)))
         return Field(name, _text(description, self.layer, value), *span)
 
     def _items(self, description: Any, values: list[Any], first: int) -> Iterator[Field]:
@@ -181,10 +181,19 @@ def _whole(built: Any) -> bytes:
 
 
 def _text(description: Any, layer: Any, value: Any) -> str:
+    if isinstance(value, bytes):
+        return octets_text(value)
     try:
         return plain(description.i2repr(layer, value))
     except Exception:  # scapy's fields raise at will on values that they did not expect
         return plain(repr(value))
+
+
+def octets_text(octets: bytes) -> str:
+    """Octets for a reader: quoted where all are printable ASCII, else as pairs of hex digits."""
+    if octets and all(0x20 <= octet < 0x7F for octet in octets):
+        return f'"{octets.decode("ascii")}"'
+    return octets.hex(" ").upper()
 
 
 def _without_spans(fields: tuple[Field, ...]) -> tuple[Field, ...]:

@@ -2,35 +2,40 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from dissectors.frame import Frame
+from dissectors.registry import Dissector
 from dissectors.tracker import Transaction
+from sniff.analysis.packet_tree import Field, fields_of
+from sniff.analysis.plain import plain
 from sniff.analysis.wording import duration, mark_names, milliseconds
 from sniff.engine import Row
-from sniff.store import Store
-from sniff.tui.plain import plain
-from sniff.tui.spans import Field, fields_of
-from sniff.tui.times import date_and_clock
 
 
-def tree_of(store: Store, row: Row) -> tuple[Field, ...]:
-    """Everything about a row: frame or noise, transaction, then the layers of its packet."""
+def tree_of(
+    dissector: Dissector, row: Row, transaction: Transaction | None, time_text: Callable[[int], str]
+) -> tuple[Field, ...]:
+    """Everything about a row: the layers of its packet, how it was found, its transaction where that has closed.
+
+    `time_text` writes times (ns since the epoch).
+    """
     event = row.event
-    known = [_event(row)]
-    transaction = store.transaction(row)
+    known = [_event(row, time_text)]
     if transaction is not None:
         known.append(_transaction(transaction, row.no))
     if isinstance(event, Frame):
         role = row.placement.role if row.placement is not None else row.header.role if row.header else None
-        return (*fields_of(store.dissector, event, role), *known) if role is not None else tuple(known)
+        return (*fields_of(dissector, event, role), *known) if role is not None else tuple(known)
     return tuple(known)
 
 
-def _event(row: Row) -> Field:
+def _event(row: Row, time_text: Callable[[int], str]) -> Field:
     event = row.event
     count = len(event.octets)
     times = [
-        Field("start", date_and_clock(event.start)),
-        Field("end", date_and_clock(event.end)),
+        Field("start", time_text(event.start)),
+        Field("end", time_text(event.end)),
         Field("lasts", milliseconds(event.end - event.start)),
     ]
     marks = [
@@ -71,7 +76,7 @@ def _transaction(transaction: Transaction, no: int) -> Field:
         parts.append(Field("attempt", f"{transaction.attempt}{of}"))
     if transaction.error:
         parts.append(Field("error", plain(transaction.error)))
-    return Field("transaction", f"{transaction.id}: {transaction.verdict.value}", None, None, tuple(parts))
+    return Field("transaction", f"{transaction.id}: {transaction.verdict.words}", None, None, tuple(parts))
 
 
 def _frame(number: int, here: int) -> str:

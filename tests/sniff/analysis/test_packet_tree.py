@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dissectors.frame import Check, Found, Frame, Role
-from sniff.tui.spans import Field, fields_of
+from sniff.analysis.packet_tree import Field, fields_of
 
 CAPTURES = Path(__file__).parents[3] / "../shared/captures"
 
@@ -89,17 +89,6 @@ def test_n2_fields_are_characters() -> None:
         "checksum": b"97",
         "end": b"\r",
     }
-
-
-def test_bit_fields_share_their_octet(busy_bus: Any) -> None:
-    row = busy_bus.store.by_no(2)
-    fields = fields_of(busy_bus.store.dissector, row.event, Role.RESPONSE)
-    found = {field.name: (field.begin, field.end) for field in flat(fields)}
-    assert found["station"] == (0, 1)
-    assert found["high"] == found["low"] == (2, 3)
-    assert found["rest"] == (3, 5)
-    assert found["[1]"] == (4, 5)
-    assert found["sum"] == (5, 6)
 
 
 def mstp_frames(name: str, most: int) -> list[bytes]:
