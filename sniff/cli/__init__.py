@@ -90,6 +90,8 @@ def _run(arguments: list[str]) -> int:
     )
     parser.add_argument("--version", action="version", version=f"sniff485 {__version__}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    if name is not None and name not in COMMANDS:
+        raise Failure(_no_such_command(name), USAGE)
     chosen: ModuleType | None = None
     for command, text in COMMANDS.items():
         sub = commands.add_parser(
@@ -108,6 +110,18 @@ def _run(arguments: list[str]) -> int:
         args = parser.parse_args(arguments)
     assert chosen is not None  # argparse has refused anything else
     return int(chosen.run(args))
+
+
+def _no_such_command(word: str) -> str:
+    from difflib import get_close_matches
+
+    close = get_close_matches(word, COMMANDS, 1)
+    if close:
+        return f"{word!r}: no such command; did you mean {close[0]!r}?"
+    if os.path.exists(word):
+        a = "live" if word.startswith("/dev/") else "open"
+        return f"{word!r}: no such command; did you mean `sniff485 {a} {word}`?"
+    return f"{word!r}: no such command; `sniff485 --help` lists them"
 
 
 def _plain(error: Exception) -> str:

@@ -28,7 +28,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     show.add_argument("name", metavar="NAME", help="a profile's name, or a .toml file")
     show.add_argument("--json", action="store_true", help="one JSON object a register or object")
     check = actions.add_parser("check", help="read profiles and say what is wrong with them")
-    check.add_argument("files", nargs="+", metavar="FILE", help="a .toml file")
+    check.add_argument("files", nargs="+", metavar="FILE", help="a .toml file, or a profile's name")
     guess = actions.add_parser("guess", help="profiles that fit the stations of a capture")
     arguments.add_files(guess)
     arguments.add_line(guess)
@@ -138,8 +138,8 @@ def _check(args: argparse.Namespace) -> int:
     wrong = 0
     for name in args.files:
         try:
-            profile = read(Path(name))
-        except ProfileError as error:
+            profile = read(Path(name)) if Path(name).exists() else find(name)
+        except (UnknownProfile, ProfileError) as error:
             wrong += 1
             print(f"sniff485: {error}", file=sys.stderr)
         else:
