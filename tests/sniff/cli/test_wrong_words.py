@@ -9,7 +9,7 @@ import pytest
 
 
 @pytest.mark.parametrize(
-    ("word", "way_out"), [("shw", "'show'"), ("cheque", "'check'"), ("xyzzy", "sniff485 --help"), ("/dev/null", "live")]
+    ("word", "way_out"), [("shw", "'show'"), ("chek", "'check'"), ("xyzzy", "sniff485 --help"), ("/dev/null", "live")]
 )
 def test_a_word_that_is_no_command(word: str, way_out: str, sniff485: Callable) -> None:
     ran = sniff485(word)
