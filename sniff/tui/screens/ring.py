@@ -67,7 +67,10 @@ class RingScreen(ViewScreen):
         words = self.query_one("#words", Static)
         observer = self.store.ring
         if observer is None:
-            words.update(f"{self.store.session.protocol} passes no token: there is no ring to show")
+            session = self.store.session
+            unknown = "protocol" in session.unknown
+            why = "the protocol is not known" if unknown else f"{session.protocol} passes no token"
+            words.update(f"{why}: there is no ring to show")
             return
         ring = observer.ring()
         places = [ring_words.HEADINGS.index(name) for name, _ in COLUMNS]
