@@ -160,6 +160,14 @@ class LineEventKind(Enum):
     ERRORS = "errors"  # errors that the driver counted without saying where; `count` of them, `text` = kind
     NOTE = "note"
 
+    @property
+    def is_hole(self) -> bool:
+        """Whether octets may be missing there, so that silence says nothing."""
+        return self in _HOLES
+
+
+_HOLES = frozenset((LineEventKind.DROPPED, LineEventKind.UNPLUGGED, LineEventKind.REPLUGGED))
+
 
 @dataclass(frozen=True, slots=True)
 class LineEvent:

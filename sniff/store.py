@@ -97,6 +97,8 @@ class Store:
         """Take something that happened to the line."""
         self.version += 1
         self.line_events.append(event)
+        if self.ring is not None and event.kind.is_hole:
+            self.ring.miss(event.time)
 
     def _close(self, transaction: Transaction) -> None:
         self.transactions[transaction.id] = transaction

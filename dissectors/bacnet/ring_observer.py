@@ -76,6 +76,7 @@ class RingObserver:
         self._doubt = True  # something may have been missed since the last good frame
         self._before: Frame | None = None  # the last good frame
         self._quiet_since: int | None = None  # end of the last event of any kind
+        self._missed: int | None = None  # where octets may be lost, until an event comes after it
         self._unanswered: _Asked | None = None  # the newest request that nobody answered in time
         self._postponed: deque[tuple[int, int, int]] = deque(maxlen=_POSTPONED_MAX)  # server, client, end of request
 
@@ -85,6 +86,8 @@ class RingObserver:
         Noise without octets is a hole: nobody listened for a while, and nothing is concluded from the silence.
         """
         tally = self._tally
+        if self._missed is not None and (event.end >= self._missed or self._silence(event) >= T_NO_TOKEN):
+            self._see_hole(event.start)
         if tally.first is None:
             tally.first, tally.last = event.start, event.end
         elif event.end > tally.last:
@@ -96,7 +99,7 @@ class RingObserver:
                     self._see_collision(no, event)
                 self._doubt = True
             else:
-                self._see_hole()
+                self._see_hole(event.start)
         else:
             tally.frames += 1
             tally.octets += len(event.octets)
@@ -108,15 +111,20 @@ class RingObserver:
                 self._doubt = False
         self._quiet_since = event.end
 
+    def miss(self, time: int) -> None:
+        """Say that octets may be lost about `time` (ns), before the next event that ends there or later."""
+        self._missed = time
+
     def ring(self) -> Ring:
         """All that was seen so far."""
         return self._tally.value()
 
     # Holes, noise and damage
 
-    def _see_hole(self) -> None:
+    def _see_hole(self, end: int) -> None:
         """No wait that began before it is measured to its end."""
         self._forget()
+        self._missed, self._quiet_since = None, end
         self._unanswered = None
         self._postponed.clear()
         self._doubt = True
@@ -382,8 +390,8 @@ class RingObserver:
     def _gap(self, frame: Frame) -> int:
         return 0 if self._before is None else max(0, frame.start - self._before.end)
 
-    def _silence(self, frame: Frame) -> int:
-        return 0 if self._quiet_since is None else max(0, frame.start - self._quiet_since)
+    def _silence(self, event: FramerEvent) -> int:
+        return 0 if self._quiet_since is None else max(0, event.start - self._quiet_since)
 
     def _surely_over(self, frame: Frame, before: Frame, limit: int) -> bool:
         """Whether the time between two frames is over a limit by its smallest reading."""

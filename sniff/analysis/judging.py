@@ -18,7 +18,6 @@ from sniff.analysis.profile_findings import PROFILE_RULES, ProfileFindings
 from sniff.engine import Output
 from sniff.session import LineEvent, LineEventKind, Session, settings_change
 
-_HOLES = frozenset((LineEventKind.DROPPED, LineEventKind.UNPLUGGED, LineEventKind.REPLUGGED))
 _DOUBTFUL = frozenset(
     (Verdict.NO_RESPONSE, Verdict.UNSOLICITED, Verdict.LATE, Verdict.DAMAGED_ANSWER, Verdict.DAMAGED_REQUEST)
 )
@@ -35,7 +34,7 @@ class Judging:
         self.devices = ProfileFindings(session.timing, dissector, devices) if devices else None
         self._searching = False
         self._hole: int | None = None  # when octets were lost, by the newest line event that says so
-        self._first_after: int | None = None  # number of the first row that begins after it
+        self._first_after: int | None = None  # number of the first row that ends after it
 
     def add(self, output: Output) -> None:
         """Take rows and closed transactions. What was heard with wrong settings says nothing about the bus."""
@@ -46,7 +45,7 @@ class Judging:
                 line.pass_by(row)
                 continue
             line.see(row)
-            if self._hole is not None and self._first_after is None and row.event.start >= self._hole:
+            if self._hole is not None and self._first_after is None and row.event.end >= self._hole:
                 self._first_after = row.no
                 if judge is not None:  # something was there that nobody heard: no silence
                     gap = Noise(b"", row.event.start, row.event.start, Place.BETWEEN, Reason.NO_FRAME)
@@ -72,7 +71,7 @@ class Judging:
         if self._searching and event.kind is LineEventKind.ERRORS:
             return  # wrong settings made them
         self.line.add_line_event(event)
-        if event.kind in _HOLES:
+        if event.kind.is_hole:
             self._hole, self._first_after = event.time, None
 
     def _is_torn(self, transaction: Transaction) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 from dissectors import registry
 from dissectors.line import LineSettings
@@ -127,6 +127,16 @@ def open_capture(path: str) -> Capture:
         return read(path)
     except CaptureError as error:
         raise Failure(str(error), USAGE if "unknown suffix" in str(error) else UNREADABLE) from None
+
+
+def open_captures(paths: Sequence[str]) -> list[tuple[str, Capture]]:
+    """Open captures by name, the parts of one recording as one; ends as `open_capture` does."""
+    opened = [(path, open_capture(path)) for path in paths]
+    if len(opened) < 2:
+        return opened
+    from sniff.recording.rotated import joined
+
+    return joined(opened)
 
 
 def settings_of(args: argparse.Namespace, session: Session) -> Session:

@@ -19,7 +19,7 @@ from sniff.analysis.summary import Summary
 from sniff.cli import INTERRUPTED, PORT_TROUBLE, UNREADABLE, USAGE, Failure, arguments, check_output
 from sniff.cli.check_output import Checked
 from sniff.engine import Output
-from sniff.formats import READERS
+from sniff.formats import READERS, Capture
 from sniff.reading import dissector_for, outputs
 from sniff.session import LineEvent, Session
 
@@ -56,7 +56,7 @@ def run(args: argparse.Namespace) -> int:
     for code in _words(args.only) + _words(args.ignore):
         _require_known(code)
     fail_on = None if args.fail_on == "never" else Severity[args.fail_on.upper()]
-    checked = [_select(_check(source, args), args) for source in args.sources]
+    checked = [_select(one, args) for one in _check(args)]
     colour = arguments.colour()
     {
         "text": lambda: check_output.write_text(checked, colour),
@@ -67,24 +67,35 @@ def run(args: argparse.Namespace) -> int:
     return int(failing)
 
 
-def _check(source: str, args: argparse.Namespace) -> Checked:
-    if source == "-" or source.lower().endswith(tuple(READERS)) or Path(source).is_file():
-        capture = arguments.open_capture(source)
-        session = arguments.settings_of(args, capture.session)
-        run_of = Checking(session, dissector_for(session), arguments.noted_devices(args, session))
-        for item in outputs(capture.items(), session):
-            run_of.take(item)
-        complete = capture.completeness()
-        notes = [] if complete.whole else [complete.text]
-        if session.unknown:
-            name = " and ".join(arguments.options(session))
-            notes.append(f"no settings were found while this was recorded, so nothing is judged; name them with {name}")
-        return run_of.result(source, "; ".join(notes))
+def _check(args: argparse.Namespace) -> list[Checked]:
+    """Every source; the parts of one recording are one."""
+    ports = [source for source in args.sources if not _is_file(source)]
+    if not ports:
+        return [_read(name, capture, args) for name, capture in arguments.open_captures(args.sources)]
+    source = ports[0]
     if not source.startswith(("/dev/", "COM", "\\\\")) and "://" not in source and ("." in source or "/" in source):
         raise Failure(f"{source}: no such file", UNREADABLE)
     if len(args.sources) > 1:
         raise Failure(f"{source}: a port is checked alone; files end in {', '.join(READERS)}", USAGE)
-    return _listen(source, args)
+    return [_listen(source, args)]
+
+
+def _is_file(source: str) -> bool:
+    return source == "-" or source.lower().endswith(tuple(READERS)) or Path(source).is_file()
+
+
+def _read(source: str, capture: Capture, args: argparse.Namespace) -> Checked:
+    """What was found in a capture."""
+    session = arguments.settings_of(args, capture.session)
+    run_of = Checking(session, dissector_for(session), arguments.noted_devices(args, session))
+    for item in outputs(capture.items(), session):
+        run_of.take(item)
+    complete = capture.completeness()
+    notes = [] if complete.whole else [complete.text]
+    if session.unknown:
+        name = " and ".join(arguments.options(session))
+        notes.append(f"no settings were found while this was recorded, so nothing is judged; name them with {name}")
+    return run_of.result(source, "; ".join(notes))
 
 
 def _listen(port: str, args: argparse.Namespace) -> Checked:

@@ -18,12 +18,13 @@ def run(args: argparse.Namespace) -> int:
     """Merge by time."""
     from sniff.editing.merging import merged, merged_session
 
-    captures = [arguments.open_capture(path) for path in args.files]
+    opened = arguments.open_captures(args.files)
+    captures = [capture for _, capture in opened]
     try:
-        session = merged_session(captures, args.files)
+        session = merged_session(captures, [name for name, _ in opened])
     except CaptureError as error:
         raise Failure(str(error), UNREADABLE) from None
     writing.write(args, session, merged(captures), args.files)
-    for path, capture in zip(args.files, captures, strict=True):
+    for path, capture in opened:
         writing.say_incomplete(path, capture)
     return 0

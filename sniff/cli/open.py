@@ -1,4 +1,5 @@
-"""Keys are shown at the foot of the screen and under `?`. Several captures are shown one after the other."""
+"""Keys are shown at the foot of the screen and under `?`. Several captures are shown one after the other,
+the parts of one recording as one."""
 
 from __future__ import annotations
 
@@ -16,7 +17,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Show captures in the terminal UI."""
-    captures = [(path, arguments.open_capture(path)) for path in args.files]
+    captures = arguments.open_captures(args.files)
     if not arguments.on_terminal():
         raise Failure("open needs a terminal; use `sniff485 show` for text", USAGE)
     from sniff.cli.feeds import FileFeed

@@ -41,9 +41,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print the values of every capture in turn."""
-    for path in args.files:
-        capture = arguments.open_capture(path)
+    """Print the values of every capture in turn, the parts of one recording as one."""
+    for path, capture in arguments.open_captures(args.files):
         session = arguments.settings_of(args, capture.session)
         latest = args.latest if args.latest is not None else args.style == "text"
         if latest:

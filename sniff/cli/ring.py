@@ -21,6 +21,8 @@ def ring_of(items: Iterable[Item], session: Session) -> Ring:
             for row in output.rows:
                 if row.searched is None:
                     observer.see(row.no, row.event, row.header)
+        elif output.kind.is_hole:
+            observer.miss(output.time)
     return observer.ring()
 
 

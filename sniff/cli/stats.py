@@ -17,6 +17,7 @@ from sniff.analysis.judging import Judging
 from sniff.analysis.load import Second
 from sniff.analysis.nodes import Node
 from sniff.analysis.summary import Summary
+from sniff.analysis.wording import station_word
 from sniff.cli import USAGE, Failure, arguments, tables
 from sniff.cli.rows import iso
 from sniff.cli.tables import Cell
@@ -49,8 +50,9 @@ def run(args: argparse.Namespace) -> int:
     if len(files) > 1 and stray:
         hint = "; values have a command of their own: points" if "points" in stray else ""
         raise Failure(f"{stray[0]}: neither a file nor a table; tables are {', '.join(TABLES)}{hint}", USAGE)
-    captures = [arguments.open_capture(path) for path in files]
-    session = arguments.settings_of(args, merged_session(captures, files))
+    opened = arguments.open_captures(files)
+    captures = [capture for _, capture in opened]
+    session = arguments.settings_of(args, merged_session(captures, [name for name, _ in opened]))
     items = merged(captures) if len(captures) > 1 else captures[0].items()
     if table == "ring":
         if "ring" not in dissector_for(session).extras:
@@ -70,7 +72,9 @@ def run(args: argparse.Namespace) -> int:
         elif judging is not None:
             judging.add_line_event(output)
     if judging is not None:
-        tables.write(HEALTH_HEADINGS, _health(health_of(summary, judging.findings())), args.style)
+        tables.write(
+            HEALTH_HEADINGS, _health(health_of(summary, judging.findings()), station_word(session.protocol)), args.style
+        )
     elif table == "nodes":
         tables.write(NODE_HEADINGS, [_node(node) for node in summary.nodes.present()], args.style)
     elif table == "transactions":
@@ -110,8 +114,8 @@ def _verdict(transaction: Transaction, args: argparse.Namespace) -> str:
     return transaction.verdict.words if args.style == "text" else transaction.verdict.value
 
 
-def _health(health: HealthReport) -> list[tuple[Cell, ...]]:
-    rows = [("bus", health.bus), *((f"station {address}", one) for address, one in sorted(health.stations.items()))]
+def _health(health: HealthReport, word: str) -> list[tuple[Cell, ...]]:
+    rows = [("bus", health.bus), *((f"{word} {address}", one) for address, one in sorted(health.stations.items()))]
     return [(subject, one.score, "; ".join(one.reasons)) for subject, one in rows]
 
 

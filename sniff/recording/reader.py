@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 import stat
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
@@ -56,13 +56,14 @@ class McapCapture:
 
     # what a capture gives
 
-    def items(self, since: int | None = None) -> Iterator[Item]:
+    def items(self, since: int | None = None, followed_by: Sequence[McapCapture] = ()) -> Iterator[Item]:
         """Chunks and line events as they were recorded.
 
         `since`: only those at or after that time (ns), without reading the chunks of the file before it.
+        `followed_by`: the parts of the recording after this one, given as one with it.
         Raises CaptureError only when the file cannot be read any more at all.
         """
-        items = self._items(since)
+        items = self._items(since, followed_by)
         if self._began.unknown:
             items = self._searching_first(items)
         return items if since is None else (item for item in items if item.time >= since)
@@ -79,8 +80,15 @@ class McapCapture:
         yield first
         yield from items
 
-    def _items(self, since: int | None) -> Iterator[Item]:
+    def _items(self, since: int | None, followed_by: Sequence[McapCapture]) -> Iterator[Item]:
         joiner = self._joiner(since)
+        yield from self._joined(joiner, since, alone=since is None)
+        for part in followed_by:
+            yield from part._joined(joiner, since, alone=False)
+        yield from joiner.close()
+
+    def _joined(self, joiner: Joiner, since: int | None, *, alone: bool) -> Iterator[Item]:
+        """What this file gives to a joiner; `alone`: which has seen no other file, so that it says what is missing."""
         with self._pass(since) as one:
             for topic, head, data in one.messages():
                 if topic == LINE:
@@ -92,8 +100,7 @@ class McapCapture:
                         joiner.skip(head[1], batch)
                     else:
                         yield from joiner.raw(head[1], batch)
-            yield from joiner.close()
-            if since is None:
+            if alone:
                 self._note(one, joiner)
 
     def completeness(self) -> Completeness:

@@ -35,6 +35,7 @@ from sniff.session import DEVICES_NOTE, LineEvent, Session
 
 EVIDENCE_SHOWN, EVIDENCE_OF_NOTES = 5, 2
 HAPPENINGS_SHOWN = 200
+LONGEST_TEXT = 180
 GOOD = frozenset((Verdict.ANSWERED, Verdict.BROADCAST, Verdict.DATA, Verdict.OPEN))
 
 
@@ -51,6 +52,8 @@ def collect(source: str, capture: Capture, session: Session, devices: Devices) -
         if isinstance(item, LineEvent):
             judging.add_line_event(item)
             summary.add_line_event(item)
+            if ring is not None:
+                ring.add_line_event(item)
             if len(happenings) < HAPPENINGS_SHOWN:
                 at = seconds_since(session.started, item.time)
                 happenings.append(Happening(at, item.kind.value, item.text, item.count))
@@ -209,7 +212,7 @@ def _words(
             continue
         for row in item.rows:
             if row.no in wanted:
-                words[row.no] = (seconds_since(session.started, row.event.start), describe(dissector, row))
+                words[row.no] = (seconds_since(session.started, row.event.start), _cut(describe(dissector, row)))
         if item.rows and item.rows[-1].no >= last:
             break
     return words
@@ -223,7 +226,7 @@ def _found(
         Found(
             code=finding.code,
             severity=finding.severity.label,
-            title=_lower(rules[finding.code].title) if finding.code in rules else "",
+            title=rules[finding.code].title if finding.code in rules else "",
             subject=finding.subject,
             count=finding.count,
             first=seconds_since(session.started, finding.first),
@@ -242,8 +245,9 @@ def _shown(finding: Finding) -> tuple[int, ...]:
     return finding.evidence[: EVIDENCE_SHOWN if finding.severity >= Severity.WARNING else EVIDENCE_OF_NOTES]
 
 
-def _lower(title: str) -> str:
-    return title if title[1:2].isupper() else title[:1].lower() + title[1:]
+def _cut(text: str) -> str:
+    """A row's words with their middle left out where they are very long, so that what is wrong with it still shows."""
+    return text if len(text) <= LONGEST_TEXT else f"{text[: LONGEST_TEXT // 2]} … {text[-LONGEST_TEXT // 3 :]}"
 
 
 def _measurement(session: Session, dissector: Dissector) -> Measurement:
@@ -292,6 +296,11 @@ class _Ring:
     def add(self, row: Row) -> None:
         """Take the next row."""
         self._observer.see(row.no, row.event, row.header)
+
+    def add_line_event(self, event: LineEvent) -> None:
+        """Take something that happened to the line."""
+        if event.kind.is_hole:
+            self._observer.miss(event.time)
 
     def numbers(self) -> RingNumbers:
         """What it came to."""
