@@ -199,7 +199,10 @@ class PcapngWriter:
     """
 
     def __init__(self, path: Path, session: Session, options: Mapping[str, str], live: bool = False) -> None:
-        self.losses: list[str] = ["pcapng keeps one time a frame (its end), no limits of reads, no line events"]
+        self.losses: list[str] = [
+            "pcapng keeps one time a frame (its end), no limits of reads, no line events; of line errors only how many "
+            "octets of a frame had one, in its comment"
+        ]
         self.live = live
         try:
             self.maker = RecordMaker(session, int(options["link-type"]) if "link-type" in options else None, live)

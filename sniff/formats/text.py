@@ -167,11 +167,13 @@ def create(path: str | Path, session: Session) -> TextWriter:
 
 
 class TextWriter:
-    """Writes the canonical form. A mark outside its chunk cannot be kept: a comment says so."""
+    """Writes the canonical form. A mark outside its chunk cannot be kept: a comment says so, and `losses`."""
 
     def __init__(self, file: NewFile, session: Session) -> None:
         self._file = file
         self._last = session.started
+        self._not_kept = 0
+        self.losses: list[str] = []
         self._put(header_lines(session))
 
     def write(self, item: Item) -> None:
@@ -179,11 +181,16 @@ class TextWriter:
         if isinstance(item, LineEvent):
             self._put([event_line(item, self._last)])
         elif item.octets:
-            self._put(chunk_lines(item, self._last))
+            lines = list(chunk_lines(item, self._last))
+            self._not_kept += len(lines) - 1
+            self._put(lines)
             self._last = item.time
 
     def close(self) -> None:
         """Finish the file and give it its name. Raises CaptureError."""
+        if self._not_kept:
+            self.losses.append(f"line errors that stand at no octet of their read became comments: {self._not_kept}")
+            self._not_kept = 0
         self._file.close()
 
     def _put(self, lines: Iterable[str]) -> None:

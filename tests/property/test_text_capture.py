@@ -28,6 +28,7 @@ def chunks(draw: st.DrawFn) -> Chunk:
 
 
 EVENTS = st.builds(LineEvent, TIMES, st.sampled_from(LineEventKind), PLAIN, st.integers(-(10**18), 10**18))
+DEVICES = st.lists(st.from_regex(r"\A([0-9]|\*|0x1F)=[a-z0-9][a-z0-9-]*\Z"), max_size=3).map(",".join)
 SESSIONS = st.builds(
     Session,
     port=PLAIN,
@@ -48,7 +49,9 @@ SESSIONS = st.builds(
         serial_number=PLAIN,
     ),
     program=PLAIN,
-    notes=st.dictionaries(PLAIN, PLAIN, max_size=3),
+    notes=st.dictionaries(st.one_of(PLAIN, st.just("devices")), st.one_of(PLAIN, DEVICES), max_size=3),
+    unknown=st.sampled_from([(), ("line",), ("protocol",), ("line", "protocol")]),
+    given=st.booleans(),
 )
 ITEMS = st.lists(st.one_of(chunks(), EVENTS), max_size=20)
 
