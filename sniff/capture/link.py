@@ -33,8 +33,8 @@ from sniff.sources.clock import Clock
 
 START_PATIENCE = 30.0
 STOP_PATIENCE = 10.0
-READ_SIZE = 256 * 1024
-READ_AT_ONCE = 1024 * 1024
+READ_SIZE = 64 * 1024
+READ_AT_ONCE = 128 * 1024
 """Octets of messages taken by one `receive`, so that a caller that is behind still gets to draw."""
 
 DERIVED_BACKLOG = 1024 * 1024

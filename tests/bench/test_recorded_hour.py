@@ -27,7 +27,7 @@ from sniff.simulation.tap import FTDI_LOW_LATENCY
 SPEED = 10
 MINUTES = 60
 ALLOWED = 8_000_000
-"""Octets that a process may grow by between a quarter of the hour and its end."""
+"""Octets that a process may grow by between a quarter of the hour and its end: what a reader that was behind holds."""
 
 
 @pytest.mark.slow
