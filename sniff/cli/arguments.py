@@ -37,7 +37,7 @@ def add_files(parser: argparse.ArgumentParser) -> None:
         "files",
         nargs="+",
         metavar="FILE",
-        help="capture: .mcap .cap.txt .pcap .pcapng .log .hex .csv; - for standard input",
+        help="capture: .mcap .cap.txt .pcap .pcapng .log .hex .csv .txt; - for standard input",
     )
 
 

@@ -56,6 +56,7 @@ READERS: dict[str, str] = {
     ".log": "sniff.formats.bytelog:read",
     ".hex": "sniff.formats.bytelog:read",
     ".csv": "sniff.formats.bytelog:read",
+    ".txt": "sniff.formats.plain_text:read",
 }
 WRITERS: dict[str, str] = {
     ".cap.txt": "sniff.formats.text:create",

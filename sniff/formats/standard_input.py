@@ -1,4 +1,4 @@
-"""A capture on standard input (`-`): the format is told by its first octets; text is the default."""
+"""A capture on standard input (`-`): told by its first octets, else a text capture or a byte log."""
 
 from __future__ import annotations
 
@@ -19,6 +19,9 @@ MAGICS = {
 LONGEST = 4 * 1024**3
 """Octets; what is longer belongs into a file."""
 
+SAMPLE = 1 << 20
+"""Octets looked at to tell a text capture from a byte log."""
+
 _kept: list[tempfile.TemporaryDirectory[str]] = []  # until the program ends: captures are read more than once
 
 
@@ -26,18 +29,24 @@ def read() -> Capture:
     """Read all of standard input. Raises CaptureError."""
     from sniff import formats
     from sniff.formats import text
+    from sniff.formats.plain_text import is_text_capture
 
     data = sys.stdin.buffer.read(LONGEST + 1)
     if len(data) > LONGEST:
         raise CaptureError(f"-: over {LONGEST} octets on standard input; put it into a file")
-    for magic, suffix in MAGICS.items():
-        if data.startswith(magic):
-            folder = tempfile.TemporaryDirectory(prefix="sniff485-")
-            _kept.append(folder)
-            path = Path(folder.name) / f"standard-input{suffix}"
-            path.write_bytes(data)
-            return formats.read(path)
+    suffix = next((suffix for magic, suffix in MAGICS.items() if data.startswith(magic)), "")
+    if not suffix:
+        if is_text_capture(data[:SAMPLE].splitlines()):
+            try:
+                return text.parse(data.decode("utf-8"), "-")
+            except UnicodeDecodeError as error:
+                raise CaptureError(f"-: neither a capture file nor a text capture (octet {error.start})") from None
+        suffix = ".log"
+    folder = tempfile.TemporaryDirectory(prefix="sniff485-")
+    _kept.append(folder)
+    path = Path(folder.name) / f"standard-input{suffix}"
+    path.write_bytes(data)
     try:
-        return text.parse(data.decode("utf-8"), "-")
-    except UnicodeDecodeError as error:
-        raise CaptureError(f"-: neither a capture file nor a text capture (octet {error.start})") from None
+        return formats.read(path)
+    except CaptureError as error:
+        raise CaptureError(str(error).replace(str(path), "-")) from None

@@ -1,0 +1,55 @@
+"""Files that do not say by their name what they are: `.txt`, and standard input."""
+
+from __future__ import annotations
+
+import io
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from dissectors.frame import Chunk
+from sniff.formats import Capture, CaptureError, read
+from sniff.formats.bytelog import ByteLog
+from sniff.formats.text import TextCapture
+
+OURS = "#!sniff-capture 1\n# line: 19200,8E1\n+0 01 03\n"
+BY_HAND = "# a poll\n\n+0 01 03\n"
+LOG = "# from the gateway\n(1.5) bus 01 03\n"
+PAIRS = "01 03\n"
+
+
+def octets(capture: Capture) -> bytes:
+    return b"".join(item.octets for item in capture.items() if isinstance(item, Chunk))
+
+
+@pytest.mark.parametrize(
+    ("content", "kind"), [(OURS, TextCapture), (BY_HAND, TextCapture), (LOG, ByteLog), (PAIRS, ByteLog)]
+)
+def test_what_a_text_is(content: str, kind: type, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "site.txt"
+    path.write_text(content)
+    monkeypatch.setattr(sys, "stdin", SimpleNamespace(buffer=io.BytesIO(content.encode())))
+    for capture in (read(path), read("-")):
+        assert isinstance(capture, kind)
+        assert octets(capture) == b"\x01\x03"
+
+
+@pytest.mark.parametrize("content", [b"hello\n", b"\xff\xfe\0", b"PK\3\4 and so on"])
+def test_what_is_neither_is_refused_by_its_name(
+    content: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "site.txt"
+    path.write_bytes(content)
+    monkeypatch.setattr(sys, "stdin", SimpleNamespace(buffer=io.BytesIO(content)))
+    for name in (path, "-"):
+        with pytest.raises(CaptureError, match="no byte log that this program reads") as caught:
+            read(name)
+        assert str(caught.value).startswith(f"{name}: ")
+
+
+def test_comments_alone_are_an_empty_text_capture(tmp_path: Path) -> None:
+    path = tmp_path / "site.txt"
+    path.write_text("# nothing yet\n")
+    assert octets(read(path)) == b""
