@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 
-from dissectors.findings import Finding
+from dissectors.findings import Finding, Tally
 from dissectors.frame import Damage, Event, Frame, Header, LineError, Noise, Role
 from dissectors.line import Timing
 from dissectors.modbus.adu import RTU_NAME, adu, rtu_check
@@ -289,10 +289,7 @@ class ModbusFindings:
             station.times.add(transaction.latency)
             if asked.header.ok and transaction.attempt == 1:
                 self._learnt.answered(transaction.station or 0, False, transaction.latency.nominal)
-            timeout = self._learnt.timeout
-            limit = SLOW_UNLEARNT if timeout is None else timeout * 7 // 10
-            if transaction.latency.low > limit:
-                station.slow.add(transaction.end, transaction.request, transaction.response)
+            self._compare_with_timeout(station, transaction, transaction.latency.low)
             if verdict is Verdict.ANSWERED and transaction.error is None and transaction.response is not None:
                 came = Answered(transaction.response, transaction.end, transaction.latency, answer)
                 station.compare(asked.key, asked.octets, came)
@@ -304,6 +301,17 @@ class ModbusFindings:
             station.unfit.add(transaction.end, transaction.request, transaction.response)
             if len(station.unfit_words) < 16:
                 station.unfit_words[transaction.error] += 1
+
+    def _compare_with_timeout(self, station: Station, transaction: Transaction, least: int) -> None:
+        """Whether an answer took long; counted anew when the timeout gets known, since the limit is another then."""
+        timeout = self._learnt.timeout
+        limit = None if timeout is None else timeout * 7 // 10
+        if (limit is None) != (station.slow_limit is None):
+            station.slow, station.slow_of = Tally(), 0
+        station.slow_limit = limit
+        station.slow_of += 1
+        if least > (SLOW_UNLEARNT if limit is None else limit):
+            station.slow.add(transaction.end, transaction.request, transaction.response)
 
     def _station(self, unit: int) -> Station:
         return self._seen.stations.setdefault(unit, Station())

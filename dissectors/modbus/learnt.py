@@ -85,13 +85,13 @@ class Learnt:
         ordered = sorted(samples)
         slowest = ordered[-2] if len(ordered) > 3 else ordered[-1]  # one outlier does not widen the window
         limit = slowest + slowest // 2 + self._tolerance
-        return limit if self._timeout is None else min(limit, self._patience())
+        return limit if self._timeout is None else min(limit, self._patience(unit))
 
     def in_time(self, unit: int, write: bool, gap: int) -> bool:
         """Whether a frame `gap` after a request may be its answer; where nothing is learnt, a fixed limit decides."""
         limit = self.response_limit(unit, write)
         if limit is None:
-            limit = UNLEARNT_LIMIT if self._timeout is None else self._patience()
+            limit = UNLEARNT_LIMIT if self._timeout is None else self._patience(unit)
         return gap <= limit
 
     def too_soon(self, silence: int) -> int:
@@ -102,8 +102,12 @@ class Learnt:
         samples = (each for by_unit in (self._reads, self._writes) for each in by_unit.values())
         return max((max(each) for each in samples), default=0)
 
-    def _patience(self) -> int:
-        return (self._timeout or 0) * 4 // 5
+    def _patience(self, unit: int) -> int:
+        """Until when something is an answer rather than the repeat after the timeout: 4/5 of that, or half way between
+        it and the slowest answer of a unit that takes longer."""
+        timeout = self._timeout or 0
+        slowest = max((*self._reads.get(unit, ()), *self._writes.get(unit, ())), default=0)
+        return max(timeout * 4 // 5, min(timeout, (slowest + timeout) // 2))
 
     def _agreed(self) -> int | None:
         ordered = sorted(self._unanswered)

@@ -127,12 +127,11 @@ def _exception(name: str, station: Station, key: Key, code: int, tally: Tally) -
 
 def _times(name: str, station: Station, timeout: int | None, seen: Evidence, is_common: bool) -> Iterator[Finding]:
     times_, slow = station.times, station.slow
-    if slow.count >= 3 and 100 * slow.count >= station.answered:
+    if slow.count >= 3 and 100 * slow.count >= station.slow_of:
+        since = "" if station.slow_of == station.answered else " since the timeout is known"
         against = "500 ms" if timeout is None else f"70% of the master's timeout of {ms(timeout)}"
-        words = (
-            f"{slow.count} of {counted(station.answered, 'answer')} took longer than {against}, the longest at least "
-            f"{ms(times_.longest)}"
-        )
+        words = f"{slow.count} of {counted(station.slow_of, 'answer')}{since} took longer than {against}"
+        words += f", the longest at least {ms(times_.longest)}"
         yield slow.found(RULES["MB101"], name, words)
     quarters = times_.quarters()
     if quarters:

@@ -121,6 +121,8 @@ class Station:
     unfit: Tally = field(default_factory=Tally)
     unfit_words: Counter[str] = field(default_factory=Counter)
     slow: Tally = field(default_factory=Tally)
+    slow_of: int = 0  # answers that were compared with the same limit
+    slow_limit: int | None = None  # that limit, ns, by the master's timeout; None: the one while it is not known
     late: Tally = field(default_factory=Tally)
     twice: Tally = field(default_factory=Tally)
     repeats: Tally = field(default_factory=Tally)

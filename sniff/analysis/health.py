@@ -70,7 +70,8 @@ def health_of(summary: Summary, findings: Iterable[Finding] = ()) -> HealthRepor
     bus = _bus_health(summary, [finding for finding in grave if finding.subject in WHOLE_BUS])
     worst = min((address for address in about if address in stations), key=lambda a: stations[a].score, default=None)
     if worst is not None and (limit := (100 + stations[worst].score) // 2) < bus.score:
-        reason = f"station {worst} is at {stations[worst].score}, so the bus is at {limit} at best"
+        word = "station" if about[worst][0].subject.startswith("station") else "MAC"
+        reason = f"{word} {worst} is at {stations[worst].score}, so the bus is at {limit} at best"
         bus = Health(limit, (*bus.reasons, reason))
     return HealthReport(bus, stations)
 
@@ -87,12 +88,12 @@ def station_health(node: Node, findings: Iterable[Finding] = ()) -> Health | Non
         return None
     asked, frames = node.asked, node.sent + node.received
     verdicts = node.verdicts
-    damaged = max(_share(verdicts[Verdict.DAMAGED_ANSWER], asked), _share(node.damaged, frames))
+    answers, of_frames = _share(verdicts[Verdict.DAMAGED_ANSWER], asked), _share(node.damaged, frames)
     again = verdicts[Verdict.LATE] + verdicts[Verdict.ANSWERED_TWICE] + verdicts[Verdict.RETRY]
     return _sum(
         findings,
         (_share(node.unanswered, asked), 200, 100, "of its requests without answer"),
-        (damaged, 300, 60, "of its frames damaged"),
+        (max(answers, of_frames), 300, 60, f"of its {'answers' if answers > of_frames else 'frames'} damaged"),
         (_share(again, asked), 100, 30, "answered late, twice or after a repeat"),
         (_share(verdicts[Verdict.EXCEPTION], asked), 50, 20, "answered with an exception"),
     )

@@ -31,6 +31,11 @@ def _octets(event: Event) -> str:
     return f"{count} octet{'s' if count != 1 else ''}"
 
 
+def station_word(protocol: str) -> str:
+    """What the people of that protocol call a place on the bus."""
+    return "MAC" if protocol == "mstp" else "station"
+
+
 def mark_names(error: LineError) -> str:
     """Line errors of one octet: "parity", "parity or framing" (the driver did not tell), "break"."""
     both = LineError.PARITY | LineError.FRAMING

@@ -16,6 +16,7 @@ from dissectors.findings import Finding, Rule, Severity
 from dissectors.line import NS_PER_S
 from sniff.analysis.health import Health
 from sniff.analysis.judging import rules_over
+from sniff.analysis.wording import station_word
 from sniff.cli.rows import iso
 from sniff.reading import dissector_for
 from sniff.session import Session
@@ -75,12 +76,13 @@ def _write_head(one: Checked, width: int) -> None:
         print(f"  incomplete: {one.note}")
     if one.frames:
         _paragraph(f"health {one.health}", width, "  ", "    ")
+        word = station_word(session.protocol)
         for address, health in sorted(one.stations.items()):
             if health.score < 100:
-                _paragraph(f"station {address}: {health}", width, "    ", "      ")
+                _paragraph(f"{word} {address}: {health}", width, "    ", "      ")
         whole = [address for address, health in sorted(one.stations.items()) if health.score == 100]
         if whole:
-            _paragraph(f"at 100: station{'s' if len(whole) > 1 else ''} {', '.join(map(str, whole))}", width, "    ")
+            _paragraph(f"at 100: {word} {', '.join(map(str, whole))}", width, "    ")
 
 
 def _write_finding(one: Checked, finding: Finding, width: int, colour: bool) -> None:
@@ -117,7 +119,7 @@ def _paragraph(text: str, width: int, first: str, rest: str | None = None) -> No
 
 def _title(one: Checked, finding: Finding) -> str:
     rule = rules_over(dissector_for(one.session)).get(finding.code)
-    return rule.title[:1].lower() + rule.title[1:] if rule is not None else ""
+    return rule.title if rule is not None else ""
 
 
 def _sentence(text: str) -> str:

@@ -33,7 +33,7 @@ def run(args: argparse.Namespace) -> int:
         for rule in chosen.values():
             print(json.dumps(to_json(rule), ensure_ascii=False))
     elif not args.codes:
-        tables.write(("code", "severity", "title"), [(r.code, r.severity.label, _title(r)) for r in chosen.values()])
+        tables.write(("code", "severity", "title"), [(r.code, r.severity.label, r.title) for r in chosen.values()])
     else:
         print("\n\n".join(_explained(rule) for rule in chosen.values()))
     return 0
@@ -52,14 +52,10 @@ def to_json(rule: Rule) -> dict[str, str]:
 
 
 def _explained(rule: Rule) -> str:
-    lines = [f"{rule.code}  {_title(rule)}  ({rule.severity.label} unless said otherwise)", ""]
+    lines = [f"{rule.code}  {rule.title}  ({rule.severity.label} unless said otherwise)", ""]
     lines += textwrap.wrap(rule.explanation, WIDTH)
     for word, text in (("consistent with", rule.means), ("check next", rule.next)):
         if text:
             head = f"{word}: "
             lines += ["", *textwrap.wrap(head + text, WIDTH, subsequent_indent=" " * len(head))]
     return "\n".join(lines)
-
-
-def _title(rule: Rule) -> str:
-    return rule.title[:1].lower() + rule.title[1:]

@@ -7,10 +7,21 @@ from collections.abc import Sequence
 from importlib import resources
 from typing import Any
 
+from dissectors.tracker import Verdict
+from sniff.analysis.wording import station_word
 from sniff.reporting.numbers import Numbers
 from sniff.reporting.pictures import pictures
 
 TEMPLATE = "page.html.jinja"
+DAMAGES = {
+    "check": "wrong check",
+    "header": "wrong header check",
+    "short": "cut short",
+    "long": "too long",
+    "form": "malformed",
+    "restarted": "broken off by a new frame",
+    "timeout": "broken off by silence",
+}
 TROUBLE_MOST = 12
 """Kinds of trouble that get a column of their own."""
 
@@ -21,12 +32,14 @@ def page(reports: Sequence[Numbers]) -> str:
     from markupsafe import Markup
 
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    environment.filters |= {"ms": _ms, "number": _number, "percent": _percent, "seconds": _seconds, "span": _span}
+    environment.filters |= {"ms": _ms, "number": _number, "percent": _percent, "seconds": _seconds, "span": _span,
+                            "verdict": _verdict, "damage": _damage}  # fmt: skip
     template = environment.from_string(resources.files(__package__).joinpath(TEMPLATE).read_text("utf-8"))
     sections = [
         {
             "report": report,
             "matrix": _matrix(report),
+            "station": station_word(report.measurement.protocol),
             # The only markup that is not escaped here: matplotlib made it out of numbers and our own words.
             "pictures": {name: Markup(svg) for name, svg in pictures(report, f"c{number}").items()},
         }
@@ -53,10 +66,20 @@ def _matrix(report: Numbers) -> dict[str, Any]:
             counts.append(sum(station.trouble.get(kind, 0) for kind in rest))
         rows.append((station, [(count, min(4, math.ceil(4 * count / most)) if count else 0) for count in counts]))
     return {
-        "kinds": [kind.replace("-", " ") for kind in shown] + (["others"] if rest else []),
+        "kinds": [*shown] + (["others"] if rest else []),
         "rows": rows,
         "clean": [station.address for station in report.stations if not station.trouble],
     }
+
+
+def _verdict(value: str) -> str:
+    """How an exchange ended, as people read it."""
+    return Verdict(value).words
+
+
+def _damage(value: str) -> str:
+    """What is wrong with damaged frames, as people read it."""
+    return DAMAGES.get(value, value)
 
 
 def _ms(value: float | None) -> str:

@@ -8,6 +8,7 @@ import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from sniff.analysis.wording import station_word
 from sniff.reporting.numbers import CLASSES, Numbers, RingNumbers, Station, TimePart
 
 if TYPE_CHECKING:
@@ -39,7 +40,8 @@ def pictures(numbers: Numbers, prefix: str) -> dict[str, str]:
         drawn["timeline"] = _svg(_timeline(numbers.timeline, numbers.part), f"{prefix}-timeline")
     answering = [station for station in numbers.stations if station.response.count]
     if answering:
-        drawn["responses"] = _svg(_responses(answering, numbers.measurement.latency_ms), f"{prefix}-responses")
+        word = station_word(numbers.measurement.protocol)
+        drawn["responses"] = _svg(_responses(answering, numbers.measurement.latency_ms, word), f"{prefix}-responses")
     if numbers.ring is not None and len(numbers.ring.order) > 1:
         drawn["ring"] = _svg(_ring(numbers.ring), f"{prefix}-ring")
     return drawn
@@ -105,8 +107,8 @@ def _width_words(width: float) -> str:
     return f"{width:g} s" if width < 120 else f"{width / 60:.3g} min"
 
 
-def _responses(stations: Sequence[Station], latency: float) -> Figure:
-    """A distribution a station on one logarithmic axis, with marks at the median, 95 % and the longest."""
+def _responses(stations: Sequence[Station], latency: float, word: str) -> Figure:
+    """A distribution a station on one logarithmic axis, with marks at the median, 95% and the longest."""
     shown = sorted(stations, key=lambda station: -station.response.count)[:STATIONS_SHOWN]
     shown.sort(key=lambda station: station.address)
     figure = _figure(1.1 + 0.42 * len(shown))
@@ -130,7 +132,7 @@ def _responses(stations: Sequence[Station], latency: float) -> Figure:
                 axes.plot(
                     [max(value, low)], [place + 0.1], marker=marker, markersize=size, color=INK, clip_on=False, zorder=3
                 )
-    labels = [f"station {station.address} ({station.response.count})" for station in shown]
+    labels = [f"{word} {station.address} ({station.response.count})" for station in shown]
     axes.set_yticks(range(len(shown)), labels=labels)
     axes.set_ylim(len(shown) - 0.6, -1)
     axes.set_xscale("log")
@@ -143,7 +145,7 @@ def _responses(stations: Sequence[Station], latency: float) -> Figure:
     axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.xaxis.set_minor_formatter(lambda value, _: f"{value:g}" if high / low < 100 and _leads(value) else "")
     axes.tick_params(axis="x", which="minor", labelsize=7)
-    axes.set_xlabel("ms from the request to the answer ( | median, ◆ 95 %, × longest)")
+    axes.set_xlabel("ms from the request to the answer ( | median, ◆ 95%, × longest)")
     _plain(axes)
     axes.grid(axis="x", which="major", color=GREY, alpha=0.3)
     return figure

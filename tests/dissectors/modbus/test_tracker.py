@@ -382,3 +382,12 @@ def test_a_wait_with_something_in_it_teaches_no_timeout(bus):
     for _ in range(3):
         bus.say(READ, 300).noise(b"\x55\xaa")
     assert bus.say(READ, 300).run().tracker.timeout is None
+
+
+def test_a_write_that_takes_as_long_as_the_reads_is_an_answer_though_the_timeout_is_near(bus):
+    for _ in range(3):
+        bus.exchange(READ, VALUES, answer=174)
+    bus.say(READ_2, 40).say(READ_2, 200).say(READ_2, 200)
+    bus.exchange(READ, VALUES, answer=174)
+    reading = bus.exchange(WRITE, WRITE, answer=175).run()
+    assert reading.last.verdict is Verdict.ANSWERED

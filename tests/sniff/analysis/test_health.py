@@ -41,8 +41,8 @@ def test_a_bus_in_order_is_at_100_without_reasons() -> None:
     [
         (node(1, 90, no_response=10), 80, "10% of its requests without answer (−20)"),
         (node(1, 0, no_response=10), 0, "100% of its requests without answer (−100)"),
-        (node(1, 90, damaged_answer=10), 70, "10% of its frames damaged (−30)"),
-        (node(1, 50, damaged_answer=50), 40, "50% of its frames damaged (−60)"),
+        (node(1, 90, damaged_answer=10), 70, "10% of its answers damaged (−30)"),
+        (node(1, 50, damaged_answer=50), 40, "50% of its answers damaged (−60)"),
         (node(1, 80, retry=20), 80, "20% answered late, twice or after a repeat (−20)"),
         (node(1, 80, exception=20), 90, "20% answered with an exception (−10)"),
     ],
