@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import heapq
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import groupby, repeat
 
 from sniff.formats import Capture, CaptureError
 from sniff.session import Item, Session
@@ -25,5 +27,14 @@ def merged_session(captures: Sequence[Capture], names: Sequence[str]) -> Session
 
 
 def merged(captures: Sequence[Capture]) -> Iterator[Item]:
-    """The items of all in order of time."""
-    return heapq.merge(*(capture.items() for capture in captures), key=lambda item: item.time)
+    """The items of all in order of time; what several captures have, the same at the same time, once."""
+    sources = [zip(repeat(number), capture.items(), strict=False) for number, capture in enumerate(captures)]
+    in_order = heapq.merge(*sources, key=lambda found: found[1].time)
+    for _, at_once in groupby(in_order, key=lambda found: found[1].time):
+        seen: Counter[tuple[int, Item]] = Counter()  # by source
+        given: Counter[Item] = Counter()
+        for number, item in at_once:
+            seen[number, item] += 1
+            if seen[number, item] > given[item]:
+                given[item] += 1
+                yield item

@@ -43,7 +43,7 @@ RING_CASES: tuple[Case, ...] = (
     ),
     Case(
         "MS/TP station comes back",
-        partial(mstp, polls_every=12, change={9: partial(FailsFor, at=_AWAY, until=4 * S, faults=Faults(off=True))}),
+        partial(mstp, polls_every=20, change={9: partial(FailsFor, at=_AWAY, until=4 * S, faults=Faults(off=True))}),
         (("MS105", "5 → 9"),),
         struck=("MAC 9", "1 → 9", "2 → 9"),
     ),
@@ -72,7 +72,7 @@ RING_CASES: tuple[Case, ...] = (
         struck=("MAC 2", "MAC 5"),
     ),
     Case(
-        "MS/TP slow to be found",
+        "MS/TP found late",
         partial(mstp, change={9: partial(SlowToBeFound, by=17 * MS)}),
         (("MS202", "5 → 9"),),
     ),

@@ -10,6 +10,7 @@ import pytest
 
 from dissectors.frame import Chunk, Frame
 from sniff.editing.anonymising import anonymised, anonymous_session
+from sniff.editing.merging import merged
 from sniff.formats import create, read
 from sniff.formats.text import parse
 from sniff.reading import settled
@@ -115,6 +116,16 @@ def test_parts_of_a_cut_merge_to_the_whole(tmp_path: Path, sniff485: Callable[..
     assert sniff485("cut", whole, "-o", second, "--from", "+5.500000001")[0] == 0
     assert sniff485("merge", second, first, "-o", both)[0] == 0
     assert list(read(both).items()) == list(read(whole).items())
+
+
+def test_what_two_captures_share_is_merged_once() -> None:
+    header = "# line: 19200,8E1\n# start: 2026-03-01T10:00:00Z\n"
+    first = parse(header + "+0 01\n+0 01\n+5 02\n#! +0 note a\n+5 03\n")
+    second = parse(header + "+5 02\n#! +0 note a\n+5 04\n+0 03\n+5 01\n")
+    start = first.session.started
+    assert [(item.time - start) // 1_000_000 for item in merged([first, second])] == [0, 0, 5, 5, 10, 10, 15]
+    assert octets(list(merged([first, second]))) == b"\1\1\2\3\4\1"
+    assert list(merged([first, first, first])) == list(first.items())
 
 
 def test_cut_by_frames_gives_these_frames(tmp_path: Path, sniff485: Callable[..., tuple[int, str, str]]) -> None:
