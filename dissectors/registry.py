@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from importlib import import_module
 from importlib.metadata import entry_points
 from typing import Any
@@ -53,6 +54,21 @@ class Dissector:
     extras: Mapping[str, Any] = field(default_factory=dict)
 
 
+def on_first_use(target: str) -> Callable[..., Any]:
+    """The function "module:name", whose module is imported when it is first called; for `packet`, which needs scapy."""
+
+    def call(*arguments: Any) -> Any:
+        return _load(target)(*arguments)
+
+    return call
+
+
+@cache
+def _load(target: str) -> Any:
+    module, _, name = target.partition(":")
+    return getattr(import_module(module), name)
+
+
 class UnknownProtocol(LookupError):
     """No such protocol; the message lists those there are."""
 
@@ -67,8 +83,7 @@ def get(name: str) -> Dissector:
     """The protocol of that name. Raises UnknownProtocol."""
     target = BUILT_IN.get(name)
     if target is not None:
-        module, _, attribute = target.partition(":")
-        found = getattr(import_module(module), attribute)
+        found = _load(target)
     else:
         for point in entry_points(group=GROUP):
             if point.name == name:

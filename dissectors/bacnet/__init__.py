@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from dissectors.bacnet.fields import fields
 from dissectors.bacnet.findings import MstpFindings, judge
 from dissectors.bacnet.framing import MstpFramer
@@ -15,8 +13,7 @@ from dissectors.bacnet.rules import RULES
 from dissectors.bacnet.segmentation import Reassembler
 from dissectors.bacnet.summary import text
 from dissectors.bacnet.tracker import MstpTracker
-from dissectors.frame import Frame, Role
-from dissectors.registry import Dissector
+from dissectors.registry import Dissector, on_first_use
 
 __all__ = [
     "MSTP",
@@ -34,12 +31,7 @@ __all__ = [
 ]
 
 
-def packet(frame: Frame, role: Role) -> Any:
-    """The scapy packet of a frame; scapy is imported on first use."""
-    from dissectors.bacnet.packets import dissect
-
-    return dissect(frame.octets)
-
+packet = on_first_use("dissectors.bacnet.packets:packet")
 
 MSTP = Dissector(
     name="mstp",

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-from dissectors.frame import Frame, Role
 from dissectors.line import Timing
 from dissectors.modbus.adu import ASCII_NAME, RTU_NAME
 from dissectors.modbus.ascii_framing import AsciiFramer
@@ -16,7 +13,7 @@ from dissectors.modbus.readings import readings, refusal
 from dissectors.modbus.rules import RULES
 from dissectors.modbus.text import text
 from dissectors.modbus.tracker import ModbusTracker
-from dissectors.registry import Dissector
+from dissectors.registry import Dissector, on_first_use
 
 __all__ = [
     "ASCII",
@@ -32,11 +29,8 @@ __all__ = [
 ]
 
 
-def packet(frame: Frame, role: Role) -> Any:
-    """The scapy packet of a frame; scapy is imported on first use."""
-    from dissectors.modbus.packets import dissect
-
-    return dissect(frame, role)
+packet = on_first_use("dissectors.modbus.packets:dissect")
+_EXTRAS = {"findings": ModbusFindings, "rules": RULES, "readings": readings, "refusal": refusal}
 
 
 def ascii_tracker(timing: Timing) -> ModbusTracker:
@@ -54,7 +48,7 @@ RTU = Dissector(
     fields=fields,
     packet=packet,
     default_line="19200,8E1",
-    extras={"findings": ModbusFindings, "rules": RULES, "readings": readings, "refusal": refusal},
+    extras=_EXTRAS,
 )
 
 ASCII = Dissector(
@@ -67,5 +61,5 @@ ASCII = Dissector(
     fields=fields,
     packet=packet,
     default_line="19200,7E1",
-    extras={"findings": ModbusFindings, "rules": RULES, "readings": readings, "refusal": refusal},
+    extras=_EXTRAS,
 )

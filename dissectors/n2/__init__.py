@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-from dissectors.frame import Frame, Role
 from dissectors.n2.fields import fields
 from dissectors.n2.findings import N2Findings
 from dissectors.n2.framing import N2Framer
@@ -14,7 +11,7 @@ from dissectors.n2.readings import readings, refusal
 from dissectors.n2.rules import RULES
 from dissectors.n2.text import text
 from dissectors.n2.tracker import N2Tracker
-from dissectors.registry import Dissector
+from dissectors.registry import Dissector, on_first_use
 
 __all__ = [
     "N2",
@@ -31,12 +28,7 @@ __all__ = [
 ]
 
 
-def packet(frame: Frame, role: Role) -> Any:
-    """The scapy packet of a frame; scapy is imported on first use."""
-    from dissectors.n2.packets import dissect
-
-    return dissect(frame.octets)
-
+packet = on_first_use("dissectors.n2.packets:packet")
 
 N2 = Dissector(
     name="n2",

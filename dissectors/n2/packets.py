@@ -15,6 +15,7 @@ from scapy.fields import Field
 from scapy.packet import Packet, Raw
 
 from dissectors.checksums import sum8
+from dissectors.frame import Frame, Role
 from dissectors.n2.commands import error_name
 from dissectors.n2.objects import (
     ATTRIBUTES,
@@ -305,6 +306,11 @@ class N2Refusal(N2Message):
 
 
 _BY_CODE: dict[bytes, type[N2Message]] = {b"1": N2Read, b"2": N2Write, b"72": N2Override, b"73": N2Release}
+
+
+def packet(frame: Frame, role: Role) -> Packet:
+    """The packet of a frame; its role makes no difference."""
+    return dissect(frame.octets)
 
 
 def dissect(octets: bytes) -> Packet:

@@ -36,6 +36,7 @@ from dissectors.bacnet.packets.network import (
     RoutingTable,
 )
 from dissectors.bacnet.packets.tags import Parameters, Tag, parameters
+from dissectors.frame import Frame, Role
 
 __all__ = [
     "MSTP",
@@ -60,8 +61,14 @@ __all__ = [
     "Tag",
     "UnconfirmedRequest",
     "dissect",
+    "packet",
     "parameters",
 ]
+
+
+def packet(frame: Frame, role: Role) -> Packet:
+    """The packet of a frame; its role makes no difference."""
+    return dissect(frame.octets)
 
 
 def dissect(octets: bytes) -> Packet:
