@@ -10,10 +10,10 @@ from bisect import bisect_left, bisect_right
 from collections import Counter
 
 from dissectors.frame import Frame, LineError
+from dissectors.histogram import Histogram
 from dissectors.profiles import Devices
 from dissectors.registry import Dissector
 from dissectors.tracker import Transaction, Verdict
-from sniff.analysis.histogram import Histogram
 from sniff.analysis.load import Load
 from sniff.analysis.nodes import NodeTable
 from sniff.analysis.points import PointReader, PointTable, words

@@ -84,7 +84,7 @@ def _tokens(ring: Ring) -> Iterable[Finding]:
         yield _of("MS104", "bus", seen, together)
     for mac in ring.masters:
         loop = ring.nodes[mac].loop
-        slow = loop.percentile(0.95)
+        slow = loop.quantile(0.95)
         if slow is not None and loop.count >= LEAST_FRAMES and slow > SLOW_ROUND:
             yield _plain("MS108", ring, _station(mac), f"95% of the rounds took up to {_ms(slow)}")
     for mac, node in ring.nodes.items():
@@ -130,7 +130,7 @@ def _times(ring: Ring) -> Iterable[Finding]:
         if node.use.count >= LEAST_FRAMES and late.count >= max(2, LATE_SHARE * node.use.count):
             seen = (
                 f"{late.count} of {node.use.count} times it used the token over {_ms(T_USAGE_DELAY)} after it came; "
-                f"median {_ms(node.use.percentile(0.5))}, longest {_ms(node.use.most)}"
+                f"median {_ms(node.use.quantile(0.5))}, longest {_ms(node.use.most)}"
             )
             yield _of("MS103", _station(mac), seen, late)
 
@@ -157,7 +157,7 @@ def _answers(ring: Ring) -> Iterable[Finding]:
         if node.postponed >= 5 and node.postponed > POSTPONED_SHARE * node.requests_received:
             seen = f"{node.postponed} of {counted(node.requests_received, 'request')} answered with Reply Postponed"
             if node.service.count:
-                seen += f"; the real answers took {_ms(node.service.percentile(0.5))}, up to {_ms(node.service.most)}"
+                seen += f"; the real answers took {_ms(node.service.quantile(0.5))}, up to {_ms(node.service.most)}"
             yield _plain("MS303", ring, _station(mac), seen, node.postponed)
 
 

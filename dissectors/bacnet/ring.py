@@ -12,8 +12,8 @@ from enum import Enum
 from types import MappingProxyType
 from typing import Any
 
-from dissectors.bacnet.durations import Durations
 from dissectors.bacnet.limits import MAX_MASTER, T_REPLY_DELAY, T_USAGE_DELAY, TURNAROUND_BITS
+from dissectors.histogram import Histogram
 from dissectors.line import Timing
 
 EVENTS_MAX = 32
@@ -109,11 +109,11 @@ class Node:
     first: int = 0
     last: int = 0
     last_token: int = 0
-    use: Durations = field(default_factory=Durations)
-    loop: Durations = field(default_factory=Durations)
-    reply: Durations = field(default_factory=Durations)
-    service: Durations = field(default_factory=Durations)
-    poll_reply: Durations = field(default_factory=Durations)
+    use: Histogram = field(default_factory=Histogram)
+    loop: Histogram = field(default_factory=Histogram)
+    reply: Histogram = field(default_factory=Histogram)
+    service: Histogram = field(default_factory=Histogram)
+    poll_reply: Histogram = field(default_factory=Histogram)
     holds: Mapping[int, int] = field(default_factory=lambda: MappingProxyType({}))
     devices: tuple[int, ...] = ()
 
@@ -269,7 +269,7 @@ class Ring:
             return None
         token = 8 * self.timing.char
         least = self.timing.line.bits(TURNAROUND_BITS)
-        return sum(token + max(least, self.nodes[mac].use.percentile(0.5) or 0) for mac in order if mac in self.nodes)
+        return sum(token + max(least, self.nodes[mac].use.quantile(0.5) or 0) for mac in order if mac in self.nodes)
 
     @property
     def needed_max_master(self) -> int | None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
-from dissectors.bacnet.durations import DurationTally
 from dissectors.bacnet.ring import SUMS, Edge, Event, Happened, Node, Ring, What
+from dissectors.histogram import Histogram
 from dissectors.line import Timing
 
 
@@ -33,11 +33,11 @@ class NodeTally:
     last: int = 0
     last_token: int = 0
     got: int | None = None  # when it last got the token
-    use: DurationTally = field(default_factory=DurationTally)
-    loop: DurationTally = field(default_factory=DurationTally)
-    reply: DurationTally = field(default_factory=DurationTally)
-    service: DurationTally = field(default_factory=DurationTally)
-    poll_reply: DurationTally = field(default_factory=DurationTally)
+    use: Histogram = field(default_factory=Histogram)
+    loop: Histogram = field(default_factory=Histogram)
+    reply: Histogram = field(default_factory=Histogram)
+    service: Histogram = field(default_factory=Histogram)
+    poll_reply: Histogram = field(default_factory=Histogram)
     holds: dict[int, int] = field(default_factory=dict)
     devices: list[int] = field(default_factory=list)
     gone: bool = False  # it was passed over
@@ -50,11 +50,11 @@ class NodeTally:
             first=self.first,
             last=self.last,
             last_token=self.last_token,
-            use=self.use.value(),
-            loop=self.loop.value(),
-            reply=self.reply.value(),
-            service=self.service.value(),
-            poll_reply=self.poll_reply.value(),
+            use=self.use.copy(),
+            loop=self.loop.copy(),
+            reply=self.reply.copy(),
+            service=self.service.copy(),
+            poll_reply=self.poll_reply.copy(),
             holds=MappingProxyType(dict(self.holds)),
             devices=tuple(self.devices),
         )

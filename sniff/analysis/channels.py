@@ -12,11 +12,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from dissectors.findings import Finding, Severity
+from dissectors.histogram import Histogram
 from dissectors.line import NS_PER_S
 from dissectors.registry import Dissector
 from dissectors.tracker import Verdict
 from sniff.analysis.health import health_of, station_health
-from sniff.analysis.histogram import Histogram
 from sniff.analysis.judging import Judging
 from sniff.analysis.nodes import Node
 from sniff.analysis.summary import Summary

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from dissectors.frame import Frame
+from dissectors.histogram import Histogram
 from dissectors.tracker import Transaction, Verdict
-from sniff.analysis.histogram import Histogram
 from sniff.engine import Row
 
 

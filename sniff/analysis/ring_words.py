@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dissectors.bacnet.durations import Durations
 from dissectors.bacnet.ring import Ring, What
+from dissectors.histogram import Histogram
 from sniff.analysis.wording import milliseconds
 
 HEADINGS = (
@@ -85,6 +85,6 @@ def sentences(ring: Ring) -> list[str]:
     return said + list(ring.advice())
 
 
-def _ms(durations: Durations, share: float) -> float | None:
-    value = durations.most if share == 1 else durations.percentile(share)
+def _ms(durations: Histogram, share: float) -> float | None:
+    value = durations.most if share == 1 else durations.quantile(share)
     return None if value is None else value / 1e6

@@ -6,9 +6,9 @@ from collections import Counter
 from dataclasses import dataclass, field
 
 from dissectors.frame import Frame, LineError
+from dissectors.histogram import Histogram
 from dissectors.line import LineSettings
 from dissectors.tracker import Transaction, Verdict
-from sniff.analysis.histogram import Histogram
 from sniff.analysis.load import KEPT_SECONDS, Load
 from sniff.analysis.nodes import NodeTable
 from sniff.analysis.wording import mark_names

@@ -9,10 +9,10 @@ import argparse
 from collections import Counter
 from pathlib import Path
 
+from dissectors.histogram import Histogram
 from dissectors.line import NS_PER_S
 from dissectors.tracker import Transaction
 from sniff.analysis.health import HealthReport, health_of
-from sniff.analysis.histogram import Histogram
 from sniff.analysis.judging import Judging
 from sniff.analysis.load import Second
 from sniff.analysis.nodes import Node

@@ -9,8 +9,8 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
+from dissectors.histogram import Histogram
 from dissectors.line import NS_PER_S
-from sniff.analysis.histogram import Histogram
 
 CLASSES = tuple(round(10_000 * 10 ** (step / 24)) for step in range(169))
 """Edges of the classes of a distribution, ns: 24 a decade from 10 µs to 100 s."""

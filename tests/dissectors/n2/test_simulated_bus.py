@@ -13,8 +13,8 @@ from dissectors.line import LineSettings, Timing
 from dissectors.n2 import N2, interpret
 from dissectors.n2.f510 import POINTS
 from dissectors.n2.findings import N2Findings
-from dissectors.n2.rules import RULES
 from dissectors.n2.framing import judge
+from dissectors.n2.rules import RULES
 from dissectors.n2.simulated import (
     Follower,
     Job,

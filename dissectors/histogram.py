@@ -1,4 +1,4 @@
-"""A mergeable histogram of durations with bounded memory and a stated precision."""
+"""Many durations in little memory: a histogram with a stated precision, so that parts of a capture add up."""
 
 from __future__ import annotations
 
@@ -45,6 +45,10 @@ class Histogram:
             min(least, default=None),
             max(most, default=None),
         )
+
+    def copy(self) -> Histogram:
+        """As it is now, for a value that does not change any more."""
+        return Histogram(Counter(self.buckets), dict(self.tops), self.count, self.total, self.least, self.most)
 
     @property
     def mean(self) -> float | None:

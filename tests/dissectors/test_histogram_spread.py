@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sniff.analysis.histogram import Histogram
+from dissectors.histogram import Histogram
 
 EDGES = [10, 1000, 100_000]
 

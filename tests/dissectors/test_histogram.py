@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sniff.analysis.histogram import Histogram
+from dissectors.histogram import Histogram
 
 durations = st.lists(st.integers(0, 10**12), min_size=1, max_size=200)
 
