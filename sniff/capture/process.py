@@ -19,7 +19,7 @@ from sniff.capture.config import CaptureConfig, SourceSpec
 from sniff.capture.loop import CaptureLoop
 from sniff.capture.outlet import Outlet
 from sniff.capture.priority import raise_priority
-from sniff.capture.wire import Kind, MessageSplitter, WireError, decode_json, encode, encode_json
+from sniff.capture.wire import Kind, MessageSplitter, WireError, decode_json, encode, encode_json, encode_status
 from sniff.formats import CaptureError
 from sniff.recording.rotation import Rotation
 from sniff.recording.writer import Recorder
@@ -120,6 +120,8 @@ def _capture(
             source.close()
         for recorder in recorders:
             recorder.close()
+    for bus in range(len(recorders)):  # what could not be written to the end
+        outlet.post(encode_status(loop.status(bus)))
     waker.close()
     outlet.finish(encode(Kind.ENDED, 0, reason.encode()), FAREWELL)
     return 0

@@ -121,6 +121,24 @@ def duration(text: str) -> float:
     return seconds
 
 
+def positive(text: str) -> int:
+    """argparse type for how many."""
+    if not (text.isascii() and text.isdigit() and int(text) > 0):
+        raise argparse.ArgumentTypeError(f"{text!r}: expected a whole number from 1 on")
+    return int(text)
+
+
+def rotation(text: str) -> str:
+    """argparse type for --rotate."""
+    from sniff.recording.rotation import Rotation
+
+    try:
+        Rotation.parse(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+    return text
+
+
 def open_capture(path: str) -> Capture:
     """Open a capture, or end with exit code 3 (2 for an unknown suffix)."""
     try:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import os
 import re
 import signal
 import sys
@@ -120,6 +121,16 @@ def start_link(source: SourceSpec, record: RecordSpec | None, duration: float | 
         raise Failure(str(error), UNREADABLE) from None
 
 
+def refuse_recording(path: str) -> None:
+    """Refuse what cannot be a recording before the port is opened. Ends with exit code 2, 3 for a directory."""
+    if path == "-":
+        raise Failure("-w -: a recording needs a file; `sniff485 live PORT --json` gives frames as they come", USAGE)
+    if path.endswith(("/", os.sep)) or Path(path).is_dir():
+        raise Failure(f"{path}: a directory; name a file in it", UNREADABLE)
+    if not path.lower().endswith(".mcap"):
+        raise Failure(f"{path}: recordings are .mcap; convert it afterwards with `sniff485 convert`", USAGE)
+
+
 def new_recording(bus: str) -> str:
     """A name in this folder that no file has: sniff485-<bus>-<date>-<time>.mcap."""
     stem = f"sniff485-{bus}-{time.strftime('%Y%m%d-%H%M%S')}"
@@ -152,6 +163,7 @@ class Printer:
         self.colour = colour
         self.summary = Summary(live.session.line, kept_seconds=60)
         self._session = live.session
+        self._trouble = ""
         self._settling = Settling(live.points)
 
     def take(self, items: list[Output | LineEvent | Status | Ended]) -> None:
@@ -163,12 +175,20 @@ class Printer:
                 self._take_output(item)
             elif isinstance(item, LineEvent):
                 self.summary.add_line_event(item)
-                if item.kind is not LineEventKind.SETTINGS:  # those of a search are said where it is shown
-                    self._say(f"{item.kind.value} {item.text}".strip())
+                self._say_event(item)
+            elif isinstance(item, Status) and item.error != self._trouble:
+                self._trouble = item.error
+                self._say(f"recording: {item.error or 'goes on'}")
             elif isinstance(item, Ended) and not item.clean:
                 self._say(item.reason)
         if not self.quiet:
             sys.stdout.flush()
+
+    def _say_event(self, event: LineEvent) -> None:
+        if event.kind in (LineEventKind.UNPLUGGED, LineEventKind.REPLUGGED):
+            print(f"sniff485: {event.text}", file=sys.stderr)  # names the port
+        elif event.kind is not LineEventKind.SETTINGS:  # those of a search are said where it is shown
+            self._say(f"{event.kind.value} {event.text}".strip())
 
     def _settle(self) -> None:
         """A search has ended: go on with what it found."""
@@ -228,6 +248,8 @@ def run(printer: Printer, count: int | None = None, duration: float | None = Non
             shown.clear()
     if live.ended is not None and not live.ended.clean:
         return PORT_TROUBLE
+    if live.status.error or live.status.lost:
+        return UNREADABLE  # what was asked for is not all in the file
     if live.engine.searching:
         say_not_found(live, "interrupted" if caught else "ended")
         return INTERRUPTED if caught else PORT_TROUBLE
@@ -263,11 +285,11 @@ def say_end(printer: Printer) -> None:
             f"sniff485: response time p50 {milliseconds(middle)}, max {milliseconds(most)} (each ±{bound})",
             file=sys.stderr,
         )
-    for what, octets in (("not shown here", status.dropped), ("NOT RECORDED", status.lost)):
-        if octets:
-            print(f"sniff485: {octets} octets {what}: this host did not keep up", file=sys.stderr)
-    if status.error:
-        print(f"sniff485: recording: {status.error}", file=sys.stderr)
+    if status.dropped:
+        print(f"sniff485: {status.dropped} octets not shown here: this host did not keep up", file=sys.stderr)
+    if status.lost:
+        why = "" if status.error else ": the disk did not keep up"
+        print(f"sniff485: {status.lost} octets NOT RECORDED{why}", file=sys.stderr)
     if status.path:
         print(f"sniff485: recorded to {status.path}", file=sys.stderr)
 

@@ -32,6 +32,8 @@ def run(args: argparse.Namespace) -> int:
     if args.no_record and args.write:
         raise Failure("--no-record and -w contradict each other", USAGE)
     path = None if args.no_record else args.write or target.record or listening.new_recording(target.source.bus)
+    if path:
+        listening.refuse_recording(path)
     live = listening.start(
         target.source, RecordSpec(path) if path else None, args.duration, target.devices, target.search
     )

@@ -17,9 +17,14 @@ def configure(parser: argparse.ArgumentParser) -> None:
     arguments.add_devices(parser)
     parser.add_argument("-w", "--write", metavar="FILE", help="recording (.mcap); default: a new name in this folder")
     parser.add_argument("--duration", type=arguments.duration, metavar="TIME", help="stop after: 90, 90s, 5m, 2h")
-    parser.add_argument("--count", type=int, metavar="N", help="stop after N frames")
-    parser.add_argument("--rotate", metavar="RULE", help="begin a new file by size:64MB, time:1h, or both with a comma")
-    parser.add_argument("--keep", type=int, metavar="N", help="keep the N newest files of a rotation")
+    parser.add_argument("--count", type=arguments.positive, metavar="N", help="stop after N frames")
+    parser.add_argument(
+        "--rotate",
+        type=arguments.rotation,
+        metavar="RULE",
+        help="begin a new file by size:64MB, time:1h, or both with a comma",
+    )
+    parser.add_argument("--keep", type=arguments.positive, metavar="N", help="keep the N newest files of a rotation")
     parser.add_argument("-q", "--quiet", action="store_true", help="no progress, no summary")
 
 
@@ -27,8 +32,9 @@ def run(args: argparse.Namespace) -> int:
     """Record until the end."""
     target = listening.target_of(args)
     path = args.write or target.record or listening.new_recording(target.source.bus)
-    if not str(path).lower().endswith(".mcap"):
-        raise Failure(f"{path}: recordings are .mcap; convert it afterwards with `sniff485 convert`", USAGE)
+    listening.refuse_recording(path)
+    if args.keep and not args.rotate:
+        raise Failure("--keep: of which rotation? say when a new file begins with --rotate size:64MB or time:1h", USAGE)
     live = listening.start(
         target.source, RecordSpec(path, args.rotate, args.keep), devices=target.devices, search=target.search
     )

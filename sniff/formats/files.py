@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import stat
 from pathlib import Path
@@ -17,13 +18,19 @@ WAYS_OUT = {
     FileExistsError: "exists already; choose another name or remove it",
 }
 
+BY_NUMBER = {
+    errno.ENOSPC: "no space left on the disk; make room, or write elsewhere",
+    errno.EDQUOT: "the quota of this user is used up; make room, or write elsewhere",
+    errno.EROFS: "the file system is read-only; write elsewhere",
+}
+
 
 def explain(path: str | Path, error: OSError) -> CaptureError:
     """An error of the operating system as one line with the way out."""
     for kind, words in WAYS_OUT.items():
         if isinstance(error, kind):
             return CaptureError(f"{path}: {words}")
-    return CaptureError(f"{path}: {error.strerror or error}")
+    return CaptureError(f"{path}: {BY_NUMBER.get(error.errno or 0) or error.strerror or error}")
 
 
 def open_capture(path: Path) -> BinaryIO:

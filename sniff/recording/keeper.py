@@ -70,6 +70,7 @@ class Keeper:
         self._next = 0  # number of the next entry of /raw
         self._octets = 0  # of the bus, in all parts
         self._finished_size = 0
+        self._unwritten = 0  # octets of the bus that were taken since everything was in the file
         self._first = 0  # of the part
         self._began: int | None = None  # time of the part's first batch
         try:
@@ -119,6 +120,7 @@ class Keeper:
         for message in batch.messages:
             self._part.add(message, batch.schema, batch.metadata)
         self._octets += batch.octets
+        self._unwritten += batch.octets
         self._next = batch.next
         if self._began is None and batch.messages[-1].topic == RAW:
             self._began = batch.messages[-1].publish_time
@@ -131,6 +133,7 @@ class Keeper:
 
     def _flush(self) -> None:
         self._part.flush()
+        self._unwritten = 0
 
     def _sync(self) -> None:
         self._part.sync()
@@ -141,8 +144,11 @@ class Keeper:
         self._open()
         try:
             old.finish()
+            self._unwritten = 0
             old.sync()
         finally:
+            self.lost_octets += self._unwritten
+            self._unwritten = 0
             self._finished_size += old.size - old.waiting
             old.stream.close()
             if self._keep is not None:
@@ -151,8 +157,10 @@ class Keeper:
     def _finish(self) -> None:
         try:
             self._part.finish()
+            self._unwritten = 0
             self._part.sync()
         finally:
+            self.lost_octets += self._unwritten  # at most: some of them may be in the file
             with contextlib.suppress(OSError):
                 self._part.stream.close()
 
@@ -188,6 +196,8 @@ def _sync_folder(folder: Path) -> None:
 
 
 def _refused(path: Path, error: OSError) -> CaptureError:
+    if path.is_dir():
+        return CaptureError(f"{path}: a directory; name a file in it")
     if isinstance(error, FileNotFoundError):
         return CaptureError(f"{path}: no such directory; create {path.parent} first")
     return explain(error.filename or path, error)
