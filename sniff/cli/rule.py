@@ -48,14 +48,21 @@ def to_json(rule: Rule) -> dict[str, str]:
         "explanation": rule.explanation,
         "means": rule.means,
         "next": rule.next,
+        "explains": " ".join(rule.explains),
     }
 
 
 def _explained(rule: Rule) -> str:
     lines = [f"{rule.code}  {rule.title}  ({rule.severity.label} unless said otherwise)", ""]
     lines += textwrap.wrap(rule.explanation, WIDTH)
-    for word, text in (("consistent with", rule.means), ("check next", rule.next)):
+    explains = f"{', '.join(map(_codes, rule.explains))}, where it is an error" if rule.explains else ""
+    for word, text in (("consistent with", rule.means), ("check next", rule.next), ("explains", explains)):
         if text:
             head = f"{word}: "
             lines += ["", *textwrap.wrap(head + text, WIDTH, subsequent_indent=" " * len(head))]
     return "\n".join(lines)
+
+
+def _codes(begin: str) -> str:
+    """A code, or the begin of several: "MB005", "LN2…"."""
+    return begin if begin in all_rules() else f"{begin}…"

@@ -1,0 +1,61 @@
+"""What an error explains is a note that names it; words for counts."""
+
+from __future__ import annotations
+
+from dissectors.findings import Finding, Rule, Severity, counted, times, with_consequences
+
+RULES = {
+    "XX1": Rule("XX1", Severity.ERROR, "two senders", "", explains=("XX2", "YY")),
+    "XX2": Rule("XX2", Severity.WARNING, "damage", ""),
+    "XX3": Rule("XX3", Severity.WARNING, "slow", ""),
+}
+
+
+def finding(code: str, subject: str, severity: Severity = Severity.WARNING) -> Finding:
+    return Finding(code, severity, subject, 0, 9, 4, (7,), "seen", "means", "next")
+
+
+def after(*findings: Finding) -> dict[tuple[str, str], Finding]:
+    made = with_consequences(findings, RULES)
+    assert [(one.code, one.subject, one.seen, one.count) for one in made] == [
+        (one.code, one.subject, one.seen, one.count) for one in findings
+    ]
+    return {(one.code, one.subject): one for one in made}
+
+
+def test_an_error_about_the_bus_explains_everybodys_trouble() -> None:
+    made = after(finding("XX1", "bus", Severity.ERROR), finding("XX2", "station 3"), finding("YY7", "master"))
+    assert made["XX1", "bus"].severity is Severity.ERROR
+    for key in (("XX2", "station 3"), ("YY7", "master")):
+        assert made[key].severity is Severity.NOTE
+        assert made[key].means == "most likely a consequence of XX1 (bus: two senders)"
+        assert made[key].next.startswith("settle XX1 first")
+
+
+def test_what_it_does_not_name_stays() -> None:
+    other = finding("XX3", "station 3")
+    assert after(finding("XX1", "bus", Severity.ERROR), other)["XX3", "station 3"] == other
+
+
+def test_an_error_about_a_station_explains_that_station_and_the_bus_only() -> None:
+    made = after(
+        finding("XX1", "station 2", Severity.ERROR),
+        finding("XX2", "station 2"),
+        finding("XX2", "station 3"),
+        finding("YY1", "bus"),
+    )
+    assert made["XX2", "station 2"].severity is Severity.NOTE
+    assert made["XX2", "station 3"].severity is Severity.WARNING
+    assert made["YY1", "bus"].severity is Severity.NOTE
+
+
+def test_a_warning_explains_nothing_and_an_information_is_not_raised() -> None:
+    assert after(finding("XX1", "bus"), finding("XX2", "bus"))["XX2", "bus"].severity is Severity.WARNING
+    low = finding("XX2", "bus", Severity.INFO)
+    assert after(finding("XX1", "bus", Severity.ERROR), low)["XX2", "bus"].severity is Severity.INFO
+
+
+def test_words_for_counts() -> None:
+    assert [times(count) for count in (1, 2, 3)] == ["once", "twice", "3 times"]
+    assert [counted(count, "answer") for count in (0, 1, 2)] == ["0 answers", "1 answer", "2 answers"]
+    assert counted(2, "stretch", "stretches") == "2 stretches"
