@@ -1,11 +1,11 @@
 """The filter language of `show -Y` and of the terminal UI's `/`: Wireshark's grammar over our columns and fields.
 
     dst == 3 && kind contains "write"          src in {1, 2, 5}        latency_ms > 50
-    !ok or verdict == no-response              modbus.func_code == 0x10   error matches "CRC|LRC"
+    !ok or verdict == "no answer"              modbus.func_code == 0x10   error matches "CRC|LRC"
 
 Names without a dot are columns (COLUMNS below), dotted names are fields as `show -T fields` lists them. A comparison
 with something that a frame does not have is false, also `!=`. A name alone is true when the frame has it and it is
-neither 0 nor empty. Pure.
+neither 0 nor empty. A verdict may be written as people read it ("no answer") or as JSON has it (no-response). Pure.
 """
 
 from __future__ import annotations

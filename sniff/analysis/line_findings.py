@@ -290,8 +290,12 @@ class LineFindings:
 
     def _stray_finding(self, code: str, name: str, record: _Sender, tally: Tally, frames: int) -> Finding:
         where = {"LN201": "before", "LN202": "after"}.get(code)
-        words = f"stray octets {times(tally.count)}"
-        words += f" {where} {counted(frames, 'frame')}" if where else f" in the silence between {frames} frames"
+        if where is None:
+            words = f"stray octets {times(tally.count)} in the silence between {counted(frames, 'frame')}"
+        elif tally.count > frames:
+            words = f"stray octets {times(tally.count)} {where} {counted(frames, 'frame')}"
+        else:
+            words = f"stray octets {where} {tally.count} of {counted(frames, 'frame')}"
         most = [value for (rule, value), _ in record.values.most_common() if rule == code][:4]
         words += f" (mostly {', '.join(f'{value:02X}' for value in most)})"
         return tally.found(RULES[code], name, words, self._note_if(tally.count, frames))
