@@ -47,7 +47,6 @@ class LiveFeed:
     def status(self) -> FeedStatus:
         """How the capture is doing."""
         status, ended = self.live.status, self.live.ended
-        trouble = status.error or (ended.reason if ended is not None else "")
         searching = self.live.searching
         return FeedStatus(
             port=self.live.session.port,
@@ -57,7 +56,8 @@ class LiveFeed:
             file_size=status.size,
             dropped=status.dropped + status.lost,
             live=True,
-            ended=trouble,
+            ended=ended.reason if ended is not None else "",
+            trouble=status.error,
             priority=status.priority,
             searching="" if searching is None else f"{searching.line}",
         )

@@ -65,6 +65,7 @@ class SnifferApp(App[None]):
         self.visited = [start_screen]
         self._worker: Timer | None = None
         self._told_end = False
+        self._told_trouble = ""
         self._asked_to_quit = 0.0
 
     @property
@@ -86,6 +87,12 @@ class SnifferApp(App[None]):
             return
         changed = self.feed.poll()
         was_searching, self.status = self.status.searching, self.feed.status()
+        if self.status.trouble != self._told_trouble:
+            self._told_trouble = self.status.trouble
+            said = plain(self.status.trouble) or "it goes on"
+            self.notify(
+                said, title="recording", severity="error" if self.status.trouble else "information", markup=False
+            )
         if was_searching and not self.status.searching:
             self._take_what_was_found()
         if self.status.ended and not self._told_end:

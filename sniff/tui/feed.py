@@ -17,6 +17,7 @@ class FeedStatus:
     read. `dropped`: octets or rows that were lost on the way here. `live`: whether rows still come from a port.
     `ended`: why nothing more comes ("unplugged", "file ends inside a record"), empty while all is well.
     `priority`: what the system allowed the capture process, in words ("real-time", "normal"), empty when unknown.
+    `trouble`: why nothing is written any more although the capture goes on ("no space left on the disk …").
     `searching`: with which settings a search listens at the moment, empty when there is none.
     """
 
@@ -30,6 +31,7 @@ class FeedStatus:
     ended: str = ""
     priority: str = ""
     searching: str = ""
+    trouble: str = ""
 
 
 class Feed(Protocol):

@@ -22,6 +22,8 @@ def record_state(status: FeedStatus) -> str:
         return "ENDED"
     if not status.live:
         return "FILE"
+    if status.trouble:
+        return "REC FAILS"
     return "REC" if status.recording else "NOT REC"
 
 
@@ -33,7 +35,7 @@ def status_line(status: FeedStatus, store: Store, viewing: Viewing, width: int) 
         *([] if status.searching else [(plain(status.line), ""), (plain(status.protocol), "")]),
         (f"load {store.load.share():.0%}", ""),
         (f"err {store.error_total}", "bad" if store.error_total else ""),
-        (state, {"REC": "bad", "NOT REC": "doubt", "ENDED": "doubt"}.get(state, "")),
+        (state, {"REC": "bad", "REC FAILS": "bad", "NOT REC": "doubt", "ENDED": "doubt"}.get(state, "")),
         (size(status.file_size), ""),
     ]
     if status.dropped:

@@ -11,6 +11,7 @@ from dissectors.frame import Chunk, Frame
 from dissectors.line import LineSettings
 from sniff.analysis.judging import Judging
 from sniff.analysis.summary import Summary
+from sniff.editing.cutting import Stretch, cut
 from sniff.engine import Output, Row
 from sniff.reading import outputs, with_settings
 from sniff.session import UNKNOWABLE, Adapter, Item, LineEvent, LineEventKind, Session, SettingsChange
@@ -152,6 +153,17 @@ def test_memory_is_bounded() -> None:
     engine = SessionEngine(OPEN)
     given_back = sum(len(engine.feed(Chunk(number, b"x")).rows) for number in range(MOST_HELD_READS + 5))
     assert given_back == MOST_HELD_READS + 1
+
+
+def test_a_stretch_cut_out_of_a_search_still_says_with_what_it_was_heard() -> None:
+    whole = rows_of(searched(), FOUND)
+    for first in (0, 60, 120, 200, 320):
+        part = list(cut(searched(), Stretch(first * MS, 1000 * MS), 0))
+        rows = rows_of(part, FOUND)
+        assert [(row.searched, row.event.octets) for row in rows] == [
+            (row.searched, row.event.octets) for row in whole[len(whole) - len(rows) :]
+        ]
+        assert len(rows) == len([item for item in searched() if isinstance(item, Chunk) and item.time >= first * MS])
 
 
 LINES = st.sampled_from([FIRST, RIGHT, LineSettings(38400)])

@@ -209,7 +209,7 @@ def test_disk_full_then_room_again(tmp_path: Path) -> None:
     disk = fill(recorder, 5000)
     give(recorder, items[:2000])
     eventually(lambda: recorder.trouble is not None, "nobody noticed")
-    assert recorder.trouble == f"{recorder.path}: No space left on device"
+    assert recorder.trouble == f"{recorder.path}: no space left on the disk; make room, or write elsewhere"
     partly = list(capture(recorder.path).items())
     assert partly == items[: len(partly)]
     disk.room = 10**9
@@ -257,6 +257,8 @@ def test_disk_full_at_the_end(tmp_path: Path) -> None:
     found = list(capture(recorder.path).items())
     assert found == items[: len(found)]
     assert not capture(recorder.path).completeness().whole
+    missing = sum(len(item.octets) for item in items[len(found) :] if isinstance(item, Chunk))
+    assert missing <= recorder.lost_octets <= recorder.octets, "at most so many, and no less"
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="RLIMIT_FSIZE as Linux does it")

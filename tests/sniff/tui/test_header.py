@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -23,6 +24,12 @@ def test_everything_is_there(busy_bus: Any) -> None:
     assert text == "/dev/ttyUSB0  19200,8E1  modbus-rtu  load 16%  err 5  REC  12.3 MB  FOLLOW"
 
 
+def test_a_search_stands_in_the_place_of_what_is_searched_for(busy_bus: Any) -> None:
+    status = replace(LIVE, searching="9600,8N1")
+    text = line(status, Viewing(busy_bus.store, follow=True))
+    assert text == "/dev/ttyUSB0  searching 9600,8N1 …  load 16%  err 5  REC  12.3 MB  FOLLOW"
+
+
 def test_frozen_says_how_many_rows_came(busy_bus: Any) -> None:
     viewing = Viewing(busy_bus.store, follow=True)
     viewing.freeze(True)
@@ -36,6 +43,7 @@ def test_frozen_says_how_many_rows_came(busy_bus: Any) -> None:
     [
         (LIVE, "REC"),
         (FeedStatus("p", "l", "n2", live=True), "NOT REC"),
+        (FeedStatus("p", "l", "n2", "/x", live=True, trouble="/x: no space left"), "REC FAILS"),
         (FeedStatus("f.mcap", "l", "n2"), "FILE"),
         (FeedStatus("p", "l", "n2", "/x", live=True, ended="unplugged"), "ENDED"),
     ],
