@@ -283,7 +283,7 @@ class Ring:
         for mac in self.masters:
             node = self.nodes[mac]
             if needed is not None and node.polls_unanswered and needed < node.highest_polled <= MAX_MASTER:
-                words.append(f"station {mac} polls up to {node.highest_polled}: Max_Master {needed} would do")
+                words.append(f"MAC {mac} polls up to {node.highest_polled}: Max_Master {needed} would do")
         return tuple(words)
 
     def of(self, what: What, mac: int | None = None) -> Happened:
