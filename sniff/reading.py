@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 
 from dissectors import registry
@@ -22,6 +22,8 @@ HELD = 20_000
 REMEMBERED = 1000
 """Rows for which a closed transaction is still known after its last one: a row may be placed in it afterwards."""
 
+Wanted = Callable[[Row, Transaction | None], bool]
+
 
 @dataclass(frozen=True, slots=True)
 class Settled:
@@ -35,9 +37,10 @@ class Settled:
 class Settling:
     """Holds rows until their transaction has closed, so that each can be shown with its verdict; keeps the order."""
 
-    def __init__(self, points: PointReader | None = None) -> None:
-        """`points`, fed before this, says what rows mean to their devices."""
+    def __init__(self, points: PointReader | None = None, wanted: Wanted | None = None) -> None:
+        """`points`, fed before this, says what rows mean to their devices. Only rows that are `wanted` are given."""
         self._points = points
+        self._wanted = wanted
         self._rows: deque[Row] = deque()
         self._closed: dict[int, Transaction] = {}
         self._in_order: deque[Transaction] = deque()  # the same, as they closed
@@ -49,22 +52,22 @@ class Settling:
             self._closed[transaction.id] = transaction
             self._in_order.append(transaction)
         while self._rows and (len(self._rows) > HELD or self._is_settled(self._rows[0])):
-            yield self._pop()
+            yield from self._pop()
 
     def flush(self) -> Iterator[Settled]:
         """Give all that is left."""
         while self._rows:
-            yield self._pop()
+            yield from self._pop()
 
     def _is_settled(self, row: Row) -> bool:
         return row.placement is None or row.placement.tx in self._closed
 
-    def _pop(self) -> Settled:
+    def _pop(self) -> Iterator[Settled]:
         row = self._rows.popleft()
-        said = "" if self._points is None else self._points.words(row)
         transaction = None if row.placement is None else self._closed.get(row.placement.tx)
         self._forget(row.no - REMEMBERED)
-        return Settled(row, transaction, said)
+        if self._wanted is None or self._wanted(row, transaction):
+            yield Settled(row, transaction, "" if self._points is None else self._points.words(row))
 
     def _forget(self, before: int) -> None:
         """Let go of what closed and has no row left that could ask for it."""
@@ -85,10 +88,10 @@ def with_settings(session: Session, protocol: str | None = None, line: LineSetti
     )
 
 
-def outputs(items: Iterable[Item], session: Session) -> Iterator[Output | LineEvent]:
-    """Run items through a new engine; line events pass through at their place. Raises CaptureError as `items` does,
+def outputs(items: Iterable[Item], session: Session, pairing: bool = True) -> Iterator[Output | LineEvent]:
+    """Run items through a new engine (without `pairing`: no transactions); line events pass through at their place. Raises CaptureError as `items` does,
     when all that was whole before the damage has been given."""
-    engine = engine_for(session)
+    engine = SessionEngine(session, pairing)
     try:
         for item in items:
             output = engine.take(item)
@@ -102,16 +105,20 @@ def outputs(items: Iterable[Item], session: Session) -> Iterator[Output | LineEv
     yield engine.close()
 
 
-def settled(items: Iterable[Item], session: Session, devices: Devices | None = None) -> Iterator[Settled]:
-    """Run items through a new engine; give every row with its verdict, and in words where its device is known.
-    Raises CaptureError as `outputs` does."""
+def settled(
+    items: Iterable[Item], session: Session, devices: Devices | None = None, wanted: Wanted | None = None
+) -> Iterator[Settled]:
+    """Run items through a new engine; give the rows that are `wanted` (by default all) with their verdicts.
+
+    Where the device is known, also what they mean to it. Raises CaptureError as `outputs` does.
+    """
     points = PointReader(dissector_for(session), devices) if devices else None
-    settling = Settling(points)
+    settling = Settling(points, wanted)
     try:
         for output in outputs(items, session):
             if isinstance(output, Output):
                 if points is not None:
-                    points.add(output)
+                    points.remember(output)
                 yield from settling.add(output)
     except CaptureError:
         yield from settling.flush()

@@ -70,6 +70,15 @@ class _Remembered:
     frame: Frame
 
 
+@dataclass(frozen=True, slots=True)
+class _Exchange:
+    """A transaction whose values count. `response`: None where none was to come."""
+
+    transaction: Transaction
+    request: _Remembered
+    response: _Remembered | None
+
+
 class PointReader:
     """Takes values out of what the engine gives. Bounded memory."""
 
@@ -82,17 +91,12 @@ class PointReader:
 
     def add(self, output: Output) -> list[Sample]:
         """Take rows and closed transactions; give the samples that these complete, in the order of closing."""
-        if self._readings is None:
-            return []
-        for row in output.rows:
-            if isinstance(row.event, Frame) and row.event.ok:
-                self._frames[row.no] = row.event
-        samples: list[Sample] = []
-        for transaction in output.transactions:
-            samples += self._samples(transaction)
-        while len(self._frames) > MOST_OPEN:
-            self._frames.popitem(last=False)
-        return samples
+        return [sample for exchange in self._exchanges(output) for sample in self._samples(exchange)]
+
+    def remember(self, output: Output) -> None:
+        """Take rows and closed transactions for `words` alone: no value is worked out."""
+        for _ in self._exchanges(output):
+            pass
 
     def words(self, row: Row) -> str:
         """What a row says of its device: "drive 1: run, reverse"; empty when no profile knows.
@@ -102,7 +106,21 @@ class PointReader:
         asked = self._asked.get(row.placement.tx) if row.placement is not None else None
         return words(self._dissector, self.devices, row, asked.frame if asked is not None else None)
 
-    def _samples(self, transaction: Transaction) -> Iterator[Sample]:
+    def _exchanges(self, output: Output) -> Iterator[_Exchange]:
+        if self._readings is None:
+            return
+        for row in output.rows:
+            if isinstance(row.event, Frame) and row.event.ok:
+                self._frames[row.no] = row.event
+        for transaction in output.transactions:
+            exchange = self._exchange(transaction)
+            if exchange is not None:
+                yield exchange
+        while len(self._frames) > MOST_OPEN:
+            self._frames.popitem(last=False)
+
+    def _exchange(self, transaction: Transaction) -> _Exchange | None:
+        """The frames of a transaction that tells something."""
         request = self._take(transaction.request)
         response = self._take(transaction.response)
         if request is not None:
@@ -114,17 +132,21 @@ class PointReader:
             request = self._asked.get(transaction.of)
             if request is not None:
                 self._asked[transaction.id] = request
-        if request is None or self._readings is None:
-            return
+        if request is None:
+            return None
         if verdict in _ALONE:
-            readings, response = self._readings(request.frame, None), None
-        elif response is not None and (verdict in _WHOLE or verdict is Verdict.LATE):
-            readings = self._readings(request.frame, response.frame)
-        else:
-            return
+            return _Exchange(transaction, request, None)
+        if response is not None and (verdict in _WHOLE or verdict is Verdict.LATE):
+            return _Exchange(transaction, request, response)
+        return None
+
+    def _samples(self, exchange: _Exchange) -> Iterator[Sample]:
+        request, response = exchange.request, exchange.response
+        readings = self._readings(request.frame, response.frame if response else None) if self._readings else ()
         if not readings:
             return
-        station = None if verdict is Verdict.BROADCAST else transaction.station
+        transaction = exchange.transaction
+        station = None if transaction.verdict is Verdict.BROADCAST else transaction.station
         if readings[0].station is not None:
             station = readings[0].station
         confirmed = (response or request).frame.end

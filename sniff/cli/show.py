@@ -11,7 +11,7 @@ import sys
 from collections.abc import Iterable, Iterator
 
 from dissectors.registry import Dissector
-from sniff.analysis.filtering import PREFIXES, FilterError, compile_filter
+from sniff.analysis.filtering import PREFIXES, FilterError, Predicate, compile_filter
 from sniff.analysis.packet_tree import Field
 from sniff.analysis.row_tree import tree_of
 from sniff.cli import USAGE, Failure, arguments, rows
@@ -48,7 +48,9 @@ def run(args: argparse.Namespace) -> int:
         session = arguments.settings_of(args, capture.session)
         dissector = dissector_for(session)
         devices = arguments.noted_devices(args, session)
-        left = _show(args, settled(capture.items(), session, devices), session, dissector, left)
+        wanted = _filter(args, dissector)
+        spoken = devices if not args.table or "text" in args.names else None
+        left = _show(args, settled(capture.items(), session, spoken, wanted), session, dissector, left)
         complete = capture.completeness()
         if not complete.whole:
             sys.stdout.flush()
@@ -58,32 +60,36 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _show(
-    args: argparse.Namespace, items: Iterable[Settled], session: Session, dissector: Dissector, left: int | None
-) -> int | None:
+def _filter(args: argparse.Namespace, dissector: Dissector) -> Predicate:
     try:
-        wanted = compile_filter(args.filter, dissector)
+        return compile_filter(args.filter, dissector)
     except FilterError as error:
         raise Failure(f"filter {args.filter!r}: {error}", USAGE) from None
+
+
+def _show(
+    args: argparse.Namespace,
+    items: Iterable[Settled],
+    session: Session,
+    dissector: Dissector,
+    left: int | None,
+) -> int | None:
     colour = arguments.colour()
     writer = csv.writer(sys.stdout, delimiter="\t", lineterminator="\n", quoting=csv.QUOTE_MINIMAL)
-    for item in items:
-        if left == 0:
-            break
-        if not wanted(item.row, item.transaction):
-            continue
+    for item in items if left != 0 else ():
         left = None if left is None else left - 1
         if args.table:
             writer.writerow(_cells(item, args.names, dissector, session))
-            continue
-        if args.json:
+        elif args.json:
             print(rows.json_line(item, dissector, session, args.fields))
-            continue
-        print(rows.text_line(item, dissector, session, colour))
-        if args.tree:
-            print(_tree(item, dissector))
-        if args.hex:
-            print(rows.hex_dump(item.row.event.octets))
+        else:
+            print(rows.text_line(item, dissector, session, colour))
+            if args.tree:
+                print(_tree(item, dissector))
+            if args.hex:
+                print(rows.hex_dump(item.row.event.octets))
+        if left == 0:
+            break
     return left
 
 
