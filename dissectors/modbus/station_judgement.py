@@ -137,7 +137,8 @@ def _times(name: str, station: Station, timeout: int | None, seen: Evidence, is_
     if quarters:
         first, last = quarters[0], quarters[-1]
         rises = all(20 * b.nominal >= 19 * a.nominal for a, b in pairwise(quarters))
-        if rises and 2 * last.low > 3 * first.high and last.low - first.high > 5 * MS:
+        quickest_too = 2 * (last.least - first.least) > last.nominal - first.nominal  # not only more of a second kind
+        if rises and quickest_too and 2 * last.low > 3 * first.high and last.low - first.high > 5 * MS:
             words = f"median response time rose from {ms(first.nominal)} to {ms(last.nominal)}"
             yield found(
                 RULES["MB102"], name, words, first=seen.first or 0, last=station.last_heard or 0, count=times_.count

@@ -24,8 +24,9 @@ Key = tuple[str, int | None]
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """Medians of some response times in a row, ns: by the shortest, the nominal and the longest reading."""
+    """Some response times in a row, ns: medians by the shortest, the nominal and the longest reading, and the least."""
 
+    least: int
     low: int
     nominal: int
     high: int
@@ -76,6 +77,7 @@ def middle(values: Sequence[int]) -> int:
 
 def _block(latencies: Sequence[Interval]) -> Block:
     return Block(
+        min(latency.low for latency in latencies),
         middle([latency.low for latency in latencies]),
         middle([latency.nominal for latency in latencies]),
         middle([latency.high for latency in latencies]),
@@ -84,6 +86,7 @@ def _block(latencies: Sequence[Interval]) -> Block:
 
 def _of_blocks(blocks: Sequence[Block]) -> Block:
     return Block(
+        middle([block.least for block in blocks]),
         middle([block.low for block in blocks]),
         middle([block.nominal for block in blocks]),
         middle([block.high for block in blocks]),
@@ -92,7 +95,10 @@ def _of_blocks(blocks: Sequence[Block]) -> Block:
 
 def _mean(earlier: Block, later: Block) -> Block:
     return Block(
-        (earlier.low + later.low) // 2, (earlier.nominal + later.nominal) // 2, (earlier.high + later.high) // 2
+        (earlier.least + later.least) // 2,
+        (earlier.low + later.low) // 2,
+        (earlier.nominal + later.nominal) // 2,
+        (earlier.high + later.high) // 2,
     )
 
 
