@@ -113,8 +113,8 @@ _ALL = (
         Severity.WARNING,
         "response time drifts",
         "The median response time of the last quarter of the answers is over half as long again as that of the first "
-        "quarter, and over 5 ms longer, by the bounds that the adapter leaves; it rose from quarter to quarter, and the "
-        "quickest answers with it.",
+        "quarter, and over 5 ms longer, by the bounds that the adapter leaves; it rose from quarter to quarter, and "
+        "the quickest answers with it.",
         "a station that gets busier or fills up, and will run into the timeout",
         "its load and log; restart it and see whether the time falls back",
     ),

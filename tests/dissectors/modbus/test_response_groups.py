@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dissectors.modbus.response_groups import ANSWERS_KEPT, ANSWERS_LEAST, Answered, Groups, SameRequest
+from dissectors.modbus.station_record import ResponseTimes
 from dissectors.tracker import Interval
 
 MS = 1_000_000
@@ -86,3 +87,14 @@ def test_any_times(times: list[int]) -> None:
     if groups is not None:
         assert groups.smaller >= 8
         assert max(a.latency.high for a in groups.quick) < min(a.latency.low for a in groups.slow)
+
+
+def test_the_quickest_answers_tell_a_drift_from_a_second_response_time() -> None:
+    drifting, two_times = ResponseTimes(), ResponseTimes()
+    for number in range(160):
+        drifting.add(Interval((8 + number // 8) * MS, (8 + number // 8) * MS, (8 + number // 8) * MS))
+        time = 21 * MS if number % 8 < number // 20 else 8 * MS  # the slow ones get more and more
+        two_times.add(Interval(time, time, time))
+    assert drifting.quarters()[-1].least > drifting.quarters()[0].nominal
+    assert two_times.quarters()[-1].nominal == 21 * MS
+    assert two_times.quarters()[-1].least == 8 * MS
