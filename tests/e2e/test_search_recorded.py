@@ -92,7 +92,7 @@ def holder_of(path: Path) -> int:
 
 def test_the_whole_search_is_in_the_file_and_says_nothing_false(tmp_path: Path, capsys) -> None:
     path = tmp_path / "found.mcap"
-    ran = run("record", RTU, "-s", "auto", "-p", "auto", "-w", str(path), "--duration", "7")
+    ran = run("record", RTU, "-s", "auto", "-p", "auto", "-w", str(path), "--count", "40")
     assert ran.returncode == 0, ran.stderr
     assert "searching, listening with 9600,8N1" in ran.stderr
     assert f"{RTU}: Modbus RTU, 19200,8E1" in ran.stderr
@@ -150,7 +150,7 @@ def test_live_is_what_is_read_from_the_file_afterwards(tmp_path: Path, monkeypat
     monkeypatch.setattr(capture_link, "spawn", line_bus.spawn)
     path = tmp_path / "live.mcap"
     source = SourceSpec(RTU, LineSettings(), "modbus-rtu", unknown=("line", "protocol"))
-    live = start(source, RecordSpec(str(path)), 5, search=Unknowns())
+    live = start(source, RecordSpec(str(path)), 4, search=Unknowns())
     heard: list[object] = []
     was_searching = 0
     while live.ended is None:
@@ -178,7 +178,7 @@ def test_live_is_what_is_read_from_the_file_afterwards(tmp_path: Path, monkeypat
 
 def test_a_silent_bus_is_waited_for(tmp_path: Path) -> None:
     path = tmp_path / "late.mcap"
-    ran = run("record", RTU.replace("+0", "+2"), "-s", "auto", "-p", "auto", "-w", str(path), "--duration", "7")
+    ran = run("record", RTU.replace("+0", "+1.5"), "-s", "auto", "-p", "auto", "-w", str(path), "--count", "10")
     assert ran.returncode == 0, ran.stderr
     assert str(read(path).session.line) == "19200,8E1"
 
@@ -259,7 +259,7 @@ def test_only_the_line_is_searched_for(tmp_path: Path) -> None:
 
 
 def test_check_of_a_port_judges_only_what_was_heard_right(tmp_path: Path) -> None:
-    ran = run("check", RTU, "-s", "auto", "-p", "auto", "--duration", "3", "--json", "--fail-on", "never")
+    ran = run("check", RTU, "-s", "auto", "-p", "auto", "--duration", "1.5", "--json", "--fail-on", "never")
     assert ran.returncode == 0, ran.stderr
     codes = {json.loads(line).get("code") for line in ran.stdout.splitlines()}
     assert "LN001" in codes
@@ -271,7 +271,7 @@ def test_auto_in_the_configuration(tmp_path: Path, monkeypatch) -> None:
     Path("sniff485.toml").write_text(
         f'[bus.boiler]\nport = "{RTU}"\nline = "auto"\nprotocol = "auto"\nrecord = "boiler.mcap"\n'
     )
-    ran = run("live", "boiler", "--json", "--duration", "6")
+    ran = run("live", "boiler", "--json", "--duration", "4")
     assert ran.returncode == 0, ran.stderr
     rows = [json.loads(line) for line in ran.stdout.splitlines()]
     assert "".join(row["hex"] for row in rows) == octets_of(Path("boiler.mcap")).hex()
