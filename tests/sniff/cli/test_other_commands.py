@@ -110,3 +110,12 @@ def test_a_port_that_is_none_is_said_in_a_line(port: str, said: str, tmp_path: P
     assert ran.code == 4
     assert said in ran.err
     assert ran.err.count("\n") == 1
+
+
+def test_health_has_a_table_with_its_reasons(sniff485, poll):
+    ran = sniff485("stats", poll, "health", "--json")
+    rows = [json.loads(line) for line in ran.out.splitlines()]
+    assert rows[0]["subject"] == "bus"
+    assert {row["subject"] for row in rows[1:]} >= {"station 1"}
+    assert all(bool(row["why"]) == (row["health"] < 100) for row in rows)
+    assert [row["health"] for row in rows] != [100] * len(rows)  # one of them does not answer

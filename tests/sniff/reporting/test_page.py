@@ -185,3 +185,21 @@ def test_a_browser_shows_it_without_errors(tmp_path: Path, numbers_of: Callable[
     assert numbers.verdict in page.text
     assert all(finding.seen[1:] in page.text for finding in numbers.findings)
     assert len(page.tags("svg")) == len(Page(out.read_text("utf-8")).tags("svg"))
+
+
+def test_each_protocol_has_its_word_for_a_place_on_the_bus(made: tuple[str, Path]) -> None:
+    name, out = made
+    text = Page(out.read_text("utf-8")).text
+    assert ("MAC health frames from" in text) == name.startswith("mstp")
+    assert ("station health frames from" in text) != name.startswith("mstp")
+    assert "no-response" not in text
+    assert "damaged-answer" not in text
+
+
+def test_a_row_of_many_words_keeps_its_begin_and_what_is_wrong_with_it(numbers_of: Callable[[Path], Numbers]) -> None:
+    found = numbers_of(CAPTURES / "findings" / "n2-two-masters.cap.txt").findings
+    rows = [evidence.text for finding in found for evidence in finding.evidence]
+    cut = [text for text in rows if " … " in text]
+    assert cut
+    assert all(text.startswith("A → ") and text.endswith("expected]") for text in cut)
+    assert max(len(text) for text in rows) <= 180
