@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,11 +13,24 @@ from sniff.formats import Capture, CaptureError
 from sniff.live import LiveBus
 from sniff.reading import dissector_for, outputs
 from sniff.session import LineEvent, Session
-from sniff.store import Store
+from sniff.store import KEPT_ROWS, Store
 from sniff.tui.feed import FeedStatus
 
 SLICE = 0.05
 """Seconds that one poll may spend on reading a file."""
+
+LEAST_ROWS = 100_000
+ROW_OCTETS = 1000
+"""What a row and its share of a transaction take in memory, about."""
+
+
+def rows_that_fit() -> int:
+    """Rows that a quarter of this machine's memory holds; as many as a store keeps where the system does not tell."""
+    try:
+        memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, OSError, ValueError):  # Windows has no sysconf
+        return KEPT_ROWS
+    return max(LEAST_ROWS, memory // 4 // ROW_OCTETS)
 
 
 class LiveFeed:
@@ -24,7 +38,7 @@ class LiveFeed:
 
     def __init__(self, live: LiveBus) -> None:
         self.live = live
-        self._store = Store(live.session, live.dissector, devices=live.devices)
+        self._store = Store(live.session, live.dissector, min(KEPT_ROWS, rows_that_fit()), live.devices)
 
     @property
     def store(self) -> Store:
@@ -73,7 +87,7 @@ class FileFeed:
     def __init__(self, path: str, capture: Capture, session: Session, devices: Devices | None = None) -> None:
         self.path = path
         self.capture = capture
-        self._store = Store(session, dissector_for(session), devices=devices)
+        self._store = Store(session, dissector_for(session), rows_that_fit(), devices)
         self._outputs: Iterator[Output | LineEvent] | None = outputs(capture.items(), session)
         self._ended = ""
         try:

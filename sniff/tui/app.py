@@ -65,6 +65,7 @@ class SnifferApp(App[None]):
         self.visited = [start_screen]
         self._worker: Timer | None = None
         self._told_end = False
+        self._told_dropped = False
         self._told_trouble = ""
         self._asked_to_quit = 0.0
 

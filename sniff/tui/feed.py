@@ -33,6 +33,11 @@ class FeedStatus:
     searching: str = ""
     trouble: str = ""
 
+    @property
+    def in_file(self) -> bool:
+        """Whether what leaves memory can be found in a file: read from one, or recorded."""
+        return not self.live or (self.recording is not None and not self.trouble)
+
 
 class Feed(Protocol):
     """Fills a store. The app calls `poll` ten times a second, from its own thread; it must return quickly."""

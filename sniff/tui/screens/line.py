@@ -54,6 +54,7 @@ def settings(store: Store, status: FeedStatus) -> list[Part]:
         ("reports", Text(reports(store))),
         ("started", Text(date_and_clock(session.started) if session.started else "unknown")),
         ("capture", Text(capture(status))),
+        *([("memory", Text(kept(store, status)))] if store.dropped_rows else []),
     ]
 
 
@@ -80,6 +81,12 @@ def capture(status: FeedStatus) -> str:
     if status.ended:
         parts.append(f"ended: {plain(status.ended)}")
     return " · ".join(parts)
+
+
+def kept(store: Store, status: FeedStatus) -> str:
+    """Which rows can be looked at, once the oldest had to go."""
+    file = "the file has them" if status.in_file else "nothing was recorded"
+    return f"rows {store.first_no} to {store.last_no}; {store.dropped_rows} older ones had to go, {file}"
 
 
 def errors(store: Store) -> list[Part]:

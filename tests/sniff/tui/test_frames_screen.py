@@ -260,6 +260,9 @@ def test_rows_dropped_from_memory_leave_the_view_where_it_is(look: Any, make_bus
         assert [line.split()[0] for line in before] == [line.split()[0] for line in see.lines()[3:13]]
         await see.press("home")
         assert see.main.cursor == bus.store.first_no
+        await see.press("8")
+        gone = bus.store.dropped_rows
+        assert f"{gone} older ones had to go, the file has them" in " ".join(see.text().split())
 
     look(bus.store, script)
 
