@@ -24,7 +24,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
         metavar="RULE",
         help="begin a new file by size:64MB, time:1h, or both with a comma",
     )
-    parser.add_argument("--keep", type=arguments.positive, metavar="N", help="keep the N newest files of a rotation")
+    parser.add_argument(
+        "--keep", type=arguments.positive, metavar="N", help="remove this recording's files but the N newest"
+    )
     parser.add_argument("-q", "--quiet", action="store_true", help="no progress, no summary")
 
 

@@ -19,7 +19,7 @@ from sniff.formats import CaptureError
 from sniff.formats.files import explain
 from sniff.recording.batch import Message
 from sniff.recording.part import PartFile
-from sniff.recording.rotation import Rotation, part_name, parts, remove_old
+from sniff.recording.rotation import NewestParts, Rotation, part_name, parts
 from sniff.recording.topics import RAW
 from sniff.session import Session
 
@@ -66,7 +66,7 @@ class Keeper:
         self._path = path
         self._session = session
         self._rotation = rotation
-        self._keep = keep
+        self._newest = NewestParts(keep)
         self._next = 0  # number of the next entry of /raw
         self._octets = 0  # of the bus, in all parts
         self._finished_size = 0
@@ -151,8 +151,7 @@ class Keeper:
             self._unwritten = 0
             self._finished_size += old.size - old.waiting
             old.stream.close()
-            if self._keep is not None:
-                remove_old(self._path, max(1, self._keep))
+            self._newest.remove_old()
 
     def _finish(self) -> None:
         try:
@@ -174,6 +173,7 @@ class Keeper:
             before = {"first_chunk": self._next, "octets_before": self._octets}
             part = PartFile(stream, self._session, len(self.paths) + 1, before)
             part.flush()
+            self._newest.add(path, stream)
         except OSError:
             stream.close()
             path.unlink(missing_ok=True)

@@ -1,7 +1,8 @@
 """The parts of one recording as one capture: what a rotation cut, a frame at the seam too, is whole again.
 
 Parts belong together by the session that each of them carries (same port, same start) and by their numbers; they
-follow each other by the numbers of their reads. A part that is missing between two others is a hole like any other: a DROPPED event.
+follow each other by the numbers of their reads. A part that is missing between two others is a hole like any other: a
+DROPPED event.
 """
 
 from __future__ import annotations

@@ -7,9 +7,11 @@ a power cut nothing needs to be renamed. Whether it is whole, its own end says.
 from __future__ import annotations
 
 import contextlib
+import os
 import re
 from dataclasses import dataclass
 from pathlib import Path
+from typing import BinaryIO
 
 _UNITS = {
     "size": {"": 1, "kb": 10**3, "mb": 10**6, "gb": 10**9, "kib": 1 << 10, "mib": 1 << 20, "gib": 1 << 30},
@@ -77,8 +79,36 @@ def parts(path: Path) -> list[tuple[int, Path]]:
     return sorted(found)
 
 
-def remove_old(path: Path, keep: int) -> None:
-    """Remove all parts of a recording but the `keep` newest. What cannot be removed stays; nobody is told."""
-    for _, part in parts(path)[:-keep]:
-        with contextlib.suppress(OSError):
-            part.unlink()
+class NewestParts:
+    """The parts that one recorder began, of which the newest `keep` stay (None: all of them).
+
+    Only files that were added here are ever removed: not a part of an earlier recording of the same name, and not
+    another file that has taken the place of one that was moved away.
+    """
+
+    def __init__(self, keep: int | None) -> None:
+        self._keep = None if keep is None else max(1, keep)
+        self._begun: list[tuple[Path, os.stat_result]] = []
+
+    def add(self, path: Path, stream: BinaryIO) -> None:
+        """Remember a part that was begun just now, open as `stream`. Raises OSError."""
+        if self._keep is not None:
+            self._begun.append((path, os.fstat(stream.fileno())))
+
+    def remove_old(self) -> None:
+        """Remove what is too old. What cannot be removed now is tried again the next time; nobody is told."""
+        if self._keep is not None:
+            old, newest = self._begun[: -self._keep], self._begun[-self._keep :]
+            self._begun = [part for part in old if not _removed(*part)] + newest
+
+
+def _removed(path: Path, begun: os.stat_result) -> bool:
+    """Remove a file if it is still the one that was begun; whether it is gone from there."""
+    try:
+        if os.path.samestat(path.lstat(), begun):
+            path.unlink()
+    except FileNotFoundError:
+        return True
+    except OSError:
+        return False
+    return True

@@ -115,9 +115,10 @@ class Recorder:
     def __init__(
         self, path: str | Path, session: Session, rotation: Rotation | None = None, keep: int | None = None
     ) -> None:
-        """Create the first file. With a rotation it is NAME-0001.mcap, or the first number that is free.
+        """Create the first file. With a rotation it is NAME-0001.mcap, or the number after the highest that is there.
 
-        Raises CaptureError when it cannot be created or exists already; nothing is ever overwritten.
+        `keep`: how many parts of this very recording stay, from 1 on; parts of an earlier one are left alone. Raises
+        CaptureError when the file cannot be created or exists already; nothing is ever overwritten.
         """
         self.chunks = 0
         self.octets = 0

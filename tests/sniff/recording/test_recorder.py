@@ -344,8 +344,24 @@ def test_keep_the_newest(tmp_path: Path) -> None:
     give(recorder, some_items(2000))
     recorder.close()
     assert len(recorder.paths) > 4
-    assert sorted(tmp_path.iterdir()) == sorted([*other, *recorder.paths[-2:]])
+    assert sorted(tmp_path.iterdir()) == sorted([*other, old, *recorder.paths[-2:]])
+    assert old.read_bytes() == b"an earlier night"
     assert capture(recorder.path).completeness().whole
+
+
+def test_only_its_own_files_are_removed(tmp_path: Path) -> None:
+    """A part that was moved away is no longer its own, and neither is what somebody put in its place."""
+    recorder = Recorder(tmp_path / "night.mcap", SESSION, Rotation(count=300), keep=1)
+    first = recorder.path
+    moved = first.rename(tmp_path / "evidence.mcap")
+    first.write_bytes(b"somebody else's")
+    give(recorder, some_items(1500))
+    recorder.close()
+    assert recorder.trouble is None
+    assert len(recorder.paths) > 3
+    assert sorted(tmp_path.iterdir()) == sorted([moved, first, recorder.path])
+    assert first.read_bytes() == b"somebody else's"
+    assert capture(moved).completeness().whole
 
 
 def test_a_part_that_cannot_be_opened(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
