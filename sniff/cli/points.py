@@ -1,5 +1,6 @@
-"""Values by name: the latest of each point as a table; --csv and --json give every sample. Names and units come from
-device profiles (-d), else a point is its place: holding/40108, AI/9. Quality: 0 good, 1 uncertain, 2 out of range.
+"""Values by name: the latest of each point as a table; --csv, --json and --parquet give every sample. Names and units
+come from device profiles (-d), else a point is its place: holding/40108, AI/9. Quality: 0 good, 1 uncertain, 2 out of
+range. Parquet needs `pip install 'sniff485[parquet]'`.
 """
 
 from __future__ import annotations
@@ -8,20 +9,35 @@ import argparse
 import fnmatch
 import sys
 from collections.abc import Iterator
+from pathlib import Path
 
 from dissectors.line import NS_PER_S
 from dissectors.profiles.decoding import number
 from sniff.analysis.points import Point, PointReader, PointTable, Sample
-from sniff.cli import arguments, tables
+from sniff.cli import USAGE, Failure, arguments, tables
 from sniff.cli.rows import iso
 from sniff.cli.tables import Cell
 from sniff.engine import Output
-from sniff.formats import Capture
+from sniff.formats import Capture, parquet
+from sniff.formats.parquet import Kind
 from sniff.reading import dissector_for, outputs
 from sniff.session import Session
 
 LATEST = ("device", "point", "value", "unit", "means", "quality", "age s", "changed s", "samples")
 SAMPLES = ("time", "device", "point", "value", "raw", "unit", "quality", "how", "frame", "means")
+PARQUET = {
+    "time": Kind.TIME,
+    "device": Kind.TEXT,
+    "point": Kind.TEXT,
+    "value": Kind.NUMBER,
+    "text": Kind.TEXT,
+    "raw": Kind.INTEGER,
+    "unit": Kind.TEXT,
+    "quality": Kind.INTEGER,
+    "how": Kind.TEXT,
+    "frame": Kind.INTEGER,
+    "means": Kind.TEXT,
+}
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -34,6 +50,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
     style = parser.add_mutually_exclusive_group()
     style.add_argument("--json", action="store_const", const="json", dest="style", help="one JSON object a sample")
     style.add_argument("--csv", action="store_const", const="csv", dest="style", help="comma-separated values")
+    style.add_argument("--parquet", metavar="OUT", help="every sample into a Parquet file: instants, numbers and texts")
+    parser.add_argument("-f", "--force", action="store_true", help="overwrite OUT")
     which = parser.add_mutually_exclusive_group()
     which.add_argument("--latest", action="store_const", const=True, dest="latest", help="only the latest of each")
     which.add_argument("--all", action="store_const", const=False, dest="latest", help="every sample")
@@ -42,6 +60,26 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the values of every capture in turn, the parts of one recording as one."""
+    if args.parquet is None:
+        return _print(args)
+    if args.latest:
+        raise Failure("--parquet holds every sample: leave --latest out", USAGE)
+    if not parquet.available():
+        raise Failure("--parquet needs polars: pip install 'sniff485[parquet]'", USAGE)
+    path = Path(args.parquet)
+    if path.exists() and not args.force:
+        raise Failure(f"{path}: exists; add --force to overwrite it", USAGE)
+    with parquet.ParquetWriter(path, PARQUET) as table:
+        for name, capture in arguments.open_captures(args.files):
+            session = arguments.settings_of(args, capture.session)
+            for samples in _samples(args, capture, session):
+                for sample in samples:
+                    table.add(_parquet_row(sample))
+            _say_cut(name, capture)
+    return 0
+
+
+def _print(args: argparse.Namespace) -> int:
     for path, capture in arguments.open_captures(args.files):
         session = arguments.settings_of(args, capture.session)
         latest = args.latest if args.latest is not None else args.style == "text"
@@ -50,11 +88,15 @@ def run(args: argparse.Namespace) -> int:
         else:
             chosen = (_sample(sample) for samples in _samples(args, capture, session) for sample in samples)
             tables.write(SAMPLES, chosen, args.style)
-        complete = capture.completeness()
-        if not complete.whole:
-            sys.stdout.flush()
-            print(f"sniff485: {path}: {complete.text}", file=sys.stderr)
+        _say_cut(path, capture)
     return 0
+
+
+def _say_cut(path: str, capture: Capture) -> None:
+    complete = capture.completeness()
+    if not complete.whole:
+        sys.stdout.flush()
+        print(f"sniff485: {path}: {complete.text}", file=sys.stderr)
 
 
 def _samples(args: argparse.Namespace, capture: Capture, session: Session) -> Iterator[list[Sample]]:
@@ -95,6 +137,27 @@ def _sample(sample: Sample) -> tuple[Cell, ...]:
         sample.station,
         sample.name,
         _cell(sample),
+        value.raw,
+        value.unit,
+        int(value.quality),
+        value.how.value,
+        sample.frame,
+        value.words,
+    )
+
+
+def _parquet_row(sample: Sample) -> tuple[Cell, ...]:
+    """A column has one type: a number and a text do not share one."""
+    value = sample.value
+    shown = _cell(sample)
+    text = isinstance(value.value, str)
+    number = None if text else float(value.value)
+    return (
+        sample.time,
+        sample.station,
+        sample.name,
+        number,
+        shown if text else None,
         value.raw,
         value.unit,
         int(value.quality),
