@@ -167,6 +167,12 @@ class OctetWindow:
             return 0, UNKNOWN_SILENCE
         return max(0, run.gap - self._latency), run.gap + run.room
 
+    @property
+    def newest_silence(self) -> int:
+        """Smallest reading of the silence before the chunk appended last, ns; 0 before the first of a capture."""
+        gap = self._runs[-1].gap
+        return gap - self._latency if self._latency < gap != UNKNOWN_SILENCE else 0
+
     def gap(self, index: int) -> int:
         """Nominal silence before octet `index` of the window, ns; 24 h before the first octet of a capture."""
         runs = self._runs

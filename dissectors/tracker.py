@@ -91,6 +91,25 @@ class Tracked:
     closed: tuple[Transaction, ...] = ()
 
 
+NOTHING_TRACKED = Tracked()
+
+
+class Unpaired:
+    """A tracker that pairs nothing: for those who only ask what was on the wire."""
+
+    def track(self, no: int, event: Event, header: Header | None) -> Tracked:
+        """No placement."""
+        return NOTHING_TRACKED
+
+    def advance(self, now: int) -> tuple[Transaction, ...]:
+        """Nothing to close."""
+        return ()
+
+    def close(self) -> tuple[Transaction, ...]:
+        """Nothing to close."""
+        return ()
+
+
 class Tracker(Protocol):
     """Pairs the frames of one bus. Transaction ids ascend from 1 in the order of opening."""
 

@@ -5,13 +5,13 @@ Pure: no I/O, no clock. One engine is one bus. What it gives is numbered from 1 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from dissectors.frame import Chunk, Event, Frame, Header
 from dissectors.line import LineSettings, Timing
 from dissectors.registry import Dissector
-from dissectors.tracker import Placement, Transaction
+from dissectors.tracker import Placement, Tracker, Transaction, Unpaired
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,14 +51,17 @@ class Engine:
     `before_tx`.
     """
 
-    def __init__(self, dissector: Dissector, timing: Timing, first: int = 1, before_tx: int = 0) -> None:
+    def __init__(
+        self, dissector: Dissector, timing: Timing, first: int = 1, before_tx: int = 0, pairing: bool = True
+    ) -> None:
+        """`pairing`: else no row has a placement and there are no transactions."""
         self.dissector = dissector
         self.timing = timing
         self.next = first
         self.last_tx = before_tx
         self._before_tx = before_tx
         self.framer = dissector.framer(timing)
-        self.tracker = dissector.tracker(timing)
+        self.tracker: Tracker = dissector.tracker(timing) if pairing else Unpaired()
 
     def feed(self, chunk: Chunk) -> Output:
         """Take one read."""
@@ -81,23 +84,26 @@ class Engine:
         """When to call `advance` next (ns), or None."""
         return self.framer.deadline()
 
-    def _track(self, events: Iterable[Event]) -> Output:
+    def _track(self, events: Sequence[Event]) -> Output:
+        if not events:
+            return NOTHING
         rows: list[Row] = []
         closed: list[Transaction] = []
+        peek, track = self.dissector.peek, self.tracker.track
         for event in events:
             no = self.next
             self.next += 1
-            header = self.dissector.peek(event) if isinstance(event, Frame) else None
-            tracked = self.tracker.track(no, event, header)
+            header = peek(event) if isinstance(event, Frame) else None
+            tracked = track(no, event, header)
             placement = tracked.placement
             if placement is not None:
                 if self._before_tx:
                     placement = replace(placement, tx=placement.tx + self._before_tx)
-                self.last_tx = max(self.last_tx, placement.tx)
+                if placement.tx > self.last_tx:
+                    self.last_tx = placement.tx
             rows.append(Row(no, event, header, placement))
-            closed.extend(self._renumbered(tracked.closed))
-        if not rows:
-            return NOTHING
+            if tracked.closed:
+                closed += self._renumbered(tracked.closed)
         return Output(tuple(rows), tuple(closed))
 
     def _renumbered(self, closed: tuple[Transaction, ...]) -> tuple[Transaction, ...]:

@@ -89,8 +89,8 @@ def with_settings(session: Session, protocol: str | None = None, line: LineSetti
 
 
 def outputs(items: Iterable[Item], session: Session, pairing: bool = True) -> Iterator[Output | LineEvent]:
-    """Run items through a new engine (without `pairing`: no transactions); line events pass through at their place. Raises CaptureError as `items` does,
-    when all that was whole before the damage has been given."""
+    """Run items through a new engine; line events pass through at their place. Raises CaptureError as `items` does,
+    when all that was whole before the damage has been given. `pairing`: else no row is placed in a transaction."""
     engine = SessionEngine(session, pairing)
     try:
         for item in items:

@@ -38,14 +38,15 @@ class SessionEngine:
     Raises registry.UnknownProtocol.
     """
 
-    def __init__(self, session: Session) -> None:
+    def __init__(self, session: Session, pairing: bool = True) -> None:
         self.session = session
+        self._pairing = pairing
         self.searching = bool(session.unknown)
         self._in_force = self._before = session.line
         self._since: int | None = None  # when the present attempt began, None before the first octet
         self._held: list[Chunk] = []
         self._held_octets = 0
-        self._engine = Engine(registry.get(session.protocol), session.timing)
+        self._engine = Engine(registry.get(session.protocol), session.timing, pairing=pairing)
 
     @property
     def dissector(self) -> Dissector:
@@ -128,7 +129,7 @@ class SessionEngine:
         before = self._engine
         output = before.close()
         dissector = before.dissector if protocol is None else registry.get(protocol)
-        self._engine = Engine(dissector, timing, before.next, before.last_tx)
+        self._engine = Engine(dissector, timing, before.next, before.last_tx, self._pairing)
         return output
 
     def _let_go(self) -> list[Chunk]:

@@ -89,10 +89,10 @@ class MstpFramer:
         return events
 
     def _append(self, chunk: Chunk) -> None:
-        index = len(self._window)
+        index = len(self._window.octets)
         self._window.append(chunk)
         if chunk.octets:
-            silence = self._window.silence(index)[0]
+            silence = self._window.newest_silence
             if silence >= self._least:
                 self._silences.append((index, silence))
 
@@ -110,7 +110,8 @@ class MstpFramer:
 
     def _drain(self, quiet: int, final: bool) -> list[Event]:
         events: list[Event] = []
-        while len(self._window):
+        octets = self._window.octets
+        while octets:
             event = self._next(quiet, final)
             if event is None:
                 break
@@ -124,7 +125,7 @@ class MstpFramer:
         if not self._noise:
             size = self._plain or self._look()
             if size and len(octets) > size and octets[size] != 0xFF:
-                return self._take_frame(size, Check.GOOD, None, self._found(0))
+                return self._take_plain(size)
             if size and len(octets) == size and not final and quiet < self._pause:
                 self._needs_pause = self._pause
                 return None
@@ -149,13 +150,13 @@ class MstpFramer:
     def _look(self) -> int:
         """The plain case, which is nearly every case: octets of a good frame at the front with no gap in it, else 0."""
         octets = self._window.octets
-        if len(octets) < HEADER or octets[:2] != PREAMBLE or crc8_mstp(bytes(octets[2:7])) != octets[7]:
+        if len(octets) < HEADER or not octets.startswith(PREAMBLE) or crc8_mstp(bytes(octets[2:7])) != octets[7]:
             return 0
         frame_type, length = octets[2], octets[5] << 8 | octets[6]
         size = total(length)
         if length > MAX_DATA or is_encoded(frame_type) or len(octets) < size:
             return 0
-        if self._silence_in(1, size, self._least) is not None:
+        if self._silences and self._silence_in(1, size, self._least) is not None:
             return 0
         if length and not body_is_good(frame_type, length, bytes(octets[HEADER:size])):
             return 0
@@ -340,6 +341,16 @@ class MstpFramer:
             taken.marks,
             flags,
         )
+
+    def _take_plain(self, size: int) -> Frame:
+        """A good frame without pad, as `_look` has found it."""
+        found = self._found(0) if self._skipped else Found.LENGTH
+        taken = self._take(size)
+        skipped, self._skipped = self._skipped, 0
+        self._plain = 0
+        self._after_frame = True
+        octets, start, end, slack, marks = taken
+        return Frame("mstp", octets, start, end, Check.GOOD, found, None, size, skipped, slack, marks)
 
     def _take(self, count: int) -> Taken:
         if self._silences:

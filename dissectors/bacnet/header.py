@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 from dissectors.bacnet import names
 from dissectors.bacnet import npdu as npdus
 from dissectors.bacnet import tags as tagging
@@ -47,17 +49,30 @@ def peek(frame: Frame) -> Header:
     if len(octets) < 4:
         return Header("mstp", None, None, Role.UNKNOWN, "fragment", ok=False, error=_why(frame))
     frame_type, destination = octets[2], octets[3]
+    if frame_type not in CARRIES_NPDU and frame.damage is None and frame.check is Check.GOOD:
+        return _of_good(frame_type, destination, octets[4])
     source = octets[4] if len(octets) > 4 else None
     kind = name(frame_type)
     if frame_type in CARRIES_NPDU and frame.check is Check.GOOD:
         return _data(frame, frame_type, destination, source, kind)
+    ok = frame.ok
+    role = _role(frame_type, destination)
+    return Header("mstp", source, destination, role, kind, frame_type, None, None, ok, None if ok else _why(frame))
+
+
+@lru_cache(maxsize=4096)
+def _of_good(frame_type: int, destination: int, source: int) -> Header:
+    """A good frame whose header says all of it: tokens and polls, which are nearly every frame of a bus."""
+    return Header("mstp", source, destination, _role(frame_type, destination), name(frame_type), frame_type)
+
+
+def _role(frame_type: int, destination: int) -> Role:
     role = _ROLES.get(frame_type)
     if role is None:
         role = Role.DATA if frame_type >= PROPRIETARY else Role.UNKNOWN
     if destination == BROADCAST and role in (Role.DATA, Role.REQUEST):
         role = Role.BROADCAST
-    ok = frame.ok
-    return Header("mstp", source, destination, role, kind, frame_type, None, None, ok, None if ok else _why(frame))
+    return role
 
 
 def _why(frame: Frame) -> str:

@@ -61,7 +61,7 @@ class MstpTracker:
         """Take the next event."""
         if isinstance(event, Noise) or header is None:
             return Tracked(None, ())
-        closed = list(self._expire(event.start))
+        closed = self._expire(event.start)
         self._clock = event.end if self._clock is None else max(self._clock, event.end)
         placement = self._place(no, event, header, closed)
         self._previous = (event, placement.tx)
@@ -88,6 +88,8 @@ class MstpTracker:
         waiting = self._waiting
         if waiting is not None and now - waiting.last >= T_NO_TOKEN:
             closed.append(self._give_up(waiting))
+        if not self._postponed:
+            return closed
         for key in [key for key, exchange in self._postponed.items() if now - exchange.last >= POSTPONED_FOR]:
             closed.append(self._end(self._postponed.pop(key), Verdict.NO_RESPONSE))
         return closed

@@ -16,7 +16,7 @@ from sniff.session import Item, Session
 def ring_of(items: Iterable[Item], session: Session) -> Ring:
     """The ring that items show."""
     observer = RingObserver(session.timing)
-    for output in outputs(items, session):
+    for output in outputs(items, session, pairing=False):
         if isinstance(output, Output):
             for row in output.rows:
                 if row.searched is None:

@@ -10,9 +10,10 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import BinaryIO
 
+from dissectors.frame import Chunk
 from sniff.formats import CaptureError
 from sniff.formats.files import NewFile, open_capture
-from sniff.formats.linktypes import LINK_TYPES, USER1
+from sniff.formats.linktypes import LINK_TYPES, MSTP, USER1
 from sniff.formats.records import Record, RecordMaker, foreign_session, items_of, protocol_of
 from sniff.session import Completeness, Item, Session
 
@@ -65,8 +66,14 @@ class PcapCapture:
         """Chunks in the order of the file."""
         with open_capture(self.path) as stream:
             stream.seek(FILE_HEADER)
+            protocol = self.session.protocol
+            if self._link_type == MSTP and protocol == "mstp":  # the record is the frame
+                for record in self._records(stream):
+                    if record.data:
+                        yield Chunk(record.time, record.data)
+                return
             for record in self._records(stream):
-                yield from items_of(record, self.session.protocol)
+                yield from items_of(record, protocol)
 
     def completeness(self) -> Completeness:
         """Whether the last record was whole, as far as `items` has read."""
