@@ -13,7 +13,7 @@ import os
 import re
 import sys
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 
@@ -109,12 +109,15 @@ def folders() -> tuple[Path, ...]:
     return (*(folder / FOLDER for folder in (here, *here.parents)), user / "sniff485" / FOLDER)
 
 
-def devices(assigned: Mapping[str, str]) -> Devices:
-    """Profiles by station, from address (or "*") → name. Raises ValueError, UnknownProfile, ProfileError."""
+def devices(assigned: Mapping[str, str], documents: Mapping[str, str] | None = None) -> Devices:
+    """Profiles by station, from address (or "*") → name. Raises ValueError, UnknownProfile, ProfileError.
+
+    `documents`: what some names mean, as TOML documents; the others are looked for here.
+    """
     by_address: dict[int, Profile] = {}
     default: Profile | None = None
     for word, name in assigned.items():
-        profile = find(name)
+        profile = _meant(name, documents or {})
         if word.strip() == EVERY:
             default = profile
         else:
@@ -125,7 +128,8 @@ def devices(assigned: Mapping[str, str]) -> Devices:
 def noted(session: Session) -> tuple[dict[str, str], tuple[str, ...]]:
     """The devices that a capture names: address (or "*") → name, and what it says that nobody here understands.
 
-    The file may be from somebody else: only names of profiles that can be found here count, never a path.
+    The file may be from somebody else: only names of profiles that it holds or that can be found here count, never a
+    path.
     """
     known: dict[str, str] = {}
     unknown: list[str] = []
@@ -137,7 +141,7 @@ def noted(session: Session) -> tuple[dict[str, str], tuple[str, ...]]:
                 raise ValueError
             if word != EVERY:
                 address(word)
-            find(name)
+            _meant(name, session.profiles)
         except (ValueError, UnknownProfile, ProfileError):
             unknown.append(token.strip())
         else:
@@ -146,8 +150,20 @@ def noted(session: Session) -> tuple[dict[str, str], tuple[str, ...]]:
 
 
 def noted_devices(session: Session) -> Devices:
-    """The devices that a capture names, as far as their profiles are known here."""
-    return devices(noted(session)[0])
+    """The devices that a capture names, as far as it holds their profiles or they are known here."""
+    return devices(noted(session)[0], session.profiles)
+
+
+def with_devices(session: Session, chosen: Devices) -> Session:
+    """The session saying who is which device, with the profiles in force."""
+    if not chosen:
+        return session
+    return replace(session, notes={**session.notes, DEVICES_NOTE: chosen.text()}, profiles=chosen.documents)
+
+
+def _meant(name: str, documents: Mapping[str, str]) -> Profile:
+    """The profile that was in force when a capture was made, else that of this name here."""
+    return parse_text(documents[name], f"{name} of the capture") if name in documents else find(name)
 
 
 def address(word: str) -> int:

@@ -57,7 +57,7 @@ class Session:
     chunk times are on the monotonic clock from there. `bus`: a short name for topics ("boiler-room").
     `unknown`: which of UNKNOWABLE nobody knows (yet): `line` is then only where the search for it began, `protocol`
     a stand-in. `given`: somebody named them after a search in vain, so that octets count wherever the search heard
-    them with `line`.
+    them with `line`. `profiles`: device profiles in force, name → TOML document, as far as the format keeps them.
     """
 
     port: str
@@ -70,6 +70,7 @@ class Session:
     notes: Mapping[str, str] = field(default_factory=dict)
     unknown: tuple[str, ...] = ()
     given: bool = False
+    profiles: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def timing(self) -> Timing:
@@ -91,7 +92,7 @@ class Session:
         return "unknown" if "protocol" in self.unknown else self.protocol
 
     def to_metadata(self) -> dict[str, str]:
-        """Flat text record of everything, for files."""
+        """Flat text record of everything but the profiles' documents, for files."""
         reports = self.adapter.reports
         return {
             "port": self.port,

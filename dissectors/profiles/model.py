@@ -145,6 +145,7 @@ class Profile:
     "n2", "bacnet"); the exceptions are exception and error codes in the maker's words. `properties`: BACnet property →
     object types that have it. `constants`: BACnet device property → its value. `absent`: parameters that the manual
     lists without a register. `reserved`: spans of registers (first, last, on the wire) that the maker keeps for itself.
+    `document`: the text of the TOML document that all this was read from.
     """
 
     name: str
@@ -163,6 +164,7 @@ class Profile:
     reserved: tuple[tuple[int, int], ...] = ()
     source: str = ""
     origin: str = ""
+    document: str = field(default="", repr=False, compare=False)
     _places: Mapping[tuple[str, int], Entry] = field(init=False, repr=False, compare=False, hash=False)
 
     def __post_init__(self) -> None:
@@ -220,6 +222,17 @@ class Devices:
         if self.default is not None:
             found.setdefault(self.default.name, self.default)
         return tuple(found.values())
+
+    @property
+    def documents(self) -> dict[str, str]:
+        """What the profiles in force were read from, by name."""
+        return {profile.name: profile.document for profile in self.profiles}
+
+    def over(self, behind: Devices) -> Devices:
+        """These, and where they say nothing what stands `behind`; a default here leaves nothing unsaid."""
+        if self.default is not None:
+            return self
+        return Devices({**behind.by_address, **self.by_address}, behind.default)
 
     def text(self) -> str:
         """As on the command line: "1=teco-e510,*=teco-f510"."""

@@ -16,7 +16,7 @@ class SourceSpec:
     """One bus to listen to. `spec`: as `open_source` takes it; `protocol`: a registry name; `bus`: its short name.
 
     `notes`: of the session, for the recording. `unknown`: "line", "protocol" or both, when they are searched for:
-    what stands there is only where the search begins.
+    what stands there is only where the search begins. `profiles`: in force, name → document, for the recording.
     """
 
     spec: str
@@ -25,6 +25,7 @@ class SourceSpec:
     bus: str = "bus"
     notes: Mapping[str, str] = field(default_factory=dict)
     unknown: tuple[str, ...] = ()
+    profiles: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,6 +77,7 @@ class CaptureConfig:
                 source["bus"],
                 dict(source.get("notes", {})),
                 tuple(source.get("unknown", ())),
+                dict(source.get("profiles", {})),
             )
             for source in value["sources"]
         )

@@ -69,6 +69,7 @@ def session_of(spec: SourceSpec, source: Source, clock: Clock) -> Session:
         source.session_adapter,
         notes=spec.notes,
         unknown=spec.unknown,
+        profiles=spec.profiles,
     )
 
 

@@ -83,14 +83,14 @@ def devices_of(args: argparse.Namespace, configured: Mapping[str, str] | None = 
 
 
 def noted_devices(args: argparse.Namespace, session: Session) -> Devices:
-    """What -d says, and behind it what the capture says of itself, as far as such profiles are known here."""
-    from sniff.profile_files import EVERY, noted
+    """What -d says, and behind it what the capture says, as far as it holds such profiles or they are known here."""
+    from sniff.profile_files import EVERY, noted, noted_devices
 
-    known, unknown = noted(session)
+    _, unknown = noted(session)
     if unknown and EVERY not in dict(args.devices):
         names = ascii(", ".join(unknown)[:200])
         print(f"sniff485: {names}: a device of the capture that is not known here; say which with -d", file=sys.stderr)
-    return devices_of(args, known)
+    return devices_of(args).over(noted_devices(session))
 
 
 def line_settings(token: str) -> LineSettings:

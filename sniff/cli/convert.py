@@ -5,15 +5,15 @@ that have a profile (-d), each point on a channel of its own.
 from __future__ import annotations
 
 import argparse
-from dataclasses import replace
 
 from dissectors.profiles import Devices
 from sniff.analysis.judging import Judging
 from sniff.cli import arguments, writing
 from sniff.engine import Output
 from sniff.formats import Capture
+from sniff.profile_files import with_devices
 from sniff.reading import dissector_for, outputs
-from sniff.session import DEVICES_NOTE, Session
+from sniff.session import Session
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -39,8 +39,7 @@ def run(args: argparse.Namespace) -> int:
     session = arguments.settings_of(args, capture.session)
     options = {"link-type": str(args.link_type)} if args.link_type is not None else None
     devices = arguments.noted_devices(args, session)
-    if devices:
-        session = replace(session, notes={**session.notes, DEVICES_NOTE: devices.text()})
+    session = with_devices(session, devices)
     values = devices if args.output.lower().endswith(".mcap") else None
     notes = _evidence(capture, session, devices) if args.output.lower().endswith(".pcapng") else None
     writing.write(args, session, capture.items(), [args.source], options, devices=values, notes=notes)

@@ -43,7 +43,9 @@ def run(args: argparse.Namespace) -> int:
     devices = arguments.devices_of(args, {str(address): name for address, name in plan.devices.items()})
     try:
         with VirtualBus.from_scenario(plan, paused=True) as bus:
-            source = SourceSpec(bus.tap(), plan.line, plan.protocol, "demo", listening.notes_of(devices))
+            source = SourceSpec(
+                bus.tap(), plan.line, plan.protocol, "demo", listening.notes_of(devices), profiles=devices.documents
+            )
             record = RecordSpec(args.write) if args.write else None
             live = listening.start(source, record, duration, devices)
             bus.begin()  # with the sniffer listening, so that the first words of the bus are heard

@@ -68,7 +68,7 @@ def target_of(args: argparse.Namespace) -> Target:
     name = bus.name if bus is not None else re.sub(r"[^A-Za-z0-9_-]+", "-", Path(port).name).strip("-") or "bus"
     devices = arguments.devices_of(args, bus.devices if bus is not None else None)
     unknown = search.names if search is not None else ()
-    source = SourceSpec(port, line, protocol, name, notes_of(devices), unknown)
+    source = SourceSpec(port, line, protocol, name, notes_of(devices), unknown, devices.documents)
     return Target(source, bus.record if bus is not None else None, devices, search)
 
 

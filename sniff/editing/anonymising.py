@@ -61,7 +61,7 @@ def anonymous_session(session: Session) -> Session:
     adapter = replace(session.adapter, serial_number="")
     if adapter.name.startswith("another program's"):
         adapter = Adapter("another program's file", latency=adapter.latency, latency_from=adapter.latency_from)
-    return replace(session, port="anonymised", bus="bus", adapter=adapter, notes=_renamed_devices(session))
+    return replace(session, port="anonymised", bus="bus", adapter=adapter, notes=_renamed_devices(session), profiles={})
 
 
 def _renamed_devices(session: Session) -> dict[str, str]:

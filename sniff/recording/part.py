@@ -13,7 +13,16 @@ from typing import BinaryIO
 from sniff import __version__
 from sniff.recording import frames
 from sniff.recording.batch import Message
-from sniff.recording.topics import FIXED_CHANNELS, PART_RECORD, PROFILE, SCHEMAS, SESSION_RECORD, VERSION
+from sniff.recording.topics import (
+    FIXED_CHANNELS,
+    PART_RECORD,
+    PROFILE,
+    PROFILE_MEDIA_TYPE,
+    PROFILE_SUFFIX,
+    SCHEMAS,
+    SESSION_RECORD,
+    VERSION,
+)
 from sniff.session import Session
 
 CHUNK_SIZE = 1 << 20
@@ -56,6 +65,10 @@ class PartFile:
         counters = {"first_chunk": 0, "octets_before": 0, **(before or {})}
         record = {"version": VERSION, "part": number, **counters}
         self._writer.add_metadata(PART_RECORD, {key: str(value) for key, value in record.items()})
+        for name, document in session.profiles.items():
+            self._writer.add_attachment(
+                session.started, session.started, name + PROFILE_SUFFIX, PROFILE_MEDIA_TYPE, document.encode()
+            )
         for topic, schema in FIXED_CHANNELS:
             self._register(topic, schema.name, {})
 

@@ -11,6 +11,7 @@ import os
 import stat
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import BinaryIO
 
@@ -21,8 +22,22 @@ from sniff.recording import scan
 from sniff.recording.batch import Batch, Joiner, line_event
 from sniff.recording.frames import METADATA, SCHEMA, FrameBatch
 from sniff.recording.messages import MessagePass
-from sniff.recording.topics import FRAMES, LINE, PART_RECORD, PROFILE, RAW, SESSION_RECORD, VERSION
+from sniff.recording.topics import (
+    FRAMES,
+    LINE,
+    PART_RECORD,
+    PROFILE,
+    PROFILE_MEDIA_TYPE,
+    PROFILE_SUFFIX,
+    RAW,
+    SESSION_RECORD,
+    VERSION,
+)
 from sniff.session import Completeness, Item, LineEvent, LineEventKind, Session, SettingsChange, settings_change
+
+MOST_PROFILE = 1 << 20
+"""Octets of an attached device profile; a longer one is passed over."""
+MOST_PROFILES = 64
 
 
 def read(path: str | Path) -> McapCapture:
@@ -211,7 +226,19 @@ class McapCapture:
                 ours = ours or (header is not None and header.profile == PROFILE)
             elif record.opcode == scan.METADATA:
                 ours = self._take_metadata(record.body) or ours
+            elif record.opcode == scan.ATTACHMENT:
+                self._take_profile(record.body)
         return ours
+
+    def _take_profile(self, body: bytes) -> None:
+        from mcap.records import Attachment
+
+        found = scan.parse(Attachment, body) if len(body) <= MOST_PROFILE else None
+        if found is None or found.media_type != PROFILE_MEDIA_TYPE or len(self.session.profiles) >= MOST_PROFILES:
+            return
+        name = found.name.removesuffix(PROFILE_SUFFIX)
+        document = found.data.decode("utf-8", "replace")
+        self.session = replace(self.session, profiles={**self.session.profiles, name: document})
 
     def _take_metadata(self, body: bytes) -> bool:
         from mcap.records import Metadata

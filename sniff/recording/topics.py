@@ -23,6 +23,10 @@ SESSION_RECORD = "session"
 PART_RECORD = "recording"
 """Metadata record with the version of the layout, the part's number and what came before it."""
 
+PROFILE_SUFFIX = ".toml"
+PROFILE_MEDIA_TYPE = "application/toml"
+"""Of the attachments that hold the device profiles in force, "teco-e510.toml" and so on, in every part."""
+
 VERSION = 1
 """Version of the layout of /raw and /line. A new one comes with a migration and a kept sample."""
 

@@ -15,8 +15,7 @@ from sniff.analysis.points import Point, PointReader, PointTable
 from sniff.analysis.summary import Summary
 from sniff.engine import Output, Row
 from sniff.formats import read
-from sniff.profile_files import devices as devices_of
-from sniff.profile_files import noted
+from sniff.profile_files import noted, noted_devices
 from sniff.reading import Settled, dissector_for, outputs
 from sniff.session import Completeness, LineEvent, Session
 
@@ -65,7 +64,7 @@ def read_capture(path: str | Path) -> CaptureReading:
     dissector = dissector_for(session)
     counts = Summary(session.line)
     known, unknown = noted(session)
-    devices = devices_of(known)
+    devices = noted_devices(session)
     judge = Judging(session, dissector, devices)
     reader, points = PointReader(dissector, devices), PointTable()
     rows: list[Row] = []
