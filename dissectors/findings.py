@@ -76,6 +76,28 @@ class Finding:
     means: str
     next: str
 
+    def merge(self, other: Finding) -> Finding:
+        """What one rule found about one subject in two captures of a bus: counts add up, times span both.
+
+        Words and evidence are those of the graver one, of the more frequent one where both are as grave: frames are
+        numbered by capture. Raises ValueError for findings of two things.
+        """
+        if (self.code, self.subject) != (other.code, other.subject):
+            raise ValueError(f"{self.code} {self.subject} and {other.code} {other.subject} are two things")
+        told = max(self, other, key=lambda finding: (finding.severity, finding.count))
+        count = self.count + other.count
+        return replace(told, count=count, first=min(self.first, other.first), last=max(self.last, other.last))
+
+
+def merged(parts: Iterable[Iterable[Finding]]) -> tuple[Finding, ...]:
+    """The findings of several captures of a bus as those of one, the gravest first, then the most frequent."""
+    found: dict[tuple[str, str], Finding] = {}
+    for part in parts:
+        for finding in part:
+            key = finding.code, finding.subject
+            found[key] = found[key].merge(finding) if key in found else finding
+    return tuple(sorted(found.values(), key=lambda one: (-one.severity, -one.count, one.code, one.subject)))
+
 
 class Judge(Protocol):
     """The rules of one protocol at work on one bus. Total: any events, any times; memory is bounded.

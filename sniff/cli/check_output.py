@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from xml.sax.saxutils import escape, quoteattr
 
-from dissectors.findings import Finding, Rule, Severity
+from dissectors.findings import Finding, Rule, Severity, merged, times
 from dissectors.line import NS_PER_S
 from sniff.analysis.health import Health
 from sniff.analysis.judging import rules_over
@@ -67,6 +67,8 @@ def write_text(checked: Sequence[Checked], colour: bool) -> None:
             _write_finding(one, finding, width, colour)
         print()
         print(_count_words(one.findings))
+    if len(checked) > 1:
+        _write_together(checked, width)
 
 
 def _write_head(one: Checked, width: int) -> None:
@@ -83,6 +85,23 @@ def _write_head(one: Checked, width: int) -> None:
         whole = [address for address, health in sorted(one.stations.items()) if health.score == 100]
         if whole:
             _paragraph(f"at 100: {word} {', '.join(map(str, whole))}", width, "    ")
+
+
+def _write_together(checked: Sequence[Checked], width: int) -> None:
+    """Which findings come back from capture to capture, one a line."""
+    print(f"\nall {len(checked)} captures together:")
+    rules = [rules_over(dissector_for(one.session)) for one in checked]
+    for finding in merged(one.findings for one in checked):
+        if finding.severity is Severity.INFO:
+            continue
+        within = sum(
+            any((found.code, found.subject) == (finding.code, finding.subject) for found in one.findings)
+            for one in checked
+        )
+        title = next((catalogue[finding.code].title for catalogue in rules if finding.code in catalogue), "")
+        label = finding.severity.label.upper().ljust(8)
+        often = f"{times(finding.count)}, in {within} of {len(checked)} captures"
+        _paragraph(f"{label} {finding.subject}: {title}  [{finding.code}]  {often}", width, "", _INDENT)
 
 
 def _write_finding(one: Checked, finding: Finding, width: int, colour: bool) -> None:

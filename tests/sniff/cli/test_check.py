@@ -79,3 +79,14 @@ def test_an_unknown_code_is_a_usage_error(absent, capsys):
     assert main(["rule", "XX9"]) == 2
     assert main(["check", absent, "--only", "XX"]) == 2
     assert "no rule has that code" in capsys.readouterr().err
+
+
+def test_several_captures_are_told_together(poll: Path, sniff485: Callable) -> None:
+    again = poll.with_name("again.cap.txt")
+    again.write_text(poll.read_text())
+    ran = sniff485("check", poll, again)
+    assert "all 2 captures together:" in ran.out
+    together = ran.out.partition("together:")[2]
+    assert "in 2 of 2 captures" in together
+    assert len(together.strip().splitlines()) >= 2
+    assert "together" not in sniff485("check", poll).out
