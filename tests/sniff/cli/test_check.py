@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import pytest
@@ -81,7 +82,7 @@ def test_an_unknown_code_is_a_usage_error(absent, capsys):
     assert "no rule has that code" in capsys.readouterr().err
 
 
-def test_several_captures_are_told_together(poll: Path, sniff485: Callable) -> None:
+def test_several_captures_are_told_together(poll: Path, sniff485: Any) -> None:
     again = poll.with_name("again.cap.txt")
     again.write_text(poll.read_text())
     ran = sniff485("check", poll, again)
