@@ -26,6 +26,8 @@ OPT_END, OPT_COMMENT, OPT_NAME, OPT_FLAGS, OPT_TSRESOL, OPT_TSOFFSET = 0, 1, 2, 
 CRC_ERROR_FLAG = 1 << 24
 LONGEST = 4 * 1024 * 1024
 """A longer block is damage."""
+LATEST = (1 << 33) * 1_000_000_000
+"""ns since the epoch, in the year 2242; a record that says more, or as much before it, is given this time."""
 SESSION_MARK = "sniff485 session: "
 
 
@@ -137,7 +139,7 @@ class PcapngCapture:
             if code == OPT_COMMENT and text.startswith(SESSION_MARK):
                 try:
                     found = json.loads(text[len(SESSION_MARK) :])
-                except ValueError:
+                except (ValueError, RecursionError):
                     continue
                 if isinstance(found, dict):
                     self._metadata = {str(key): str(item) for key, item in found.items()}
@@ -168,6 +170,7 @@ def _packet(order: str, kind: int, body: bytes, interfaces: list[_Interface]) ->
     interface = interfaces[number]
     factor, ticks = interface.resolution
     time = ((high << 32) | low) * factor // ticks + interface.offset * 1_000_000_000
+    time = max(-LATEST, min(time, LATEST))
     comment, crc_error = "", False
     for code, value in _options(order, body[20 + kept + (-kept % 4) :]):
         if code == OPT_COMMENT:

@@ -32,6 +32,7 @@ MODBUS = """\
 +250      01 03 00 00 00 02 C4 0B
 +8.2      01 83 02 C0 F1
 """
+POLL = bytes.fromhex("010300000002c40b")
 TSHARK = shutil.which("tshark")
 needs_tshark = pytest.mark.skipif(TSHARK is None, reason="tshark is not installed")
 
@@ -216,3 +217,49 @@ def test_findings_stand_in_the_comments_of_their_packets(tmp_path: Path) -> None
         comments = [record.comment for record in PcapngCapture(target)._records(stream)]
     assert "MB008 station 1: exception 2 (illegal data address)" in comments[-1]
     assert "MB008" not in comments[0]
+
+
+def block(kind: int, body: bytes) -> bytes:
+    size = struct.pack("<I", len(body) + 12)
+    return struct.pack("<I", kind) + size + body + size
+
+
+def option(code: int, value: bytes = b"") -> bytes:
+    return struct.pack("<HH", code, len(value)) + value + b"\0" * (-len(value) % 4)
+
+
+def made(path: Path, comment: bytes = b"", interface: bytes = b"", ticks: int = 1) -> Path:
+    """A pcapng file of one poll, with options as somebody hostile would write them."""
+    about = option(1, comment) + option(0) if comment else b""
+    packet = struct.pack("<IIIII", 0, ticks >> 32, ticks & 0xFFFFFFFF, len(POLL), len(POLL)) + POLL
+    path.write_bytes(
+        block(0x0A0D0D0A, struct.pack("<IHHq", 0x1A2B3C4D, 1, 0, -1) + about)
+        + block(1, struct.pack("<HHI", 147, 0, 0) + interface + option(0))
+        + block(6, packet)
+    )
+    return path
+
+
+@pytest.mark.parametrize("nested", [b"[" * 60_000, b'{"a":' * 10_000], ids=["list", "object"])
+def test_a_session_nested_without_end_is_no_session(tmp_path: Path, nested: bytes) -> None:
+    capture = read(made(tmp_path / "deep.pcapng", b"sniff485 session: " + nested))
+    assert [item.octets for item in capture.items() if isinstance(item, Chunk)] == [POLL]
+
+
+@pytest.mark.parametrize(
+    ("interface", "ticks"),
+    [
+        (option(9, b"\0"), (1 << 64) - 1),
+        (option(14, struct.pack("<q", (1 << 63) - 1)), 1),
+        (option(14, struct.pack("<q", -1 << 63)), 1),
+    ],
+    ids=["seconds", "late", "early"],
+)
+def test_times_beyond_all_clocks(tmp_path: Path, interface: bytes, ticks: int) -> None:
+    from sniff.cli import main
+
+    path = made(tmp_path / "far.pcapng", interface=interface, ticks=ticks)
+    assert main(["check", str(path), "--fail-on", "never"]) == 0
+    for name in ("far.mcap", "far.cap.txt", "far2.pcapng", "far.pcap"):
+        assert main(["convert", str(path), str(tmp_path / name)]) == 0
+        assert [item.octets for item in read(tmp_path / name).items() if isinstance(item, Chunk)] == [POLL]
