@@ -6,6 +6,7 @@ Exit codes: 0 fine · 1 findings at or above --fail-on · 2 usage · 3 unreadabl
 from __future__ import annotations
 
 import argparse
+import io
 import os
 import sys
 from importlib import import_module
@@ -64,6 +65,7 @@ USAGE, UNREADABLE, PORT_TROUBLE, INTERRUPTED = 2, 3, 4, 130
 def main(argv: list[str] | None = None) -> int:
     """Run one command; give its exit code."""
     arguments = sys.argv[1:] if argv is None else argv
+    _print_anything()
     try:
         return _run(arguments)
     except Failure as failure:
@@ -122,6 +124,13 @@ def _no_such_command(word: str) -> str:
         a = "live" if word.startswith("/dev/") else "open"
         return f"{word!r}: no such command; did you mean `sniff485 {a} {word}`?"
     return f"{word!r}: no such command; `sniff485 --help` lists them"
+
+
+def _print_anything() -> None:
+    """Where the output's encoding has no such character (Windows writes files as cp1252), print its escape."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
 
 
 def _plain(error: Exception) -> str:

@@ -53,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
     if any(Path(place).resolve() == Path(file).resolve() for file in args.files if file != "-"):
         raise Failure(f"{place}: is a capture that is being read; choose another name with -o", USAGE)
     try:
-        Path(place).write_text(text, "utf-8")
+        Path(place).write_text(text, "utf-8", "backslashreplace")  # names need not be text
     except OSError as error:
         raise Failure(f"{place}: cannot be written: {error.strerror}", UNREADABLE) from None
     print(f"sniff485: report in {place}", file=sys.stderr)

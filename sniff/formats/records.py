@@ -38,7 +38,7 @@ def foreign_session(path: str, protocol: str | None, started: int, kind: str) ->
     """What is known of a packet file that we did not write."""
     name = protocol or "modbus-rtu"
     return Session(
-        port=path,
+        port=path.encode("utf-8", "backslashreplace").decode(),  # a name need not be text
         line=LineSettings.parse(registry.get(name).default_line),
         protocol=name,
         started=started,

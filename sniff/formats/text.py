@@ -42,7 +42,7 @@ from dissectors.line import LineSettings
 from sniff.formats import CaptureError
 from sniff.formats.files import NewFile, explain, open_capture
 from sniff.formats.text_line import DEVICE, EPOCH, HEADER, MAGIC, MARKS, VERSION, Line, is_device
-from sniff.session import DEVICES_NOTE, Completeness, Item, LineEvent, LineEventKind, Session
+from sniff.session import DEVICES_NOTE, Completeness, Item, LineEvent, Session, settings_change
 
 MOST_DEVICES = 256
 LONGEST_LINE = 4 << 20  # octets; a chunk of a megabyte fits
@@ -55,12 +55,16 @@ _LINE_END = re.compile(r"\r\n|\n|\r")
 # -- reading ---------------------------------------------------------------------------------------------------
 
 
-def read(path: str | Path) -> TextCapture:
-    """Open a text capture. Raises CaptureError here for a bad header, and from `items` for a bad line."""
+def read(path: str | Path, name: str | None = None) -> TextCapture:
+    """Open a text capture; `name` stands in error messages, the path when None.
+
+    Raises CaptureError here for a bad header, and from `items` for a bad line.
+    """
     place = Path(path)
-    capture = TextCapture(str(place), _FileLines(place))
+    called = str(place) if name is None else name
+    capture = TextCapture(called, _FileLines(place))
     if capture.empty:
-        raise CaptureError(f"{place}: empty file; a text capture begins with '{MAGIC} {VERSION}'")
+        raise CaptureError(f"{called}: empty file; a text capture begins with '{MAGIC} {VERSION}'")
     return capture
 
 
@@ -148,14 +152,8 @@ class _FileLines:
 
 def _changed(line: LineSettings | None, event: LineEvent) -> LineSettings | None:
     """The line settings after an event: `~` follows them."""
-    if event.kind is LineEventKind.SETTINGS:
-        for word in event.text.split():
-            if word.startswith("line="):
-                try:
-                    return LineSettings.parse(word[5:])
-                except ValueError:
-                    return line
-    return line
+    change = settings_change(event)
+    return line if change is None or change.line is None else change.line
 
 
 # -- writing ---------------------------------------------------------------------------------------------------

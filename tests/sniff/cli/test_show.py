@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -125,3 +126,44 @@ def test_standard_input(poll: Path, sniff485: Callable, monkeypatch: pytest.Monk
     for path in (poll, mcap):
         monkeypatch.setattr("sys.stdin", SimpleNamespace(buffer=io.BytesIO(path.read_bytes()), isatty=lambda: False))
         assert sniff485("show", "-").out == whole
+
+
+@pytest.mark.parametrize("text", ["", "(1.0) bus 01 03 00 00 00 02 C4 0B\n"], ids=["nothing", "byte log"])
+def test_standard_input_has_no_path(
+    text: str, sniff485: Callable, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    import io
+    import tempfile
+    from types import SimpleNamespace
+
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setattr("sys.stdin", SimpleNamespace(buffer=io.BytesIO(text.encode()), isatty=lambda: False))
+    ran = sniff485("info", "-")
+    assert ran.code == (0 if text else 3)
+    assert str(tmp_path) not in ran.out + ran.err
+
+
+@pytest.mark.parametrize("encoding", ["cp1252", "ascii", "utf-8"])
+def test_an_output_without_arrows(encoding: str, poll: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What Windows makes of `show FILE > frames.txt`."""
+    import io
+
+    from sniff.cli import main
+
+    out = io.TextIOWrapper(io.BytesIO(), encoding)
+    monkeypatch.setattr("sys.stdout", out)
+    assert main(["show", str(poll)]) == 0
+    out.flush()
+    written = out.buffer.getvalue().decode(encoding)  # type: ignore[attr-defined]
+    assert ("1 ← read holding" if encoding == "utf-8" else "1 \\u2190 read holding") in written
+
+
+@pytest.mark.skipif(os.name != "posix", reason="names of files are text here")
+def test_a_name_that_is_no_text(sniff485: Callable, tmp_path: Path) -> None:
+    log = tmp_path / os.fsdecode(b"\xff.log")
+    log.write_text("(1.0) bus 01 03 00 00 00 02 C4 0B\n")
+    assert sniff485("show", log).code == 0
+    assert sniff485("info", log).code == 0
+    for out in ("out.mcap", "out.cap.txt", "out.pcapng"):
+        assert sniff485("convert", log, tmp_path / out).code == 0
+        assert "\\udcff.log" in sniff485("info", tmp_path / out).out
