@@ -64,10 +64,11 @@ class NewFile:
             raise explain(path, error) from None
 
     def write(self, octets: bytes) -> None:
-        """Append."""
+        """Append; what cannot be written gives the file up."""
         try:
             self.stream.write(octets)
         except OSError as error:
+            self.discard()
             raise explain(self.path, error) from None
 
     def close(self) -> None:
@@ -75,6 +76,9 @@ class NewFile:
         if self.stream.closed:
             return
         try:
+            if self._temporary is not None:
+                self.stream.flush()
+                os.fsync(self.stream.fileno())  # the name must not be there before the octets are
             self.stream.close()
             if self._temporary is not None:
                 os.replace(self._temporary, self._target)
