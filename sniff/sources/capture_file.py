@@ -7,7 +7,7 @@ from itertools import islice
 
 from dissectors.line import LineSettings
 from sniff.formats import CaptureError, read
-from sniff.session import Adapter, Item, Session
+from sniff.session import Adapter, Item, LineEvent, LineEventKind, Session
 from sniff.sources import PortError
 from sniff.sources.clock import Clock
 
@@ -18,7 +18,8 @@ AT_ONCE = 256
 class CaptureFileSource:
     """Plays a capture. `speed`: 1 as it was, 2 twice as fast, None as fast as it is read.
 
-    Items keep the times of the file, so `now` is on its clock, not on the one that paces it. Raises PortError.
+    Items keep the times of the file, so `now` is on its clock, not on the one that paces it. Raises PortError when it
+    cannot be opened; a file that turns out to be damaged ends there, with a NOTE that says why.
     """
 
     def __init__(self, path: str, clock: Clock, speed: float | None = 1.0) -> None:
@@ -82,7 +83,12 @@ class CaptureFileSource:
         now = self._clock.now()
         while self._next is not None and self._due(self._next) <= now:
             item = self._next
-            self._next = next(self._items, None)
+            try:
+                self._next = next(self._items, None)
+            except (CaptureError, OSError) as error:
+                self._next = None
+                yield from (item, LineEvent(item.time, LineEventKind.NOTE, f"ends here: {error}"))
+                return
             yield item
 
     def _due(self, item: Item) -> int:

@@ -3,6 +3,7 @@ from __future__ import annotations
 import pytest
 
 from dissectors.line import LineSettings
+from sniff.session import LineEventKind
 from sniff.sources import PortError, open_source
 from sniff.sources.capture_file import AT_ONCE, CaptureFileSource
 from sniff.sources.clock import Clock
@@ -93,3 +94,15 @@ def test_unreadable_files_are_named(tmp_path, clock) -> None:
         CaptureFileSource(str(tmp_path / "missing.cap.txt"), clock)
     with pytest.raises(PortError, match="speed 0"):
         CaptureFileSource(str(tmp_path / "missing.cap.txt"), clock, speed=0)
+
+
+def test_a_damaged_file_ends_where_it_is_damaged(path, clock):
+    """Nothing raises once it is open: the capture process would die of it."""
+    with open(path, "a") as file:
+        file.write("+10 no octets\n+10 01\n")
+    source = CaptureFileSource(path, clock, speed=None)
+    *chunks, last = source.read()
+    assert [chunk.octets for chunk in chunks] == [b"\x01\x03", b"\x01\x03\x04", b"\xff"]
+    assert last.kind is LineEventKind.NOTE
+    assert "poll.cap.txt:8:5: expected" in last.text
+    assert source.ended
