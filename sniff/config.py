@@ -88,7 +88,7 @@ def parse(path: Path) -> Config:
         data = tomllib.loads(text)
     except OSError as error:
         raise ConfigError(f"{path}: {error.strerror}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
         raise ConfigError(f"{path}: {error}") from None
     reader = _Reader(path, text)
     reader.check_keys(data, TOP_KEYS, "")

@@ -33,6 +33,6 @@ def parse_text(text: str, origin: str) -> Profile:
     """The profile in the text of a TOML document. Raises ProfileError."""
     try:
         data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise ProfileError(f"{origin}: {error}") from None
     return replace(parse(data, origin), document=text)

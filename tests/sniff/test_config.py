@@ -51,3 +51,10 @@ def test_a_mistake_is_named_with_its_place(tmp_path: Path, text: str, expected: 
         parse(write(tmp_path, text))
     assert expected in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_nesting_without_end_is_a_mistake(tmp_path: Path) -> None:
+    path = tmp_path / "sniff485.toml"
+    path.write_text("a = " + "[" * 20_000)
+    with pytest.raises(ConfigError, match=r"sniff485\.toml"):
+        parse(path)
