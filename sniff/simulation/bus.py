@@ -74,14 +74,22 @@ class VirtualBus:
         if self._process is not None:
             return
         context = multiprocessing.get_context("spawn")
-        self._control, other = context.Pipe()
-        self._process = context.Process(target=hub.main, args=(self._plan, other), name="virtual-bus", daemon=True)
+        control, other = context.Pipe()
+        process = context.Process(target=hub.main, args=(self._plan, other), name="virtual-bus", daemon=True)
         try:
-            self._process.start()
+            process.start()
+        except BaseException:
+            control.close()
+            raise
         finally:
             other.close()
+        self._process, self._control = process, control
         if not self._paused:
-            self.begin()
+            try:
+                self.begin()
+            except BaseException:
+                self.close()
+                raise
 
     def close(self) -> None:
         """Stop the process and wait for it; harmless when called twice."""

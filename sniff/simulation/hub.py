@@ -213,10 +213,6 @@ class Hub:
         if self._origin is None:
             self._origin = self._began = time.monotonic_ns()
 
-    def do_stop(self) -> None:
-        """End the process."""
-        self._running = False
-
     def do_attach(self, kind: str, link: str, port: Port) -> str:
         """Take a party or a tap on the bus; give what a program opens.
 
