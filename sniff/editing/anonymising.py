@@ -2,8 +2,9 @@
 
 Every octet stays an octet at its time, so framing, gaps, pairs, damage and findings stay what they were; only who it
 was and what it is called is gone. Rewritten are: addresses in all frames; in good frames server identification (Modbus
-17, 43/14), BACnet character strings, device instances and network addresses. Values of points are kept: they are what
-a reader needs. The data of extended (COBS) MS/TP frames is blanked: it would not keep its length.
+17, 43/14), BACnet character strings, device instances and network addresses; what events of the line say in words
+(ports that went and came back, notes) is left out. Values of points are kept: they are what a reader needs. The data of
+extended (COBS) MS/TP frames is blanked: it would not keep its length.
 
 A damaged frame keeps its damage: only its address is renumbered, where its place is known.
 """
@@ -23,11 +24,14 @@ from dissectors.profiles.packaged import names
 from sniff.engine import Output
 from sniff.profile_files import EVERY, address, noted
 from sniff.reading import engine_for
-from sniff.session import DEVICES_NOTE, Adapter, Item, Session
+from sniff.session import DEVICES_NOTE, Adapter, Item, LineEvent, LineEventKind, Session, settings_change
 
 BLANK = ord("x")
 CHARACTER_STRING, OBJECT_IDENTIFIER = 7, 12
 DEVICE = 8
+ERROR_NAMES = frozenset(("parity", "framing", "break", "overrun", "buffer overrun"))
+"""What drivers and gateways call errors that they count."""
+
 SHORTEST_TEXT = 4
 """Printable octets in a row that are taken for a text where nothing says what they are."""
 
@@ -122,8 +126,18 @@ def _filled(waiting: list[Item], made: bytearray) -> Iterator[Item]:
             count = len(item.octets)
             item = replace(item, octets=bytes(made[:count]))
             del made[:count]
+        else:
+            item = replace(item, text=_without_names(item))
         waiting.pop(0)
         yield item
+
+
+def _without_names(event: LineEvent) -> str:
+    """What an event of the line may say of itself: settings and kinds of errors. The rest may name a port or a place."""
+    change = settings_change(event)
+    if change is not None:
+        return str(replace(change, protocol=change.protocol if change.protocol in _REWRITERS else None))
+    return event.text if event.kind is LineEventKind.ERRORS and event.text in ERROR_NAMES else ""
 
 
 def _without_text(octets: bytes) -> bytes:

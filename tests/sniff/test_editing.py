@@ -14,7 +14,7 @@ from sniff.editing.merging import merged
 from sniff.formats import create, read
 from sniff.formats.text import parse
 from sniff.reading import settled
-from sniff.session import Item, Session
+from sniff.session import Item, LineEvent, Session
 from sniff.simulation.scenarios import scenario, simulate
 from sniff.testing.capture_reading import read_capture
 
@@ -92,6 +92,29 @@ def test_no_name_survives(tmp_path: Path, sniff485: Callable[..., tuple[int, str
         assert row.event.ok
         assert b"\x04\xd2" not in row.event.octets
         assert secret not in octets(list(read(out).items()))
+
+
+def test_no_name_survives_in_events_of_the_line() -> None:
+    """A port that was unplugged is named by its path, which has the adapter's serial number."""
+    text = (
+        "# line: 19200,8E1\n+0 01 03 00 00 00 02 C4 0B\n"
+        "#! +1 unplugged /dev/serial/by-id/usb-ACME_7 is gone\n"
+        "#! +2 note boiler room 7\n"
+        "#! +3 errors count=2 parity\n"
+        "#! +3 errors count=2 boiler\n"
+        "#! +4 dropped count=9 boiler\n"
+        "#! +5 settings line=9600,8N1 protocol=boiler room\n"
+    )
+    capture = parse(text)
+    events = [item for item in anonymised(capture.items(), capture.session) if isinstance(item, LineEvent)]
+    assert [(event.kind.value, event.count, event.text) for event in events] == [
+        ("unplugged", 0, ""),
+        ("note", 0, ""),
+        ("errors", 2, "parity"),
+        ("errors", 2, ""),
+        ("dropped", 9, ""),
+        ("settings", 0, "line=9600,8N1"),
+    ]
 
 
 def test_known_devices_stay_known_under_their_new_addresses() -> None:
