@@ -6,7 +6,9 @@ Exit codes: 0 fine · 1 findings at or above --fail-on · 2 usage · 3 unreadabl
 from __future__ import annotations
 
 import argparse
+import codecs
 import io
+import json
 import os
 import sys
 from importlib import import_module
@@ -58,6 +60,8 @@ class Failure(Exception):
         super().__init__(message)
         self.code = code
 
+
+ESCAPE = "sniff485.escape"
 
 USAGE, UNREADABLE, PORT_TROUBLE, INTERRUPTED = 2, 3, 4, 130
 
@@ -128,9 +132,17 @@ def _no_such_command(word: str) -> str:
 
 def _print_anything() -> None:
     """Where the output's encoding has no such character (Windows writes files as cp1252), print its escape."""
+    codecs.register_error(ESCAPE, _escape)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="backslashreplace")
+            stream.reconfigure(errors=ESCAPE)
+
+
+def _escape(error: UnicodeError) -> tuple[str, int]:
+    """\\u2190 and such, as JSON has it, so that JSON stays JSON."""
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    return json.dumps(error.object[error.start : error.end])[1:-1], error.end
 
 
 def _plain(error: Exception) -> str:

@@ -7,14 +7,13 @@ from __future__ import annotations
 
 import argparse
 import fnmatch
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 from dissectors.line import NS_PER_S
 from dissectors.profiles.decoding import number
 from sniff.analysis.points import Point, PointReader, PointTable, Sample
-from sniff.cli import USAGE, Failure, arguments, tables
+from sniff.cli import USAGE, Failure, arguments, tables, writing
 from sniff.cli.rows import iso
 from sniff.cli.tables import Cell
 from sniff.engine import Output
@@ -75,7 +74,7 @@ def run(args: argparse.Namespace) -> int:
             for samples in _samples(args, capture, session):
                 for sample in samples:
                     table.add(_parquet_row(sample))
-            _say_cut(name, capture)
+            writing.say_incomplete(name, capture)
     return 0
 
 
@@ -88,15 +87,8 @@ def _print(args: argparse.Namespace) -> int:
         else:
             chosen = (_sample(sample) for samples in _samples(args, capture, session) for sample in samples)
             tables.write(SAMPLES, chosen, args.style)
-        _say_cut(path, capture)
+        writing.say_incomplete(path, capture)
     return 0
-
-
-def _say_cut(path: str, capture: Capture) -> None:
-    complete = capture.completeness()
-    if not complete.whole:
-        sys.stdout.flush()
-        print(f"sniff485: {path}: {complete.text}", file=sys.stderr)
 
 
 def _samples(args: argparse.Namespace, capture: Capture, session: Session) -> Iterator[list[Sample]]:

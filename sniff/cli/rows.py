@@ -67,7 +67,7 @@ def to_json(item: Settled, dissector: Dissector, session: Session, with_fields: 
 
 
 def json_line(item: Settled, dissector: Dissector, session: Session, with_fields: bool = False) -> str:
-    """The object on one line of ASCII."""
+    """The object on one line."""
     return json.dumps(to_json(item, dissector, session, with_fields), separators=(", ", ": "), ensure_ascii=False)
 
 

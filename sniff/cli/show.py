@@ -14,7 +14,7 @@ from dissectors.registry import Dissector
 from sniff.analysis.filtering import PREFIXES, FilterError, Predicate, compile_filter
 from sniff.analysis.packet_tree import Field
 from sniff.analysis.row_tree import tree_of
-from sniff.cli import USAGE, Failure, arguments, rows
+from sniff.cli import USAGE, Failure, arguments, rows, writing
 from sniff.cli.tables import safe_cell
 from sniff.config import nearest
 from sniff.reading import Settled, dissector_for, settled
@@ -51,10 +51,7 @@ def run(args: argparse.Namespace) -> int:
         wanted = _filter(args, dissector)
         spoken = devices if not args.table or "text" in args.names else None
         left = _show(args, settled(capture.items(), session, spoken, wanted), session, dissector, left)
-        complete = capture.completeness()
-        if not complete.whole:
-            sys.stdout.flush()
-            print(f"sniff485: {path}: {complete.text}", file=sys.stderr)
+        writing.say_incomplete(path, capture)
         if left == 0:
             break
     return 0

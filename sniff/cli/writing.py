@@ -77,9 +77,10 @@ def write(
 
 
 def say_incomplete(path: str, capture: Capture) -> None:
-    """Where a capture that was read ends too early."""
+    """Where a capture that was read ends too early; after what was printed of it."""
     complete = capture.completeness()
     if not complete.whole:
+        sys.stdout.flush()
         print(f"sniff485: {path}: {plain(complete.text)}", file=sys.stderr)
 
 
