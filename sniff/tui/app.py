@@ -16,6 +16,7 @@ from sniff.store import Store
 from sniff.tui.feed import Feed, FeedStatus
 from sniff.tui.header import StatusHeader
 from sniff.tui.help import HelpScreen
+from sniff.tui.judged import Judged
 from sniff.tui.palette import ActionCommands
 from sniff.tui.plain import plain
 from sniff.tui.prompt import Prompt
@@ -60,6 +61,7 @@ class SnifferApp(App[None]):
             self.add_mode(entry.name, partial(_make, entry))
         self.feed = feed
         self.status: FeedStatus = feed.status()
+        self.judged = Judged(feed.store)  # keeps up behind every screen, so that findings are there when asked for
         self.viewing = Viewing(feed.store, follow=self.status.live)
         self.tabs = tuple((entry.key, entry.title) for entry in SCREENS)
         self.visited = [start_screen]
@@ -88,20 +90,29 @@ class SnifferApp(App[None]):
             return
         changed = self.feed.poll()
         was_searching, self.status = self.status.searching, self.feed.status()
-        if self.status.trouble != self._told_trouble:
-            self._told_trouble = self.status.trouble
-            said = plain(self.status.trouble) or "it goes on"
-            self.notify(
-                said, title="recording", severity="error" if self.status.trouble else "information", markup=False
-            )
         if was_searching and not self.status.searching:
             self._take_what_was_found()
+        self._tell()
+        if changed:
+            self.draw_screen()
+        if self._worker is not None and self.judged.left(self.viewing.last_row) and (self.status.live or not changed):
+            self._worker.resume()  # a file is read first: judging would slow that down
+        self._draw_header()
+
+    def _tell(self) -> None:
+        """Say once what happened to the recording, to the view and to the capture."""
+        trouble = self.status.trouble
+        if trouble != self._told_trouble:
+            self._told_trouble = trouble
+            said = plain(trouble) or "it goes on"
+            self.notify(said, title="recording", severity="error" if trouble else "information", markup=False)
+        if self.store.dropped_rows and not self._told_dropped:
+            self._told_dropped = True
+            file = "the file keeps all" if self.status.in_file else "nothing is recorded"
+            self.notify(f"the oldest rows leave the view, {self.store.keep} stay; {file}", title="memory", markup=False)
         if self.status.ended and not self._told_end:
             self._told_end = True
             self.notify(plain(self.status.ended), title="the capture has ended", severity="warning", markup=False)
-        if changed:
-            self.draw_screen()
-        self._draw_header()
 
     def _take_what_was_found(self) -> None:
         """A search for settings has ended: say so, and read the filter with what was found."""
@@ -131,7 +142,8 @@ class SnifferApp(App[None]):
 
     def _work(self) -> None:
         screen = self.shown
-        if not _is_whole(screen) or not screen.work():
+        busy = _is_whole(screen) and screen.work_left() and screen.work()
+        if not busy and not self.judged.work(self.viewing.last_row):
             self._worker.pause()
 
     def _draw_header(self) -> None:

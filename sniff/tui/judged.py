@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import time
+
 from dissectors.findings import Finding
 from sniff.analysis.judging import Judging
 from sniff.engine import Output
 from sniff.store import Store
+
+SLICE_SECONDS = 0.012
+SLICE_ROWS = 200
 
 
 class Judged:
@@ -22,6 +27,13 @@ class Judged:
     def left(self, last: int) -> int:
         """How many rows up to number `last` are still to be taken."""
         return max(0, last - max(self._row, self.store.first_no - 1))
+
+    def work(self, last: int) -> bool:
+        """Take rows up to number `last` for some milliseconds; whether more are left."""
+        end = time.perf_counter() + SLICE_SECONDS
+        while self.left(last) and time.perf_counter() < end:
+            self.step(SLICE_ROWS, last)
+        return self.left(last) > 0
 
     def step(self, count: int, last: int) -> None:
         """Take some rows, at most up to number `last`, and what closed with them."""

@@ -19,8 +19,6 @@ from sniff.tui.screens.base import ViewScreen
 from sniff.tui.tables import StationTable
 from sniff.tui.times import clock
 
-SLICE_SECONDS = 0.012
-SLICE_ROWS = 200
 PERIOD = 1.0
 """Seconds between two looks at the findings while rows keep coming."""
 
@@ -43,7 +41,6 @@ class FindingsScreen(ViewScreen):
 
     def __init__(self) -> None:
         super().__init__()
-        self._judged: Judged | None = None
         self._looked = -PERIOD
         self._first_look = True
         self._by_subject = False
@@ -69,38 +66,27 @@ class FindingsScreen(ViewScreen):
 
     def draw(self) -> None:
         """Look again when all rows are judged, at most once a second."""
-        if self._judged is None or self._judged.store is not self.store:
-            self._judged = Judged(self.store)
         if not self.work_left() and time.monotonic() - self._looked >= PERIOD:
             self._look()
 
     def work_left(self) -> bool:
         """Whether rows are still to be judged."""
-        return self._judged is not None and self._judged.left(self.viewing.last_row) > 0
+        return self.judged.left(self.viewing.last_row) > 0
 
     def work(self) -> bool:
         """Judge some rows."""
-        judged = self._judged
-        if judged is None:
-            return False
-        end = time.perf_counter() + SLICE_SECONDS
-        last = self.viewing.last_row
-        while judged.left(last) and time.perf_counter() < end:
-            judged.step(SLICE_ROWS, last)
-        if not judged.left(last) or time.monotonic() - self._looked >= PERIOD:
+        left = self.judged.work(self.viewing.last_row)
+        if not left or time.monotonic() - self._looked >= PERIOD:
             self._look()
-        return self.work_left()
+        return left
 
-    def note(self) -> str:
-        """How far the rules are."""
-        judged = self._judged
-        left = judged.left(self.viewing.last_row) if judged is not None else 0
-        return f"{left} rows to judge" if left else ""
+    @property
+    def judged(self) -> Judged:
+        """The rules at work, on all screens."""
+        return self.app.judged
 
     def _look(self) -> None:
-        judged = self._judged
-        if judged is None:
-            return
+        judged = self.judged
         self._looked = time.monotonic()
         self._titles = {code: rule.title for code, rule in rules_over(self.store.dissector).items()}
         if self.viewing.last_row >= self.store.last_no:
@@ -127,11 +113,11 @@ class FindingsScreen(ViewScreen):
     def _describe(self) -> None:
         words = self.query_one("#words", Static)
         finding = self._here()
+        left = self.judged.left(self.viewing.last_row)
+        text = Text(f"the rules have {left} rows still to read\n" if left else "", style="dim")
         if finding is None:
-            left = self.work_left()
-            words.update("the rules are still reading" if left else "nothing was found")
+            words.update(text if left else "nothing was found")
             return
-        text = Text()
         text.append(f"{finding.severity.label} {finding.code} ", style=_STYLES[finding.severity])
         text.append(plain(f"{finding.subject}: {finding.seen}") + "\n")
         for word, said in (("means", finding.means), ("next", finding.next)):

@@ -118,3 +118,16 @@ def test_an_empty_store_is_said_to_be_empty(look, make_bus, key):
         assert "nothing was heard" in looking.text() or "nothing" in looking.text() or "not one octet" in looking.text()
 
     look(make_bus().store, script)
+
+
+def test_the_rules_read_on_behind_every_screen(look, store):
+    async def script(see):
+        for _ in range(500):
+            if not see.app.judged.left(store.last_no):
+                break
+            await see.pilot.pause(0.01)
+        assert see.app.current_mode == "frames"
+        assert not see.app.judged.left(store.last_no)
+        assert {finding.code for finding in see.app.judged.findings()} >= {"MB001"}
+
+    look(store, script)
