@@ -49,11 +49,11 @@ _ALL = (
     Rule(
         "LN005",
         Severity.WARNING,
-        "octets lost by this computer",
-        "Octets that the capture lost because the computer did not keep up. What follows such a hole looks like faults "
-        "of the bus and is not.",
-        "a computer that is too busy, or a full disk",
-        "what else runs; real-time priority for the capture; another disk",
+        "octets missing from the capture",
+        "Octets that were on the bus and are not in the capture: the computer did not keep up, the file is damaged, or "
+        "a part of a recording was not given. What follows such a hole looks like faults of the bus and is not.",
+        "a computer that is too busy, a full disk, a damaged file, or a part left out",
+        "what else runs on the computer; real-time priority for the capture; whether no part was left out",
     ),
     Rule(
         "LN006",

@@ -7,13 +7,12 @@ from __future__ import annotations
 
 import argparse
 import importlib.util
-import json
 import os
 import sys
 from pathlib import Path
 
-from sniff.cli import UNREADABLE, USAGE, Failure, arguments
-from sniff.formats import READERS
+from sniff.cli import UNREADABLE, USAGE, Failure, arguments, json_output
+from sniff.formats import READERS, Capture
 from sniff.reporting.collecting import collect
 from sniff.reporting.numbers import Numbers
 
@@ -35,12 +34,12 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Report on all captures."""
+    """Report on all captures, the parts of one recording as one."""
     if not args.json:
         require_libraries()
-    reports = [_numbers(path, args) for path in args.files]
+    reports = [_numbers(name, capture, args) for name, capture in arguments.open_captures(args.files)]
     if args.json:
-        text = "".join(json.dumps(report.to_json(), ensure_ascii=False) + "\n" for report in reports)
+        text = "".join(json_output.dumps(report.to_json()) + "\n" for report in reports)
         place = args.output or "-"
     else:
         from sniff.reporting.page import page
@@ -75,7 +74,6 @@ def default_place(file: str) -> Path:
     return path.with_name(name) if os.access(path.parent, os.W_OK) else Path(name)
 
 
-def _numbers(path: str, args: argparse.Namespace) -> Numbers:
-    capture = arguments.open_capture(path)
+def _numbers(path: str, capture: Capture, args: argparse.Namespace) -> Numbers:
     session = arguments.settings_of(args, capture.session)
     return collect(Path(path).name, capture, session, arguments.noted_devices(args, session))
