@@ -13,6 +13,7 @@ from __future__ import annotations
 import contextlib
 import importlib.util
 import struct
+from collections.abc import Iterator
 from typing import Any, NoReturn, cast
 
 import serial
@@ -31,7 +32,8 @@ class ListeningPort(serial.Serial):
             return
         fd = getattr(self, "fd", None)  # Windows has a handle instead
         release_transmitter(fd)
-        cast(Any, super())._reconfigure_port(*args, **kwargs)
+        with termios_errors():
+            cast(Any, super())._reconfigure_port(*args, **kwargs)
         standard = getattr(self, "BAUDRATE_CONSTANTS", (self.baudrate,))
         if mark_line_errors(fd) and self.baudrate not in standard:
             cast(Any, self)._set_special_baudrate(self.baudrate)  # the step before knows only the standard rates
@@ -78,10 +80,25 @@ def open_listening(device: str, line: LineSettings) -> ListeningPort:
     port.exclusive = True if _can_lock() else None
     port.timeout = 0
     port.apply(line)
-    port.open()
+    with termios_errors():
+        port.open()
     keep_others_out(port)
     ask_low_latency(port)
     return port
+
+
+@contextlib.contextmanager
+def termios_errors() -> Iterator[None]:
+    """Have errors of termios, which are of a kind of their own and which pyserial lets through, raised as OSError."""
+    try:
+        import termios
+    except ImportError:
+        yield
+        return
+    try:
+        yield
+    except termios.error as error:
+        raise OSError(*error.args) from error
 
 
 def stop_bits(line: LineSettings) -> float:
@@ -149,7 +166,8 @@ def marks_errors(fd: int | None) -> bool:
     try:
         import termios
 
-        return fd is not None and bool(termios.tcgetattr(fd)[0] & termios.PARMRK)
+        with termios_errors():
+            return fd is not None and bool(termios.tcgetattr(fd)[0] & termios.PARMRK)
     except (ImportError, OSError):
         return False
 

@@ -320,3 +320,20 @@ def test_a_system_without_descriptors_is_polled(pty, monkeypatch) -> None:
 def test_no_locks_where_there_are_none(monkeypatch) -> None:
     monkeypatch.setattr(tty.importlib.util, "find_spec", lambda name: None)
     assert tty._can_lock() is False
+
+
+def test_a_port_that_goes_while_it_is_set_is_trouble_not_a_crash(source, monkeypatch) -> None:
+    """termios has errors of a kind of its own, which pyserial lets through."""
+    import termios
+
+    def gone(*_: object) -> None:
+        raise termios.error(5, "Input/output error")
+
+    for name in ("tcgetattr", "tcsetattr"):
+        with monkeypatch.context() as patched, pytest.raises(PortError, match="Input/output error"):
+            patched.setattr(termios, name, gone)
+            source.reconfigure(LineSettings.parse("9600,8N1"))
+    source.close()
+    with monkeypatch.context() as patched, pytest.raises(PortError, match="Input/output error"):
+        patched.setattr(termios, "tcflush", gone)
+        SerialSource(source.device, LINE, Clock.start())
