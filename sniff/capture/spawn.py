@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import secrets
 import socket
@@ -33,15 +34,22 @@ def spawn(words: Sequence[str]) -> Spawned:
     errors = tempfile.TemporaryFile()  # noqa: SIM115 (lives as long as the process)
     command = [sys.executable, "-P", "-m", "sniff.capture.process", *words]
     options: dict[str, Any] = {"stdout": errors, "stderr": errors, "env": _environment()}
-    if os.name == "posix":
-        return _spawn_with_socket(command, options, errors)
-    return _spawn_and_listen(command, options, errors)
+    start = _spawn_with_socket if os.name == "posix" else _spawn_and_listen
+    try:
+        return start(command, options, errors)
+    except BaseException:
+        errors.close()
+        raise
 
 
 def _spawn_with_socket(command: list[str], options: dict[str, Any], errors: IO[bytes]) -> Spawned:
     ours, theirs = socket.socketpair()
-    with theirs:
-        process = subprocess.Popen(command, stdin=theirs.fileno(), start_new_session=True, **options)
+    try:
+        with theirs:
+            process = subprocess.Popen(command, stdin=theirs.fileno(), start_new_session=True, **options)
+    except BaseException:
+        ours.close()
+        raise
     return Spawned(process, ours, errors)
 
 
@@ -56,23 +64,23 @@ def _spawn_and_listen(command: list[str], options: dict[str, Any], errors: IO[by
         try:
             with process.stdin as pipe:
                 pipe.write(f"{server.getsockname()[1]} {token.hex()}\n".encode())
-            while True:
-                connection, _ = server.accept()
-                connection.settimeout(CONNECT_PATIENCE)
-                if secrets.compare_digest(_receive(connection, _TOKEN_SIZE), token):
-                    return Spawned(process, connection, errors)
+            while not _proves(connection := server.accept()[0], token):
                 connection.close()
+            return Spawned(process, connection, errors)
         except BaseException:
             process.kill()
             process.wait()
             raise
 
 
-def _receive(connection: socket.socket, size: int) -> bytes:
+def _proves(connection: socket.socket, token: bytes) -> bool:
+    """Whether it is our process that has connected: a stranger sends something else, nothing, or goes away."""
+    connection.settimeout(CONNECT_PATIENCE)
     data = b""
-    while len(data) < size and (part := connection.recv(size - len(data))):
-        data += part
-    return data
+    with contextlib.suppress(OSError):
+        while len(data) < len(token) and (part := connection.recv(len(token) - len(data))):
+            data += part
+    return secrets.compare_digest(data, token)
 
 
 def _environment() -> dict[str, str]:
