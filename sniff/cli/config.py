@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import argparse
-import json
 
-from sniff.cli import USAGE, Failure
+from sniff.cli import USAGE, Failure, json_output
 from sniff.config import FILE, ConfigError, load
 
 
@@ -32,7 +31,7 @@ def run(args: argparse.Namespace) -> int:
             "devices": dict(bus.devices) or None,
         }
         if args.json:
-            print(json.dumps({"bus": bus.name, **values, "from": dict(bus.origin)}, ensure_ascii=False))
+            print(json_output.dumps({"bus": bus.name, **values, "from": dict(bus.origin)}))
             continue
         print(f"[bus.{bus.name}]")
         for key, value in values.items():

@@ -5,10 +5,9 @@ suffices; a silent bus is told from a wrong setting. Exit code 0 when found, 4 w
 from __future__ import annotations
 
 import argparse
-import json
 
 from sniff.analysis.detecting import Ending, Outcome, Reading, sureness
-from sniff.cli import PORT_TROUBLE, arguments, listening
+from sniff.cli import PORT_TROUBLE, arguments, json_output, listening
 from sniff.cli.searching import TIMEOUT, search, sentence
 from sniff.config import AUTO
 
@@ -40,7 +39,7 @@ def run(args: argparse.Namespace) -> int:
     with listening.start_link(target.source, None) as link:
         outcome = search(link, target.search, args.timeout)
     if args.json:
-        print(json.dumps(to_json(args.port, outcome), ensure_ascii=False))
+        print(json_output.dumps(to_json(args.port, outcome)))
     else:
         write(args.port, outcome)
     return 0 if outcome.ending is Ending.FOUND else PORT_TROUBLE

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from typing import Any
 
 from sniff.analysis.plain import plain
 from sniff.analysis.summary import Summary
 from sniff.analysis.wording import milliseconds
-from sniff.cli import arguments
+from sniff.cli import arguments, json_output
 from sniff.cli.rows import iso
 from sniff.engine import Output
 from sniff.formats import Capture
@@ -32,7 +31,7 @@ def run(args: argparse.Namespace) -> int:
         session = arguments.settings_of(args, capture.session)
         summary, events = _summarise(capture, session)
         if args.json:
-            print(json.dumps(_as_json(path, capture, session, summary), ensure_ascii=False))
+            print(json_output.dumps(_as_json(path, capture, session, summary)))
             continue
         if number:
             print()

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import json
 
+from sniff.analysis.plain import plain
 from sniff.analysis.wording import milliseconds
+from sniff.cli import json_output
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -33,10 +34,11 @@ def run(args: argparse.Namespace) -> int:
                 "latency_timer_ms": port.latency_timer,
                 "held_by": [str(holder) for holder in port.holders],
             }
-            print(json.dumps(record, ensure_ascii=False))
+            print(json_output.dumps(record))
             continue
         reports = "unknown" if adapter.reports is None else ", ".join(adapter.reports) or "none"
-        print(f"{port.device}  {adapter.name}{f' ({adapter.driver})' if adapter.driver else ''}")
+        name = plain(adapter.name)  # an adapter may call itself anything
+        print(f"{port.device}  {name}{f' ({adapter.driver})' if adapter.driver else ''}")
         print(f"    holds octets back up to {milliseconds(adapter.latency)} ({adapter.latency_from})")
         print(f"    line errors it reports: {reports}{'; ' + adapter.detail if adapter.detail else ''}")
         for holder in port.holders:

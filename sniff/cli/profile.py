@@ -5,13 +5,12 @@ which profiles fit the stations that were heard. Own profiles: ./profiles/NAME.t
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from pathlib import Path
 from typing import Any
 
 from dissectors.profiles import Entry, Profile, ProfileError
-from sniff.cli import UNREADABLE, USAGE, Failure, arguments, tables
+from sniff.cli import UNREADABLE, USAGE, Failure, arguments, json_output, tables
 from sniff.engine import Output
 from sniff.profile_files import UnknownProfile, available, find, read
 from sniff.reading import dissector_for, outputs
@@ -62,7 +61,7 @@ def _show(args: argparse.Namespace) -> int:
         raise Failure(str(error), USAGE) from None
     if args.json:
         for entry in profile.entries:
-            print(json.dumps(_as_json(entry), ensure_ascii=False))
+            print(json_output.dumps(_as_json(entry)))
         return 0
     print(f"{profile.name}: {profile.title} ({profile.vendor}; {', '.join(profile.models)})")
     print(f"protocols: {', '.join(profile.protocols)}")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 
+from sniff.analysis.plain import plain
 from sniff.cli import arguments, writing
 
 
@@ -26,5 +27,5 @@ def run(args: argparse.Namespace) -> int:
     writing.write(args, session, capture.items(), [args.file])
     complete = capture.completeness()
     said = "was whole" if complete.whole else complete.text
-    print(f"sniff485: {args.file}: {said}", file=sys.stderr)
+    print(f"sniff485: {args.file}: {plain(said)}", file=sys.stderr)
     return 0

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import json
 from datetime import UTC, datetime
 from typing import Any
 
 from dissectors.frame import Frame, Role
 from dissectors.line import NS_PER_S
 from dissectors.registry import Dissector
+from sniff.analysis.plain import ascii_of
 from sniff.analysis.wording import describe, duration, is_error
+from sniff.cli import json_output
 from sniff.reading import Settled
 from sniff.session import Session
 
@@ -68,7 +69,7 @@ def to_json(item: Settled, dissector: Dissector, session: Session, with_fields: 
 
 def json_line(item: Settled, dissector: Dissector, session: Session, with_fields: bool = False) -> str:
     """The object on one line."""
-    return json.dumps(to_json(item, dissector, session, with_fields), separators=(", ", ": "), ensure_ascii=False)
+    return json_output.dumps(to_json(item, dissector, session, with_fields))
 
 
 def role_of(item: Settled) -> Role:
@@ -135,6 +136,5 @@ def hex_dump(octets: bytes) -> str:
     lines = []
     for offset in range(0, len(octets), 16):
         part = octets[offset : offset + 16]
-        text = "".join(chr(octet) if 32 <= octet < 127 else "." for octet in part)
-        lines.append(f"        {offset:04x}  {part.hex(' '):<47}  {text}")
+        lines.append(f"        {offset:04x}  {part.hex(' '):<47}  {ascii_of(part)}")
     return "\n".join(lines)

@@ -8,6 +8,7 @@ import argparse
 import sys
 from pathlib import Path
 
+from sniff.analysis.plain import plain
 from sniff.cli import UNREADABLE, Failure, arguments
 from sniff.formats import CaptureError
 
@@ -40,7 +41,8 @@ def run(args: argparse.Namespace) -> int:
             raise Failure(str(error), UNREADABLE) from None
         if args.check and expected != found:
             differing += 1
-            print(difference(expected, found, place.name) if expected else f"{place}: no expectation")
+            said = difference(expected, found, place.name).splitlines() if expected else [f"{place}: no expectation"]
+            print("\n".join(map(plain, said)))
     if differing:
         print(f"sniff485: {differing} of {len(args.files)} captures differ", file=sys.stderr)
     return 1 if differing else 0

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import csv
-import json
 import sys
 from collections.abc import Iterable, Sequence
 
 from sniff.analysis.plain import plain
+from sniff.cli import json_output
 
 Cell = str | int | float | None
 
@@ -16,7 +16,7 @@ def write(headings: Sequence[str], rows: Iterable[Sequence[Cell]], style: str = 
     """Print a table. `style`: "text" (aligned), "csv", "json" (one object a row, headings as keys)."""
     if style == "json":
         for row in rows:
-            print(json.dumps(dict(zip(headings, row, strict=True)), ensure_ascii=False))
+            print(json_output.dumps(dict(zip(headings, row, strict=True))))
     elif style == "csv":
         writer = csv.writer(sys.stdout, lineterminator="\n")
         writer.writerow(headings)

@@ -133,7 +133,7 @@ def _filled(waiting: list[Item], made: bytearray) -> Iterator[Item]:
 
 
 def _without_names(event: LineEvent) -> str:
-    """What an event of the line may say of itself: settings and kinds of errors. The rest may name a port or a place."""
+    """What an event of the line may say: settings, kinds of errors. The rest may name a port or a place."""
     change = settings_change(event)
     if change is not None:
         return str(replace(change, protocol=change.protocol if change.protocol in _REWRITERS else None))

@@ -9,6 +9,7 @@ import difflib
 from collections.abc import Iterator
 
 from dissectors.frame import Frame
+from sniff.analysis.plain import plain
 from sniff.analysis.points import Point
 from sniff.analysis.wording import describe, mark_names
 from sniff.reading import Settled
@@ -18,8 +19,8 @@ MAGIC = "#!sniff-expect 1"
 
 
 def render(reading: CaptureReading) -> str:
-    """The whole expectation, ending with a newline."""
-    return "\n".join(_lines(reading)) + "\n"
+    """The whole expectation, ending with a newline; characters that a terminal obeys are escaped."""
+    return "\n".join(map(plain, _lines(reading))) + "\n"
 
 
 def difference(expected: str, found: str, name: str) -> str:

@@ -100,3 +100,15 @@ def test_a_usb_chip_is_known_where_the_system_names_no_driver(monkeypatch) -> No
     assert adapter.reports is None
     port.vid = None
     assert describe_port("COM7").latency == 20_000_000
+
+
+def test_what_an_adapter_calls_itself_is_escaped(monkeypatch, capsys) -> None:
+    from sniff.cli import main
+    from sniff.session import Adapter
+
+    adapter = Adapter("\x1b[2Jadapter\u202e", "ftdi_sio", 0, "exact", ())
+    monkeypatch.setattr(ports, "list_ports", lambda: [ports.PortInfo("/dev/ttyUSB0", adapter)])
+    assert main(["ports"]) == 0
+    said = capsys.readouterr().out
+    assert r"\x1b[2Jadapter\u202e" in said
+    assert "\x1b" not in said
