@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from dissectors import registry
 from dissectors.line import LineSettings
 from sniff import __version__
-from sniff.cli import PORT_TROUBLE, USAGE, Failure, arguments
+from sniff.cli import PORT_TROUBLE, UNREADABLE, USAGE, Failure, arguments
 from sniff.config import AUTO, Config, ConfigError, load
 from sniff.formats.linktypes import link_type_for
 
@@ -113,6 +113,8 @@ def _capture(bus: _Bus, fifo: str) -> int:
     from sniff.formats.pcapng import PcapngWriter
     from sniff.sources import PortError
 
+    if not Path(fifo).exists():
+        raise Failure(f"extcap: {fifo}: no such pipe; Wireshark makes it", UNREADABLE)
     try:
         link = CaptureLink.start([SourceSpec(bus.port, bus.line, bus.protocol, "rs485")])
     except PortError as error:

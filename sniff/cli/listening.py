@@ -16,6 +16,7 @@ from pathlib import Path
 from dissectors import registry
 from dissectors.line import LineSettings
 from dissectors.profiles import Devices
+from sniff.analysis.plain import plain
 from sniff.analysis.summary import Summary
 from sniff.analysis.wording import milliseconds
 from sniff.capture.config import RecordSpec, SourceSpec
@@ -186,7 +187,7 @@ class Printer:
 
     def _say_event(self, event: LineEvent) -> None:
         if event.kind in (LineEventKind.UNPLUGGED, LineEventKind.REPLUGGED):
-            print(f"sniff485: {event.text}", file=sys.stderr)  # names the port
+            print(f"sniff485: {plain(event.text)}", file=sys.stderr)  # names the port
         elif event.kind is not LineEventKind.SETTINGS:  # those of a search are said where it is shown
             self._say(f"{event.kind.value} {event.text}".strip())
 
@@ -216,7 +217,7 @@ class Printer:
             print(rows.text_line(settled, self.live.dissector, self.live.session, self.colour))
 
     def _say(self, text: str) -> None:
-        print(f"sniff485: {self.live.session.port}: {text}", file=sys.stderr)
+        print(f"sniff485: {self.live.session.port}: {plain(text)}", file=sys.stderr)
 
 
 def run(printer: Printer, count: int | None = None, duration: float | None = None, progress: bool = True) -> int:
@@ -228,7 +229,7 @@ def run(printer: Printer, count: int | None = None, duration: float | None = Non
     until = None if duration is None else time.monotonic() + duration
     meter = _Meter(printer) if progress and printer.quiet and sys.stderr.isatty() else None
     search_meter = searching.Meter() if progress and live.searching is not None else None
-    with until_interrupted() as caught:
+    with until_interrupted() as caught, _stopped_by_its_reader(live):
         while live.ended is None:
             items = live.poll(0.1)
             if search_meter is not None:
@@ -254,6 +255,16 @@ def run(printer: Printer, count: int | None = None, duration: float | None = Non
         say_not_found(live, "interrupted" if caught else "ended")
         return INTERRUPTED if caught else PORT_TROUBLE
     return 0
+
+
+@contextlib.contextmanager
+def _stopped_by_its_reader(live: LiveBus) -> Iterator[None]:
+    """End the capture when whoever reads our output goes away (`| head`): a recording would go on for ever."""
+    try:
+        yield
+    except BrokenPipeError:
+        live.stop()
+        raise
 
 
 def say_not_found(live: LiveBus, how: str) -> None:

@@ -261,6 +261,16 @@ def test_a_count_ends_it(run, bus, tmp_path) -> None:
     assert len(octets_of(tmp_path / "x.mcap")) >= 5 * len(POLL)
 
 
+def test_its_reader_going_away_ends_it(begin, bus, tmp_path) -> None:
+    """`live --json | head`: nobody would know of a recording that goes on."""
+    process = begin("live", str(bus.link), *LINE, "--json", "-w", "x.mcap")
+    assert process.stdout is not None
+    assert POLL.hex() in process.stdout.readline()
+    process.stdout.close()
+    assert process.wait(20) == 0
+    assert read(tmp_path / "x.mcap").completeness().whole
+
+
 def test_live_without_a_recording_leaves_nothing(run, bus, tmp_path) -> None:
     code, said, _ = run("live", str(bus.link), *LINE, "--no-record", "--duration", "1", "--json")
     assert code == 0
