@@ -46,6 +46,19 @@ class Histogram:
             max(most, default=None),
         )
 
+    def since(self, before: Histogram) -> Histogram:
+        """What was added since `before`, an earlier copy; its least and most are right to the stated precision."""
+        buckets = self.buckets - before.buckets
+        tops = {bucket: self.tops[bucket] for bucket in buckets}
+        return Histogram(
+            buckets,
+            tops,
+            self.count - before.count,
+            self.total - before.total,
+            min(tops.values(), default=None),
+            max(tops.values(), default=None),
+        )
+
     def copy(self) -> Histogram:
         """As it is now, for a value that does not change any more."""
         return Histogram(Counter(self.buckets), dict(self.tops), self.count, self.total, self.least, self.most)

@@ -9,6 +9,7 @@ from dissectors.bacnet.header import peek
 from dissectors.bacnet.readings import readings
 from dissectors.bacnet.ring import Ring
 from dissectors.bacnet.ring_observer import RingObserver
+from dissectors.bacnet.ring_window import ring_window
 from dissectors.bacnet.rules import RULES
 from dissectors.bacnet.segmentation import Reassembler
 from dissectors.bacnet.summary import text
@@ -47,6 +48,7 @@ MSTP = Dissector(
         "findings": MstpFindings,  # (timing): see(no, event, header, placement), settle(tx), findings(), ring()
         "rules": RULES,  # code → Rule
         "ring": RingObserver,  # (timing): see(no, event, header), ring()
+        "ring_window": ring_window,  # two of its Rings → RingWindow
         "judge": judge,  # Ring → findings
         "readings": readings,
         "reassembler": Reassembler,  # (): add(no, frame) → Gathered | None

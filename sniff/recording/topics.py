@@ -116,6 +116,13 @@ BUS_SCHEMA = _flat(
         "latency_p50_ms": ("number", "median response time, ms"),
         "latency_p95_ms": ("number", "95th percentile of response time, ms"),
         "latency_max_ms": ("number", "longest response time, ms"),
+        "ring_masters": ("integer", "token passing: stations in the ring as the newest tokens show it"),
+        "tokens": ("integer", "token passing: tokens in the window"),
+        "token_retries": ("integer", "token passing: tokens sent again because nobody used them"),
+        "tokens_lost": ("integer", "token passing: silences after which somebody made a new token"),
+        "poll_waste": ("number", "token passing: share of the time that unanswered polls for masters took, 0 ... 1"),
+        "loop_p50_ms": ("number", "token passing: median time from token to token of a station, ms"),
+        "loop_max_ms": ("number", "token passing: longest time from token to token of a station, ms"),
     },
 )
 
@@ -130,6 +137,14 @@ NODE_SCHEMA = _flat(
         "latency_p50_ms": ("number", "median response time, ms"),
         "latency_p95_ms": ("number", "95th percentile of response time, ms"),
         "latency_max_ms": ("number", "longest response time, ms"),
+        "tokens": ("integer", "token passing: tokens that it got"),
+        "token_retries": ("integer", "token passing: tokens that it had to send again"),
+        "polls_unanswered": ("integer", "token passing: its polls for masters that nobody answered"),
+        "postponed": ("integer", "token passing: answers that it postponed"),
+        "loop_p50_ms": ("number", "token passing: median time from token to token, ms"),
+        "loop_max_ms": ("number", "token passing: longest time from token to token, ms"),
+        "token_use_p50_ms": ("number", "token passing: median time from token to its first frame, ms"),
+        "token_use_max_ms": ("number", "token passing: longest time from token to its first frame, ms"),
     },
 )
 

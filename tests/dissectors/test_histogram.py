@@ -33,3 +33,17 @@ def test_merging_is_the_same_as_counting_all(left: list[int], right: list[int]) 
 def test_nothing_counted_has_no_quantile() -> None:
     assert Histogram().quantile(0.5) is None
     assert Histogram().mean is None
+
+
+@given(durations, durations)
+def test_what_came_since_is_right_to_two_percent(before: list[int], later: list[int]) -> None:
+    histogram = filled(before)
+    earlier = histogram.copy()
+    for value in later:
+        histogram.add(value)
+    since, exact = histogram.since(earlier), filled(later)
+    assert (since.count, since.total, since.buckets) == (exact.count, exact.total, exact.buckets)
+    for found, wanted in ((since.least, exact.least), (since.most, exact.most)):
+        assert found is not None
+        assert wanted is not None
+        assert abs(found - wanted) <= max(2, wanted * 0.022)

@@ -1,0 +1,91 @@
+"""The messages a second that go back into a recording: windows add up to the whole, keys are those of the schemas."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import pytest
+
+from dissectors import registry
+from dissectors.bacnet import RingObserver
+from dissectors.bacnet.ring import What
+from sniff.analysis.channels import BUS, NODE, BusChannels
+from sniff.engine import Output
+from sniff.reading import outputs
+from sniff.recording.topics import SCHEMAS
+from sniff.simulation.faults import LostResponse
+from sniff.simulation.scenarios import scenario, simulate
+from sniff.simulation.tap import EXACT
+from tests.faults.buses import modbus
+
+S = 10**9
+Told = list[tuple[str, dict[str, Any]]]
+
+
+def told(session: Any, items: Any) -> tuple[Told, RingObserver, int]:
+    """All messages but findings, what the ring was in all, and the number of frames."""
+    dissector = registry.get(session.protocol)
+    channels, ring, frames, messages = BusChannels(session, dissector), RingObserver(session.timing), 0, []
+    now = 0
+    for item in outputs(items, session):
+        if not isinstance(item, Output):
+            channels.add_line_event(item)
+            continue
+        for row in item.rows:
+            ring.see(row.no, row.event, row.header)
+            frames += row.header is not None
+            now = row.event.end
+        channels.add(item)
+        messages += channels.due(now)
+    messages += channels.due(now + 10 * S)
+    known = {BUS: BUS, NODE: NODE}
+    kept = [(one.topic, json.loads(one.data), one.schema) for one in messages if one.schema in known]
+    for _, content, schema in kept:
+        properties = json.loads(SCHEMAS[schema].text)["properties"]
+        assert content.keys() <= properties.keys()
+        for key, value in content.items():
+            assert isinstance(value, int | float)
+            assert properties[key]["type"] == "number" or isinstance(value, int), key
+    return [(topic, content) for topic, content, _ in kept], ring, frames
+
+
+def total(messages: Told, topic: str, key: str) -> int:
+    return sum(content.get(key, 0) for at, content in messages if at == topic)
+
+
+def test_windows_of_a_ring_add_up() -> None:
+    session, items = simulate(scenario("mstp", seed=4), 30, EXACT)
+    messages, observer, frames = told(session, items)
+    ring = observer.ring()
+    bus = f"/bus/{session.bus}"
+    assert total(messages, bus, "frames") == frames
+    assert total(messages, bus, "tokens") == sum(edge.tokens for edge in ring.edges.values()) > 500
+    lost = sum(one.count for (what, _), one in ring.happened.items() if what is What.LOST_TOKEN)
+    assert total(messages, bus, "tokens_lost") == lost > 0
+    for mac, node in ring.nodes.items():
+        topic = f"/nodes/{session.bus}/{mac}"
+        assert total(messages, topic, "tokens") == node.tokens_received
+        assert total(messages, topic, "postponed") == (node.postponed if node.is_master else 0)
+    last = [content for topic, content in messages if topic == bus][-1]
+    assert last["ring_masters"] == len(ring.order) == 4
+    assert 5 < last["loop_p50_ms"] < 100
+    assert 0 <= last["poll_waste"] <= 1
+
+
+def test_a_bus_without_tokens_says_nothing_of_them() -> None:
+    session, items = simulate(modbus((LostResponse(0.2, ("unit 2",)),), seed=2), 20, EXACT)
+    messages, _, frames = told(session, items)
+    assert total(messages, f"/bus/{session.bus}", "frames") == frames
+    assert not any("tokens" in content for _, content in messages)
+    assert total(messages, f"/nodes/{session.bus}/2", "errors") > 0
+    assert min(content["health"] for topic, content in messages if topic.endswith("/2")) < 100
+
+
+@pytest.mark.parametrize("name", ["modbus-rtu", "n2", "mstp"])
+def test_nothing_between_windows(name: str) -> None:
+    session, _ = simulate(scenario(name, seed=1), 1, EXACT)
+    channels = BusChannels(session, registry.get(session.protocol))
+    assert channels.due(5 * S) == []
+    assert channels.due(5 * S + S - 1) == []
+    assert [one.topic for one in channels.due(6 * S)] == [f"/bus/{session.bus}"]
