@@ -1,5 +1,6 @@
-"""Before and after a repair: stations, answers, times, findings. A time counts as changed when it moved by a tenth and
-by more than both adapters together may have added. Exit code 1 when something differs.
+"""Before and after a repair: stations, answers, times, values, findings. A time counts as changed when it moved by a
+tenth and by more than both adapters together may have added; a value when the newest readings before and after have no
+number in common. Exit code 1 when something differs.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     """Options of `diff`."""
     parser.add_argument("before", metavar="BEFORE", help="capture")
     parser.add_argument("after", metavar="AFTER", help="capture")
+    arguments.add_devices(parser)
     style = parser.add_mutually_exclusive_group()
     style.add_argument("--json", action="store_const", const="json", dest="style", help="one JSON object a difference")
     style.add_argument("--csv", action="store_const", const="csv", dest="style", help="comma-separated values")
@@ -24,11 +26,13 @@ def run(args: argparse.Namespace) -> int:
     from sniff.editing.comparing import Side, differences
     from sniff.testing.capture_reading import read_capture
 
+    said = arguments.devices_of(args)
     sides = []
     for path in (args.before, args.after):
         arguments.open_capture(path)
-        reading = read_capture(path)
-        sides.append(Side(path, reading.counts, reading.findings, reading.session.adapter.latency))
+        reading = read_capture(path, said)
+        adapter = reading.session.adapter
+        sides.append(Side(path, reading.counts, reading.findings, adapter.latency, reading.points))
     found = list(differences(*sides))
     rows = [(one.subject, one.what, one.before, one.after) for one in found]
     if rows or args.style != "text":

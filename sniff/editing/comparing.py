@@ -6,8 +6,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from dissectors.findings import Finding, Severity
+from dissectors.profiles.decoding import number
 from dissectors.tracker import Verdict
 from sniff.analysis.nodes import Node
+from sniff.analysis.points import ALL, Point
 from sniff.analysis.summary import Summary
 from sniff.analysis.wording import milliseconds
 
@@ -19,12 +21,16 @@ COMPARED_VERDICTS = (Verdict.NO_RESPONSE, Verdict.EXCEPTION, Verdict.DAMAGED_ANS
 
 @dataclass(frozen=True, slots=True)
 class Side:
-    """One capture: what was counted and found in it. `latency`: ns that its adapter may hold octets back."""
+    """One capture: what was counted and found in it. `latency`: ns that its adapter may hold octets back.
+
+    `points`: the values of its stations, as `PointTable` gives them.
+    """
 
     name: str
     counts: Summary
     findings: tuple[Finding, ...]
     latency: int
+    points: tuple[Point, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +55,7 @@ def differences(before: Side, after: Side) -> Iterator[Difference]:
             yield Difference(subject, "presence", _presence(old.get(address)), _presence(new.get(address)))
         else:
             yield from _node(subject, old[address], new[address], doubt)
+    yield from _values(before, after)
     yield from _findings(before, after)
 
 
@@ -78,6 +85,42 @@ def _node(subject: str, old: Node, new: Node, doubt: int) -> Iterator[Difference
             yield Difference(subject, name, milliseconds(was_time), milliseconds(now_time))
     for kind in sorted(old.kinds.keys() ^ new.kinds.keys()):
         yield Difference(subject, kind, f"{old.kinds[kind]} times", f"{new.kinds[kind]} times")
+
+
+def _values(before: Side, after: Side) -> Iterator[Difference]:
+    """Points that both have and whose values have nothing in common; what goes up and down as ever is no difference.
+
+    Bits are told by the words of their register.
+    """
+    new = {_key(point): point for point in after.points}
+    for point in before.points:
+        other = new.get(_key(point))
+        if other is None or point.sample.value.bit or _overlap(point, other):
+            continue
+        station = point.sample.station
+        subject = station if station == ALL else f"station {station}"
+        yield Difference(subject, point.sample.name, _range(point), _range(other))
+
+
+def _key(point: Point) -> tuple[str, str, bool]:
+    """What was written and what was read under one name are compared each with its like."""
+    return point.sample.station, point.sample.name, point.is_command
+
+
+def _overlap(old: Point, new: Point) -> bool:
+    if not old.history or not new.history:
+        return old.sample.value.text == new.sample.value.text
+    was, now = [value for _, value in old.history], [value for _, value in new.history]
+    return min(was) <= max(now) and min(now) <= max(was)
+
+
+def _range(point: Point) -> str:
+    """The latest value in words, and between which it was if it moved."""
+    value = point.sample.value
+    seen = [number for _, number in point.history]
+    if not seen or value.words or min(seen) == max(seen):
+        return value.text
+    return f"{number(min(seen), value.entry)} … {number(max(seen), value.entry, value.unit)}"
 
 
 def _findings(before: Side, after: Side) -> Iterator[Difference]:

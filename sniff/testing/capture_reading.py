@@ -9,6 +9,7 @@ from typing import Any
 
 from dissectors.findings import Finding
 from dissectors.frame import Frame
+from dissectors.profiles import Devices
 from dissectors.registry import Dissector
 from dissectors.tracker import Transaction
 from sniff.analysis.points import Point, PointReader, PointTable
@@ -54,8 +55,8 @@ class CaptureReading:
         return {node.address: node for node in self.counts.nodes.present()}
 
 
-def read_capture(path: str | Path) -> CaptureReading:
-    """Read a capture whole. Raises CaptureError, UnknownProtocol."""
+def read_capture(path: str | Path, said: Devices | None = None) -> CaptureReading:
+    """Read a capture whole. `said`: devices, before those that it names. Raises CaptureError, UnknownProtocol."""
     from sniff.analysis.judging import Judging
 
     place = Path(path)
@@ -64,7 +65,7 @@ def read_capture(path: str | Path) -> CaptureReading:
     dissector = dissector_for(session)
     counts = Summary(session.line)
     known, unknown = noted(session)
-    devices = noted_devices(session)
+    devices = (said or Devices()).over(noted_devices(session))
     judge = Judging(session, dissector, devices)
     reader, points = PointReader(dissector, devices), PointTable()
     rows: list[Row] = []

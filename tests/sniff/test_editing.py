@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from dissectors.checksums import crc16_modbus
 from dissectors.frame import Chunk, Frame
 from sniff.editing.anonymising import anonymised, anonymous_session
 from sniff.editing.merging import merged
@@ -231,6 +232,34 @@ def test_diff_names_the_station_that_went_bad(sniff485: Callable[..., tuple[int,
     assert code == 1
     assert any(one["subject"] == "station 2" and one["what"] == "MB006" for one in found)
     assert not any(one["subject"] == "station 1" and "response" in one["what"] for one in found)
+
+
+def polled(path: Path, values: list[tuple[int, int]]) -> Path:
+    """A capture in which unit 1 tells its registers 2523h and 2524h, again and again."""
+    lines = ["#!sniff-capture 1", "# line: 9600,8N1", "# protocol: modbus-rtu", "# device: 1=teco-e510"]
+    for first, second in values:
+        request = bytes.fromhex("010325230002")
+        answer = bytes.fromhex("010304") + first.to_bytes(2, "big") + second.to_bytes(2, "big")
+        lines += [f"+{gap} {(each + crc16_modbus(each).to_bytes(2, 'little')).hex(' ')}"
+                  for gap, each in ((200, request), (20, answer))]  # fmt: skip
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def test_diff_tells_values_that_moved_for_good(tmp_path: Path, sniff485: Callable[..., tuple[int, str, str]]) -> None:
+    before = polled(tmp_path / "before.cap.txt", [(6000, 5990), (6000, 6010), (6000, 5000)])
+    after = polled(tmp_path / "after.cap.txt", [(5000, 5500), (5000, 4000), (5000, 4500)])
+    code, out, _ = sniff485("diff", "--json", before, after)
+    assert code == 1
+    assert [json.loads(line) for line in out.splitlines()] == [
+        {"subject": "station 1", "what": "frequency-command", "before": "60.00 Hz", "after": "50.00 Hz"}
+    ]
+    assert sniff485("diff", "--json", before, before)[0] == 0
+    code, out, _ = sniff485("diff", "--json", before, after, "-d", "1=automationdirect-acn")
+    assert [json.loads(line)["before"] for line in out.splitlines()] == ["6000"]
+    far = polled(tmp_path / "far.cap.txt", [(6000, 1000), (6000, 1200)])
+    assert "50.00 … 60.10 Hz" in sniff485("diff", before, far)[1]
+    assert "10.00 … 12.00 Hz" in sniff485("diff", before, far)[1]
 
 
 def test_a_target_that_is_a_source_is_refused(tmp_path: Path, sniff485: Callable[..., tuple[int, str, str]]) -> None:
