@@ -29,12 +29,15 @@ from pathlib import Path
 from dissectors.frame import Chunk
 from dissectors.line import NS_PER_S
 from sniff.formats import CaptureError
-from sniff.formats.files import open_capture
+from sniff.formats.files import explain, open_capture
 from sniff.formats.octet_table import columns, octets_of, seconds
 from sniff.formats.records import foreign_session
 from sniff.session import Adapter, Completeness, Item, Session
 
 LONGEST_LINE = 1 << 20
+MOST_ROWS = 5_000_000
+"""Of a table, which is held in memory whole to be sorted: 140 octets of it a row."""
+
 SAMPLE = 200
 """Lines looked at to tell the kind."""
 
@@ -97,7 +100,7 @@ class ByteLog:
         self.session = replace(session, started=first.time if first is not None else 0, adapter=adapter)
 
     def items(self) -> Iterator[Item]:
-        """The octets in the order of the file."""
+        """The octets in the order of the file, those of a table in order of time. Raises CaptureError."""
         self._passed = self._first_passed = 0
         give: Callable[[], Iterator[Item]] = self._table if self.kind == "CSV" else self._text
         return give()
@@ -112,8 +115,11 @@ class ByteLog:
 
     def _lines(self) -> Iterator[str]:
         with open_capture(self.path) as stream:
-            while line := stream.readline(LONGEST_LINE):
-                yield line.decode("utf-8", "replace").rstrip("\r\n").removeprefix("\ufeff")
+            try:
+                while line := stream.readline(LONGEST_LINE):
+                    yield line.decode("utf-8", "replace").rstrip("\r\n").removeprefix("\ufeff")
+            except OSError as error:
+                raise explain(self.path, error) from None
 
     def _pass(self, number: int) -> None:
         self._passed += 1
@@ -155,6 +161,8 @@ class ByteLog:
             for row in rows:
                 if not any(row) or table is None:
                     continue
+                if len(found) >= MOST_ROWS:
+                    raise CaptureError(f"{self.path}: a table of over {MOST_ROWS} rows; cut it into pieces")
                 try:
                     found.append(table.chunk(row, self.session.line.char))
                 except ValueError:

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from dissectors.frame import Chunk, Frame, LineError, Mark
 from dissectors.line import LineSettings
-from sniff.formats import CaptureError, read
+from sniff.formats import CaptureError, bytelog, read
 from sniff.reading import settled, with_settings
 
 REQUEST, ANSWER = bytes.fromhex("010300000002C40B"), bytes.fromhex("01030400D7001ACBC0")
@@ -151,3 +151,13 @@ def test_any_change_is_no_traceback(tmp_path: Path, kind: str, place: float, tex
     except CaptureError:
         return
     assert all(isinstance(item, Chunk) for item in log.items())
+
+
+def test_a_table_too_long_for_memory_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "long.csv"
+    path.write_text("time,data\n" + "".join(f"0.{number:03},01\n" for number in range(50)))
+    monkeypatch.setattr(bytelog, "MOST_ROWS", 50)
+    assert len(list(bytelog.read(path).items())) == 50
+    monkeypatch.setattr(bytelog, "MOST_ROWS", 49)
+    with pytest.raises(CaptureError, match="over 49 rows; cut it into pieces"):
+        bytelog.read(path)
