@@ -6,6 +6,7 @@ import argparse
 import sys
 from typing import Any
 
+from sniff.analysis.nodes import Node
 from sniff.analysis.plain import plain
 from sniff.analysis.summary import Summary
 from sniff.analysis.wording import milliseconds
@@ -14,7 +15,7 @@ from sniff.cli.rows import iso
 from sniff.engine import Output
 from sniff.formats import Capture
 from sniff.reading import dissector_for, outputs
-from sniff.session import LineEvent, Session, settings_change
+from sniff.session import Adapter, LineEvent, Session, settings_change
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -79,28 +80,31 @@ def _as_json(path: str, capture: Capture, session: Session, summary: Summary) ->
         "line_errors": dict(summary.marks),
         "line_events": {kind.value: count for kind, count in summary.events.items()},
         "verdicts": {verdict.value: count for verdict, count in summary.verdicts.items()},
-        "response_ms": {
-            name: None if value is None else value / 1e6
-            for name, value in (
-                ("least", summary.latency.least),
-                ("p50", summary.latency.quantile(0.5)),
-                ("p95", summary.latency.quantile(0.95)),
-                ("most", summary.latency.most),
-            )
-        },
-        "nodes": [
-            {
-                "address": node.address,
-                "sent": node.sent,
-                "received": node.received,
-                "damaged": node.damaged,
-                "asked": node.asked,
-                "verdicts": {verdict.value: count for verdict, count in node.verdicts.items()},
-                "errors": dict(node.errors),
-            }
-            for node in summary.nodes.present()
-        ],
+        "response_ms": _response_times(summary),
+        "nodes": [_node_as_json(node) for node in summary.nodes.present()],
         "polled_only": summary.nodes.absent(),
+    }
+
+
+def _response_times(summary: Summary) -> dict[str, float | None]:
+    times = {
+        "least": summary.latency.least,
+        "p50": summary.latency.quantile(0.5),
+        "p95": summary.latency.quantile(0.95),
+        "most": summary.latency.most,
+    }
+    return {name: None if time is None else time / 1e6 for name, time in times.items()}
+
+
+def _node_as_json(node: Node) -> dict[str, Any]:
+    return {
+        "address": node.address,
+        "sent": node.sent,
+        "received": node.received,
+        "damaged": node.damaged,
+        "asked": node.asked,
+        "verdicts": {verdict.value: count for verdict, count in node.verdicts.items()},
+        "errors": dict(node.errors),
     }
 
 
@@ -126,6 +130,16 @@ def _print(path: str, capture: Capture, session: Session, summary: Summary, even
     searched = f"{summary.searched} of them while searching, " if summary.searched else ""
     octets = summary.octets + summary.searched
     _line("octets", f"{octets}, {searched}{summary.noise} of them noise; bus load {summary.load.overall():.1%}")
+    _print_traffic(summary, adapter)
+    _print_nodes(summary)
+    for event in events[:20]:
+        _line("event", f"{iso(event.time)} {event.kind.value} {event.text} {event.count or ''}".rstrip())
+    if len(events) > 20:
+        _line("event", f"and {sum(summary.events.values()) - 20} more")
+    sys.stdout.flush()
+
+
+def _print_traffic(summary: Summary, adapter: Adapter) -> None:
     _line("frames", f"{summary.frames}, {summary.damaged} damaged{_counts(summary.damages)}")
     _line("found by", _listed(summary.found))
     _line("kinds", _listed(summary.kinds))
@@ -142,6 +156,9 @@ def _print(path: str, capture: Capture, session: Session, summary: Summary, even
         shown = ", ".join(f"{name} {milliseconds(value)}" for name, value in quantiles if value is not None)
         bound = f" (each known to ±{milliseconds(adapter.latency)})" if adapter.latency else ""
         _line("response", shown + bound)
+
+
+def _print_nodes(summary: Summary) -> None:
     for node in summary.nodes.present():
         verdicts = {verdict.words: count for verdict, count in node.verdicts.items()}
         _line(f"node {node.address}", f"{node.sent} frames from, {node.received} to; {_listed(verdicts)}")
@@ -150,11 +167,6 @@ def _print(path: str, capture: Capture, session: Session, summary: Summary, even
     absent = summary.nodes.absent()
     if absent:
         _line("polled only", f"{spans(absent)}: never heard, never asked anything")
-    for event in events[:20]:
-        _line("event", f"{iso(event.time)} {event.kind.value} {event.text} {event.count or ''}".rstrip())
-    if len(events) > 20:
-        _line("event", f"and {sum(summary.events.values()) - 20} more")
-    sys.stdout.flush()
 
 
 def _settings(session: Session) -> str:

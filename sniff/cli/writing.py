@@ -40,10 +40,7 @@ def write(
     `notes`: by row number, for the comments of packets where OUT has such. Ends with exit code 2 when OUT is there.
     """
     target = Path(args.output)
-    if target.exists() and any(name != "-" and Path(name).samefile(target) for name in sources):
-        raise Failure(f"{target}: is a capture to read; name another file", USAGE)
-    if target.exists() and not args.force and not target.is_char_device():
-        raise Failure(f"{target}: exists; add --force to overwrite it", USAGE)
+    _refuse_to_overwrite(target, sources, args.force)
     chunks = octets = 0
     progress = _Progress(target.name)
     try:
@@ -74,6 +71,13 @@ def write(
     for loss in getattr(writer, "losses", ()):
         print(f"sniff485: {target}: {loss}", file=sys.stderr)
     return octets
+
+
+def _refuse_to_overwrite(target: Path, sources: Sequence[str], force: bool) -> None:
+    if target.exists() and any(name != "-" and Path(name).samefile(target) for name in sources):
+        raise Failure(f"{target}: is a capture to read; name another file", USAGE)
+    if target.exists() and not force and not target.is_char_device():
+        raise Failure(f"{target}: exists; add --force to overwrite it", USAGE)
 
 
 def say_incomplete(path: str, capture: Capture) -> None:

@@ -117,37 +117,47 @@ def records(stream: BinaryIO, report: Report, since: int | None = None, start: i
             stream.seek(position)
             continue
         if opcode == DATA_END:
-            told = stream.read(4)
-            if length != 4:
-                report.problem("the index at the end is damaged")
-            elif whole and told not in (bytes(4), struct.pack("<I", check)):
-                report.problem("the check over the whole file fails: some octet has changed")
             report.end = position
-            _summary(stream, report)
+            _end_of_data(stream, length, check if whole else None, report)
             return
-        sound = False  # a chunk whose sizes agree
-        if opcode == CHUNK and length <= MOST_RECORD:
-            start_of_body = stream.read(min(length, _CHUNK_START))
-            sound = _sizes_agree(start_of_body, length)
-            if sound and since is not None and _last_time(start_of_body) < since:
-                stream.seek(length - len(start_of_body), 1)
-                body: bytes | None = None
-            else:
-                body = start_of_body + stream.read(length - len(start_of_body))
-        elif length <= MOST_RECORD:
-            body = stream.read(length)
-        else:
-            body = None
-            whole = False
-            stream.seek(length, 1)
+        body, last_time = _body(stream, opcode, length, since)
+        whole = whole and body is not None
         if whole and body is not None:
             check = zlib.crc32(body, zlib.crc32(head, check))
         yield Record(opcode, position, body)
         record_at, position = position, position + _RECORD.size + length
         report.end = position
-        if sound:
-            report.chunks.add(record_at, _last_time(start_of_body))
+        if last_time is not None:
+            report.chunks.add(record_at, last_time)
             anchor = position
+
+
+def _body(stream: BinaryIO, opcode: int, length: int, since: int | None) -> tuple[bytes | None, int | None]:
+    """A record's content, None where it is too long or earlier than `since`; the last time in a sound chunk.
+
+    A sound chunk is one whose sizes agree.
+    """
+    if length > MOST_RECORD:
+        stream.seek(length, 1)
+        return None, None
+    if opcode != CHUNK:
+        return stream.read(length), None
+    start = stream.read(min(length, _CHUNK_START))
+    last_time = _last_time(start) if _sizes_agree(start, length) else None
+    if last_time is not None and since is not None and last_time < since:
+        stream.seek(length - len(start), 1)
+        return None, last_time
+    return start + stream.read(length - len(start)), last_time
+
+
+def _end_of_data(stream: BinaryIO, length: int, check: int | None, report: Report) -> None:
+    """After the data: their check (`check` as computed, None when not all were read), summary and footer."""
+    told = stream.read(4)
+    if length != 4:
+        report.problem("the index at the end is damaged")
+    elif check is not None and told not in (bytes(4), struct.pack("<I", check)):
+        report.problem("the check over the whole file fails: some octet has changed")
+    _summary(stream, report)
 
 
 def _plausible(opcode: int, length: int, left: int) -> bool:
