@@ -19,6 +19,9 @@ from sniff.analysis.plain import plain
 DEEPEST = 20
 """Layers and nested packets deeper than this are not shown; no honest frame has them."""
 
+CHECK = re.compile("crc|lrc|checksum|preamble")
+"""Fields that nobody reads as a number."""
+CAMEL = re.compile(r"(?<=[a-z0-9])(?=[A-Z])")
 HEX_PAIRS = re.compile(rb"(?:[0-9A-Fa-f]{2}){2,}")
 
 
@@ -141,11 +144,11 @@ class _Walk:
         self.end = first
         known = self.octets[first:last] == built
         span = (first, last) if known else (None, None)
-        return Field(plain(description.name), _text(description, self.layer, value), *span)
+        return Field(field_name(description.name), _text(description, self.layer, value), *span)
 
     def _field(self, description: Any, value: Any, first: int, last: int) -> Field:
         span = (None, None) if self.lost or first == last else (first, last)
-        name = plain(description.name)
+        name = field_name(description.name)
         packets = [item for item in (value if isinstance(value, list) else [value]) if hasattr(item, "fields_desc")]
         if packets:
             children: list[Field] = []
@@ -184,9 +187,16 @@ def _text(description: Any, layer: Any, value: Any) -> str:
     if isinstance(value, bytes):
         return octets_text(value)
     try:
-        return plain(description.i2repr(layer, value))
+        shown = plain(description.i2repr(layer, value))
+        plain_hex = isinstance(value, int) and shown.startswith("0x") and not CHECK.search(description.name)
+        return f"{value} ({shown})" if plain_hex and value > 9 else shown
     except Exception:  # scapy's fields raise at will on values that they did not expect
         return plain(repr(value))
+
+
+def field_name(name: str) -> str:
+    """A field of scapy's or ours as words: "startAddr" and "start_addr" both become "start addr"."""
+    return plain(CAMEL.sub(" ", name).replace("_", " ").lower())
 
 
 def octets_text(octets: bytes) -> str:

@@ -107,7 +107,9 @@ class KeyBar(Widget):
         entries: dict[str, _Entry] = {}
         for key, active in working_keys(self.screen):
             if active.binding.show:
-                entries.setdefault(active.binding.description, _Entry(active)).keys.append(key)
+                keys = entries.setdefault(active.binding.description, _Entry(active)).keys
+                if key not in keys:  # two that are shown as one: + with and without shift
+                    keys.append(key)
         always = [entry for entry in entries.values() if entry.label in ALWAYS]
         room = width - sum(entry.length + 2 for entry in always) + 2
         fitting = []

@@ -10,6 +10,7 @@ from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.widgets import Static
 
+from dissectors.findings import counted
 from dissectors.line import NS_PER_S
 from sniff.analysis.load import Second
 from sniff.store import Store
@@ -163,7 +164,8 @@ class TimelineScreen(ViewScreen):
             return ""
         words = (
             f"{clock(column.begin * NS_PER_S)[:8]} + {_duration(zoom)}: load {column.load:.1%}, "
-            f"{column.frames} frames, {column.failed} errors, {column.damaged} damaged, {column.noise} octets of noise"
+            f"{counted(column.frames, 'frame')}, {counted(column.failed, 'error')}, {column.damaged} damaged, "
+            f"{counted(column.noise, 'octet')} of noise"
         )
         if self._anchor is not None and chosen is not None:
             span = f"{clock(chosen[0] * NS_PER_S)[:8]} … {clock(chosen[1] * NS_PER_S)[:8]}"

@@ -63,8 +63,8 @@ def test_modbus_response_with_registers() -> None:
     assert spans(modbus(), octets, Role.RESPONSE, "modbus-rtu") == {
         "unit": "01",
         "crc": "cb c0",
-        "funcCode": "03",
-        "byteCount": "04",
+        "func code": "03",
+        "byte count": "04",
         "[0]": "00 d7",
         "[1]": "00 1a",
     }
