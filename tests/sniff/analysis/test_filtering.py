@@ -53,7 +53,7 @@ NOISE = Row(8, Noise(b"\x00\x00", 2, 3, Place.BETWEEN, Reason.NO_FRAME))
         ('kind matches "^write-(single|multiple)"', True),
         ("verdict in {no-response, late}", True),
         ('verdict == "no answer"', True),
-        ("verdict in {late, \"no answer\"}", True),
+        ('verdict in {late, "no answer"}', True),
         ("verdict == one-way", False),
         ("verdict == answered", False),
         ("latency_ms > 8 && latency_ms < 8.5", True),
