@@ -75,8 +75,26 @@ class Settling:
             del self._closed[self._in_order.popleft().id]
 
 
+LINE_NOTE = "line"
+ASSUMED = "assumed: the file does not say"
+"""Note of a session whose format keeps no line settings: `line` is what such a bus normally runs."""
+
+
+def line_is_assumed(session: Session) -> bool:
+    """Whether neither the file nor the user says the line settings."""
+    return session.notes.get(LINE_NOTE) == ASSUMED
+
+
 def with_settings(session: Session, protocol: str | None = None, line: LineSettings | None = None) -> Session:
-    """The session with what the user says instead of what the file says."""
+    """The session with what the user says instead of what the file says.
+
+    A line that is only assumed becomes that of the protocol said. Raises registry.UnknownProtocol where it must know.
+    """
+    if line is not None:
+        notes = {name: text for name, text in session.notes.items() if name != LINE_NOTE or text != ASSUMED}
+        session = replace(session, notes=notes)
+    elif protocol is not None and line_is_assumed(session):
+        session = replace(session, line=LineSettings.parse(registry.get(protocol).default_line))
     said = [name for name, value in (("line", line), ("protocol", protocol)) if value is not None]
     unknown = tuple(name for name in session.unknown if name not in said)
     return replace(

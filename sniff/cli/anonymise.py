@@ -21,7 +21,7 @@ def run(args: argparse.Namespace) -> int:
     from sniff.editing import anonymising
 
     capture = arguments.open_capture(args.file)
-    session = arguments.settings_of(args, capture.session)
+    session = arguments.settings_of(args, capture.session, args.file)
     if not anonymising.knows(session.protocol):
         raise Failure(f"anonymise: does not know where {session.protocol} keeps addresses and texts", USAGE)
     items = anonymising.anonymised(capture.items(), session)

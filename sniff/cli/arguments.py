@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dissectors import registry
 from dissectors.line import LineSettings
 from dissectors.profiles import Devices, ProfileError
+from sniff.analysis.plain import plain
 from sniff.cli import UNREADABLE, USAGE, Failure
 from sniff.config import AUTO
 from sniff.formats import Capture, CaptureError, read
@@ -157,16 +158,29 @@ def open_captures(paths: Sequence[str]) -> list[tuple[str, Capture]]:
     return joined(opened)
 
 
-def settings_of(args: argparse.Namespace, session: Session) -> Session:
-    """The session with -s and -p applied; ends with exit code 2 when its protocol is unknown here."""
+def settings_of(args: argparse.Namespace, session: Session, path: str) -> Session:
+    """The session of a file with -s and -p applied; says when its line settings are a guess.
+
+    Ends with exit code 2 when its protocol is unknown here.
+    """
     from sniff.reading import dissector_for, with_settings
 
-    session = with_settings(session, args.protocol, args.line)
     try:
+        session = with_settings(session, args.protocol, args.line)
         dissector_for(session)
     except registry.UnknownProtocol as error:
         raise Failure(f"{error}; say which with -p", USAGE) from None
+    say_assumed(session, path, "; -s names them")
     return session
+
+
+def say_assumed(session: Session, path: str, way_out: str = "") -> None:
+    """Say on standard error that nobody knows a file's line settings, and what stands in for them."""
+    from sniff.reading import line_is_assumed
+
+    if line_is_assumed(session):
+        said = f"no line settings in {plain(path)}: assuming {session.line} for {session.protocol}{way_out}"
+        print(f"sniff485: {said}", file=sys.stderr)
 
 
 def options(session: Session) -> list[str]:

@@ -86,7 +86,7 @@ def _is_file(source: str) -> bool:
 
 def _read(source: str, capture: Capture, args: argparse.Namespace) -> Checked:
     """What was found in a capture."""
-    session = arguments.settings_of(args, capture.session)
+    session = arguments.settings_of(args, capture.session, source)
     run_of = Checking(session, dissector_for(session), arguments.noted_devices(args, session))
     for item in outputs(capture.items(), session):
         run_of.take(item)

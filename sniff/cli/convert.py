@@ -36,7 +36,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Read, write, say what was lost."""
     capture = arguments.open_capture(args.source)
-    session = arguments.settings_of(args, capture.session)
+    session = arguments.settings_of(args, capture.session, args.source)
     options = {"link-type": str(args.link_type)} if args.link_type is not None else None
     devices = arguments.noted_devices(args, session)
     session = with_devices(session, devices)

@@ -31,7 +31,7 @@ def run(args: argparse.Namespace) -> int:
     if sum(chosen) != 1:
         raise Failure("say what to keep: --from and --to, or --frames, or --around", USAGE)
     capture = arguments.open_capture(args.file)
-    session = arguments.settings_of(args, capture.session)
+    session = arguments.settings_of(args, capture.session, args.file)
     try:
         if args.frames:
             stretch = cutting.of_frames(capture, session, args.frames)

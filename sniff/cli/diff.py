@@ -31,6 +31,7 @@ def run(args: argparse.Namespace) -> int:
     for path in (args.before, args.after):
         arguments.open_capture(path)
         reading = read_capture(path, said)
+        arguments.say_assumed(reading.session, path)
         adapter = reading.session.adapter
         sides.append(Side(path, reading.counts, reading.findings, adapter.latency, reading.points))
     found = list(differences(*sides))

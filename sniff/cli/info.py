@@ -14,7 +14,7 @@ from sniff.cli import arguments, json_output
 from sniff.cli.rows import iso
 from sniff.engine import Output
 from sniff.formats import Capture
-from sniff.reading import dissector_for, outputs
+from sniff.reading import dissector_for, line_is_assumed, outputs
 from sniff.session import Adapter, LineEvent, Session, settings_change
 
 
@@ -29,7 +29,7 @@ def run(args: argparse.Namespace) -> int:
     """Describe every capture in turn."""
     for number, path in enumerate(args.files):
         capture = arguments.open_capture(path)
-        session = arguments.settings_of(args, capture.session)
+        session = arguments.settings_of(args, capture.session, path)
         summary, events = _summarise(capture, session)
         if args.json:
             print(json_output.dumps(_as_json(path, capture, session, summary)))
@@ -64,6 +64,7 @@ def _as_json(path: str, capture: Capture, session: Session, summary: Summary) ->
         "seconds": summary.seconds,
         "protocol": None if "protocol" in session.unknown else session.protocol,
         "line": None if "line" in session.unknown else str(session.line),
+        "line_assumed": line_is_assumed(session),
         "port": session.port,
         "adapter": session.adapter.name,
         "adapter_latency_ms": session.adapter.latency / 1e6,
@@ -171,7 +172,9 @@ def _print_nodes(summary: Summary) -> None:
 
 def _settings(session: Session) -> str:
     title = "unknown" if "protocol" in session.unknown else dissector_for(session).title
-    return f"{title}, line settings unknown" if "line" in session.unknown else f"{title}, {session.line}"
+    if "line" in session.unknown:
+        return f"{title}, line settings unknown"
+    return f"{title}, {session.line}{' (assumed)' if line_is_assumed(session) else ''}"
 
 
 def _search(session: Session, summary: Summary, events: list[LineEvent]) -> str:

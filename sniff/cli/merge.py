@@ -24,6 +24,7 @@ def run(args: argparse.Namespace) -> int:
         session = merged_session(captures, [name for name, _ in opened])
     except CaptureError as error:
         raise Failure(str(error), UNREADABLE) from None
+    arguments.say_assumed(session, args.files[0])
     writing.write(args, session, merged(captures), args.files)
     for path, capture in opened:
         writing.say_incomplete(path, capture)

@@ -24,6 +24,6 @@ def run(args: argparse.Namespace) -> int:
     from sniff.tui import run as run_tui
 
     for path, capture in captures:
-        session = arguments.settings_of(args, capture.session)
+        session = arguments.settings_of(args, capture.session, path)
         run_tui(FileFeed(path, capture, session, arguments.noted_devices(args, session)))
     return 0

@@ -70,7 +70,7 @@ def run(args: argparse.Namespace) -> int:
         raise Failure(f"{path}: exists; add --force to overwrite it", USAGE)
     with parquet.ParquetWriter(path, PARQUET) as table:
         for name, capture in arguments.open_captures(args.files):
-            session = arguments.settings_of(args, capture.session)
+            session = arguments.settings_of(args, capture.session, name)
             for samples in _samples(args, capture, session):
                 for sample in samples:
                     table.add(_parquet_row(sample))
@@ -80,7 +80,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _print(args: argparse.Namespace) -> int:
     for path, capture in arguments.open_captures(args.files):
-        session = arguments.settings_of(args, capture.session)
+        session = arguments.settings_of(args, capture.session, path)
         latest = args.latest if args.latest is not None else args.style == "text"
         if latest:
             _print_latest(args, capture, session)

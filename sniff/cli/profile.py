@@ -153,7 +153,7 @@ def _guess(args: argparse.Namespace) -> int:
     rows: list[tuple[tables.Cell, ...]] = []
     for path in args.files:
         capture = arguments.open_capture(path)
-        session = arguments.settings_of(args, capture.session)
+        session = arguments.settings_of(args, capture.session, path)
         guessing = Guessing(dissector_for(session))
         for output in outputs(capture.items(), session):
             if isinstance(output, Output):

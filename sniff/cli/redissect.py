@@ -21,7 +21,7 @@ def run(args: argparse.Namespace) -> int:
     if not str(args.output).lower().endswith(".mcap"):
         raise Failure(f"{args.output}: only .mcap holds what was found; for other formats use convert", USAGE)
     capture = arguments.open_capture(args.file)
-    session = arguments.settings_of(args, capture.session)
+    session = arguments.settings_of(args, capture.session, args.file)
     writing.write(args, session, capture.items(), [args.file], with_frames=True)
     writing.say_incomplete(args.file, capture)
     return 0

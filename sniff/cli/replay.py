@@ -32,7 +32,8 @@ def run(args: argparse.Namespace) -> int:
         raise Failure(
             f"--to {args.to}: refused; a capture is only played to pty, tcp or tcp:PORT, never to a port", USAGE
         )
-    arguments.open_capture(args.file)  # says what is wrong with the file before anything is opened
+    capture = arguments.open_capture(args.file)  # says what is wrong with the file before anything is opened
+    arguments.say_assumed(capture.session, args.file)
     try:
         replay: Replay = (
             PtyReplay(Path(args.file), args.speed)

@@ -75,5 +75,5 @@ def default_place(file: str) -> Path:
 
 
 def _numbers(path: str, capture: Capture, args: argparse.Namespace) -> Numbers:
-    session = arguments.settings_of(args, capture.session)
+    session = arguments.settings_of(args, capture.session, path)
     return collect(Path(path).name, capture, session, arguments.noted_devices(args, session))

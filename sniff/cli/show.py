@@ -45,7 +45,7 @@ def run(args: argparse.Namespace) -> int:
             raise Failure(f"-e {name}: unknown field{nearest(name, rows.JSON_KEYS)}; --fields lists a capture's", USAGE)
     left = args.count
     for path, capture in arguments.open_captures(args.files):
-        session = arguments.settings_of(args, capture.session)
+        session = arguments.settings_of(args, capture.session, path)
         dissector = dissector_for(session)
         devices = arguments.noted_devices(args, session)
         wanted = _filter(args, dissector)

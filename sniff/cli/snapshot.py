@@ -26,7 +26,7 @@ def run(args: argparse.Namespace) -> int:
 
     differing = 0
     for name in args.files:
-        arguments.open_capture(name)
+        arguments.say_assumed(arguments.open_capture(name).session, name)
         path = Path(name)
         place = expectation_path(path)
         found = render(read_capture(path))

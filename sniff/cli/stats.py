@@ -52,7 +52,8 @@ def run(args: argparse.Namespace) -> int:
         raise Failure(f"{stray[0]}: neither a file nor a table; tables are {', '.join(TABLES)}{hint}", USAGE)
     opened = arguments.open_captures(files)
     captures = [capture for _, capture in opened]
-    session = arguments.settings_of(args, merged_session(captures, [name for name, _ in opened]))
+    names = [name for name, _ in opened]
+    session = arguments.settings_of(args, merged_session(captures, names), names[0])
     items = merged(captures) if len(captures) > 1 else captures[0].items()
     if table == "ring":
         if "ring" not in dissector_for(session).extras:

@@ -23,7 +23,7 @@ from dissectors.frame import Chunk, Frame, Noise
 from dissectors.profiles.packaged import names
 from sniff.engine import Output
 from sniff.profile_files import EVERY, address, noted
-from sniff.reading import engine_for
+from sniff.reading import ASSUMED, LINE_NOTE, engine_for, line_is_assumed
 from sniff.session import DEVICES_NOTE, Adapter, Item, LineEvent, LineEventKind, Session, settings_change
 
 BLANK = ord("x")
@@ -77,7 +77,8 @@ def _renamed_devices(session: Session) -> dict[str, str]:
         for word, name in known.items()
         if name in names()
     ]
-    return {DEVICES_NOTE: ",".join(said)} if said else {}
+    devices = {DEVICES_NOTE: ",".join(said)} if said else {}
+    return {**devices, LINE_NOTE: ASSUMED} if line_is_assumed(session) else devices
 
 
 def _rewriter(session: Session) -> Rewriter:

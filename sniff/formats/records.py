@@ -16,7 +16,7 @@ from dissectors.line import LineSettings
 from sniff.analysis.wording import describe, duration
 from sniff.engine import Output
 from sniff.formats.linktypes import LINK_TYPES, RTAC, RTAC_ERRORS, USER1, link_type_for, rtac_record
-from sniff.reading import Settled, Settling, engine_for
+from sniff.reading import ASSUMED, LINE_NOTE, Settled, Settling, engine_for
 from sniff.session import Adapter, Item, LineEvent, LineEventKind, Session, SettingsChange
 
 FOREIGN_LATENCY = 20_000_000
@@ -43,7 +43,7 @@ def foreign_session(path: str, protocol: str | None, started: int, kind: str) ->
         protocol=name,
         started=started,
         adapter=Adapter(name=f"another program's {kind}", latency=FOREIGN_LATENCY, latency_from="assumed"),
-        notes={"line": "assumed: the file does not say"},
+        notes={LINE_NOTE: ASSUMED},
     )
 
 
