@@ -9,10 +9,10 @@ A protocol brings its rules as `Dissector.extras["findings"]`, a function Timing
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from dissectors.frame import Event, Header
 from dissectors.tracker import Placement, Transaction
@@ -116,6 +116,19 @@ class Judge(Protocol):
 
     def findings(self) -> tuple[Finding, ...]:
         """All findings so far; may be asked at any time."""
+        ...
+
+
+ExceptionWords = Callable[[int, int], str]
+"""Station and exception code → what the manual of that device says of the code; empty where it is not known."""
+
+
+@runtime_checkable
+class WordsExceptions(Protocol):
+    """A judge that can be told how makers word exception codes: what they mean in the standard may be untrue there."""
+
+    def word_exceptions(self, words: ExceptionWords) -> None:
+        """Use these words from here on, also for what was seen before."""
         ...
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from dissectors.findings import Tally
@@ -12,6 +13,10 @@ from dissectors.modbus.station_record import Cycles, Station
 _SENDERS_KEPT = 300
 
 
+def _no_words(unit: int, code: int) -> str:
+    return ""
+
+
 @dataclass(slots=True)
 class Evidence:
     """What was seen on the bus. Times are ns.
@@ -19,6 +24,7 @@ class Evidence:
     `hasty`: requests after another that nothing had followed: (longest reading of the silence between, unit asked
     before, time, frame before, frame). `close`, `paused`: by sender. `pairs`: (unit asked, unit that answered);
     `repeated_elsewhere`: repeats of requests that such a pair is about, by unit asked.
+    `maker_words`: unit and exception code → what the maker of the device says of it, empty where not known.
     """
 
     timing: Timing
@@ -38,6 +44,7 @@ class Evidence:
     pairs: dict[tuple[int, int], Tally] = field(default_factory=dict)
     repeated_elsewhere: Counter[int] = field(default_factory=Counter)
     cycles: Cycles = field(default_factory=Cycles)
+    maker_words: Callable[[int, int], str] = _no_words
 
     @property
     def span(self) -> int:

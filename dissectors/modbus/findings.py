@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 
-from dissectors.findings import Finding, Tally
+from dissectors.findings import ExceptionWords, Finding, Tally
 from dissectors.frame import Damage, Event, Frame, Header, LineError, Noise, Role
 from dissectors.line import Timing
 from dissectors.modbus.adu import RTU_NAME, adu, rtu_check
@@ -121,6 +121,10 @@ class ModbusFindings:
             station.heard(transaction.end)
         elif asked is not None:
             self._settle_request(station, transaction, asked, code, answer)
+
+    def word_exceptions(self, words: ExceptionWords) -> None:
+        """See `dissectors.findings.WordsExceptions`."""
+        self._seen.maker_words = words
 
     def findings(self) -> tuple[Finding, ...]:
         """See `dissectors.findings.Judge`."""

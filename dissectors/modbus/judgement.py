@@ -21,7 +21,7 @@ def judge(seen: Evidence, timeout: int | None) -> tuple[Finding, ...]:
     common = _common_damage(seen)
     made += common
     for unit in sorted(seen.stations):
-        made += of_station(seen, f"station {unit}", seen.stations[unit], timeout, bool(common))
+        made += of_station(seen, unit, seen.stations[unit], timeout, bool(common))
     return tuple(made)
 
 

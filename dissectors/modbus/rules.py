@@ -79,7 +79,7 @@ _ALL = (
         Severity.WARNING,
         "exception",
         "A station answers with an exception code. Codes 1 … 11 have the meanings of Modbus Application Protocol "
-        "V1.1b3, clause 7; others are the vendor's.",
+        "V1.1b3, clause 7; others are the vendor's. Where the profile of the device words a code, those words count.",
         "the station heard the request well and refuses it; the code says why",
         "the code, the register and the count, against the device's manual",
     ),
@@ -284,6 +284,16 @@ EXCEPTIONS: dict[int, tuple[Severity, str, str]] = {
     11: (Severity.WARNING, "the device behind a gateway does not answer", "that device: supply, address, wiring"),
 }
 """Exception code → severity, what it is consistent with, what to check next."""
+
+USED_ALIKE = (1, 2, 3, 6)
+"""Codes of the standard that makers use as the standard does, whatever they call them."""
+
+MAKER_EXCEPTION = (
+    Severity.WARNING,
+    "the device refuses the request, for the reason that its maker gives for this code",
+    "the request against the device's manual: register, count, value, and whether it takes writes now",
+)
+"""The same for a code that the profile of the device words: the maker may use codes of the standard otherwise."""
 
 VENDOR_EXCEPTION = (
     Severity.WARNING,

@@ -11,7 +11,7 @@ from dissectors.modbus.evidence import Evidence
 from dissectors.modbus.functions import EXCEPTIONS as EXCEPTION_NAMES
 from dissectors.modbus.judgement_words import MS, ms, note_if, request_words, seconds, wilson
 from dissectors.modbus.response_groups import Answered
-from dissectors.modbus.rules import EXCEPTIONS, RULES, VENDOR_EXCEPTION
+from dissectors.modbus.rules import EXCEPTIONS, MAKER_EXCEPTION, RULES, USED_ALIKE, VENDOR_EXCEPTION
 from dissectors.modbus.station_record import Key, Requested, Station
 
 SILENT_AT_END = 5
@@ -21,11 +21,12 @@ _REPEATS_COST = 0.02
 _REPEATS_LEAST = 3  # fewer are no habit, however short the capture
 
 
-def of_station(seen: Evidence, name: str, station: Station, timeout: int | None, is_common: bool) -> Iterator[Finding]:
+def of_station(seen: Evidence, unit: int, station: Station, timeout: int | None, is_common: bool) -> Iterator[Finding]:
+    name = f"station {unit}"
     yield from _missing(seen, name, station)
     yield from _damaged(seen, name, station, is_common)
     for (key, code), tally in sorted(station.exceptions.items(), key=lambda item: str(item[0])):
-        yield _exception(name, station, key, code, tally)
+        yield _exception(name, station, key, code, tally, seen.maker_words(unit, code))
     if station.unfit.count:
         why, _ = station.unfit_words.most_common(1)[0] if station.unfit_words else ("", 0)
         words = f"{station.unfit.count} of {counted(station.answered, 'answer')} not as asked for: {why}"
@@ -115,9 +116,11 @@ def _damaged(seen: Evidence, name: str, station: Station, is_common: bool) -> It
     yield damaged.found(RULES["MB005"], name, words, note_if(rare or is_common))
 
 
-def _exception(name: str, station: Station, key: Key, code: int, tally: Tally) -> Finding:
-    severity, means, following = EXCEPTIONS.get(code, VENDOR_EXCEPTION)
-    meaning = EXCEPTION_NAMES.get(code) or f"code 0x{code:02X} of the vendor's"
+def _exception(name: str, station: Station, key: Key, code: int, tally: Tally, maker: str) -> Finding:
+    """`maker`: what the manual of the device says of the code; it stands before the standard."""
+    otherwise = MAKER_EXCEPTION if maker else VENDOR_EXCEPTION
+    severity, means, following = otherwise if maker and code not in USED_ALIKE else EXCEPTIONS.get(code, otherwise)
+    meaning = maker or EXCEPTION_NAMES.get(code) or f"code 0x{code:02X} of the vendor's"
     request = station.requests.get(key)
     of = tally.count if request is None else request.tries
     some = "the only request" if of == 1 else f"{tally.count} of {of} requests"

@@ -212,6 +212,11 @@ class Devices:
             return self.default
         return self.by_address.get(address, self.default)
 
+    def exception(self, address: int, family: str, code: int) -> str:
+        """The maker's words for an exception code of a station; empty when there are none."""
+        profile = self.at(address)
+        return "" if profile is None else profile.exception(family, code)
+
     def __bool__(self) -> bool:
         return bool(self.by_address) or self.default is not None
 

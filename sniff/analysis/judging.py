@@ -6,10 +6,11 @@ from collections.abc import Callable, Mapping
 from typing import cast
 
 from dissectors import registry
-from dissectors.findings import Finding, Judge, Rule, with_consequences
+from dissectors.findings import Finding, Judge, Rule, WordsExceptions, with_consequences
 from dissectors.frame import Noise, Place, Reason
 from dissectors.line import Timing
 from dissectors.profiles import Devices
+from dissectors.profiles.model import FAMILIES
 from dissectors.registry import Dissector
 from dissectors.tracker import Transaction, Verdict
 from sniff.analysis.line_findings import LineFindings
@@ -32,6 +33,9 @@ class Judging:
         self.line = LineFindings(session)
         self._rules = rules_over(dissector)
         self.devices = ProfileFindings(session.timing, dissector, devices) if devices else None
+        if devices and isinstance(self.judge, WordsExceptions):
+            family = FAMILIES.get(dissector.name, dissector.name)
+            self.judge.word_exceptions(lambda station, code: devices.exception(station, family, code))
         self._searching = False
         self._hole: int | None = None  # when octets were lost, by the newest line event that says so
         self._first_after: int | None = None  # number of the first row that ends after it

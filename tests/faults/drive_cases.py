@@ -27,7 +27,11 @@ DRIVE_CASES: tuple[Case, ...] = (
         also=("MB008",),
     ),
     Case("drive, reserved register", partial(drives, extra=(_reserved,)), (("PR002", "drive 2"),), struck=_refused),
-    Case("drive, read-only register", partial(drives, extra=(_read_only,)), (("PR003", "drive 2"),), struck=_refused),
+    Case(
+        "drive, read-only register",
+        partial(drives, extra=(_read_only,)),
+        (("PR003", "drive 2"), ("MB008", "station 2")),  # the device refuses it: no mere "acknowledge"
+    ),
     Case("drive trips", partial(drives, extra=(_trip,)), (("PR004", "drive 2"),)),
     Case("drive warns", partial(drives, change={2: partial(Shows, values={0x2528: 9})}), (("PR005", "drive 2"),)),
     Case("drive, frame too long", partial(drives, extra=(_too_long,)), (("PR006", "drive 2"),), struck=_refused),

@@ -149,3 +149,25 @@ def test_a_simulated_bus_without_faults(name: str) -> None:
     }
     assert found <= meant[name]
     assert name == "mstp" or found
+
+
+@pytest.mark.parametrize(
+    ("devices", "exchange", "words", "severity"),
+    [
+        (E510, ("010625240001", "018605"), "exception 5 (write mode error)", Severity.WARNING),
+        (E510, ("010625020001", "018604"), "exception 4 (data setting error)", Severity.WARNING),
+        (Devices({2: packaged("teco-e510")}), ("010625240001", "018605"), "exception 5 (acknowledge)", Severity.NOTE),
+        (None, ("010625240001", "018605"), "exception 5 (acknowledge)", Severity.NOTE),
+        (ACN, ("010625240001", "018606"), "exception 6 (slave device busy)", Severity.NOTE),
+    ],
+)
+def test_the_makers_words_for_an_exception_stand_before_the_standard(
+    devices: Devices | None, exchange: tuple[str, str], words: str, severity: Severity
+) -> None:
+    judging = Judging(bus.SESSION, dissector_for(bus.SESSION), devices)
+    for output in bus.run(bus.chunks(exchange, latency=8.0), bus.SESSION):
+        judging.add(output)
+    (finding,) = (finding for finding in judging.findings() if finding.code == "MB008")
+    assert finding.seen.startswith(words)
+    assert finding.severity is severity
+    assert ("later" in finding.means) == ("acknowledge" in words)
