@@ -51,10 +51,16 @@ class Load:
         event = row.event
         self.first = event.start if self.first is None else min(self.first, event.start)
         self.last = event.end if self.last is None else max(self.last, event.end)
-        second = self._second(event.end // NS_PER_S)
+        number = event.end // NS_PER_S
+        second = self._second(number)
         octets = len(event.octets)
+        busy = octets * self.line.char
+        late = min(busy, event.end - number * NS_PER_S)
+        self.total.busy += busy
+        second.busy += late
+        if late < busy:  # it began in the second before
+            self._second(number - 1).busy += busy - late
         for part in (self.total, second):
-            part.busy += octets * self.line.char
             part.octets += octets
             if isinstance(event, Frame):
                 part.frames += 1
@@ -90,6 +96,13 @@ class Load:
         busy = sum(self.seconds[number].busy for number in numbers if number in self.seconds)
         span = max(self.last - max(self.first, numbers.start * NS_PER_S), self.line.char)
         return min(1.0, busy / span)
+
+    def share_of(self, part: Second, start: int, end: int) -> float:
+        """Bus load, 0 … 1, of a stretch (ns) whose seconds together are `part`; only what the capture covers counts."""
+        if self.last is None or self.first is None:
+            return 0.0
+        span = min(end, self.last) - max(start, self.first)
+        return min(1.0, part.busy / max(span, self.line.char))
 
     def overall(self) -> float:
         """Bus load, 0 … 1, over the whole capture."""

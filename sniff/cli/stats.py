@@ -153,6 +153,13 @@ def _load(summary: Summary, every: int) -> list[tuple[Cell, ...]]:
         part.damaged += second.damaged
         part.noise += second.noise
     return [
-        (iso(number * every), 100 * min(1.0, part.busy / every), part.frames, part.damaged, part.noise, part.octets)
+        (
+            iso(number * every),
+            100 * summary.load.share_of(part, number * every, (number + 1) * every),
+            part.frames,
+            part.damaged,
+            part.noise,
+            part.octets,
+        )
         for number, part in sorted(spans.items())
     ]

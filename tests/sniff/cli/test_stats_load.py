@@ -1,0 +1,42 @@
+"""`stats FILE load`: a second of which the capture covers a part is divided by that part."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+CHAR = 11 / 9600
+HEAD = "#!sniff-capture 1\n# line: 9600,8E1\n# protocol: modbus-rtu\n# start: 2026-03-01T10:00:00Z\n"
+FRAME = "01 03 00 00 00 02 C4 0B"
+
+
+def rows(sniff485: Callable[..., Any], tmp_path: Path, gaps: list[float]) -> list[dict[str, Any]]:
+    path = tmp_path / "a.cap.txt"
+    path.write_text(HEAD + "".join(f"+{gap} {FRAME}\n" for gap in gaps))
+    info = json.loads(sniff485("info", path, "--json").out)
+    found = [json.loads(line) for line in sniff485("stats", path, "load", "--json").out.splitlines()]
+    return [info, *found]
+
+
+def test_a_short_capture_has_the_load_that_info_says(sniff485: Callable[..., Any], tmp_path: Path) -> None:
+    info, only = rows(sniff485, tmp_path, [20, 100, 100])
+    assert only["load %"] == pytest.approx(100 * info["load"], rel=1e-3)
+    assert only["load %"] > 10
+
+
+def test_whole_seconds_are_divided_by_a_second(sniff485: Callable[..., Any], tmp_path: Path) -> None:
+    _, *seconds = rows(sniff485, tmp_path, [20, *[100] * 28])
+    middle = seconds[1]
+    assert middle["load %"] == pytest.approx(100 * 10 * 8 * CHAR, rel=0.1)
+
+
+def test_a_frame_over_the_boundary_counts_in_both_seconds(sniff485: Callable[..., Any], tmp_path: Path) -> None:
+    info, *seconds = rows(sniff485, tmp_path, [500, 503])  # the second frame ends 3 ms after the full second
+    assert len(seconds) == 2
+    whole = sum(row["octets"] for row in seconds)
+    assert whole == info["octets"] == 16
+    assert seconds[0]["load %"] > 2.5  # of half a second: one frame, and most of another
