@@ -30,6 +30,8 @@ WORK_SECONDS = 0.02
 SURE_SECONDS = 4.0
 """How long a first `q` during a recording waits for the second."""
 THEMES = ("textual-dark", "textual-light")
+PATH = 8
+"""Screens that `q` can walk back over."""
 
 
 class SnifferApp(App[None]):
@@ -156,9 +158,7 @@ class SnifferApp(App[None]):
         """Show a screen; `q` comes back from it."""
         if name == self.current_mode:
             return
-        if name in self.visited:
-            del self.visited[self.visited.index(name) :]
-        self.visited.append(name)
+        self.visited = with_step(self.visited, name)
         self.switch_mode(name)
 
     def action_go_back(self) -> None:
@@ -225,6 +225,14 @@ class SnifferApp(App[None]):
         """Filters work on every screen."""
         if message.purpose == "filter":
             self.filter(message.text)
+
+
+def with_step(path: list[str], name: str) -> list[str]:
+    """The path of screens with one more; to and fro between two (A B A B) is kept once, and the oldest give way."""
+    longer = [*path, name]
+    if len(longer) >= 4 and longer[-2:] == longer[-4:-2]:
+        longer = longer[:-2]
+    return longer[-PATH:]
 
 
 def _make(entry: Entry) -> Screen[None]:

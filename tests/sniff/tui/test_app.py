@@ -10,6 +10,7 @@ import pytest
 from textual.widgets import Static
 
 from sniff.tui import run
+from sniff.tui.app import PATH, with_step
 from sniff.tui.feed import FeedStatus, StoreFeed
 from sniff.tui.help import HelpScreen
 from sniff.tui.keybar import explanation, working_keys
@@ -56,14 +57,40 @@ def test_an_unknown_start_screen_is_refused(busy_bus: Any) -> None:
 def test_back_walks_the_screens_and_then_quits(look: Any, busy_bus: Any) -> None:
     async def script(see: Any) -> None:
         await see.press("2", "3", "8", "2")
-        assert see.app.visited == ["frames", "transactions"]
-        await see.press("q")
-        assert see.app.current_mode == "frames"
-        assert see.app.is_running
+        for before in ("line", "nodes", "transactions", "frames"):
+            await see.press("q")
+            assert see.app.current_mode == before
+            assert not see.app._exit
         await see.press("q")
         assert see.app._exit
 
     look(busy_bus.store, script)
+
+
+@pytest.mark.parametrize("key", ["2", "3"])
+def test_back_from_the_frames_of_something_goes_to_it(look: Any, busy_bus: Any, key: str) -> None:
+    async def script(see: Any) -> None:
+        await see.press(key)
+        came_from = see.app.current_mode
+        await see.press("enter")
+        assert see.app.current_mode == "frames"
+        await see.press("q")
+        assert see.app.current_mode == came_from
+        await see.press("q")
+        assert see.app.current_mode == "frames"
+        assert not see.app._exit
+
+    look(busy_bus.store, script)
+
+
+def test_the_way_back_stays_short() -> None:
+    path = ["frames"]
+    for _ in range(20):
+        path = with_step(with_step(path, "nodes"), "frames")
+    assert path == ["frames", "nodes", "frames"]
+    for number in range(20):
+        path = with_step(path, f"screen {number}")
+    assert path == [f"screen {number}" for number in range(20 - PATH, 20)]
 
 
 def test_quitting_a_recording_takes_two(look: Any, busy_bus: Any) -> None:
