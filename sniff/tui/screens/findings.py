@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterable
 from typing import ClassVar
 
 from rich.text import Text
@@ -94,7 +95,7 @@ class FindingsScreen(ViewScreen):
         found = [f for f in judged.findings() if self._all or f.severity >= Severity.WARNING]
         if self._by_subject:
             found.sort(key=lambda f: (f.subject, -f.severity, f.code))
-        self._found = {f"{finding.code} {finding.subject}": finding for finding in found}
+        self._found = _keyed(found)
         table = self.query_one(StationTable)
         table.fill((key, self._cells(f)) for key, f in self._found.items())
         if self._first_look:  # the cursor stays on the gravest one until all was read once
@@ -179,3 +180,14 @@ class FindingsScreen(ViewScreen):
         """With facts and notes, or without."""
         self._all = not self._all
         self._look()
+
+
+def _keyed(found: Iterable[Finding]) -> dict[str, Finding]:
+    """By what they are about, in their order; two of the same code about the same subject keep a line each."""
+    keyed: dict[str, Finding] = {}
+    for finding in found:
+        key, again = f"{finding.code} {finding.subject}", 1
+        while (name := key if again == 1 else f"{key} {again}") in keyed:
+            again += 1
+        keyed[name] = finding
+    return keyed

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
+from dissectors.findings import Severity
 from dissectors.registry import get
 from sniff.engine import Output
 from sniff.reading import outputs
@@ -129,5 +132,22 @@ def test_the_rules_read_on_behind_every_screen(look, store):
         assert see.app.current_mode == "frames"
         assert not see.app.judged.left(store.last_no)
         assert {finding.code for finding in see.app.judged.findings()} >= {"MB001"}
+
+    look(store, script)
+
+
+def test_two_findings_of_one_code_about_one_station_stand_in_their_places(look, store):
+    """As one line the lesser of them would show in the place of the graver one."""
+
+    async def script(see):
+        see.app.judged.step(store.last_no, store.last_no)
+        found = see.app.judged.findings()
+        worst, least = found[0], replace(found[0], severity=Severity.NOTE, seen="the lesser one")
+        see.app.judged.findings = lambda: (*found, least)
+        await see.press("5")
+        rows = [[cell.plain for cell in see.main.get_row_at(at)] for at in range(see.main.row_count)]
+        assert len(rows) == len(found) + 1
+        assert rows[0][:2] == ["E!", worst.code]
+        assert rows[-1][:2] == ["n", worst.code]
 
     look(store, script)
