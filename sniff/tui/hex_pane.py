@@ -52,6 +52,7 @@ class HexPane(ScrollView, can_focus=True, inherit_bindings=False):
 
     def __init__(self, *, id: str | None = None) -> None:
         super().__init__(id=id)
+        self.row: int | None = None  # number of the row that is shown
         self.octets = b""
         self.letters: dict[int, str] = {}
         self.notes: list[str] = []
@@ -59,8 +60,9 @@ class HexPane(ScrollView, can_focus=True, inherit_bindings=False):
         self.span: tuple[int, int] | None = None
         self.field_name = ""
 
-    def show(self, octets: bytes, marks: tuple[Mark, ...]) -> None:
-        """Show the octets of another frame."""
+    def show(self, row: int | None, octets: bytes, marks: tuple[Mark, ...]) -> None:
+        """Show the octets of another row; None and nothing where there is none."""
+        self.row = row
         self.octets = octets
         self.letters = {mark.offset: mark_letter(mark.error) for mark in marks}
         self.notes = [f"octet {mark.offset}: {mark_names(mark.error)}" for mark in marks[:NAMED_MARKS]]
@@ -130,7 +132,10 @@ class HexPane(ScrollView, can_focus=True, inherit_bindings=False):
     # -- drawing -----------------------------------------------------------------------------------------------
 
     def title(self) -> str:
-        """Which octets are selected, in words."""
+        """Which row this is, and which octets are selected, in words; the list may be ahead while it follows."""
+        return "no row" if self.row is None else f"row {self.row} · {self._selected()}"
+
+    def _selected(self) -> str:
         count = len(self.octets)
         if self.span is None:
             known = f"{self.field_name}: octets not known" if self.field_name else ""

@@ -44,7 +44,7 @@ class FramesScreen(ListingScreen):
         Binding("tab", "app.focus_next", "pane", tooltip="next pane: list, fields, octets", show=False),
         Binding("shift+tab", "app.focus_previous", "pane", tooltip="pane before", show=False),
         Binding("z", "zoom", "zoom", tooltip="the pane as large as the screen, and back", show=False),
-        Binding("y", "copy", "copy", tooltip="copy the octets as hex to the clipboard", show=False),
+        Binding("y", "copy", "copy", tooltip="copy the octets that are shown as hex to the clipboard", show=False),
     ]
 
     def __init__(self) -> None:
@@ -118,6 +118,9 @@ class FramesScreen(ListingScreen):
     def _plan_detail(self) -> None:
         if self._state() == self._detail or self._detail_timer is not None:
             return
+        if self._detail is None and self.query(HexPane):  # beside the first row there must not stand nothing
+            self._show_detail()
+            return
         delay = FOLLOWING_SECONDS if self.viewing.follow and not self.viewing.frozen else DETAIL_SECONDS
         self._detail_timer = self.set_timer(delay, self._show_detail)
 
@@ -128,11 +131,11 @@ class FramesScreen(ListingScreen):
         self._detail = self._state()
         octets, tree = self.query_one(HexPane), self.query_one(FieldTree)
         if self._detail is None:
-            octets.show(b"", ())
+            octets.show(None, b"", ())
             tree.show(())
             return
         row, transaction = self._detail
-        octets.show(row.event.octets, row.event.marks)
+        octets.show(row.no, row.event.octets, row.event.marks)
         kept = tree.show(tree_of(self.store.dissector, row, transaction, date_and_clock))
         if kept is not None:
             octets.select(kept.begin, kept.end, kept.name)
@@ -209,8 +212,10 @@ class FramesScreen(ListingScreen):
 
     def action_copy(self) -> None:
         """Octets to the clipboard of the terminal (OSC 52)."""
-        row = self._row()
-        if row is not None:
+        if not self.viewing.follow or self.viewing.frozen:  # then the cursor's row, however fast the keys came
+            self._show_detail()
+        if self._detail is not None:
+            row, _ = self._detail
             self.app.copy_to_clipboard(row.event.octets.hex(" ").upper())
             kind = "frame" if isinstance(row.event, Frame) else "noise"
             self.notify(f"{kind} {row.no} copied as hex, if your terminal allows it", timeout=2)

@@ -274,3 +274,40 @@ def test_an_empty_bus_says_so(look: Any, make_bus: Any) -> None:
         assert "nothing happened to the line" in see.text()
 
     look(make_bus().store, script)
+
+
+def test_the_panes_say_which_row_they_show_and_y_copies_that(
+    look: Any, busy_bus: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def script(see: Any) -> None:
+        octets = see.app.screen.query_one(HexPane)
+        assert octets.title() == "row 13 · 5 octets"
+        monkeypatch.setattr("sniff.tui.screens.frames.FOLLOWING_SECONDS", 1000)  # as on a loaded machine
+        busy_bus.ask(7)
+        see.app.poll()
+        await see.pilot.pause(0.05)
+        assert see.main.cursor == 15
+        assert octets.title() == "row 13 · 5 octets"
+        see.app.screen.action_copy()
+        assert see.app.clipboard == "02 03 00 07 63"
+        await see.pilot.pause(0)
+        assert see.notices()[-1].startswith("frame 13 copied")
+        see.app.viewing.follow = False
+        see.app.screen.action_copy()
+        assert octets.title() == "row 15 · 6 octets"
+        assert see.app.clipboard == "07 03 12 34 56 4D"
+
+    look(busy_bus.store, script, live=True)
+
+
+def test_no_row_is_not_an_empty_row(look: Any, make_bus: Any, busy_bus: Any) -> None:
+    async def nothing(see: Any) -> None:
+        assert "no row" in see.text()
+        assert "0 octets" not in see.text()
+
+    look(make_bus().store, nothing)
+
+    async def at_once(see: Any) -> None:
+        assert see.app.screen.query_one(HexPane).row == 1
+
+    look(busy_bus.store, at_once)
