@@ -1,6 +1,7 @@
 """The protocols: built-in ones and those that other packages bring (entry points, group `sniff485.dissectors`).
 
-A new protocol is one folder and one line in BUILT_IN. Nothing is imported before it is asked for.
+A new protocol is one folder and one line in BUILT_IN. Nothing is imported before it is asked for. What a plug-in's
+functions raise is shown at the frame it was about (`plugin_guard.py`).
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import import_module
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
 from dissectors.frame import Frame, Header, Role
@@ -73,6 +74,10 @@ class UnknownProtocol(LookupError):
     """No such protocol; the message lists those there are."""
 
 
+class BrokenPlugin(UnknownProtocol):
+    """A plug-in that is installed and cannot be used; the message names it, its package and why."""
+
+
 def names() -> tuple[str, ...]:
     """Names of all protocols, built-in first."""
     plugged = sorted(point.name for point in entry_points(group=GROUP) if point.name not in BUILT_IN)
@@ -87,10 +92,30 @@ def get(name: str) -> Dissector:
     else:
         for point in entry_points(group=GROUP):
             if point.name == name:
-                found = point.load()
-                break
+                return _plugged(point)
         else:
             raise UnknownProtocol(f"protocol {name!r}: expected one of {', '.join(names())}")
-    if not isinstance(found, Dissector):
-        raise UnknownProtocol(f"protocol {name!r}: {found!r} is no Dissector")
+    assert isinstance(found, Dissector)
     return found
+
+
+_guarded: dict[str, tuple[Dissector, Dissector]] = {}
+"""Name of a plug-in → what it brought, and the same with its functions guarded."""
+
+
+def _plugged(point: EntryPoint) -> Dissector:
+    """The protocol of another package. Raises BrokenPlugin."""
+    package = f" of package {point.dist.name}" if point.dist is not None else ""
+    where = f"plug-in {point.name!r}{package}"
+    try:
+        found = point.load()
+    except Exception as error:  # its module is imported: anything may happen
+        raise BrokenPlugin(f"{where}: {str(error) or type(error).__name__}") from error
+    if not isinstance(found, Dissector):
+        raise BrokenPlugin(f"{where}: {point.value} is no Dissector")
+    known = _guarded.get(point.name)
+    if known is None or known[0] is not found:
+        from dissectors.plugin_guard import guarded
+
+        known = _guarded[point.name] = (found, guarded(found))
+    return known[1]

@@ -14,6 +14,7 @@ import sys
 from importlib import import_module
 from types import ModuleType
 
+from dissectors.registry import BrokenPlugin
 from sniff import __version__
 from sniff.formats import CaptureError
 
@@ -79,6 +80,9 @@ def main(argv: list[str] | None = None) -> int:
         sys.stdout.flush()
         print(f"sniff485: {_plain(error)}", file=sys.stderr)
         return UNREADABLE
+    except BrokenPlugin as error:
+        print(f"sniff485: {_plain(error)}", file=sys.stderr)
+        return USAGE
     except KeyboardInterrupt:
         return INTERRUPTED
     except BrokenPipeError:  # the reader of our output went away (`| head`)

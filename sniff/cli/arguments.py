@@ -168,6 +168,8 @@ def settings_of(args: argparse.Namespace, session: Session, path: str) -> Sessio
     try:
         session = with_settings(session, args.protocol, args.line)
         dissector_for(session)
+    except registry.BrokenPlugin:
+        raise
     except registry.UnknownProtocol as error:
         raise Failure(f"{error}; say which with -p", USAGE) from None
     say_assumed(session, path, "; -s names them")

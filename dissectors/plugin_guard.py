@@ -1,0 +1,55 @@
+"""A plug-in's functions made total: what they raise is said at its frame, and the capture goes on. Pure."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from dissectors.frame import Frame, Header, Role
+
+if TYPE_CHECKING:
+    from dissectors.registry import Dissector
+
+LONGEST = 120
+"""Characters of an error that are shown."""
+
+
+def guarded(dissector: Dissector) -> Dissector:
+    """The same protocol, whose `peek`, `text`, `fields` and `packet` never raise."""
+
+    def failed(function: str, error: Exception) -> str:
+        said = "".join(c if c.isprintable() else "." for c in str(error))[:LONGEST]
+        return f"{function} of plug-in {dissector.name!r} failed: {type(error).__name__}{': ' if said else ''}{said}"
+
+    failed_peek = f"peek of plug-in {dissector.name!r} failed: "
+
+    def peek(frame: Frame) -> Header:
+        try:
+            return dissector.peek(frame)
+        except Exception as error:
+            words = failed("peek", error)
+            return Header(dissector.name, None, None, Role.UNKNOWN, "unknown", ok=frame.ok, error=words)
+
+    def text(frame: Frame, header: Header, role: Role) -> str:
+        if header.error is not None and header.error.startswith(failed_peek):
+            return header.error
+        try:
+            return dissector.text(frame, header, role)
+        except Exception as error:
+            return failed("text", error)
+
+    def fields(frame: Frame, role: Role) -> dict[str, int | float | str]:
+        try:
+            return dissector.fields(frame, role)
+        except Exception as error:
+            return {f"{dissector.name}.error": failed("fields", error)}
+
+    def packet(frame: Frame, role: Role) -> Any:
+        try:
+            return dissector.packet(frame, role)
+        except Exception:
+            from scapy.packet import Raw
+
+            return Raw(frame.octets)
+
+    return replace(dissector, peek=peek, text=text, fields=fields, packet=packet)
