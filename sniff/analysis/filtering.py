@@ -5,7 +5,8 @@
 
 Names without a dot are columns (COLUMNS below), dotted names are fields as `show -T fields` lists them. A comparison
 with something that a frame does not have is false, also `!=`. A name alone is true when the frame has it and it is
-neither 0 nor empty. A verdict may be written as people read it ("no answer") or as JSON has it (no-response). Pure.
+neither 0 nor empty. A verdict may be written as people read it ("no answer") or as JSON has it (no-response). A
+verdict, role, found or damage that there is not is an error, for nothing would ever match. Pure.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from dissectors.frame import Frame, Role
+from dissectors.frame import Damage, Found, Frame, Role
 from dissectors.registry import Dissector
 from dissectors.tracker import Transaction, Verdict
 from sniff.analysis.wording import describe
@@ -106,6 +107,13 @@ FIELDS: tuple[str, ...] = (*COLUMNS, "text", *ALIASES)
 """Names for completion; the dotted fields of the protocol come on top."""
 
 _VERDICTS = {verdict.words: verdict.value for verdict in Verdict}
+_CLOSED: dict[str, tuple[str, ...]] = {
+    "verdict": tuple(verdict.value for verdict in Verdict),
+    "role": tuple(role.value for role in Role),
+    "found": tuple(found.value for found in Found),
+    "damage": tuple(damage.value for damage in Damage),
+}
+"""Columns that have one of these values and no other."""
 _COMPARE: dict[str, Callable[[Any, Any], bool]] = {
     "==": operator.eq,
     "!=": operator.ne,
@@ -243,9 +251,17 @@ class _Parser:
 
     def _value_of(self, name: str) -> Value:
         """The next value to compare a name with; a verdict may stand as people read it, "no answer"."""
+        column = self._now.column
         value = self._value()
-        if ALIASES.get(name, name) == "verdict" and isinstance(value, str):
-            return _VERDICTS.get(value.lower(), value)
+        name = ALIASES.get(name, name)
+        if name == "verdict" and isinstance(value, str):
+            value = _VERDICTS.get(value.lower(), value)
+        known = _CLOSED.get(name)
+        if known is not None and str(value).lower() not in known:
+            spoken = {**{words: words for words in known}, **(_VERDICTS if name == "verdict" else {})}
+            close = difflib.get_close_matches(str(value).lower(), spoken, 1, 0.5)
+            hint = f"did you mean {spoken[close[0]]!r}?" if close else f"expected one of {', '.join(known)}"
+            raise FilterError(f"unknown {name} {value!r} ({hint})", column)
         return value
 
     def _value(self) -> Value:

@@ -90,6 +90,11 @@ def test_noise_has_only_what_it_has(text: str, expected: bool) -> None:
         ("dst == 3 &&", 11, "expected a name"),
         ('kind matches "("', 13, "regular expression"),
         ("dst == 3 # x", 9, "unexpected '#'"),
+        ("verdict == noanswer", 11, "unknown verdict 'noanswer' (did you mean 'no-response'?)"),
+        ("dst == 3 && role in {request, 7}", 30, "unknown role 7 (expected one of request,"),
+        ("found == splt", 9, "did you mean 'split'?"),
+        ("damage != chek", 10, "did you mean 'check'?"),
+        ("tx.verdict == lat", 14, "did you mean 'late'?"),
         ("!" * 500 + "ok", 200, "nested"),
     ],
 )
