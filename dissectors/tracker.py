@@ -39,6 +39,9 @@ class Verdict(Enum):
 
 _WORDS = {Verdict.NO_RESPONSE: "no answer", Verdict.DATA: "one-way", Verdict.UNSOLICITED: "unasked"}
 
+PASSING = frozenset(("token", "poll-for-master"))
+"""Kinds of transactions that pass on the right to send, or look for a station to pass it to: they ask for nothing."""
+
 
 @dataclass(frozen=True, slots=True)
 class Interval:
@@ -81,6 +84,11 @@ class Transaction:
     attempt: int = 1
     of: int | None = None
     error: str | None = None
+
+    @property
+    def is_passing(self) -> bool:
+        """Whether it is no request and no data, only the right to send on its way."""
+        return self.kind in PASSING
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,11 @@ from sniff.engine import Row
 
 @dataclass(slots=True)
 class Node:
-    """One station. Times are ns; `damaged` counts frames to or from it that were not good."""
+    """One station. Times are ns; `damaged` counts frames to or from it that were not good.
+
+    `verdicts`: of requests and data to it. Tokens and polls for masters are `passed` to it instead; a token that it did
+    not use is `unused`, and no request without answer.
+    """
 
     address: int
     sent: int = 0  # frames from it
@@ -24,14 +28,16 @@ class Node:
     first: int | None = None
     last: int | None = None
     verdicts: Counter[Verdict] = field(default_factory=Counter)
+    passed: int = 0  # tokens and polls
+    unused: int = 0  # tokens of those
     kinds: Counter[str] = field(default_factory=Counter)
     errors: Counter[str] = field(default_factory=Counter)
     latency: Histogram = field(default_factory=Histogram)
 
     @property
     def seen(self) -> bool:
-        """Whether there is a sign of it but being polled for: it sent a good frame, or was asked something."""
-        return bool(self.heard or self.asked)
+        """Whether there is a sign of it but being polled for: it sent a good frame, was asked, or given a token."""
+        return bool(self.heard or self.asked or self.unused)
 
     @property
     def asked(self) -> int:
@@ -56,6 +62,8 @@ class Node:
             min(times, default=None),
             max(lasts, default=None),
             self.verdicts + other.verdicts,
+            self.passed + other.passed,
+            self.unused + other.unused,
             self.kinds + other.kinds,
             self.errors + other.errors,
             self.latency.merge(other.latency),
@@ -101,7 +109,11 @@ class NodeTable:
         if transaction.station is None:
             return
         node = self._node(transaction.station)
-        node.verdicts[transaction.verdict] += 1
+        if transaction.is_passing:
+            node.passed += 1
+            node.unused += transaction.verdict is Verdict.NO_RESPONSE
+        else:
+            node.verdicts[transaction.verdict] += 1
         node.kinds[transaction.kind] += 1
         if transaction.error:
             node.errors[transaction.error] += 1

@@ -162,7 +162,10 @@ def _print_traffic(summary: Summary, adapter: Adapter) -> None:
 def _print_nodes(summary: Summary) -> None:
     for node in summary.nodes.present():
         verdicts = {verdict.words: count for verdict, count in node.verdicts.items()}
-        _line(f"node {node.address}", f"{node.sent} frames from, {node.received} to; {_listed(verdicts)}")
+        _line(
+            f"node {node.address}",
+            f"{node.sent} frames from, {node.received} to; {_listed(verdicts) if verdicts else 'nothing asked of it'}",
+        )
         if node.errors:
             _line("", _listed(node.errors))
     absent = summary.nodes.absent()

@@ -156,6 +156,8 @@ def _trouble(transaction: Transaction) -> str:
     """What kind of trouble: an exception by its name, else how the exchange ended."""
     if transaction.verdict is Verdict.EXCEPTION and transaction.error:
         return transaction.error
+    if transaction.is_passing and transaction.verdict is Verdict.NO_RESPONSE:
+        return "token unused"
     return transaction.verdict.words
 
 

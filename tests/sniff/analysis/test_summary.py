@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from itertools import pairwise
 
@@ -9,6 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from dissectors.tracker import Transaction, Verdict
+from sniff.analysis.nodes import NodeTable
 from sniff.analysis.summary import Summary
 from sniff.engine import Output
 from sniff.reading import outputs
@@ -46,3 +49,18 @@ def test_parts_add_up_to_the_whole(name: str, cuts: list[float]) -> None:
     assert whole == expected
     assert expected.frames > 50
     assert expected.load.total.busy == sum(second.busy for second in expected.load.seconds.values())
+
+
+@pytest.mark.parametrize("kind", ["token", "poll-for-master"])
+def test_a_token_is_no_request(kind: str) -> None:
+    unused = Transaction(1, 27, kind, 1, None, Verdict.NO_RESPONSE, 0, 1)
+    request = replace(unused, id=2, kind="read-property")
+    table = NodeTable()
+    for transaction in (unused, unused, request, replace(request, verdict=Verdict.ANSWERED)):
+        table.add_transaction(transaction)
+    (node,) = table.merge(NodeTable())
+    assert (node.asked, node.unanswered, node.passed, node.unused) == (2, 1, 2, 2)
+    assert NodeTable(dict(table.nodes)).present() == [node]
+    only_given = NodeTable()
+    only_given.add_transaction(unused)
+    assert [node.address for node in only_given.present()] == [27]
