@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from inspect import Parameter, signature
 
 from dissectors.checksums import crc8_mstp, crc16_modbus, crc16_x25, lrc, sum8
 
@@ -48,6 +49,18 @@ MAKERS: dict[str, Callable[..., bytes]] = {
 
 
 def craft(kind: str, **parts: object) -> bytes:
-    """A frame of a kind in MAKERS from its parts, by keyword. Raises KeyError for an unknown kind."""
-    maker: Callable[..., bytes] = MAKERS[kind]
+    """A frame of a kind in MAKERS from its parts, by keyword. Raises ValueError that says what there is."""
+    maker = MAKERS.get(kind)
+    if maker is None:
+        raise ValueError(f"craft {kind!r}: expected one of {', '.join(MAKERS)}")
+    try:
+        signature(maker).bind(**parts)
+    except TypeError as error:
+        takes = ", ".join(_part(part) for part in signature(maker).parameters.values())
+        raise ValueError(f"craft {kind!r}: {error}; its parts are {takes}") from None
     return maker(**parts)
+
+
+def _part(part: Parameter) -> str:
+    shown = f"{part.name}: {part.annotation}"
+    return shown if part.default is Parameter.empty else f"{shown} = {part.default!r}"

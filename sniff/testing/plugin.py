@@ -16,6 +16,10 @@ if TYPE_CHECKING:
     from sniff.testing.capture_reading import CaptureReading
 
 INI = "sniff_captures"
+WITHOUT = pytest.StashKey[dict[Path, None]]()
+"""Captures that were met and are no test, for nobody has written what is expected of them."""
+NAMED = 3
+"""So many of them are named."""
 
 pytest.register_assert_rewrite("sniff.testing.framer_contract")  # imports nothing: its failures will show their values
 
@@ -37,9 +41,21 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Col
         return None
     wanted = parent.config.getoption("--sniff-update") or parent.config.getoption("--sniff-strict")
     if not wanted and not expectation_path(file_path).exists():
+        parent.config.stash.setdefault(WITHOUT, {})[file_path] = None
         return None
     collector: pytest.Collector = CaptureFile.from_parent(parent, path=file_path)
     return collector
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
+    """Say which captures are not tested."""
+    paths = [*config.stash.get(WITHOUT, {})]
+    if not paths:
+        return
+    shown = [str(path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path) for path in paths[:NAMED]]
+    more = f" and {len(paths) - NAMED} more" if len(paths) > NAMED else ""
+    many = "1 capture" if len(paths) == 1 else f"{len(paths)} captures"
+    terminalreporter.write_line(f"{many} without expectation: sniff485 snapshot {' '.join(shown)}{more} writes it")
 
 
 class CaptureFile(pytest.File):

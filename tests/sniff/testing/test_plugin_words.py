@@ -1,0 +1,66 @@
+"""What the pytest plugin says where something is missing: expectations, kinds of frames, their parts."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from sniff.testing.crafting import MAKERS, craft
+
+CAPTURE = "#!sniff-capture 1\n# line: 19200,8E1\n# protocol: modbus-rtu\n+0 01 03 00 00 00 02 C4 0B\n"
+
+
+def pytest_in(folder: Path, *arguments: str) -> str:
+    environment = {key: value for key, value in os.environ.items() if not key.startswith(("PYTEST", "COV"))}
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "no:benchmark", *arguments]
+    return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=100).stdout
+
+
+@pytest.fixture
+def project(tmp_path: Path) -> Path:
+    (tmp_path / "pyproject.toml").write_text('[tool.pytest.ini_options]\nsniff_captures = ["captures"]\n')
+    (tmp_path / "captures").mkdir()
+    (tmp_path / "captures" / "poll.cap.txt").write_text(CAPTURE)
+    return tmp_path
+
+
+def test_captures_without_expectation_are_said(project: Path) -> None:
+    (project / "test_other.py").write_text("def test_it():\n    pass\n")
+    ran = pytest_in(project)
+    assert f"1 capture without expectation: sniff485 snapshot {Path('captures/poll.cap.txt')} writes it" in ran
+    assert "1 passed" in ran
+    pytest_in(project, "--sniff-update")
+    ran = pytest_in(project)
+    assert "without expectation" not in ran
+    assert "2 passed" in ran
+
+
+def test_many_are_counted(project: Path) -> None:
+    for number in range(5):
+        (project / "captures" / f"more-{number}.cap.txt").write_text(CAPTURE)
+    ran = pytest_in(project)
+    assert "6 captures without expectation: sniff485 snapshot " in ran
+    assert " and 3 more writes it" in ran
+
+
+def test_an_unknown_kind_lists_those_there_are() -> None:
+    with pytest.raises(ValueError, match="'nix': expected one of modbus-rtu, modbus-ascii, n2, n2-answer, mstp"):
+        craft("nix")
+
+
+@pytest.mark.parametrize("parts", [{"station": 1}, {}, {"text": "0A4", "unit": 1}])
+def test_wrong_parts_list_the_right_ones(parts: dict[str, object]) -> None:
+    with pytest.raises(ValueError, match=r"craft 'n2': .*; its parts are text: str$"):
+        craft("n2", **parts)
+
+
+def test_the_readme_shows_every_kind_as_it_works() -> None:
+    readme = (Path(__file__).parents[3] / "sniff" / "testing" / "README.md").read_text(encoding="utf-8")
+    shown = [part.split("`")[0] for part in readme.split("`craft(")[1:]]
+    examples = [f"craft({one}" for one in shown if "…" not in one]
+    assert all(eval(one, {"craft": craft}) for one in examples)
+    assert {one.split('"')[1] for one in examples} == {*MAKERS}
