@@ -6,6 +6,7 @@ import argparse
 import sys
 from typing import Any
 
+from dissectors.tracker import Verdict
 from sniff.analysis.nodes import Node
 from sniff.analysis.plain import plain
 from sniff.analysis.summary import Summary
@@ -83,7 +84,7 @@ def _as_json(path: str, capture: Capture, session: Session, summary: Summary) ->
         "verdicts": {verdict.value: count for verdict, count in summary.verdicts.items()},
         "response_ms": _response_times(summary),
         "nodes": [_node_as_json(node) for node in summary.nodes.present()],
-        "polled_only": summary.nodes.absent(),
+        "polled_only": _polled_only(summary),
     }
 
 
@@ -168,9 +169,21 @@ def _print_nodes(summary: Summary) -> None:
         )
         if node.errors:
             _line("", _listed(node.errors))
-    absent = summary.nodes.absent()
-    if absent:
-        _line("polled only", f"{spans(absent)}: never heard, never asked anything")
+    polled, all_of_them = _polled_only(summary), _broadcasts(summary)
+    if polled:
+        _line("polled only", f"{spans(polled)}: never heard, never asked anything")
+    if all_of_them:
+        _line("broadcasts", ", ".join(f"{node.received} to {node.address}" for node in all_of_them))
+
+
+def _polled_only(summary: Summary) -> list[int]:
+    """Addresses that were polled for or given a token, and gave no sign."""
+    return [node.address for node in summary.nodes if not node.seen and node.passed]
+
+
+def _broadcasts(summary: Summary) -> list[Node]:
+    """Addresses at which nobody in particular is spoken to."""
+    return [node for node in summary.nodes if not node.seen and node.verdicts[Verdict.BROADCAST]]
 
 
 def _settings(session: Session) -> str:

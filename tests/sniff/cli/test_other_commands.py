@@ -119,3 +119,11 @@ def test_health_has_a_table_with_its_reasons(sniff485, poll):
     assert {row["subject"] for row in rows[1:]} >= {"station 1"}
     assert all(bool(row["why"]) == (row["health"] < 100) for row in rows)
     assert [row["health"] for row in rows] != [100] * len(rows)  # one of them does not answer
+
+
+def test_broadcasts_are_no_stations_that_were_polled_for(sniff485: Callable, poll: Path) -> None:
+    poll.write_text(poll.read_text() + "+500 00 06 00 01 00 01 18 1B\n")
+    shown = sniff485("info", poll).out
+    assert "broadcasts   1 to 0" in shown
+    assert "polled only" not in shown
+    assert json.loads(sniff485("info", poll, "--json").out)["polled_only"] == []
