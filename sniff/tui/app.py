@@ -14,7 +14,7 @@ from textual.timer import Timer
 from sniff.analysis.filtering import FilterError
 from sniff.store import Store
 from sniff.tui.feed import Feed, FeedStatus
-from sniff.tui.header import StatusHeader
+from sniff.tui.header import StatusHeader, why_ended
 from sniff.tui.help import HelpScreen
 from sniff.tui.judged import Judged
 from sniff.tui.palette import ActionCommands
@@ -114,7 +114,8 @@ class SnifferApp(App[None]):
             self.notify(f"the oldest rows leave the view, {self.store.keep} stay; {file}", title="memory", markup=False)
         if self.status.ended and not self._told_end:
             self._told_end = True
-            self.notify(plain(self.status.ended), title="the capture has ended", severity="warning", markup=False)
+            said = plain(why_ended(self.status, self.store)[1])
+            self.notify(said, title="the capture has ended", severity="warning", markup=False)
 
     def _take_what_was_found(self) -> None:
         """A search for settings has ended: say so, and read the filter with what was found."""
@@ -179,7 +180,11 @@ class SnifferApp(App[None]):
         self.exit()
 
     def action_freeze(self) -> None:
-        """Freeze the view or let it go on."""
+        """Freeze the view or let it go on; where nothing comes any more it stands anyway."""
+        if not self.viewing.frozen and (not self.status.live or self.status.ended):
+            what = "the capture has ended" if self.status.live else "a file stands still"
+            self.notify(f"{what}: there is nothing to freeze", timeout=3)
+            return
         self.viewing.freeze(not self.viewing.frozen)
         self.draw_screen()
 

@@ -8,12 +8,19 @@ from rich.cells import cell_len
 from rich.text import Text
 from textual.widget import Widget
 
+from sniff.session import LineEventKind
 from sniff.store import Store
 from sniff.tui.columns import fit
 from sniff.tui.feed import FeedStatus
 from sniff.tui.plain import plain
 from sniff.tui.times import size
 from sniff.tui.viewing import Viewing
+
+ROOMY = 100
+"""Width from which two spaces stand between the pieces; by the width alone, so that nothing jumps."""
+REASON = 20
+"""Cells for why the capture has ended."""
+PORT_EVENTS = (LineEventKind.UNPLUGGED, LineEventKind.REPLUGGED)
 
 
 def record_state(status: FeedStatus) -> str:
@@ -27,16 +34,33 @@ def record_state(status: FeedStatus) -> str:
     return "REC" if status.recording else "NOT REC"
 
 
+def why_ended(status: FeedStatus, store: Store) -> tuple[str, str]:
+    """Why nothing more comes, in two or three words and in full; empty while it does.
+
+    Where the port went before, that is the cause, and what the capture says only follows from it.
+    """
+    if not status.ended:
+        return "", ""
+    of_port = [event for event in store.line_events if event.kind in PORT_EVENTS]
+    if not of_port or of_port[-1].kind is not LineEventKind.UNPLUGGED:
+        return status.ended, status.ended
+    said = of_port[-1].text or "unplugged"
+    inner = said.rpartition("(")[2].removesuffix(")")  # "/dev/ttyUSB0 is gone (hung up)"
+    return inner, f"{said}; {status.ended}"
+
+
 def status_line(status: FeedStatus, store: Store, viewing: Viewing, width: int) -> list[tuple[str, str]]:
     """Pieces of text with a style name each, together at most `width` cells: the port gives way first."""
     state = record_state(status)
+    reason = plain(why_ended(status, store)[0])
+    shown_state = f"{state}: {fit(reason, min(cell_len(reason), REASON))}" if reason else state
     pieces = [
         *([(f"searching {plain(status.searching)} …", "doubt")] if status.searching else []),
         *([] if status.searching else [(plain(status.line), ""), (plain(status.protocol), "")]),
         (f"load {store.load.share():.0%}", ""),
         (f"err {store.error_total}", "bad" if store.error_total else ""),
-        (state, {"REC": "bad", "REC FAILS": "bad", "NOT REC": "doubt", "ENDED": "doubt"}.get(state, "")),
-        (size(status.file_size), ""),
+        (shown_state, {"REC": "bad", "REC FAILS": "bad", "NOT REC": "doubt", "ENDED": "doubt"}.get(state, "")),
+        *([(size(status.file_size), "")] if status.recording or not status.live else []),
     ]
     if status.dropped:
         pieces.append((f"LOST {status.dropped}", "bad"))
@@ -44,7 +68,9 @@ def status_line(status: FeedStatus, store: Store, viewing: Viewing, width: int) 
         pieces.append((f"FROZEN +{viewing.came_since}", "frozen"))
     elif viewing.follow:
         pieces.append(("FOLLOW", ""))
-    gap = "  " if sum(cell_len(text) + 2 for text, _ in pieces) + 12 <= width else " "
+    elif status.live and not status.ended:
+        pieces.append(("STILL", ""))
+    gap = "  " if width >= ROOMY else " "
     room = width - sum(cell_len(text) + len(gap) for text, _ in pieces)
     port = plain(status.port)
     if cell_len(port) > room:  # the end of a path says more than its beginning

@@ -27,6 +27,15 @@ LEGEND: tuple[tuple[str, str], ...] = (
     ("38 (−0/+16)", "a time in ms: in truth up to 0 less or 16 more, as far as the adapter tells"),
 )
 
+HEADER: tuple[tuple[str, str], ...] = (
+    ("load", "share of the time in which the bus was busy"),
+    ("err", "rows that are damaged or noise, or whose exchange went wrong"),
+    ("LOST", "octets or rows that were lost before they could be shown"),
+    ("FOLLOW", "the newest row is under the cursor (f)"),
+    ("STILL", "rows come at the end, the cursor stays (f follows)"),
+    ("FROZEN +n", "the view stands, n rows came since (space lets it go on)"),
+)
+
 
 class HelpScreen(ModalScreen[None]):
     """Closed by the keys that anybody would try."""
@@ -48,6 +57,8 @@ class HelpScreen(ModalScreen[None]):
             yield Static(self._keys())
             yield Static(Text("\nmarks in the lists", style="bold"))
             yield Static(_table(LEGEND))
+            yield Static(Text("\nwords in the first line", style="bold"))
+            yield Static(_table(HEADER))
 
     def _keys(self) -> Table:
         """What keys do first, then those that only move; those have no explanation beyond their name."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -146,7 +147,7 @@ def test_the_palette_lists_every_action_and_does_it(look: Any, busy_bus: Any) ->
         await see.press("ctrl+p")
         assert "Search" in see.text()
 
-    look(busy_bus.store, script)
+    look(busy_bus.store, script, live=True)
 
 
 def test_every_key_is_explained() -> None:
@@ -219,7 +220,7 @@ def test_mouse(look: Any, busy_bus: Any) -> None:
         await see.settle()
         assert "octet 2 of 6" in see.text()
 
-    look(busy_bus.store, script)
+    look(busy_bus.store, script, live=True)
 
 
 def test_run_closes_the_feed_and_says_where_the_file_is(
@@ -250,3 +251,26 @@ def test_importing_the_package_loads_no_textual() -> None:
         "import sys, sniff.tui, sniff.tui.feed; sys.exit(any(m in sys.modules for m in ('textual', 'scapy', 'rich')))"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_a_file_cannot_be_frozen(look: Any, busy_bus: Any) -> None:
+    async def script(see: Any) -> None:
+        await see.press("space")
+        assert "FROZEN" not in see.lines()[0]
+        assert see.notices() == ["a file stands still: there is nothing to freeze"]
+
+    look(busy_bus.store, script)
+
+
+def test_a_frozen_view_goes_on_after_the_end(look: Any, busy_bus: Any) -> None:
+    async def script(see: Any) -> None:
+        await see.press("space")
+        assert "FROZEN" in see.lines()[0]
+        see.feed.current = replace(see.feed.current, ended="asked to")
+        await see.poll()
+        await see.press("space")
+        assert "FROZEN" not in see.lines()[0]
+        await see.press("space")
+        assert "FROZEN" not in see.lines()[0]
+
+    look(busy_bus.store, script, live=True)

@@ -153,7 +153,7 @@ def test_a_filter_while_frozen_stays_below_the_freeze(look: Any, busy_bus: Any) 
         await see.press("space")
         assert shown(see) == [1, 9, 11, 14]
 
-    look(busy_bus.store, script)
+    look(busy_bus.store, script, live=True)
 
 
 def test_transactions_are_filtered_by_their_frames(look: Any, busy_bus: Any) -> None:

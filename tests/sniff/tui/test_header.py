@@ -8,8 +8,9 @@ from typing import Any
 import pytest
 from rich.cells import cell_len
 
+from sniff.session import LineEvent, LineEventKind
 from sniff.tui.feed import FeedStatus
-from sniff.tui.header import record_state, status_line
+from sniff.tui.header import record_state, status_line, why_ended
 from sniff.tui.viewing import Viewing
 
 LIVE = FeedStatus("/dev/ttyUSB0", "19200,8E1", "modbus-rtu", "/tmp/x.mcap", 12_345_678, live=True)
@@ -21,13 +22,15 @@ def line(status: FeedStatus, viewing: Viewing, width: int = 80) -> str:
 
 def test_everything_is_there(busy_bus: Any) -> None:
     text = line(LIVE, Viewing(busy_bus.store, follow=True))
-    assert text == "/dev/ttyUSB0  19200,8E1  modbus-rtu  load 16%  err 5  REC  12.3 MB  FOLLOW"
+    assert text == "/dev/ttyUSB0 19200,8E1 modbus-rtu load 16% err 5 REC 12.3 MB FOLLOW"
+    roomy = line(LIVE, Viewing(busy_bus.store, follow=True), 100)
+    assert roomy == "/dev/ttyUSB0  19200,8E1  modbus-rtu  load 16%  err 5  REC  12.3 MB  FOLLOW"
 
 
 def test_a_search_stands_in_the_place_of_what_is_searched_for(busy_bus: Any) -> None:
     status = replace(LIVE, searching="9600,8N1")
     text = line(status, Viewing(busy_bus.store, follow=True))
-    assert text == "/dev/ttyUSB0  searching 9600,8N1 …  load 16%  err 5  REC  12.3 MB  FOLLOW"
+    assert text == "/dev/ttyUSB0 searching 9600,8N1 … load 16% err 5 REC 12.3 MB FOLLOW"
 
 
 def test_frozen_says_how_many_rows_came(busy_bus: Any) -> None:
@@ -87,3 +90,28 @@ def test_eight_screens_fit(look: Any, busy_bus: Any, width: int, tabs: str) -> N
         assert see.lines()[1] == tabs
 
     look(busy_bus.store, script, (width, 24))
+
+
+def test_neither_following_nor_frozen_is_said_while_rows_come(busy_bus: Any) -> None:
+    viewing = Viewing(busy_bus.store)
+    assert line(LIVE, viewing).endswith(" STILL")
+    assert "STILL" not in line(replace(LIVE, ended="asked to"), viewing)
+    assert "STILL" not in line(FeedStatus("f.mcap", "l", "n2"), viewing)
+
+
+def test_no_size_where_nothing_is_recorded(busy_bus: Any) -> None:
+    viewing = Viewing(busy_bus.store, follow=True)
+    assert line(FeedStatus("p", "l", "n2", live=True), viewing).endswith("NOT REC FOLLOW")
+    assert line(FeedStatus("f", "l", "n2", file_size=2000), viewing).endswith("FILE 2.0 kB FOLLOW")
+
+
+def test_the_end_says_why(busy_bus: Any) -> None:
+    store = busy_bus.store
+    ended = replace(LIVE, recording=None, ended="nothing more to read")
+    assert line(ended, Viewing(store)).endswith("ENDED: nothing more to read")
+    store.add_line_event(LineEvent(busy_bus.now, LineEventKind.UNPLUGGED, "/dev/ttyUSB0 is gone (hung up)"))
+    assert line(ended, Viewing(store)).endswith(" ENDED: hung up")
+    assert why_ended(ended, store)[1] == "/dev/ttyUSB0 is gone (hung up); nothing more to read"
+    store.add_line_event(LineEvent(busy_bus.now, LineEventKind.REPLUGGED, "/dev/ttyUSB0 is back"))
+    assert why_ended(ended, store)[1] == "nothing more to read"
+    assert why_ended(LIVE, store) == ("", "")

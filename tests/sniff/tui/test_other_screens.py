@@ -115,7 +115,7 @@ def test_nodes_keep_up_and_freeze(look: Any, busy_bus: Any) -> None:
         await see.press("space")
         assert cells(see, 1)[3] == "5"
 
-    look(busy_bus.store, script, start="nodes")
+    look(busy_bus.store, script, start="nodes", live=True)
 
 
 def test_one_failure_in_many_is_not_rounded_away(look: Any, make_bus: Any) -> None:

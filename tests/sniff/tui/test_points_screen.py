@@ -102,7 +102,7 @@ def test_a_frozen_view_stands_still(look: Any) -> None:
         await see.poll()
         assert see.lines()[2:-1] != before
 
-    look(store, script, start="points")
+    look(store, script, start="points", live=True)
 
 
 def test_no_values_yet_and_no_profile(look: Any, make_bus: Any) -> None:

@@ -77,7 +77,7 @@ def test_the_header_says_so_and_then_what_was_found(look: Any, monkeypatch: Any)
         looking.feed.current = FeedStatus("/dev/ttyUSB0", str(RIGHT), "mstp", live=True)
         await looking.poll()
         assert "searching" not in looking.lines()[0]
-        assert "38400,8N1  mstp" in looking.lines()[0]
+        assert "38400,8N1 mstp" in looking.lines()[0]
         assert any("found: mstp, 38400,8N1" in notice for notice in looking.notices())
         assert "oken" in looking.text()
         assert "err 0" in looking.lines()[0]
