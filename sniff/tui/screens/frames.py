@@ -8,6 +8,7 @@ from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Horizontal
 from textual.timer import Timer
+from textual.widget import Widget
 
 from dissectors.frame import Frame
 from dissectors.tracker import Transaction
@@ -51,6 +52,7 @@ class FramesScreen(ListingScreen):
         super().__init__()
         self._detail: tuple[Row, Transaction | None] | None = None  # what tree and hex show
         self._detail_timer: Timer | None = None
+        self.zoomed: Widget | None = None  # the one pane that is shown, None while all are
 
     def compose_view(self) -> ComposeResult:
         """List above, fields and octets side by side below."""
@@ -93,6 +95,7 @@ class FramesScreen(ListingScreen):
     def on_line_list_chosen(self, message: LineList.Chosen) -> None:
         """Look into the row."""
         self._show_detail()
+        self._zoom(None)
         self.query_one(FieldTree).focus()
 
     def on_field_tree_picked(self, message: FieldTree.Picked) -> None:
@@ -204,11 +207,33 @@ class FramesScreen(ListingScreen):
                 self.lines.go_to(found)
 
     def action_zoom(self) -> None:
-        """One pane over all, and back."""
-        if self.maximized is not None:
-            self.minimize()
-        elif self.focused is not None:
-            self.maximize(self.focused, container=False)
+        """One pane between header and keys, and back."""
+        if self.zoomed is None and self.focused in self._panes():
+            self._zoom(self.focused)
+            self.notify("z or esc: back to all panes", timeout=3)
+        else:
+            self._zoom(None)
+
+    def action_leave(self) -> None:
+        """Back to all panes; then to the list; there: remove the filter."""
+        if self.zoomed is not None:
+            self._zoom(None)
+        else:
+            super().action_leave()
+
+    def on_prompt_closed(self) -> None:
+        """Back to the list, or to the one pane that is shown."""
+        (self.zoomed or self.lines).focus()
+
+    def _zoom(self, pane: Widget | None) -> None:
+        self.zoomed = pane
+        self.set_class(pane is not None, "-zoomed")
+        self.set_class(pane is self.lines, "-list-alone")
+        for each in self._panes():
+            each.display = pane is None or each is pane
+
+    def _panes(self) -> tuple[Widget, ...]:
+        return self.lines, self.query_one(FieldTree), self.query_one(HexPane)
 
     def action_copy(self) -> None:
         """Octets to the clipboard of the terminal (OSC 52)."""

@@ -234,10 +234,24 @@ def test_line_errors_are_letters_and_words(look: Any, busy_bus: Any) -> None:
 
 def test_zoom_and_copy(look: Any, busy_bus: Any) -> None:
     async def script(see: Any) -> None:
+        octets, tree = see.app.screen.query_one(HexPane), see.app.screen.query_one(FieldTree)
         await see.press("home", "tab", "tab", "z")
-        assert see.app.screen.maximized is see.app.screen.query_one(HexPane)
+        assert octets.size.width >= 78
+        assert octets.size.height == 24 - 2 - 1  # header and keys stay
+        assert see.lines()[0].startswith("/dev/ttyUSB0")
+        assert see.lines()[-1].endswith("q back")
+        assert see.notices() == ["z or esc: back to all panes"]
         await see.press("z")
-        assert see.app.screen.maximized is None
+        assert see.main.size.height > 5
+        assert tree.size.height == octets.size.height < 12
+        await see.press("z", "escape")
+        assert see.main.size.height > 5
+        assert see.app.focused is octets
+        await see.press("escape", "z")
+        assert see.main.size.height == 21
+        await see.press("enter")
+        assert see.app.focused is tree
+        assert tree.size.height < 12
         await see.press("y")
         assert see.app.clipboard == "01 03 00 07 63"
 
