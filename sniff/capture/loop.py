@@ -17,6 +17,7 @@ from dissectors.frame import Chunk
 from dissectors.line import LineSettings
 from sniff.capture.outlet import Outlet
 from sniff.capture.wire import (
+    NOTHING_MORE,
     Kind,
     MessageSplitter,
     Status,
@@ -146,7 +147,7 @@ class CaptureLoop:
             self._set_due(bus, _FAR)
             self._watch(bus, None)
             if all(other.ended for other in self._buses):
-                self.stop("nothing more to read")
+                self.stop(NOTHING_MORE)
 
     def _set_due(self, bus: _Bus, due: int) -> None:
         if bus.due != due:

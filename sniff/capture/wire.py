@@ -77,6 +77,10 @@ class Status:
     error: str = ""
 
 
+NOTHING_MORE = "nothing more to read"
+"""Why a capture ended whose ports are gone for good, or whose file is at its end."""
+
+
 @dataclass(frozen=True, slots=True)
 class Ended:
     """The capture is over and its files are closed, unless `clean` is False."""

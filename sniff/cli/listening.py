@@ -21,12 +21,12 @@ from sniff.analysis.summary import Summary
 from sniff.analysis.wording import milliseconds
 from sniff.capture.config import RecordSpec, SourceSpec
 from sniff.capture.link import CaptureLink
-from sniff.capture.wire import Ended, Status
+from sniff.capture.wire import NOTHING_MORE, Ended, Status
 from sniff.cli import INTERRUPTED, PORT_TROUBLE, UNREADABLE, USAGE, Failure, arguments, rows, searching
 from sniff.cli.searching import Unknowns
 from sniff.config import AUTO, Config, ConfigError, load
 from sniff.engine import Output
-from sniff.formats import CaptureError
+from sniff.formats import READERS, CaptureError
 from sniff.live import LiveBus
 from sniff.reading import Settled, Settling
 from sniff.session import DEVICES_NOTE, LineEvent, LineEventKind
@@ -251,10 +251,19 @@ def run(printer: Printer, count: int | None = None, duration: float | None = Non
         return PORT_TROUBLE
     if live.status.error or live.status.lost:
         return UNREADABLE  # what was asked for is not all in the file
+    if _gone_for_good(live):
+        print(f"sniff485: {plain(live.session.port)}: gone for good; nothing more can be heard", file=sys.stderr)
+        return PORT_TROUBLE
     if live.engine.searching:
         say_not_found(live, "interrupted" if caught else "ended")
         return INTERRUPTED if caught else PORT_TROUBLE
     return 0
+
+
+def _gone_for_good(live: LiveBus) -> bool:
+    """Whether the port ended the capture. A capture file that stands in for one simply ends."""
+    ended = live.ended is not None and live.ended.reason == NOTHING_MORE
+    return ended and not live.session.port.lower().endswith(tuple(READERS))
 
 
 @contextlib.contextmanager
