@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable
 
 from dissectors.bacnet.limits import MAX_MASTER, N_POLL, T_REPLY_DELAY, T_USAGE_DELAY
 from dissectors.bacnet.ring import Happened, Node, Ring, What
 from dissectors.bacnet.ring_observer import RingObserver
 from dissectors.bacnet.rules import RULES
-from dissectors.findings import EVIDENCE_MAX, Finding, Severity, counted, found, times
+from dissectors.findings import EVIDENCE_MAX, Finding, Severity, Tally, counted, found, times
 from dissectors.frame import Event, Header
 from dissectors.line import Timing
-from dissectors.tracker import Placement, Transaction
+from dissectors.tracker import Placement, Transaction, Verdict
 
 _MS = 1_000_000
 SLOW_ROUND = 2_000 * _MS
@@ -27,6 +28,11 @@ COLLIDED_SHARE = 0.2
 LEAST_FRAMES = 20
 ALONE_POLLS = 2 * MAX_MASTER
 """A first search for a successor takes at most MAX_MASTER polls."""
+
+REFUSED_KEPT = 512
+"""Most services and errors of stations that are counted apart."""
+
+_ANSWERED = frozenset((Verdict.ANSWERED, Verdict.RETRY, Verdict.EXCEPTION))
 
 _SIMPLE: tuple[tuple[str, What, int, str], ...] = (
     ("MS102", What.RETRY, 1, "token repeated {times}"),
@@ -51,7 +57,11 @@ def judge(ring: Ring) -> tuple[Finding, ...]:
     shared = list(_duplicates(ring))
     sure = [finding for finding in shared if finding.severity is Severity.ERROR]
     made += sure or shared  # one that is sure explains the damage at the others
-    return tuple(sorted(made, key=lambda finding: (-finding.severity, finding.code, finding.subject)))
+    return tuple(sorted(made, key=_gravest_first))
+
+
+def _gravest_first(finding: Finding) -> tuple[int, str, str]:
+    return -finding.severity, finding.code, finding.subject
 
 
 def _tokens(ring: Ring) -> Iterable[Finding]:
@@ -268,13 +278,24 @@ class MstpFindings:
 
     def __init__(self, timing: Timing) -> None:
         self._observer = RingObserver(timing)
+        self._asked: Counter[tuple[int, str]] = Counter()  # answered requests, by station and service
+        self._refused: dict[tuple[int, str, str], Tally] = {}  # by station, service, and class and code in words
 
     def see(self, no: int, event: Event, header: Header | None, placement: Placement | None = None) -> None:
         """Take the next row: event, its header and placement (None for noise)."""
         self._observer.see(no, event, header)
 
     def settle(self, transaction: Transaction) -> None:
-        """Take a transaction that closed; the ring model has its own view of them."""
+        """Take a transaction that closed; the ring model has its own view of them, but for error answers."""
+        station, verdict = transaction.station, transaction.verdict
+        if station is None or transaction.is_passing or verdict not in _ANSWERED:
+            return
+        if len(self._asked) < REFUSED_KEPT or (station, transaction.kind) in self._asked:
+            self._asked[station, transaction.kind] += 1
+        if verdict is Verdict.EXCEPTION:
+            key = station, transaction.kind, transaction.error or "error"
+            if key in self._refused or len(self._refused) < REFUSED_KEPT:
+                self._refused.setdefault(key, Tally()).add(transaction.end, transaction.request, transaction.response)
 
     def ring(self) -> Ring:
         """The ring so far."""
@@ -282,4 +303,13 @@ class MstpFindings:
 
     def findings(self) -> tuple[Finding, ...]:
         """All findings so far, the gravest first."""
-        return judge(self._observer.ring())
+        made = (*judge(self._observer.ring()), *self._error_answers())
+        return tuple(sorted(made, key=_gravest_first))
+
+    def _error_answers(self) -> Iterable[Finding]:
+        for (mac, service, words), tally in self._refused.items():
+            error = words if words.startswith(("error", "reject", "abort")) else f"error {words}"
+            of = max(tally.count, self._asked[mac, service])
+            some = f"the only {service} request" if of == 1 else f"{tally.count} of {of} {service} requests"
+            severity = Severity.NOTE if tally.count == 1 else None
+            yield tally.found(RULES["MS305"], _station(mac), f"{error} in answer to {some}", severity)

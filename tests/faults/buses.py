@@ -198,15 +198,24 @@ def mstp(
     twin_of: int | None = None,
     polls_every: int = 50,
     requests: int = 1,
+    also_logged: Sequence[tuple[int, str, str]] = (),
     seed: int = 0,
 ) -> Scenario:
     """A ring of four masters: a controller that asks, a logger, two drives; those `present` of them.
 
     `node_faults`: as `simulated.Faults`. `twin_of`: a second drive with this address. `polls_every`: tokens from poll
     to poll. `requests`: what controller and logger ask with each token, once a second unless there are several.
+    `also_logged`: what the logger asks for besides: station, object, property.
     """
     parties = partial(
-        _mstp_parties, tuple(present), node_faults or {}, change or {}, twin_of, polls_every, max(1, requests)
+        _mstp_parties,
+        tuple(present),
+        node_faults or {},
+        change or {},
+        twin_of,
+        polls_every,
+        max(1, requests),
+        tuple(also_logged),
     )
     return Scenario("mstp", "mstp", MSTP_LINE, parties, tuple(faults), seed)
 
@@ -218,6 +227,7 @@ def _mstp_parties(
     twin_of: int | None,
     polls_every: int,
     requests: int,
+    also_logged: tuple[tuple[int, str, str], ...],
 ) -> list[Party]:
     from dissectors.bacnet.application import Application
     from dissectors.bacnet.f510 import f510
@@ -226,7 +236,7 @@ def _mstp_parties(
 
     timing = Timing(MSTP_LINE)
     readings = [(mac, f"analog-input,{number}", "present-value") for number in (4, 5) for mac in (5, 9)]
-    logged = [(mac, "analog-output,0", "present-value") for mac in (5, 9)]
+    logged = [(mac, "analog-output,0", "present-value") for mac in (5, 9)] + list(also_logged)
     applications: dict[int, Application] = {
         1: Poller(readings) if requests == 1 else Greedy(readings, requests),
         2: Poller(logged) if requests == 1 else Greedy(logged, requests),

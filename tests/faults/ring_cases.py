@@ -28,6 +28,11 @@ RING_CASES: tuple[Case, ...] = (
     Case("MS/TP slow to use the token", partial(mstp, node_faults={5: {"use_delay": 18 * MS}}), (("MS103", "MAC 5"),)),
     Case("MS/TP silent drive", partial(mstp, node_faults={9: {"silent": True}}), (("MS301", "MAC 9"),)),
     Case(
+        "MS/TP object that is not there",
+        partial(mstp, also_logged=((9, "analog-input,999", "present-value"),)),
+        (("MS305", "MAC 9"),),
+    ),
+    Case(
         "MS/TP damaged frames of one",
         partial(mstp, node_faults={5: {"damages_every": 40}}),
         (("MS401", "bus"),),

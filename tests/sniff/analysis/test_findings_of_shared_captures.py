@@ -146,6 +146,7 @@ def test_a_ring_that_a_master_leaves() -> None:
         ("warning", "MS201", "MAC 12"),
         ("warning", "MS201", "MAC 27"),
         ("note", "MS301", "0 → 27"),
+        ("note", "MS305", "MAC 27"),  # row 202: reject buffer-overflow
         ("note", "MS102", "12 → 27"),
     }
     evidence = {finding.code: finding.evidence for finding in findings}
