@@ -138,8 +138,8 @@ _ALL = (
         "MS305",
         Severity.WARNING,
         "error answer",
-        "A station answers a request with Error, Reject or Abort (ASHRAE 135, clause 18); by service, error class and code. "
-        "A single one is only noted.",
+        "A station answers a request with Error, Reject or Abort (ASHRAE 135, clause 18), counted "
+        "by service, error class and code. A single one is only noted.",
         "the station heard the request well and refuses it; class and code say why",
         "object, property and service asked for, against what the device has; take what it has not out of the client",
     ),
