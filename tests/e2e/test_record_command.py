@@ -87,6 +87,23 @@ def environment() -> dict[str, str]:
 
 
 @pytest.fixture
+def refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
+    """What ends before it has begun needs no process of its own, but for the capture's."""
+    from sniff.cli import main
+
+    monkeypatch.chdir(tmp_path)
+
+    def refused(*arguments: str) -> tuple[int, str, str]:
+        try:
+            code = main(list(arguments))
+        except SystemExit as end:  # argparse
+            code = int(end.code or 0)
+        return code, *capsys.readouterr()
+
+    return refused
+
+
+@pytest.fixture
 def run(begin):
     def run(*arguments: str, **options) -> tuple[int, str, str]:
         process = begin(*arguments, **options)
@@ -124,11 +141,11 @@ def wait_for(path: Path) -> None:
         (["-w", "x.mcap", "--duration", "0"], 2, "duration '0'"),
     ],
 )
-def test_what_cannot_be_recorded_to(run, bus, tmp_path, arguments, code, words) -> None:
+def test_what_cannot_be_recorded_to(refused, bus, tmp_path, arguments, code, words) -> None:
     (tmp_path / "folder.mcap").mkdir()
     (tmp_path / "there.mcap").write_bytes(b"precious")
     before = sorted(os.listdir(tmp_path))
-    result, said, errors = run("record", str(bus.link), *LINE, *arguments)
+    result, said, errors = refused("record", str(bus.link), *LINE, *arguments)
     assert (result, said) == (code, "")
     assert words in errors.splitlines()[-1]
     assert "Traceback" not in errors
@@ -137,18 +154,18 @@ def test_what_cannot_be_recorded_to(run, bus, tmp_path, arguments, code, words) 
 
 
 @pytest.mark.parametrize("port", ["/dev/null", "/dev/no-such-port", "socket://127.0.0.1:1", "."])
-def test_a_port_that_is_none(run, tmp_path, port) -> None:
-    code, _, errors = run("record", port, *LINE, "-w", "x.mcap")
+def test_a_port_that_is_none(refused, tmp_path, port) -> None:
+    code, _, errors = refused("record", port, *LINE, "-w", "x.mcap")
     assert code == 4
     assert len(errors.splitlines()) == 1
     assert errors.startswith(f"sniff485: {port}: ")
     assert not (tmp_path / "x.mcap").exists()
 
 
-def test_the_second_recorder_is_told_who_has_the_port(begin, run, bus, tmp_path) -> None:
+def test_the_second_recorder_is_told_who_has_the_port(begin, refused, bus, tmp_path) -> None:
     first = begin("record", str(bus.link), *LINE, "-w", "first.mcap")
     wait_for(tmp_path / "first.mcap")
-    code, _, errors = run("record", str(bus.link), *LINE, "-w", "second.mcap", "--duration", "1")
+    code, _, errors = refused("record", str(bus.link), *LINE, "-w", "second.mcap", "--duration", "1")
     assert code == 4
     assert "held by pid" in errors
     assert "to end it: kill" in errors
@@ -246,11 +263,12 @@ def test_no_space_left_says_the_way_out() -> None:
 
 def test_a_rotation_that_keeps_some(run, bus, tmp_path) -> None:
     code, _, errors = run(
-        "record", str(bus.link), *LINE, "-w", "r.mcap", "--rotate", "time:1s", "--keep", "2", "--duration", "4"
+        "record", str(bus.link), *LINE, "-w", "r.mcap", "--rotate", "count:1", "--keep", "2", "--duration", "2.5"
     )
     assert code == 0, errors
     parts = sorted(path.name for path in tmp_path.glob("r*.mcap"))
     assert len(parts) == 2
+    assert parts[-1] > "r-0002.mcap", "there was something to remove"
     assert parts[-1] in errors
     assert all(read(tmp_path / part).completeness().whole for part in parts)
 
@@ -271,12 +289,12 @@ def test_its_reader_going_away_ends_it(begin, bus, tmp_path) -> None:
     assert read(tmp_path / "x.mcap").completeness().whole
 
 
-def test_live_without_a_recording_leaves_nothing(run, bus, tmp_path) -> None:
+def test_live_without_a_recording_leaves_nothing(run, refused, bus, tmp_path) -> None:
     code, said, _ = run("live", str(bus.link), *LINE, "--no-record", "--duration", "1", "--json")
     assert code == 0
     assert [json.loads(line)["hex"] for line in said.splitlines()][-1] == POLL.hex()
     assert not list(tmp_path.glob("*.mcap"))
-    code, _, errors = run("live", str(bus.link), *LINE, "--no-record", "-w", "x.mcap")
+    code, _, errors = refused("live", str(bus.link), *LINE, "--no-record", "-w", "x.mcap")
     assert (code, errors) == (2, "sniff485: --no-record and -w contradict each other\n")
 
 

@@ -28,8 +28,8 @@ READS_A_PART = 600
 
 @pytest.fixture(scope="module")
 def bus() -> tuple[Session, list[Item]]:
-    """25 s of a ring with faults, as a CH340 gives it: reads end inside frames."""
-    session, items = simulate(scenario("mstp", 485), 25, CH340, STARTED)
+    """14 s of a ring with faults, as a CH340 gives it: reads end inside frames."""
+    session, items = simulate(scenario("mstp", 485), 14, CH340, STARTED)
     return session, list(items)
 
 

@@ -26,6 +26,14 @@ CAPTURE = """\
 +50 "$SDDBT,12.0*74\\r\\n"
 """
 
+UNSHRUNK = """\
+from hypothesis import Phase, settings
+
+settings.register_profile("first", phases=[Phase.generate], database=None)
+settings.load_profile("first")
+"""
+"""The first failing example is enough here: finding the smallest takes seconds."""
+
 
 @pytest.fixture
 def installed(tmp_path: Path) -> Path:
@@ -63,6 +71,7 @@ def test_a_broken_framer_fails_it_and_says_why(run: Run, installed: Path) -> Non
     broken = module.read_text().replace("== check_of(", "!= check_of(")
     assert broken != module.read_text()
     module.write_text(broken)
+    (installed / "conftest.py").write_text(UNSHRUNK)
     ran = run("pytest", "-q", "-p", "no:cacheprovider", "-p", "no:benchmark", "-k", "clean", "test_sniff485_nmea.py")
     assert ran.returncode == 1, ran.stdout
     assert "AssertionError: assert [" in ran.stdout, "a failure inside the suite shows its values"
