@@ -197,7 +197,7 @@ class SnifferApp(App[None]):
     def action_time(self) -> None:
         """Next way to count time."""
         self.viewing.time_mode = self.viewing.time_mode.next()
-        self.notify(f"time: {self.viewing.time_mode.value}", timeout=2)
+        self.notify(f"time: {self.viewing.time_mode.words}", timeout=2)
         self.draw_screen()
 
     def action_theme(self) -> None:

@@ -16,7 +16,7 @@ COLUMNS = (
     Column("dst", "dst", 4, right=True, needs=94),
     Column("text", "what"),
     Column("verdict", "verdict", 9),
-    Column("latency", "latency ms", 14, right=True),
+    Column("latency", "latency ms", 8, right=True),
     Column("len", "len", 4, right=True, needs=98),
     Column("flags", "flag", 4),
 )
@@ -89,7 +89,9 @@ class FrameList(StoreList):
             "dst": Cell("" if destination is None else str(destination)),
             "text": Cell(plain(self.store.text(row)), style),
             "verdict": verdict_cell(transaction, self.width_of("verdict")),
-            "latency": latency_cell(transaction.latency if transaction is not None and answers else None),
+            "latency": latency_cell(
+                transaction.latency if transaction is not None and answers else None, self.store.session.adapter.latency
+            ),
             "len": Cell(str(len(event.octets)), "dim"),
             "flags": Cell(flags(event), style or "dim"),
         }
@@ -107,4 +109,6 @@ class FrameList(StoreList):
         """Why nothing is shown."""
         if self.index.pending:
             return "searching …"
-        return "no frame passes the filter" if self.viewing.filter and len(self.store) else "no frames yet"
+        if self.viewing.filter and len(self.store):
+            return "no frame passes the filter"
+        return "no frames yet" if self.app.status.live else "no frames in this file"

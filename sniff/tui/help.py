@@ -24,7 +24,8 @@ LEGEND: tuple[tuple[str, str], ...] = (
     ("E", "parity or framing error, the driver did not say which"),
     ("n", "noise directly before the frame"),
     ("s j", "frame split out of a run of octets, joined over a silence"),
-    ("38 (−0/+16)", "a time in ms: in truth up to 0 less or 16 more, as far as the adapter tells"),
+    ("ms ±16", "times in ms: in truth up to 16 less or more, as far as the adapter tells"),
+    ("38.0?", "a time that is less sure than that; its fields say how much"),
 )
 
 HEADER: tuple[tuple[str, str], ...] = (

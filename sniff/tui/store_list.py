@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import ClassVar
 
 from sniff.store import Store
 from sniff.tui.columns import Column, lay_out
 from sniff.tui.linelist import LineList
 from sniff.tui.times import TimeMode, clock, seconds
-from sniff.tui.verdicts import latency_width
+from sniff.tui.verdicts import latency_title
 from sniff.tui.viewing import Viewing
 
 WIDE = 110
 """From this width on the verdict is written in full."""
+NO_LATENCY, NO_TIME = 70, 56
+"""Below these widths latency, then time, gives way to what a row says."""
+LATENCY = len("99999.0?")
 DAY = 10**14
 """About a day, ns: from then on relative times are written in milliseconds, or the column would not hold them."""
 
@@ -28,13 +32,17 @@ class StoreList(LineList):
 
     def lay_out_columns(self, width: int) -> list[Column]:
         """What is needed least gives way first; the one column without a width takes what is left."""
-        return lay_out(
+        latency = latency_title(self.store.session.adapter.latency, roomy=width >= WIDE)
+        titles = {"time": self.viewing.time_mode.title, "latency": latency}
+        shown = lay_out(
             self.COLUMNS,
             width,
             verdict=15 if width >= WIDE else 9,
-            latency=max(10, latency_width(self.store.session.adapter.latency)),
+            latency=0 if width < NO_LATENCY else max(LATENCY, len(latency)),
+            time=0 if width < NO_TIME else 12,
             **{self.COLUMNS[0].name: max(4, len(str(self.index.last)))},
         )
+        return [replace(column, title=titles.get(column.name, column.title)) for column in shown]
 
     def width_of(self, name: str) -> int:
         """Cells that a column has now."""

@@ -15,10 +15,28 @@ class TimeMode(Enum):
     RELATIVE = "relative"
     DELTA = "delta"
 
+    @property
+    def title(self) -> str:
+        """Title of the column, at most 12 characters, with the unit where it counts in one."""
+        return _TITLES[self]
+
+    @property
+    def words(self) -> str:
+        """What the column says then."""
+        return _WORDS[self]
+
     def next(self) -> TimeMode:
         """The one after it."""
         modes = list(TimeMode)
         return modes[(modes.index(self) + 1) % len(modes)]
+
+
+_TITLES = {TimeMode.ABSOLUTE: "time", TimeMode.RELATIVE: "s from start", TimeMode.DELTA: "s from last"}
+_WORDS = {
+    TimeMode.ABSOLUTE: "time of day",
+    TimeMode.RELATIVE: "seconds since the first row",
+    TimeMode.DELTA: "seconds since the row above began",
+}
 
 
 def clock(time: int) -> str:

@@ -15,7 +15,7 @@ COLUMNS = (
     Column("station", "stn", 3, right=True),
     Column("kind", "what"),
     Column("verdict", "verdict", 12),
-    Column("latency", "latency ms", 14, right=True),
+    Column("latency", "latency ms", 8, right=True),
     Column("attempt", "try", 3, right=True),
     Column("request", "request", 8, right=True, needs=128),
     Column("response", "response", 8, right=True, needs=128),
@@ -53,7 +53,7 @@ class TransactionList(StoreList):
             "station": Cell("" if transaction.station is None else str(transaction.station)),
             "kind": Cell(self._what(transaction)),
             "verdict": verdict_cell(transaction, self.width_of("verdict"), attempts=False),
-            "latency": latency_cell(transaction.latency),
+            "latency": latency_cell(transaction.latency, self.store.session.adapter.latency),
             "attempt": Cell(str(transaction.attempt), "doubt" if transaction.attempt > 1 else "dim"),
             "request": Cell("–" if transaction.request is None else str(transaction.request), "dim"),
             "response": Cell("–" if transaction.response is None else str(transaction.response), "dim"),
@@ -78,4 +78,6 @@ class TransactionList(StoreList):
         """Why nothing is shown."""
         if self.index.pending:
             return "searching …"
-        return "no transaction passes the filter" if self.viewing.filter else "no transaction has closed yet"
+        if self.viewing.filter:
+            return "no transaction passes the filter"
+        return "no transaction has closed yet" if self.app.status.live else "no transactions in this file"

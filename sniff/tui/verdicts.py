@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dissectors.tracker import Interval, Transaction, Verdict
-from sniff.analysis.wording import duration, milliseconds
+from sniff.analysis.wording import milliseconds
 from sniff.tui.columns import Cell
 
 SHORT: dict[Verdict, str] = {
@@ -42,11 +42,15 @@ def verdict_cell(transaction: Transaction | None, width: int, attempts: bool = T
     return Cell(text, STYLE.get(verdict, ""))
 
 
-def latency_cell(latency: Interval | None) -> Cell:
-    """Milliseconds with what the adapter allows, without the unit (the column's title has it): "38.0 (−0/+16)"."""
-    return Cell("" if latency is None else duration(latency).replace(" ms", ""))
+def latency_cell(latency: Interval | None, held: int) -> Cell:
+    """Milliseconds without the unit and the doubt, both are in the title; "?" where the doubt is larger than there."""
+    if latency is None:
+        return Cell("")
+    more = max(latency.nominal - latency.low, latency.high - latency.nominal) > held
+    return Cell(milliseconds(latency.nominal).removesuffix(" ms") + ("?" if more else ""))
 
 
-def latency_width(adapter_latency: int) -> int:
-    """How wide that gets: bounds need room only where the adapter holds octets back (ns)."""
-    return 14 if adapter_latency else len(milliseconds(99_999_000_000)) - 2
+def latency_title(held: int, roomy: bool = False) -> str:
+    """Title of that column; `held`: how long the adapter may hold octets back, ns: the most that a time is wrong."""
+    title = "latency ms" if roomy or not held else "ms"
+    return f"{title} ±{milliseconds(held).removesuffix(' ms').removesuffix('.0')}" if held else title

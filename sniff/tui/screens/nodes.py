@@ -102,7 +102,7 @@ class NodesScreen(ViewScreen):
 
     def _doubt(self) -> str:
         latency = self.store.session.adapter.latency
-        return f", in truth up to {milliseconds(latency)} more" if latency else ""
+        return f" (±{milliseconds(latency)})" if latency else ""
 
     def action_sort(self) -> None:
         """Next order."""

@@ -108,7 +108,7 @@ class TimelineScreen(ViewScreen):
         chart = self.query_one("#main", Static)
         first, last = self._span()
         if first is None or last is None:
-            chart.update("nothing was heard yet")
+            chart.update("nothing was heard yet" if self.app.status.live else "no frames in this file")
             return
         if self._zoom is None:
             fitting = (at for at, zoom in enumerate(ZOOMS) if (last - first + 1) <= zoom * width)

@@ -283,7 +283,7 @@ def test_rows_dropped_from_memory_leave_the_view_where_it_is(look: Any, make_bus
 
 def test_an_empty_bus_says_so(look: Any, make_bus: Any) -> None:
     async def script(see: Any) -> None:
-        assert "no frames yet" in see.text()
+        assert "no frames in this file" in see.text()
         await see.press("e", "x", "m", "apostrophe", "enter", "down", "end", "y", "2", "enter", "e", "3", "enter", "8")
         assert "nothing happened to the line" in see.text()
 
@@ -325,3 +325,38 @@ def test_no_row_is_not_an_empty_row(look: Any, make_bus: Any, busy_bus: Any) -> 
         assert see.app.screen.query_one(HexPane).row == 1
 
     look(busy_bus.store, at_once)
+
+
+def test_the_title_says_how_time_is_counted_and_how_sure_latencies_are(look: Any, busy_bus: Any) -> None:
+    async def script(see: Any) -> None:
+        titles = []
+        for _ in range(3):
+            titles.append(see.lines()[2])
+            await see.press("t")
+        assert [title[6:20].strip() for title in titles] == ["time", "s from start", "s from last"]
+        assert all("ms ±16" in title for title in titles)
+        assert see.notices()[0] == "time: seconds since the first row"
+        assert "(−0/+16)" not in "".join(see.lines()[2:14])
+
+    look(busy_bus.store, script)
+
+
+@pytest.mark.parametrize(("width", "shown", "gone"), [(60, ["time", "what"], ["ms ±16"]), (50, ["what"], ["time"])])
+def test_narrow_lists_keep_what_rows_say(
+    look: Any, busy_bus: Any, width: int, shown: list[str], gone: list[str]
+) -> None:
+    async def script(see: Any) -> None:
+        for key in "1", "2":
+            await see.press(key)
+            titles = see.lines()[2]
+            assert all(title in titles for title in shown)
+            assert not any(title in titles for title in gone)
+
+    look(busy_bus.store, script, (width, 24))
+
+
+def test_a_live_bus_may_still_bring_frames(look: Any, make_bus: Any) -> None:
+    async def script(see: Any) -> None:
+        assert "no frames yet" in see.text()
+
+    look(make_bus().store, script, live=True)
