@@ -12,6 +12,9 @@ from dissectors.modbus.station_record import Cycles, Station
 
 _SENDERS_KEPT = 300
 
+PAUSE_MARGIN = 5
+"""So many times the adapter's delay must fit into 1.5 characters before pauses inside frames are judged."""
+
 
 def _no_words(unit: int, code: int) -> str:
     return ""
@@ -50,6 +53,11 @@ class Evidence:
     def span(self) -> int:
         """From the first octet to the last, ns; at least 1."""
         return max(1, self.now - (self.first or 0))
+
+    @property
+    def judges_pauses(self) -> bool:
+        """Whether a pause inside a frame is the sender's: a busy computer goes well over what its adapter may add."""
+        return PAUSE_MARGIN * self.timing.latency <= self.timing.t15
 
     def pair(self, pair: tuple[int, int]) -> Tally:
         """The record of one unit that answers for another."""

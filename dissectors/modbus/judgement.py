@@ -96,10 +96,10 @@ def _of_gaps(seen: Evidence) -> Iterator[Finding]:
             words = f"{tally.count} frames began less than {ms(timing.t35)} after the frame before"
             yield tally.found(RULES["MB301"], sender, words)
     for sender, tally in sorted(seen.paused.items()):
-        if tally.count >= 3:
+        if tally.count >= 3 and seen.judges_pauses:
             words = f"{tally.count} frames with over {ms(timing.t15)} of silence inside"
             yield tally.found(RULES["MB302"], sender, words)
-    if timing.latency >= timing.t15 and seen.stations:
+    if not seen.judges_pauses and seen.stations:
         words = (
             f"the adapter may hold octets back for {ms(timing.latency)}; limits are {ms(timing.t15)} inside a frame "
             f"and {ms(timing.t35)} between frames"

@@ -235,7 +235,7 @@ _ALL = (
         "pauses inside frames",
         "More than 1.5 characters of silence inside an RTU frame (Modbus over Serial Line V1.02, 2.5.1.1), even by the "
         "shortest reading that the adapter leaves, and beyond the even spacing of octets that the sender shows in most "
-        "of its frames. At least three.",
+        "of its frames. At least three, and only where the adapter's delay is at most a fifth of 1.5 characters.",
         "a sender that cannot keep its transmitter fed: an interrupted program, a USB adapter, a radio link",
         "strict receivers drop such frames; use a sender with a FIFO or a lower baud rate",
     ),
@@ -243,8 +243,9 @@ _ALL = (
         "MB303",
         Severity.INFO,
         "gaps cannot be judged with this adapter",
-        "Gaps of 1.5 and 3.5 characters are judged only where the adapter's delay is shorter than they are.",
-        "MB301 and MB302 found nothing because they could not look",
+        "Pauses of 1.5 characters inside a frame are judged only where the adapter's delay is at most a fifth of "
+        "that; gaps of 3.5 characters between frames only where it is shorter than they are.",
+        "that MB301 and MB302 say nothing does not mean that all gaps are as they should be",
         "lower the adapter's latency timer, or use a port of the computer itself",
     ),
     Rule(

@@ -1,0 +1,43 @@
+"""Pauses inside frames are a sender's fault only where the adapter cannot have made them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+from dissectors.frame import Frame
+from dissectors.line import LineSettings, Timing
+from dissectors.modbus.findings import ModbusFindings
+from dissectors.modbus.header import peek_rtu
+from dissectors.tracker import Placement
+
+MS = 1_000_000
+READ = "01 03 00 00 00 0A C5 CD"
+
+
+@pytest.mark.parametrize(
+    ("baud", "latency", "judged"),
+    [
+        (19200, 0, True),
+        (1200, 0, True),
+        (19200, 3 * MS, False),  # longer than 1.5 characters
+        (600, 3 * MS, True),
+        (1200, 3 * MS, False),  # a pseudo-terminal: a busy computer is late by several slices
+        (115200, 3 * MS, False),
+    ],
+)
+def test_pauses_are_judged_where_the_adapter_is_quick_enough(
+    frame_of: Callable[..., Frame], baud: int, latency: int, judged: bool
+) -> None:
+    timing = Timing(LineSettings.parse(f"{baud},8E1"), latency)
+    judge = ModbusFindings(timing)
+    now = 0
+    for no in range(1, 41):
+        pause = 2 * timing.t15 + 2 * latency if no > 30 else 0
+        frame = frame_of(READ, start=now, end=now + 8 * timing.char + pause, slack=latency)
+        judge.see(no, frame, peek_rtu(frame), Placement(no, no, peek_rtu(frame).role, None, 1))
+        now = frame.end + 200 * MS
+    codes = {finding.code for finding in judge.findings()}
+    assert ("MB302" in codes) is judged
+    assert ("MB303" in codes) is not judged
