@@ -80,8 +80,13 @@ class TimelineScreen(ViewScreen):
         Binding("minus", "zoom(1)", "zoom out", key_display="-", tooltip="more seconds a column"),
         Binding("e", "error(1)", "error", tooltip="next column with errors"),
         Binding("E", "error(-1)", "error", tooltip="column with errors before", show=False),
-        Binding("v", "select", "select", tooltip="begin a selection here; again: end it"),
-        Binding("enter", "open", "frames", tooltip="show the frames of the selection, or those at the cursor"),
+        Binding("v", "select", "select", tooltip="begin a selection here; again: show its frames, as a filter"),
+        Binding(
+            "enter",
+            "open",
+            "frames",
+            tooltip="show the frames of the selection, as a filter, or go to the first one at the cursor",
+        ),
         Binding("escape", "clear", "clear", tooltip="remove selection and filter", show=False),
     ]
 
@@ -116,7 +121,8 @@ class TimelineScreen(ViewScreen):
         zoom = ZOOMS[self._zoom]
         cursor = last if self._cursor is None else min(max(self._cursor, first), last)
         self._begin = self._scrolled(first, last, cursor, width, zoom)
-        chart.update(self._text(columns(self.store, self._begin, width, zoom), cursor, zoom))
+        width = min(width, (last - self._begin) // zoom + 1)  # none after the end
+        chart.update(self._text(columns(self.store, self._begin, width, zoom), cursor, zoom, last))
 
     def _scrolled(self, first: int, last: int, cursor: int, width: int, zoom: int) -> int:
         """Second at which the charts begin, a whole number of columns after the first; the cursor is inside."""
@@ -127,7 +133,7 @@ class TimelineScreen(ViewScreen):
             begin = first + ((cursor - first) // zoom - width + 1) * zoom
         return begin
 
-    def _text(self, made: list[Column], cursor: int, zoom: int) -> Text:
+    def _text(self, made: list[Column], cursor: int, zoom: int, last: int) -> Text:
         at = (cursor - self._begin) // zoom
         chosen = self._chosen(cursor, zoom)
         text = Text(no_wrap=True)
@@ -149,14 +155,19 @@ class TimelineScreen(ViewScreen):
                 text.append(bar, style="reverse" if place == at else f"{style} on blue" if marked else style)
             text.append("\n")
         text.append(" " * LABEL + " " * max(0, at) + "▲\n")
-        text.append(self._axis(made, zoom) + "\n\n")
+        text.append(self._axis(made, zoom, last) + "\n")
+        text.append("full height: the number at the left\n\n", style="dim")
         text.append(self._words(made[at] if 0 <= at < len(made) else None, zoom, chosen))
         return text
 
-    def _axis(self, made: list[Column], zoom: int) -> str:
-        left, right = clock(made[0].begin * NS_PER_S)[:8], clock((made[-1].begin + zoom) * NS_PER_S)[:8]
+    def _axis(self, made: list[Column], zoom: int, last: int) -> str:
+        """Time at both ends, where there is room for them below the charts; `last`: s, what was heard last."""
+        ends = (made[0].begin, min(made[-1].begin + zoom, last))
+        left, right = (clock(second * NS_PER_S)[:8] for second in ends)
         middle = f"one column {_duration(zoom)}"
-        space = max(1, len(made) - len(left) - len(right) - len(middle))
+        space = len(made) - len(left) - len(right) - len(middle)
+        if space < 2:
+            return " " * LABEL + f"{left} … {right}, {middle}"
         return " " * LABEL + left + " " * (space // 2) + middle + " " * (space - space // 2) + right
 
     def _words(self, column: Column | None, zoom: int, chosen: tuple[int, int] | None) -> str:
@@ -213,9 +224,13 @@ class TimelineScreen(ViewScreen):
 
     def action_zoom(self, step: int) -> None:
         """Fewer or more seconds a column."""
-        if self._zoom is not None:
-            self._zoom = min(max(0, self._zoom + step), len(ZOOMS) - 1)
-            self.draw()
+        if self._zoom is None:
+            return
+        if not 0 <= self._zoom + step < len(ZOOMS):
+            self.app.notify("one second is the least" if step < 0 else "one hour is the most", timeout=2)
+            return
+        self._zoom += step
+        self.draw()
 
     def action_error(self, step: int) -> None:
         """To the next column with an error, or the one before."""
@@ -262,6 +277,7 @@ class TimelineScreen(ViewScreen):
         if chosen is not None:
             self.app.filter(f"no >= {first} && no < {after}")
             self._anchor = None
+            self.app.notify("a filter shows these frames only; esc removes it", timeout=5)
         self.app.show_row(min(first, self.store.last_no))
 
 

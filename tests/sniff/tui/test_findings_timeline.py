@@ -118,7 +118,9 @@ def test_e_goes_to_the_next_second_with_an_error(look, store):
 def test_an_empty_store_is_said_to_be_empty(look, make_bus, key):
     async def script(looking):
         await looking.press(key)
-        assert any(words in looking.text() for words in ("nothing was found", "not one octet", "no frames in this file"))
+        assert any(
+            words in looking.text() for words in ("nothing was found", "not one octet", "no frames in this file")
+        )
 
     look(make_bus().store, script)
 
@@ -149,5 +151,31 @@ def test_two_findings_of_one_code_about_one_station_stand_in_their_places(look, 
         assert len(rows) == len(found) + 1
         assert rows[0][:2] == ["E!", worst.code]
         assert rows[-1][:2] == ["n", worst.code]
+
+    look(store, script)
+
+
+def test_the_timeline_ends_where_the_capture_ends(look, store):
+    async def script(see):
+        await see.press("6")
+        axis = next(line for line in see.lines() if "one column 1 s" in line)
+        assert f"10:00:00 … 10:00:{store.load.last // 10**9 % 60:02d}," in axis
+        assert "full height: the number at the left" in see.text()
+        await see.press("plus")
+        assert see.notices() == ["one second is the least"]
+        await see.press("minus", "minus", "minus", "minus")
+        assert "10:00:00 … 10:00:" in see.text()
+
+    look(store, script)
+
+
+def test_the_second_v_says_how_to_get_rid_of_its_filter(look, store):
+    async def script(see):
+        await see.press("6", "g", "v", "right", "v")
+        assert see.app.current_mode == "frames"
+        assert see.app.viewing.filter
+        assert see.notices() == ["a filter shows these frames only; esc removes it"]
+        await see.press("escape")
+        assert not see.app.viewing.filter
 
     look(store, script)
