@@ -56,6 +56,10 @@ class HelpScreen(ModalScreen[None]):
             page.border_title = Text(f"keys on {self.title_text}")
             page.border_subtitle = Text("esc closes")
             yield Static(self._keys())
+            own = getattr(self.below, "LEGEND", ())
+            if own:
+                yield Static(Text(f"\nmarks and titles on {self.title_text}", style="bold"))
+                yield Static(_table(own))
             yield Static(Text("\nmarks in the lists", style="bold"))
             yield Static(_table(LEGEND))
             yield Static(Text("\nwords in the first line", style="bold"))

@@ -24,6 +24,7 @@ class ViewScreen(Screen[None]):
     """
 
     TITLE: ClassVar[str] = ""
+    LEGEND: ClassVar[tuple[tuple[str, str], ...]] = ()  # marks and titles of this screen, for its help page
     AUTO_FOCUS: ClassVar[str] = "#main"
 
     def compose(self) -> ComposeResult:

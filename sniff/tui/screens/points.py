@@ -65,6 +65,15 @@ class PointsScreen(ViewScreen):
     """One line a point; enter shows the frame that carried its latest value."""
 
     TITLE = "Points"
+    LEGEND = (
+        ("^", "pinned to the top (p)"),
+        ("→", "a command: written to the device"),
+        ("?", "uncertain value"),
+        ("!", "value out of its range"),
+        ("*", "before a value: it changed in the last two seconds"),
+        ("age", "how long ago the value was seen, at the time of the newest row"),
+        ("trend", "the last values, between their least and their most"),
+    )
     CSS_PATH = "points.tcss"
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("p", "pin", "pin", tooltip="pin the point to the top, or let it go"),

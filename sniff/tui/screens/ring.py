@@ -38,6 +38,18 @@ class RingScreen(ViewScreen):
     """One line a master, then the ring in sentences; enter shows the frames of a master."""
 
     TITLE = "Ring"
+    LEGEND = (
+        ("MAC  next", "a master, and the one that it passes the token to"),
+        ("tok.", "tokens that it passed on"),
+        ("retr", "tokens that it had to send again"),
+        ("lost", "tokens that were lost at it"),
+        ("loop  max", "round trip of the token, ms: median, longest"),
+        ("use95", "from getting the token to its first frame, ms: 95 of 100 are shorter (95th percentile)"),
+        ("repl95", "time to its answers, ms: 95th percentile"),
+        ("post", "answers that it postponed"),
+        ("poll-", "its polls for masters that nobody answered"),
+        ("dam.", "damaged frames"),
+    )
     CSS_PATH = "ring.tcss"
 
     def __init__(self) -> None:
@@ -79,8 +91,9 @@ class RingScreen(ViewScreen):
             (str(row[0]), [_cell(COLUMNS[at][0], row[place]) for at, place in enumerate(places)]) for row in rows
         )
         legend = (
-            "times in ms · loop, max: round trip of the token · use: from token to first frame · repl: answers · "
-            "poll-: unanswered polls for masters"
+            "tok.: tokens passed · retr: sent again · times in ms, 95: 95th percentile · loop, max: round trip of the "
+            "token · use: from token to first frame · repl: answers · post: postponed · poll-: unanswered polls for "
+            "masters · dam.: damaged frames"
         )
         words.update("\n".join((*ring_words.sentences(ring), "", legend)))
 

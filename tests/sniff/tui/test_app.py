@@ -274,3 +274,12 @@ def test_a_frozen_view_goes_on_after_the_end(look: Any, busy_bus: Any) -> None:
         assert "FROZEN" not in see.lines()[0]
 
     look(busy_bus.store, script, live=True)
+
+
+@pytest.mark.parametrize(("key", "said"), [("4", "pinned to the top"), ("7", "95th percentile"), ("1", "err")])
+def test_help_explains_marks_and_titles(look: Any, busy_bus: Any, key: str, said: str) -> None:
+    async def script(see: Any) -> None:
+        await see.press(key, "question_mark")
+        assert said in see.text()
+
+    look(busy_bus.store, script, (100, 80))
