@@ -263,13 +263,18 @@ class Ring:
 
     @property
     def predicted_loop(self) -> int | None:
-        """How long an idle round takes: a token, the turnaround and the median use time of each station, ns."""
+        """How long an idle round takes: a token and the median use time of each station, ns.
+
+        Where the adapter's times cannot tell use times, a station counts with the turnaround, which is the least.
+        """
         order = self.order
         if not order:
             return None
         token = 8 * self.timing.char
         least = self.timing.line.bits(TURNAROUND_BITS)
-        return sum(token + max(least, self.nodes[mac].use.quantile(0.5) or 0) for mac in order if mac in self.nodes)
+        known = self.measurable(T_USAGE_DELAY)
+        uses = [self.nodes[mac].use.quantile(0.5) if known else None for mac in order if mac in self.nodes]
+        return sum(token + max(least, use or 0) for use in uses)
 
     @property
     def needed_max_master(self) -> int | None:

@@ -123,8 +123,10 @@ _ALL = (
         Severity.NOTE,
         "many postponed replies",
         "More than one request in 10 was answered with Reply Postponed.",
-        "the station, or the network behind a router, cannot answer within 250 ms",
-        "how long the real answers take; polling rate of the clients",
+        "the station does not answer at once, or passes requests on behind a router; its answers wait until it has the "
+        "token, however soon they are ready",
+        "how long the real answers take: well below 250 ms (Treply_delay) it could have answered at once; its firmware "
+        "and load; polling rate of the clients",
     ),
     Rule(
         "MS304",

@@ -71,7 +71,8 @@ def sentences(ring: Ring) -> list[str]:
     ]
     predicted = ring.predicted_loop
     if predicted is not None:
-        said.append(f"an idle round should take {milliseconds(predicted)}")
+        least = "" if ring.limits["token use"] else "at least "
+        said.append(f"an idle round should take {least}{milliseconds(predicted)}")
     bound = milliseconds(ring.timing.latency)
     said += [
         f"{name} against the standard's limit: not measurable, this adapter may hold octets back up to {bound}"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from dissectors.bacnet import RingObserver, judge
@@ -66,6 +68,8 @@ def test_what_the_model_says_of_a_clean_ring(clean: Heard):
     loop = found.nodes[9].loop.quantile(0.5)
     assert found.predicted_loop is not None
     assert loop == pytest.approx(found.predicted_loop, rel=0.2)
+    slow_adapter = replace(found, timing=replace(TIMING, latency=20_000_000))
+    assert slow_adapter.predicted_loop == 4 * (8 * TIMING.char + turnaround)  # its use times say nothing
     assert found.poll_waste_share == pytest.approx(
         sum(
             clean.events[no + 1].start - event.start
