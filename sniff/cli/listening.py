@@ -24,7 +24,7 @@ from sniff.capture.link import CaptureLink
 from sniff.capture.wire import NOTHING_MORE, Ended, Status
 from sniff.cli import INTERRUPTED, PORT_TROUBLE, UNREADABLE, USAGE, Failure, arguments, rows, searching
 from sniff.cli.searching import Unknowns
-from sniff.config import AUTO, Config, ConfigError, load
+from sniff.config import AUTO, FILE, Config, ConfigError, load
 from sniff.engine import Output
 from sniff.formats import READERS, CaptureError
 from sniff.live import LiveBus
@@ -52,7 +52,11 @@ def target_of(args: argparse.Namespace) -> Target:
         raise Failure(str(error), USAGE) from None
     wanted = args.port or _only_port(config)
     bus = config.buses.get(wanted)
+    if bus is None:
+        _refuse_unknown(wanted, config)
     port = (bus.port or wanted) if bus is not None else wanted
+    if not args.port:
+        print(f"sniff485: no port named: listening to {plain(port)}, the only one there is", file=sys.stderr)
     configured = args.protocol or (bus.protocol if bus is not None else None)
     said: LineSettings | str | None = args.line or (bus.line if bus is not None else None)
     auto = AUTO in (said, configured)
@@ -66,11 +70,31 @@ def target_of(args: argparse.Namespace) -> Target:
     if line is None:
         line = LineSettings.parse(registry.get(protocol).default_line)
         print(f"sniff485: no line settings given (-s): assuming {line} for {protocol}", file=sys.stderr)
-    name = bus.name if bus is not None else re.sub(r"[^A-Za-z0-9_-]+", "-", Path(port).name).strip("-") or "bus"
+    name = bus.name if bus is not None else re.sub(r"[^A-Za-z0-9_-]+", "-", _short(port)).strip("-") or "bus"
     devices = arguments.devices_of(args, bus.devices if bus is not None else None)
     unknown = search.names if search is not None else ()
     source = SourceSpec(port, line, protocol, name, notes_of(devices), unknown, devices.documents)
     return Target(source, bus.record if bus is not None else None, devices, search)
+
+
+def _short(port: str) -> str:
+    """What names a port in the name of a file: the last part of its path, "pts-0" of a pseudo-terminal."""
+    path = Path(port)
+    return f"pts-{path.name}" if path.parent.name == "pts" else path.name
+
+
+def _refuse_unknown(word: str, config: Config) -> None:
+    """End with exit code 2 for a plain word that is neither a file nor a configured bus: it can be no port."""
+    if not re.fullmatch(r"[A-Za-z0-9_-]+", word) or re.fullmatch(r"COM\d+", word, re.IGNORECASE) or Path(word).exists():
+        return
+    device = Path("/dev") / word
+    if device.is_char_device():
+        raise Failure(f"{word}: no such port or configured bus; did you mean {device}?", USAGE)
+    if config.path is None:
+        looked = f"there is no {FILE} in this folder, in one above it, or in the user's configuration"
+    else:
+        looked = f"{config.path} has {', '.join(config.buses) or 'none'}"
+    raise Failure(f"{plain(word)}: no such bus is configured: {looked}", USAGE)
 
 
 def _only_port(config: Config) -> str:
