@@ -90,7 +90,9 @@ class ByteLog:
         lines = [line for _, line in zip(range(SAMPLE), self._lines(), strict=False)]
         self.kind = _kind_of(lines)
         if self.kind is None:
-            raise CaptureError(f"{path}: no byte log that this program reads; it knows {', '.join(KNOWN)}")
+            raise CaptureError(
+                f"{path}{_first_written(lines)}: no byte log that this program reads; it knows {', '.join(KNOWN)}"
+            )
         session = foreign_session(str(path), None, 0, f"{self.kind} log")
         self.session: Session = session
         first = next(self.items(), None)
@@ -183,6 +185,14 @@ def _kind_of(lines: list[str]) -> str | None:
     written = [line for line in lines if line.strip() and not line.lstrip().startswith(_REMARK)]
     bare = sum(1 for line in written if _BARE.fullmatch(line))
     return BARE if bare and 2 * bare >= len(written) else None
+
+
+def _first_written(lines: list[str]) -> str:
+    """ ":3", the first line that is not empty and no remark, as the place of an error; "" when there is none."""
+    for number, line in enumerate(lines, 1):
+        if line.strip() and not line.lstrip().startswith(_REMARK) and not _BARE.fullmatch(_narrow(line)):
+            return f":{number}"
+    return ""
 
 
 def _narrow(line: str) -> str:

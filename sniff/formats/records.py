@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 from dissectors import registry
 from dissectors.frame import Chunk, Frame
@@ -35,10 +36,10 @@ class Record:
 
 
 def foreign_session(path: str, protocol: str | None, started: int, kind: str) -> Session:
-    """What is known of a packet file that we did not write."""
+    """What is known of a packet file that we did not write; its folder is nobody else's business."""
     name = protocol or "modbus-rtu"
     return Session(
-        port=path.encode("utf-8", "backslashreplace").decode(),  # a name need not be text
+        port=Path(path).name.encode("utf-8", "backslashreplace").decode(),  # a name need not be text
         line=LineSettings.parse(registry.get(name).default_line),
         protocol=name,
         started=started,

@@ -53,7 +53,7 @@ def read() -> Capture:
         raise explain("-", error) from None
     except CaptureError as error:
         raise CaptureError(str(error).replace(str(path), "-")) from None
-    if capture.session.port == str(path):  # of a format that does not say it
+    if capture.session.port == path.name:  # of a format that does not say it
         capture.session = replace(capture.session, port="-")
     return capture
 

@@ -113,8 +113,8 @@ def test_xxd_is_a_hexdump_too(tmp_path: Path) -> None:
 
 def test_what_is_no_byte_log_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "x.log"
-    path.write_text("Dear diary,\ntoday nothing happened.\n")
-    with pytest.raises(CaptureError, match=r"no byte log .* candump"):
+    path.write_text("\n# mine\nDear diary,\ntoday nothing happened.\n")
+    with pytest.raises(CaptureError, match=r"x\.log:3: no byte log .* candump"):
         read(path)
 
 

@@ -46,7 +46,7 @@ def test_what_is_neither_is_refused_by_its_name(
     for name in (path, "-"):
         with pytest.raises(CaptureError, match="no byte log that this program reads") as caught:
             read(name)
-        assert str(caught.value).startswith(f"{name}: ")
+        assert str(caught.value).startswith(f"{name}:1: ")
 
 
 def test_comments_alone_are_an_empty_text_capture(tmp_path: Path) -> None:
