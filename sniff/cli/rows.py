@@ -45,8 +45,8 @@ def to_json(item: Settled, dissector: Dissector, session: Session, with_fields: 
     result: dict[str, Any] = {
         "no": row.no,
         "t": iso(event.start),
-        "start_ns": event.start - session.started,
-        "end_ns": event.end - session.started,
+        "start_ns": since_start(event.start, session),
+        "end_ns": since_start(event.end, session),
         "proto": header.protocol if header else None,
         "src": placement.source if placement else header.source if header else None,
         "dst": placement.destination if placement else header.destination if header else None,
@@ -65,6 +65,14 @@ def to_json(item: Settled, dissector: Dissector, session: Session, with_fields: 
     if with_fields:
         result["fields"] = fields_of(item, dissector)
     return result
+
+
+def since_start(time: int, session: Session) -> int:
+    """ns since the capture's start, at least 0.
+
+    A foreign file's start is its first stamp, which is the end of a read: the first octets began before it.
+    """
+    return max(0, time - session.started)
 
 
 def json_line(item: Settled, dissector: Dissector, session: Session, with_fields: bool = False) -> str:
@@ -102,7 +110,7 @@ def fields_of(item: Settled, dissector: Dissector) -> dict[str, int | float | st
 def text_line(item: Settled, dissector: Dissector, session: Session, colour: bool = False) -> str:
     """One line for people: number, seconds since the start, what it is, verdict and response time, doubts."""
     row, transaction = item.row, item.transaction
-    seconds = (row.event.start - session.started) / NS_PER_S
+    seconds = since_start(row.event.start, session) / NS_PER_S
     notes: list[str] = []
     bad = is_error(row)
     if row.event.marks:

@@ -77,7 +77,11 @@ def run(args: argparse.Namespace) -> int:
             HEALTH_HEADINGS, _health(health_of(summary, judging.findings()), station_word(session.protocol)), args.style
         )
     elif table == "nodes":
-        tables.write(NODE_HEADINGS, [_node(node) for node in summary.nodes.present()], args.style)
+        nodes = [_node(node) for node in summary.nodes.present()]
+        if nodes or args.style != "text":
+            tables.write(NODE_HEADINGS, nodes, args.style)
+        else:
+            print(f"no stations were heard in {summary.frames} frames and {summary.noise} octets of noise")
     elif table == "transactions":
         ordered = sorted(kinds.items(), key=lambda pair: (pair[0][0], -pair[1]))
         tables.write(("kind", "verdict", "count"), [(*key, count) for key, count in ordered], args.style)

@@ -1,0 +1,33 @@
+"""Times count from the capture's start and are never negative; a table without rows says what is missing."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+
+@pytest.fixture
+def foreign(tmp_path: Path) -> Path:
+    path = tmp_path / "a.log"
+    path.write_text("(0.010000) bus 01 03 00 00 00 02 C4 0B\n(0.900000) bus 01 03 00 00 00 02 C4 0B\n")
+    return path
+
+
+def test_the_first_read_began_before_its_stamp(foreign: Path, sniff485: Callable) -> None:
+    shown = sniff485("show", foreign, "--json", "-s", "9600,8N1").out
+    first, second = map(json.loads, shown.splitlines())
+    assert (first["start_ns"], first["end_ns"]) == (0, 0)
+    assert 0 < second["start_ns"] < second["end_ns"]
+    assert second["end_ns"] == 890_000_000
+    assert "-0." not in sniff485("show", foreign).out
+
+
+def test_stats_without_stations_says_so(tmp_path: Path, sniff485: Callable) -> None:
+    noise = tmp_path / "noise.hex"
+    noise.write_text("FF\n")
+    ran = sniff485("stats", noise)
+    assert (ran.code, ran.out) == (0, "no stations were heard in 0 frames and 1 octets of noise\n")
+    assert sniff485("stats", noise, "--json").out == ""
