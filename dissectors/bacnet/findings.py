@@ -149,7 +149,7 @@ def _polls(ring: Ring) -> Iterable[Finding]:
     advice = {int(words.split()[1]): words for words in ring.advice()}
     for mac, node in ring.nodes.items():
         tokens = node.tokens_received
-        polls = node.polls_sent - node.polls_before_token
+        polls = node.polls_sent - node.polls_of_search
         if polls < LEAST_FRAMES or not tokens or polls <= POLLS_SHARE * tokens:
             continue
         seen = (

@@ -87,14 +87,14 @@ class Node:
 
     `use`: end of a token to it … its first frame. `loop`: from token to token. `reply`: request to its answer.
     `service`: request to the answer after it had postponed. `poll_reply`: poll to its answer. `holds`: data frames a
-    token → how often. `highest_polled`: highest address that it ever polled. `polls_before_token`: polls of its first
-    search for a successor, which are as they should be.
+    token → how often. `highest_polled`: highest address that it ever polled. `polls_of_search`: polls of
+    searches for a successor, its first one or one that was lost: they are as they should be.
     """
 
     tokens_received: int = 0
     tokens_sent: int = 0
     polls_sent: int = 0
-    polls_before_token: int = 0
+    polls_of_search: int = 0
     polls_unanswered: int = 0
     polls_received: int = 0
     poll_replies_sent: int = 0
@@ -149,7 +149,7 @@ SUMS = (
     "tokens_received",
     "tokens_sent",
     "polls_sent",
-    "polls_before_token",
+    "polls_of_search",
     "polls_unanswered",
     "polls_received",
     "poll_replies_sent",

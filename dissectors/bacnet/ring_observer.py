@@ -203,8 +203,8 @@ class RingObserver:
 
     def _poll(self, no: int, frame: Frame, source: int, destination: int, node: NodeTally) -> None:
         node.polls_sent += 1
-        if not node.tokens_sent:
-            node.polls_before_token += 1
+        if node.searches or not node.tokens_sent:
+            node.polls_of_search += 1
         if node.highest_polled < destination <= MAX_MASTER:
             node.highest_polled = destination
         self._asked = _Asked(_POLL, source, destination, frame, no)
@@ -342,6 +342,7 @@ class RingObserver:
             if self._holder is not None and frame.octets[2] == _POLL:
                 self._tally.note(What.LEFT, frame.start, no, self._holder, source)
                 self._tally.node(self._holder).gone = True
+                node.searches = True
             self._holder = source
             self._passed_by = None
             return
@@ -357,6 +358,7 @@ class RingObserver:
         edge.tokens += 1
         edge.last = target.last_token = frame.end
         node.tokens_sent += 1
+        node.searches = False
         if (
             before is not None
             and not self._doubt

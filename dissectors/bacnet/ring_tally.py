@@ -17,7 +17,7 @@ class NodeTally:
     tokens_received: int = 0
     tokens_sent: int = 0
     polls_sent: int = 0
-    polls_before_token: int = 0
+    polls_of_search: int = 0
     polls_unanswered: int = 0
     polls_received: int = 0
     poll_replies_sent: int = 0
@@ -41,6 +41,7 @@ class NodeTally:
     holds: dict[int, int] = field(default_factory=dict)
     devices: list[int] = field(default_factory=list)
     gone: bool = False  # it was passed over
+    searches: bool = False  # its successor is lost, and it has passed the token to nobody since
 
     def value(self) -> Node:
         """What was counted so far."""

@@ -90,9 +90,10 @@ _ALL = (
         Severity.WARNING,
         "too many polls for masters",
         "A station polls for a new master once in 50 tokens (Npoll); more than one in 10 is counted here, "
-        "with the share of time that unanswered polls take.",
-        "a station that does not count to Npoll, searches a lost successor, or polls far beyond the last address",
-        "Max_Master of the stations named; gaps in the addresses; the station that the search began at",
+        "with the share of time that unanswered polls take. Polls of a search for a successor, the first one or a lost "
+        "one, do not count.",
+        "a station that does not count to Npoll, or polls far beyond the last address",
+        "Max_Master and firmware of the stations named; gaps in the addresses",
     ),
     Rule(
         "MS202",

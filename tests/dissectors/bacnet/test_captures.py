@@ -264,7 +264,7 @@ def test_the_ring_of_a_real_capture():
     assert ring.nodes[27].highest_polled == 127
     assert ring.edges[12, 27].retries == 1
     found = {(f.code, f.subject) for f in judge(ring)}
-    assert {("MS106", "MAC 27"), ("MS301", "0 → 27"), ("MS201", "MAC 12")} <= found
+    assert {("MS106", "MAC 27"), ("MS301", "0 → 27")} <= found
     assert not {"MS101", "MS104", "MS501"} & {code for code, _ in found}
 
 
