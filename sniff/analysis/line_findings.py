@@ -296,8 +296,11 @@ class LineFindings:
             words = f"stray octets {times(tally.count)} {where} {counted(frames, 'frame')}"
         else:
             words = f"stray octets {where} {tally.count} of {counted(frames, 'frame')}"
-        most = [value for (rule, value), _ in record.values.most_common() if rule == code][:4]
-        words += f" (mostly {', '.join(f'{value:02X}' for value in most)})"
+        values = [(value, count) for (rule, value), count in record.values.most_common() if rule == code]
+        most = values[:4]
+        if 2 * sum(count for _, count in most) > sum(count for _, count in values):
+            mostly = "" if len(values) == len(most) else "mostly "
+            words += f" ({mostly}{', '.join(f'{value:02X}' for value, _ in most)})"
         return tally.found(RULES[code], name, words, self._note_if(tally.count, frames))
 
     def _whole(self, code: str, subject: str, words: str) -> Finding:
