@@ -132,8 +132,8 @@ class NodeTable:
         return [node for node in self if node.seen]
 
     def absent(self) -> list[int]:
-        """Addresses that were only polled for."""
-        return [node.address for node in self if not node.seen]
+        """Addresses that were polled for or given a token, and gave no sign."""
+        return [node.address for node in self if not node.seen and node.passed]
 
     def __iter__(self) -> Iterator[Node]:
         return iter(sorted(self.nodes.values(), key=lambda node: node.address))

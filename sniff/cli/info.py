@@ -84,7 +84,7 @@ def _as_json(path: str, capture: Capture, session: Session, summary: Summary) ->
         "verdicts": {verdict.value: count for verdict, count in summary.verdicts.items()},
         "response_ms": _response_times(summary),
         "nodes": [_node_as_json(node) for node in summary.nodes.present()],
-        "polled_only": _polled_only(summary),
+        "polled_only": summary.nodes.absent(),
     }
 
 
@@ -169,16 +169,11 @@ def _print_nodes(summary: Summary) -> None:
         )
         if node.errors:
             _line("", _listed(node.errors))
-    polled, all_of_them = _polled_only(summary), _broadcasts(summary)
+    polled, all_of_them = summary.nodes.absent(), _broadcasts(summary)
     if polled:
         _line("polled only", f"{spans(polled)}: never heard, never asked anything")
     if all_of_them:
         _line("broadcasts", ", ".join(f"{node.received} to {node.address}" for node in all_of_them))
-
-
-def _polled_only(summary: Summary) -> list[int]:
-    """Addresses that were polled for or given a token, and gave no sign."""
-    return [node.address for node in summary.nodes if not node.seen and node.passed]
 
 
 def _broadcasts(summary: Summary) -> list[Node]:
