@@ -173,8 +173,8 @@ def _values(entry: Entry, reading: Reading, raws: Sequence[int | None]) -> Itera
 
 
 def _scaled(entry: Entry, reading: Reading, raws: Sequence[int | None]) -> tuple[int | float | str, int | None]:
-    """The value of an entry and its bits on the wire, in the order of significance."""
-    if entry.kind in (Kind.REAL, Kind.BIT, Kind.TEXT) or reading.space not in _REGISTERS:
+    """The value of an entry and its bits on the wire, in the order of significance; as read where it has none."""
+    if entry.kind in (Kind.REAL, Kind.BIT, Kind.TEXT) or reading.space not in _REGISTERS or None in raws:
         value = reading.value
         if isinstance(value, str) or (entry.scale == 1 and not entry.offset):
             return value, reading.raw

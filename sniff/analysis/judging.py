@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import cast
 
 from dissectors import registry
@@ -15,6 +16,7 @@ from dissectors.registry import Dissector
 from dissectors.tracker import Transaction, Verdict
 from sniff.analysis.line_findings import LineFindings
 from sniff.analysis.line_rules import LINE_RULES
+from sniff.analysis.plain import plain
 from sniff.analysis.profile_findings import PROFILE_RULES, ProfileFindings
 from sniff.engine import Output
 from sniff.session import LineEvent, LineEventKind, Session, settings_change
@@ -96,10 +98,21 @@ class Judging:
             made += self.devices.findings()
         return tuple(
             sorted(
-                with_consequences(made, self._rules),
+                map(_harmless, with_consequences(made, self._rules)),
                 key=lambda finding: (-finding.severity, finding.first, finding.code, finding.subject),
             )
         )
+
+
+def _harmless(finding: Finding) -> Finding:
+    """The same finding; what its words quote from a file or an adapter may be hostile."""
+    return replace(
+        finding,
+        subject=plain(finding.subject),
+        seen=plain(finding.seen),
+        means=plain(finding.means),
+        next=plain(finding.next),
+    )
 
 
 def rules_of(dissector: Dissector) -> Mapping[str, Rule]:

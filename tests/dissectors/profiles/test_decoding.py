@@ -6,7 +6,7 @@ import math
 import struct
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from dissectors.profiles import packaged, parse_text
@@ -159,6 +159,7 @@ readings = st.builds(
 
 
 @given(st.sampled_from(["teco-e510", "teco-f510", "automationdirect-acn"]), st.lists(readings, max_size=8))
+@example("teco-e510", [Reading("holding", 9475, None, 0, How.READ)])  # a signed register without its bits
 def test_any_readings_decode(name: str, given_readings: list[Reading]) -> None:
     for value in decode(packaged(name), given_readings):
         assert value.text

@@ -11,9 +11,11 @@ from dissectors import registry
 from dissectors.bacnet import RingObserver
 from dissectors.bacnet.ring import What
 from sniff.analysis.channels import BUS, NODE, BusChannels
+from sniff.analysis.judging import Judging
 from sniff.engine import Output
 from sniff.reading import outputs
 from sniff.recording.topics import SCHEMAS
+from sniff.session import LineEvent, LineEventKind
 from sniff.simulation.faults import LostResponse
 from sniff.simulation.scenarios import scenario, simulate
 from sniff.simulation.tap import EXACT
@@ -89,3 +91,13 @@ def test_nothing_between_windows(name: str) -> None:
     assert channels.due(5 * S) == []
     assert channels.due(5 * S + S - 1) == []
     assert [one.topic for one in channels.due(6 * S)] == [f"/bus/{session.bus}"]
+
+
+def test_words_of_a_finding_are_harmless_whatever_an_event_says() -> None:
+    session, _ = simulate(scenario("modbus-rtu", seed=1), 1, EXACT)
+    judging = Judging(session, registry.get(session.protocol))
+    for _ in range(20):
+        judging.add_line_event(LineEvent(S, LineEventKind.ERRORS, "\x1b[2J\u202eparity", 40))
+    said = [finding for finding in judging.findings() if "parity" in finding.seen]
+    assert said
+    assert all(word.isprintable() for finding in said for word in (finding.seen, finding.means, finding.subject))
