@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import sys
+from collections import Counter
 
+from dissectors.findings import counted
+from dissectors.frame import Chunk
 from sniff.cli import UNREADABLE, Failure, arguments, writing
 from sniff.formats import CaptureError
 
@@ -25,7 +29,10 @@ def run(args: argparse.Namespace) -> int:
     except CaptureError as error:
         raise Failure(str(error), UNREADABLE) from None
     arguments.say_assumed(session, args.files[0])
-    writing.write(args, session, merged(captures), args.files)
+    shared: Counter[type] = Counter()
+    writing.write(args, session, merged(captures, lambda item: shared.update([type(item)])), args.files)
+    if shared[Chunk]:
+        print(f"sniff485: {counted(shared[Chunk], 'read')} in more than one capture, written once", file=sys.stderr)
     for path, capture in opened:
         writing.say_incomplete(path, capture)
     return 0

@@ -6,15 +6,19 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from dissectors.profiles import Entry, Profile, ProfileError
+from sniff.analysis.profile_guess import Guess, Guessing
 from sniff.cli import UNREADABLE, USAGE, Failure, arguments, json_output, tables
 from sniff.engine import Output
 from sniff.profile_files import UnknownProfile, available, find, read
 from sniff.reading import dissector_for, outputs
 
+TIE = 0.1
+"""Share by which a profile must fit better than another to be preferred."""
 ENTRY_HEADINGS = ("place", "point", "unit", "range", "access", "what")
 
 
@@ -147,8 +151,6 @@ def _check(args: argparse.Namespace) -> int:
 
 
 def _guess(args: argparse.Namespace) -> int:
-    from sniff.analysis.profile_guess import Guessing
-
     profiles = [listed.profile for listed in available() if listed.profile is not None]
     rows: list[tuple[tables.Cell, ...]] = []
     for path in args.files:
@@ -158,8 +160,20 @@ def _guess(args: argparse.Namespace) -> int:
         for output in outputs(capture.items(), session):
             if isinstance(output, Output):
                 guessing.add(output)
-        rows += [
-            (guess.station, guess.profile.name, f"{guess.score:.0%}", guess.why) for guess in guessing.guesses(profiles)
-        ]
+        guesses = list(guessing.guesses(profiles))
+        rows += [(guess.station, guess.profile.name, f"{guess.score:.0%}", guess.why) for guess in guesses]
+        _say_ties(guesses)
     tables.write(("station", "profile", "fits", "why"), rows, "json" if args.json else "text")
     return 0
+
+
+def _say_ties(guesses: Sequence[Guess]) -> None:
+    """Where the best profile of a station is hardly better than the next, the capture cannot decide."""
+    best: dict[int, list[Guess]] = {}
+    for guess in guesses:
+        best.setdefault(guess.station, []).append(guess)
+    for station, fitting in best.items():
+        alike = [guess.profile.name for guess in fitting if fitting[0].score - guess.score <= TIE]
+        if len(alike) > 1:
+            names = " and ".join(alike)
+            print(f"sniff485: station {station}: {names} fit alike; the type plate decides", file=sys.stderr)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import heapq
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import groupby, repeat
 
@@ -26,8 +26,11 @@ def merged_session(captures: Sequence[Capture], names: Sequence[str]) -> Session
     return replace(first, started=min(capture.session.started for capture in captures), adapter=worst)
 
 
-def merged(captures: Sequence[Capture]) -> Iterator[Item]:
-    """The items of all in order of time; what several captures have, the same at the same time, once."""
+def merged(captures: Sequence[Capture], shared: Callable[[Item], None] | None = None) -> Iterator[Item]:
+    """The items of all in order of time; what several captures have, the same at the same time, once.
+
+    `shared` is called for each item that is left out because another capture has given it.
+    """
     sources = [zip(repeat(number), capture.items(), strict=False) for number, capture in enumerate(captures)]
     in_order = heapq.merge(*sources, key=lambda found: found[1].time)
     for _, at_once in groupby(in_order, key=lambda found: found[1].time):
@@ -38,3 +41,5 @@ def merged(captures: Sequence[Capture]) -> Iterator[Item]:
             if seen[number, item] > given[item]:
                 given[item] += 1
                 yield item
+            elif shared is not None:
+                shared(item)
