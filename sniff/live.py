@@ -78,7 +78,7 @@ class LiveBus:
         """What depends on the settings, anew."""
         self.points = PointReader(self.dissector, self.devices)
         recorded = self.link.paths and not self.engine.searching
-        self._bus_channels = BusChannels(self.session, self.dissector) if recorded else None
+        self._bus_channels = BusChannels(self.session, self.dissector, self.devices) if recorded else None
 
     def _take(self, message: Received | Tick | Status | Ended) -> list[LiveItem]:
         if self.search is not None and self.engine.searching:

@@ -10,10 +10,12 @@ import json
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from typing import Any, cast
 
 from dissectors.findings import Finding, Severity
 from dissectors.histogram import Histogram
 from dissectors.line import NS_PER_S
+from dissectors.profiles import Devices
 from dissectors.registry import Dissector
 from dissectors.tracker import Verdict
 from sniff.analysis.health import health_of, station_health
@@ -56,11 +58,12 @@ class DerivedMessage:
 class BusChannels:
     """Messages of one bus. Fed like `Judging`; `due` gives what is to be written by then."""
 
-    def __init__(self, session: Session, dissector: Dissector) -> None:
+    def __init__(self, session: Session, dissector: Dissector, devices: Devices | None = None) -> None:
         self._session = session
         self._bus = re.sub(r"[^A-Za-z0-9_.-]+", "-", session.bus).strip("-") or "bus"
-        self._judging = Judging(session, dissector)
-        self._ring = _RingWatch(session, dissector) if "ring_window" in dissector.extras else None
+        self._judging = Judging(session, dissector, devices)
+        self._compare = dissector.extras.get("ring_window")
+        self._ring = self._look_at_ring()
         self._window = Summary(session.line)
         self._begin: int | None = None
         self._windows = 0
@@ -70,14 +73,10 @@ class BusChannels:
         """Take what the engine gave."""
         self._judging.add(output)
         self._window.add(output)
-        if self._ring is not None:
-            self._ring.add(output)
 
     def add_line_event(self, event: LineEvent) -> None:
         """Take something that happened to the line."""
         self._judging.add_line_event(event)
-        if self._ring is not None and event.kind.is_hole:
-            self._ring.miss(event.time)
 
     def due(self, now: int) -> list[DerivedMessage]:
         """What a window that has ended by `now` (ns, the capture's clock) gives; nothing in between."""
@@ -116,34 +115,22 @@ class BusChannels:
             "health": health_of(window).bus.score,
             **_latency(window.latency),
         }
-        whole, each = self._ring.turn() if self._ring is not None else ({}, {})
+        whole, each = self._turn_of_ring()
         yield DerivedMessage(f"/bus/{self._bus}", BUS, end, begin, _json(content | whole))
         for node in window.nodes.present():
             told = _of_node(node) | each.get(node.address, {})
             yield DerivedMessage(f"/nodes/{self._bus}/{node.address}", NODE, end, begin, _json(told))
 
+    def _look_at_ring(self) -> Any:
+        """The token ring so far, as the rules of such a protocol see it; None for other protocols."""
+        return None if self._compare is None else cast("Any", self._judging.judge).ring()
 
-class _RingWatch:
-    """The token ring of a bus, told window by window."""
-
-    def __init__(self, session: Session, dissector: Dissector) -> None:
-        self._observer = dissector.extras["ring"](session.timing)
-        self._compare = dissector.extras["ring_window"]
-        self._before = self._observer.ring()
-
-    def add(self, output: Output) -> None:
-        for row in output.rows:
-            if row.searched is None:
-                self._observer.see(row.no, row.event, row.header)
-
-    def miss(self, time: int) -> None:
-        self._observer.miss(time)
-
-    def turn(self) -> tuple[dict[str, object], dict[int, dict[str, object]]]:
+    def _turn_of_ring(self) -> tuple[dict[str, object], dict[int, dict[str, object]]]:
         """Numbers of the ring and of its stations since the last call."""
-        now = self._observer.ring()
-        window = self._compare(self._before, now)
-        self._before = now
+        if self._compare is None:
+            return {}, {}
+        before, self._ring = self._ring, self._look_at_ring()
+        window = self._compare(before, self._ring)
         return dict(window.bus), {mac: dict(numbers) for mac, numbers in window.nodes.items()}
 
 

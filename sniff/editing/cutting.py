@@ -12,6 +12,7 @@ from dissectors.line import NS_PER_S
 from sniff.analysis.judging import Judging
 from sniff.engine import Output
 from sniff.formats import Capture
+from sniff.profile_files import noted_devices
 from sniff.reading import dissector_for, outputs
 from sniff.session import Item, LineEvent, LineEventKind, Session, SettingsChange, settings_change
 
@@ -69,7 +70,7 @@ def of_frames(capture: Capture, session: Session, text: str) -> Stretch:
 
 def around_finding(capture: Capture, session: Session, code: str) -> Stretch:
     """The stretch from the first to the last evidence of the first finding with that code. Raises ValueError."""
-    judging = Judging(session, dissector_for(session))
+    judging = Judging(session, dissector_for(session), noted_devices(session))
     times: dict[int, tuple[int, int]] = {}
     for output in outputs(capture.items(), session):
         if isinstance(output, Output):

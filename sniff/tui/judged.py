@@ -19,7 +19,7 @@ class Judged:
     def __init__(self, store: Store) -> None:
         self.store = store
         self._session = store.session
-        self.judging = Judging(store.session, store.dissector)
+        self.judging = Judging(store.session, store.dissector, store.devices)
         self._row = 0  # number of the last row taken
         self._closed = 0  # number of the last closed transaction taken
         self._events = 0
@@ -40,7 +40,7 @@ class Judged:
         store = self.store
         if store.session is not self._session:  # its settings were found: nothing was judged before
             self._session = store.session
-            self.judging = Judging(store.session, store.dissector)
+            self.judging = Judging(store.session, store.dissector, store.devices)
             self._events = 0
         judging = self.judging
         self._row = max(self._row, store.first_no - 1)

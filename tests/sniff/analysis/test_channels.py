@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -12,15 +13,21 @@ from dissectors.bacnet import RingObserver
 from dissectors.bacnet.ring import What
 from sniff.analysis.channels import BUS, NODE, BusChannels
 from sniff.analysis.judging import Judging
+from sniff.editing.cutting import around_finding
 from sniff.engine import Output
+from sniff.formats import read
+from sniff.profile_files import noted_devices
 from sniff.reading import outputs
 from sniff.recording.topics import SCHEMAS
 from sniff.session import LineEvent, LineEventKind
 from sniff.simulation.faults import LostResponse
 from sniff.simulation.scenarios import scenario, simulate
 from sniff.simulation.tap import EXACT
+from sniff.store import Store
+from sniff.tui.judged import Judged
 from tests.faults.buses import modbus
 
+CAPTURES = Path(__file__).parents[3] / "captures" / "findings"
 S = 10**9
 Told = list[tuple[str, dict[str, Any]]]
 
@@ -101,3 +108,19 @@ def test_words_of_a_finding_are_harmless_whatever_an_event_says() -> None:
     said = [finding for finding in judging.findings() if "parity" in finding.seen]
     assert said
     assert all(word.isprintable() for finding in said for word in (finding.seen, finding.means, finding.subject))
+
+
+def test_findings_about_known_devices_are_told_everywhere() -> None:
+    capture = read(CAPTURES / "drive-told-too-much.cap.txt")
+    session, devices = capture.session, noted_devices(capture.session)
+    dissector = registry.get(session.protocol)
+    channels, store = BusChannels(session, dissector, devices), Store(session, dissector, devices=devices)
+    for item in outputs(capture.items(), session):
+        if isinstance(item, Output):
+            channels.add(item)
+            store.add(item)
+    judged = Judged(store)
+    judged.step(len(store), store.last_no)
+    assert "PR001" in {finding.code for finding in judged.findings()}
+    assert any(json.loads(one.data)["name"] == "PR001" for one in channels.findings(S))
+    assert around_finding(capture, session, "PR001")
