@@ -9,7 +9,7 @@ A protocol brings its rules as `Dissector.extras["findings"]`, a function Timing
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from typing import Protocol, runtime_checkable
@@ -44,7 +44,7 @@ class Rule:
 
     `title`: some words for a list. `explanation`: plain text for `rule CODE`: what is measured, against which limit,
     from which source. `means`, `next`: the defaults of its findings. `explains`: codes, or begins of codes, of what is
-    most likely a mere consequence where this rule finds an error.
+    most likely a mere consequence of what this rule finds, at warning or above.
     """
 
     code: str
@@ -62,7 +62,8 @@ class Finding:
 
     `subject`: what it is about ("MAC 12", "12 → 27", "bus"). `first`, `last`: ns, when it was seen first and last.
     `count`: how often. `evidence`: frame numbers, at most EVIDENCE_MAX. `seen`: what was seen; `means`: what it is
-    consistent with; `next`: what to check next. Plain sentences, no control characters.
+    consistent with; `next`: what to check next. Plain sentences, no control characters. `cause`: code and subject of
+    the finding that most likely explains this one; a face shows this one under it.
     """
 
     code: str
@@ -75,6 +76,7 @@ class Finding:
     seen: str
     means: str
     next: str
+    cause: tuple[str, str] | None = None
 
     def merge(self, other: Finding) -> Finding:
         """What one rule found about one subject in two captures of a bus: counts add up, times span both.
@@ -164,38 +166,39 @@ class Tally:
 
 
 def with_consequences(findings: Iterable[Finding], rules: Mapping[str, Rule]) -> tuple[Finding, ...]:
-    """The same findings; those that an error explains (`Rule.explains`) are notes that name it.
+    """The same findings; those that a graver or as grave one explains (`Rule.explains`) are notes that name it.
 
-    An error about a station explains what is said of that station, of the bus and of the master; an error about the
-    bus explains it of everybody.
+    Only a warning or an error explains, and never what is itself a consequence. What is found about a station explains
+    what is said of that station, of the bus and of the master; what is found about the bus explains it of everybody.
     """
-    made = tuple(findings)
-    causes = [
-        (finding, rules[finding.code].explains)
-        for finding in made
-        if finding.severity is Severity.ERROR and finding.code in rules and rules[finding.code].explains
-    ]
-    return tuple(_as_consequence(finding, causes, rules) for finding in made)
-
-
-def _as_consequence(
-    finding: Finding, causes: Sequence[tuple[Finding, tuple[str, ...]]], rules: Mapping[str, Rule]
-) -> Finding:
-    for cause, codes in causes:
-        everybody = cause.subject in WHOLE_BUS or finding.subject in WHOLE_BUS
-        if (
-            cause is finding
-            or not finding.code.startswith(codes)
-            or not (everybody or finding.subject == cause.subject)
-        ):
+    made = list(findings)
+    order = sorted(range(len(made)), key=lambda at: -made[at].severity)
+    for at in order:
+        cause = made[at]
+        if cause.cause is not None or cause.severity < Severity.WARNING or cause.code not in rules:
             continue
-        return replace(
-            finding,
-            severity=min(finding.severity, Severity.NOTE),
-            means=f"most likely a consequence of {cause.code} ({cause.subject}: {rules[cause.code].title})",
-            next=f"settle {cause.code} first, then see whether this is still there",
-        )
-    return finding
+        codes = rules[cause.code].explains
+        for other, finding in enumerate(made):
+            if other != at and finding.cause is None and codes and _is_explained(finding, cause, codes):
+                made[other] = _as_consequence(finding, cause, rules)
+    return tuple(made)
+
+
+def _is_explained(finding: Finding, cause: Finding, codes: tuple[str, ...]) -> bool:
+    if not finding.code.startswith(codes) or finding.severity > cause.severity:
+        return False
+    everybody = cause.subject in WHOLE_BUS or finding.subject in WHOLE_BUS
+    return everybody or finding.subject == cause.subject
+
+
+def _as_consequence(finding: Finding, cause: Finding, rules: Mapping[str, Rule]) -> Finding:
+    return replace(
+        finding,
+        severity=min(finding.severity, Severity.NOTE),
+        means=f"most likely a consequence of {cause.code} ({cause.subject}: {rules[cause.code].title})",
+        next=f"settle {cause.code} first, then see whether this is still there",
+        cause=(cause.code, cause.subject),
+    )
 
 
 def times(count: int) -> str:

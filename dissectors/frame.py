@@ -74,6 +74,29 @@ class Damage(Enum):
     RESTARTED = "restarted"  # a new start delimiter before the end
 
 
+class Flaw(Enum):
+    """What is wrong with a damaged frame whose check agrees once that one thing is put right."""
+
+    FIRST_MISSING = "first octet missing"
+    FIRST_SPOILT = "first octet spoilt"
+    LAST_MISSING = "last octet missing"
+    LAST_TWO_MISSING = "last two octets missing"
+    LAST_SPOILT = "last octet spoilt"
+    CHECK_SWAPPED = "check octets swapped"
+
+
+@dataclass(frozen=True, slots=True)
+class Repair:
+    """What a damaged frame was, if only `flaw` happened to it: `octets` is the whole frame with a good check.
+
+    Given only where the check of what is put together agrees, or, where check octets themselves are missing, where all
+    that is left of it does. What the octets say may be shown, marked as repaired; the frame stays damaged.
+    """
+
+    flaw: Flaw
+    octets: bytes
+
+
 @dataclass(frozen=True, slots=True)
 class Frame:
     """One frame as it was on the wire, good or damaged; `octets` include delimiters and check.
@@ -83,6 +106,7 @@ class Frame:
     `expected`: total octets predicted from its first octets, None where nothing predicts it.
     `skipped`: octets of noise directly before it since the frame before.
     `flags`: protocol-specific oddities in words ("lower-case", "trailing-pad"), ascending.
+    `repair`: of a damaged frame, what it was if one thing at one of its ends went wrong.
     """
 
     protocol: str
@@ -97,6 +121,7 @@ class Frame:
     slack: int = 0
     marks: tuple[Mark, ...] = ()
     flags: tuple[str, ...] = ()
+    repair: Repair | None = None
 
     @property
     def ok(self) -> bool:

@@ -55,7 +55,7 @@ def to_json(rule: Rule) -> dict[str, str]:
 def _explained(rule: Rule) -> str:
     lines = [f"{rule.code}  {rule.title}  ({rule.severity.label} unless said otherwise)", ""]
     lines += textwrap.wrap(rule.explanation, WIDTH)
-    explains = f"{', '.join(map(_codes, rule.explains))}, where it is an error" if rule.explains else ""
+    explains = f"{', '.join(map(_codes, rule.explains))}, where it is a warning or an error" if rule.explains else ""
     for word, text in (("consistent with", rule.means), ("check next", rule.next), ("explains", explains)):
         if text:
             head = f"{word}: "

@@ -49,10 +49,27 @@ def test_an_error_about_a_station_explains_that_station_and_the_bus_only() -> No
     assert made["YY1", "bus"].severity is Severity.NOTE
 
 
-def test_a_warning_explains_nothing_and_an_information_is_not_raised() -> None:
-    assert after(finding("XX1", "bus"), finding("XX2", "bus"))["XX2", "bus"].severity is Severity.WARNING
+def test_a_warning_explains_no_error_and_an_information_is_not_raised() -> None:
+    assert after(finding("XX1", "bus"), finding("XX2", "bus"))["XX2", "bus"].severity is Severity.NOTE
+    grave = finding("XX2", "bus", Severity.ERROR)
+    assert after(finding("XX1", "bus"), grave)["XX2", "bus"].severity is Severity.ERROR
     low = finding("XX2", "bus", Severity.INFO)
     assert after(finding("XX1", "bus", Severity.ERROR), low)["XX2", "bus"].severity is Severity.INFO
+
+
+def test_a_consequence_names_its_cause_and_explains_nothing_itself() -> None:
+    rules = {
+        "A": Rule("A", Severity.ERROR, "a", "", explains=("B",)),
+        "B": Rule("B", Severity.ERROR, "b", "", explains=("A", "C")),
+        "C": Rule("C", Severity.WARNING, "c", ""),
+    }
+    made = with_consequences([finding("A", "bus", Severity.ERROR), finding("B", "bus"), finding("C", "bus")], rules)
+    assert [one.cause for one in made] == [None, ("A", "bus"), None]
+
+
+def test_a_note_explains_nothing() -> None:
+    made = after(finding("XX1", "bus", Severity.NOTE), finding("XX2", "bus", Severity.NOTE))
+    assert made["XX2", "bus"].cause is None
 
 
 def test_words_for_counts() -> None:
