@@ -6,13 +6,13 @@ import time
 from functools import partial
 from typing import ClassVar
 
-from textual.app import App
 from textual.binding import Binding, BindingType
 from textual.screen import Screen
 from textual.timer import Timer
 
 from sniff.analysis.filtering import FilterError
 from sniff.store import Store
+from sniff.tui.analyzer import Analyzer
 from sniff.tui.feed import Feed, FeedStatus
 from sniff.tui.header import StatusHeader, why_ended
 from sniff.tui.help import HelpScreen
@@ -34,12 +34,12 @@ PATH = 8
 """Screens that `q` can walk back over."""
 
 
-class SnifferApp(App[None]):
+class SnifferApp(Analyzer):
     """Shows what a feed brings. Nothing that the user does here touches the capture."""
 
     TITLE = "sniff485"
     CSS_PATH = "app.tcss"
-    COMMANDS = App.COMMANDS | {ActionCommands}
+    COMMANDS = Analyzer.COMMANDS | {ActionCommands}
     ENABLE_COMMAND_PALETTE = True
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("space", "freeze", "freeze", tooltip="freeze the view, or let it go on; the capture never stops"),
@@ -57,7 +57,7 @@ class SnifferApp(App[None]):
     def __init__(self, feed: Feed, start_screen: str = "frames") -> None:
         if start_screen not in {entry.name for entry in SCREENS}:
             raise ValueError(f"screen {start_screen!r}: expected one of {', '.join(entry.name for entry in SCREENS)}")
-        self.DEFAULT_MODE = start_screen
+        self.DEFAULT_MODE = start_screen  # type: ignore[misc]  # textual reads it from the instance
         super().__init__()
         for entry in SCREENS:
             self.add_mode(entry.name, partial(_make, entry))
@@ -131,7 +131,7 @@ class SnifferApp(App[None]):
     def draw_screen(self) -> None:
         """Bring the shown screen up to date."""
         screen = self.shown
-        if _is_whole(screen):
+        if screen is not None and _is_whole(screen):
             screen.draw()
             if self._worker is not None and screen.work_left():
                 self._worker.resume()
@@ -145,8 +145,8 @@ class SnifferApp(App[None]):
 
     def _work(self) -> None:
         screen = self.shown
-        busy = _is_whole(screen) and screen.work_left() and screen.work()
-        if not busy and not self.judged.work(self.viewing.last_row):
+        busy = screen is not None and _is_whole(screen) and screen.work_left() and screen.work()
+        if not busy and not self.judged.work(self.viewing.last_row) and self._worker is not None:
             self._worker.pause()
 
     def _draw_header(self) -> None:
@@ -241,9 +241,10 @@ def with_step(path: list[str], name: str) -> list[str]:
 
 
 def _make(entry: Entry) -> Screen[None]:
-    return load(entry)()
+    made: Screen[None] = load(entry)()
+    return made
 
 
-def _is_whole(screen: ViewScreen | None) -> bool:
+def _is_whole(screen: ViewScreen) -> bool:
     """Whether a screen can be drawn: a timer may still fire while its widgets are put in or taken out."""
-    return screen is not None and screen.is_mounted and bool(screen.query("#main"))
+    return screen.is_mounted and bool(screen.query("#main"))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dissectors.frame import Event, Found, Frame, LineError
 from sniff.engine import Row
+from sniff.tui.analyzer import analyzer
 from sniff.tui.columns import Cell, Column
 from sniff.tui.plain import plain
 from sniff.tui.store_list import StoreList
@@ -111,4 +112,4 @@ class FrameList(StoreList):
             return "searching …"
         if self.viewing.filter and len(self.store):
             return "no frame passes the filter"
-        return "no frames yet" if self.app.status.live else "no frames in this file"
+        return "no frames yet" if analyzer(self).status.live else "no frames in this file"

@@ -5,11 +5,13 @@ from __future__ import annotations
 from typing import ClassVar
 
 from rich.cells import cell_len
+from rich.style import Style
 from rich.text import Text
 from textual.widget import Widget
 
 from sniff.session import LineEventKind
 from sniff.store import Store
+from sniff.tui.analyzer import analyzer
 from sniff.tui.columns import fit
 from sniff.tui.feed import FeedStatus
 from sniff.tui.plain import plain
@@ -100,7 +102,7 @@ class StatusHeader(Widget):
 
     def bring_up(self) -> None:
         """Draw again if anything changed."""
-        pieces = status_line(self.app.status, self.app.store, self.app.viewing, self.size.width)
+        pieces = status_line(analyzer(self).status, analyzer(self).store, analyzer(self).viewing, self.size.width)
         if pieces != self._pieces:
             self._pieces = pieces
             self.refresh()
@@ -121,7 +123,7 @@ class StatusHeader(Widget):
         return text.append("\n").append_text(tabs)
 
     def _tabs(self, width: int) -> Text:
-        tabs = [(f"{key} {title}", title == self.here) for key, title in self.app.tabs]
+        tabs = [(f"{key} {title}", title == self.here) for key, title in analyzer(self).tabs]
         if sum(len(label) + 2 for label, _ in tabs) <= width:
             labels = [f"[{label}]" if here else f" {label} " for label, here in tabs]
         else:  # closer together, then the numbers alone
@@ -134,5 +136,5 @@ class StatusHeader(Widget):
             text.append(label, self._style("here" if here else "dim"))
         return text
 
-    def _style(self, name: str):
+    def _style(self, name: str) -> Style:
         return self.get_component_rich_style(f"status-header--{name}", partial=True)

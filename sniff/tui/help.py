@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from rich.table import Table
 from rich.text import Text
@@ -45,7 +45,7 @@ class HelpScreen(ModalScreen[None]):
         Binding("escape,q,question_mark,enter", "dismiss", "close", show=False),
     ]
 
-    def __init__(self, below: Screen, title: str) -> None:
+    def __init__(self, below: Screen[Any], title: str) -> None:
         super().__init__()
         self.below = below
         self.title_text = title

@@ -7,11 +7,12 @@ Bindings with the same description share one place: "e/E error".
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from rich.text import Text
 from textual import events
-from textual.screen import ActiveBinding, Screen
+from textual.binding import ActiveBinding
+from textual.screen import Screen
 from textual.widget import Widget
 from textual.widgets import Input
 
@@ -45,7 +46,7 @@ def explanation(active: ActiveBinding) -> str:
     return active.binding.tooltip or active.binding.description
 
 
-def working_keys(screen: Screen) -> list[tuple[str, ActiveBinding]]:
+def working_keys(screen: Screen[Any]) -> list[tuple[str, ActiveBinding]]:
     """Keys that work on a screen and have a description: those of the focused pane, of the screen, then of the app.
 
     While something is typed, only the keys of the field and of what is around it.

@@ -10,6 +10,7 @@ from collections.abc import Iterable
 from typing import ClassVar
 
 from rich.segment import Segment
+from rich.style import Style
 from textual import events
 from textual.binding import Binding, BindingType
 from textual.geometry import Size
@@ -298,5 +299,5 @@ class LineList(ScrollView, can_focus=True, inherit_bindings=False):
             segments.append(Segment(cell.text, style + top if top else style))
         return Strip(segments).adjust_cell_length(width, base + top if top else base)
 
-    def _style(self, name: str):
+    def _style(self, name: str) -> Style:
         return self.get_component_rich_style(f"line-list--{name}", partial=True)

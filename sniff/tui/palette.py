@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from typing import Any
 
 from textual.command import DiscoveryHit, Hit, Hits, Provider
 
@@ -12,7 +13,7 @@ from sniff.tui.keybar import explanation, working_keys
 class ActionCommands(Provider):
     """Lists what the keys of the screen below the palette do."""
 
-    def _actions(self) -> list[tuple[str, str, partial]]:
+    def _actions(self) -> list[tuple[str, str, partial[Any]]]:
         found = []
         for key, active in working_keys(self.screen):
             run = partial(self.app.run_action, active.binding.action, active.node)

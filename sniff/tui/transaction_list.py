@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dissectors.tracker import Transaction, Verdict
 from sniff.store import BAD_VERDICTS
+from sniff.tui.analyzer import analyzer
 from sniff.tui.columns import Cell, Column
 from sniff.tui.plain import plain
 from sniff.tui.store_list import StoreList
@@ -80,4 +81,4 @@ class TransactionList(StoreList):
             return "searching …"
         if self.viewing.filter:
             return "no transaction passes the filter"
-        return "no transaction has closed yet" if self.app.status.live else "no transactions in this file"
+        return "no transaction has closed yet" if analyzer(self).status.live else "no transactions in this file"

@@ -7,7 +7,10 @@ order people know from the documentation, so numbers without a screen stay free.
 from __future__ import annotations
 
 from importlib import import_module
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    from textual.screen import Screen
 
 
 class Entry(NamedTuple):
@@ -35,7 +38,8 @@ SCREENS: tuple[Entry, ...] = (
 )
 
 
-def load(entry: Entry) -> type:
+def load(entry: Entry) -> type[Screen[None]]:
     """The class of a screen."""
     module, _, name = entry.target.partition(":")
-    return getattr(import_module(module), name)
+    found: type[Screen[None]] = getattr(import_module(module), name)
+    return found

@@ -9,6 +9,7 @@ from textual.screen import Screen
 from textual.widget import Widget
 
 from sniff.store import Store
+from sniff.tui.analyzer import analyzer
 from sniff.tui.header import StatusHeader
 from sniff.tui.keybar import KeyBar
 from sniff.tui.prompt import Prompt
@@ -53,16 +54,16 @@ class ViewScreen(Screen[None]):
     @property
     def viewing(self) -> Viewing:
         """How the user looks at things."""
-        return self.app.viewing
+        return analyzer(self).viewing
 
     @property
     def store(self) -> Store:
         """The rows."""
-        return self.app.store
+        return analyzer(self).store
 
     def on_screen_resume(self) -> None:
         """Shown (again): catch up."""
-        self.app.draw_screen()
+        analyzer(self).draw_screen()
 
     def on_prompt_closed(self) -> None:
         """Back to where the keys were."""

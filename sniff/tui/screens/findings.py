@@ -14,6 +14,7 @@ from textual.widgets import DataTable, Static
 
 from dissectors.findings import Finding, Severity
 from sniff.analysis.judging import rules_over
+from sniff.tui.analyzer import analyzer
 from sniff.tui.judged import Judged
 from sniff.tui.plain import plain
 from sniff.tui.screens.base import ViewScreen
@@ -84,7 +85,7 @@ class FindingsScreen(ViewScreen):
     @property
     def judged(self) -> Judged:
         """The rules at work, on all screens."""
-        return self.app.judged
+        return analyzer(self).judged
 
     def _look(self) -> None:
         judged = self.judged
@@ -168,7 +169,7 @@ class FindingsScreen(ViewScreen):
             self.app.notify("no frame of it is kept" if finding.evidence else "it is about no single frame", timeout=3)
             return
         self._evidence[key] = place % len(kept)
-        self.app.show_row(kept[place % len(kept)])
+        analyzer(self).show_row(kept[place % len(kept)])
 
     def action_order(self) -> None:
         """By severity, or by subject."""

@@ -36,7 +36,10 @@ class FramesScreen(ListingScreen):
     TITLE = "Frames"
     THINGS = "frames"
     CSS_PATH = "frames.tcss"
-    HORIZONTAL_BREAKPOINTS: ClassVar[list[tuple[int, str]]] = [(0, "-narrow"), (124, "-wide")]
+    HORIZONTAL_BREAKPOINTS: ClassVar[list[tuple[int, str]]] = [  # type: ignore[misc]  # textual's is no plain ClassVar
+        (0, "-narrow"),
+        (124, "-wide"),
+    ]
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("x", "partner", "pair", tooltip="jump between request and response"),
         Binding("m", "mark", "mark", tooltip="mark this row, or take the mark away"),

@@ -16,6 +16,7 @@ from dissectors.line import NS_PER_S
 from sniff.analysis.wording import milliseconds
 from sniff.session import LineEvent
 from sniff.store import Store
+from sniff.tui.analyzer import analyzer
 from sniff.tui.charts import bar, sparkline
 from sniff.tui.feed import FeedStatus
 from sniff.tui.plain import plain
@@ -218,7 +219,7 @@ class LineScreen(ViewScreen):
         self._drawn = state
         store = self.store
         sections = {
-            "settings": settings(store, self.app.status),
+            "settings": settings(store, analyzer(self).status),
             "errors": errors(store),
             "load": load(store, width),
             "gaps": gaps(store, width),

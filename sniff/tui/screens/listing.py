@@ -8,6 +8,7 @@ from typing import ClassVar
 from textual.binding import Binding, BindingType
 
 from sniff.analysis.filtering import FIELDS, FilterError, compile_filter
+from sniff.tui.analyzer import analyzer
 from sniff.tui.filter_line import FilterLine
 from sniff.tui.index import Index
 from sniff.tui.linelist import LineList
@@ -116,7 +117,7 @@ class ListingScreen(ViewScreen):
 
     def action_data(self) -> None:
         """Hide what only keeps a token-passing bus going, or show it again."""
-        self.app.filter("" if self.viewing.filter == DATA_ONLY else DATA_ONLY)
+        analyzer(self).filter("" if self.viewing.filter == DATA_ONLY else DATA_ONLY)
 
     def _wrong(self, text: str) -> str:
         try:
@@ -130,4 +131,4 @@ class ListingScreen(ViewScreen):
         if self.focused is not self.lines:
             self.lines.focus()
         elif self.viewing.filter:
-            self.app.filter("")
+            analyzer(self).filter("")

@@ -13,6 +13,7 @@ from textual.widgets import DataTable, Static
 from dissectors.tracker import Verdict
 from sniff.analysis.nodes import Node
 from sniff.analysis.wording import milliseconds
+from sniff.tui.analyzer import analyzer
 from sniff.tui.screens.base import ViewScreen
 from sniff.tui.tables import StationTable
 
@@ -118,8 +119,8 @@ class NodesScreen(ViewScreen):
         """Show the frames of the station under the cursor."""
         key = self.query_one(StationTable).key_here()
         if key is not None:
-            self.app.filter(f"addr == {key}")
-            self.app.action_switch("frames")
+            analyzer(self).filter(f"addr == {key}")
+            analyzer(self).action_switch("frames")
 
 
 def _cells(node: Node) -> list[Text]:

@@ -13,6 +13,7 @@ from textual.widgets import DataTable, Static
 from dissectors.line import NS_PER_S
 from dissectors.profiles.decoding import Quality, Value, number
 from sniff.analysis.points import Point
+from sniff.tui.analyzer import analyzer
 from sniff.tui.charts import BARS
 from sniff.tui.plain import plain
 from sniff.tui.screens.base import ViewScreen
@@ -86,7 +87,7 @@ class PointsScreen(ViewScreen):
         self._pinned: list[Key] = []
         self._bits = False
         self._commands = False
-        self._drawn: object = None
+        self._drawn: tuple[int, tuple[object, ...]] | None = None
 
     def compose_view(self) -> ComposeResult:
         """The table, and more about the point under the cursor."""
@@ -172,7 +173,7 @@ class PointsScreen(ViewScreen):
         if self.store.by_no(point.sample.frame) is None:
             self.notify("its frame is no longer in memory", timeout=2)
         else:
-            self.app.show_row(point.sample.frame)
+            analyzer(self).show_row(point.sample.frame)
 
     def action_pin(self) -> None:
         """Pin the point under the cursor, or let it go."""

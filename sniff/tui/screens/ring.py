@@ -10,6 +10,7 @@ from textual.containers import VerticalScroll
 from textual.widgets import DataTable, Static
 
 from sniff.analysis import ring_words
+from sniff.tui.analyzer import analyzer
 from sniff.tui.screens.base import ViewScreen
 from sniff.tui.tables import StationTable
 
@@ -102,8 +103,8 @@ class RingScreen(ViewScreen):
         event.stop()
         key = self.query_one(StationTable).key_here()
         if key is not None:
-            self.app.filter(f"addr == {key}")
-            self.app.action_switch("frames")
+            analyzer(self).filter(f"addr == {key}")
+            analyzer(self).action_switch("frames")
 
 
 def _cell(name: str, value: ring_words.Cell) -> Text:

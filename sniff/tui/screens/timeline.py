@@ -14,6 +14,7 @@ from dissectors.findings import counted
 from dissectors.line import NS_PER_S
 from sniff.analysis.load import Second
 from sniff.store import Store
+from sniff.tui.analyzer import analyzer
 from sniff.tui.charts import sparkline
 from sniff.tui.screens.base import ViewScreen
 from sniff.tui.times import clock
@@ -113,7 +114,7 @@ class TimelineScreen(ViewScreen):
         chart = self.query_one("#main", Static)
         first, last = self._span()
         if first is None or last is None:
-            chart.update("nothing was heard yet" if self.app.status.live else "no frames in this file")
+            chart.update("nothing was heard yet" if analyzer(self).status.live else "no frames in this file")
             return
         if self._zoom is None:
             fitting = (at for at, zoom in enumerate(ZOOMS) if (last - first + 1) <= zoom * width)
@@ -261,7 +262,7 @@ class TimelineScreen(ViewScreen):
         """No selection, no filter."""
         self._anchor = None
         if self.viewing.filter:
-            self.app.filter("")
+            analyzer(self).filter("")
         self.draw()
 
     def action_open(self) -> None:
@@ -275,10 +276,10 @@ class TimelineScreen(ViewScreen):
         low, high = chosen or (begin, begin + zoom)
         first, after = (_row_at(self.store, second * NS_PER_S) for second in (low, high))
         if chosen is not None:
-            self.app.filter(f"no >= {first} && no < {after}")
+            analyzer(self).filter(f"no >= {first} && no < {after}")
             self._anchor = None
             self.app.notify("a filter shows these frames only; esc removes it", timeout=5)
-        self.app.show_row(min(first, self.store.last_no))
+        analyzer(self).show_row(min(first, self.store.last_no))
 
 
 class _Chart(Static, can_focus=True):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from textual.app import ComposeResult
 
 from sniff.store import BAD_VERDICTS
+from sniff.tui.analyzer import analyzer
 from sniff.tui.filter_line import FilterLine
 from sniff.tui.linelist import LineList
 from sniff.tui.screens.listing import ListingScreen
@@ -44,7 +45,7 @@ class TransactionsScreen(ListingScreen):
         if shown is None or self.store.by_no(shown) is None:
             self.notify("its frames are no longer in memory", timeout=2)
         else:
-            self.app.show_row(shown)
+            analyzer(self).show_row(shown)
 
     def action_error(self, direction: int) -> None:
         """Next or previous transaction that went wrong and that is shown."""
