@@ -41,6 +41,10 @@ class Expected(NamedTuple):
     length: int | None
     octets: bytes
 
+    def is_for(self, octets: Octets, start: int) -> bool:
+        """Whether the head at `start` names the station and the function asked, as an exception or not."""
+        return octets[start] == self.unit and octets[start + 1] & ~EXCEPTION_BIT == self.function
+
     def fit(self, octets: bytes, response: bool) -> int:
         """Bits that a complete frame gains from being expected (0: it is not); `response`: whether it can be one."""
         if octets[0] != self.unit:

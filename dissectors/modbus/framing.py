@@ -294,11 +294,17 @@ class RtuFramer:
         starts = list(window.cuts)
         if window.start_bits() or window.good_before:
             starts.append(base)
-        for each in self._open.look(bytes(octets[:count]), base, starts, self._finder.good, silent):
+        known, good = bytes(octets[:count]), self._finder.good
+        for each in self._open.look(known, base, starts, good, silent, window.expected, window.past, window.units):
             found[each.start, each.length] = each
         if silent:
             for start in starts:
-                whole = whole_stretch(octets, start - base, count, start, window.past, window.expected)
+                at, heard = start - base, False
+                awaited = False
+                if at + 2 <= count:
+                    heard = window.heard(octets[at])
+                    awaited = window.expected is not None and window.expected.is_for(octets, at)
+                whole = whole_stretch(octets, at, count, start, window.past, awaited, heard)
                 if whole is not None:
                     found[start, whole.length] = whole
         return list(found.values())

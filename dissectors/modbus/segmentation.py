@@ -35,7 +35,7 @@ from typing import Final, NamedTuple, Protocol
 from dissectors.modbus.candidates import CRC_BITS, ZERO_TAIL, Candidate, Pending, Reading, octet_hope
 from dissectors.modbus.expectation import LOOSE, Expected, expectation
 from dissectors.modbus.functions import EXCEPTION_BIT, MORE
-from dissectors.modbus.past import KNOWN_LENGTH, Past
+from dissectors.modbus.past import KNOWN_LENGTH, KNOWN_REQUEST, Past
 
 THRESHOLD: Final = 20
 SCALE: Final = 16
@@ -80,13 +80,14 @@ class Surroundings(Protocol):
 
 
 class _Step(NamedTuple):
-    """A path: the candidate it ends with, the path before, and its worth."""
+    """A path: the candidate it ends with, the path before, and its worth; `asked`: the newest request in it."""
 
     worth: int
     candidate: Candidate | None
     before: _Step | None
     end: int  # position directly after a good frame, or -1
     expected: Expected | None
+    asked: bytes
 
 
 def worth(bits: int, length: int) -> int:
@@ -121,7 +122,7 @@ class Paths:
     def __init__(self, window: Surroundings) -> None:
         self._window = window
         self.base = window.base
-        root = _Step(0, None, None, window.base if window.good_before else -1, window.expected)
+        root = _Step(0, None, None, window.base if window.good_before else -1, window.expected, b"")
         self._ends = [window.base]  # of every path found, ascending
         self._best = [root]  # the best of those that end there or before
         self._touching: dict[int, list[_Step]] = {window.base: [root]}  # by the position that they end at
@@ -168,23 +169,26 @@ class Paths:
         bits = candidate.bits + window.edge(end) + _standing(window, candidate.unit, start, end)
         known = window.past.bits(octets, candidate.request, candidate.response)
         edge = window.edge(start)
-        total, before = None, self._best[0]
+        either = candidate.request and candidate.response
+        chosen: dict[bool, tuple[int, _Step]] = {}  # one that may be both is tried as request and as answer
         for step in self._options(start, candidate.unit, octets[1]):
             fit = step.expected.fit(octets, candidate.response) if step.expected is not None else 0
+            if candidate.request and octets == step.asked:
+                fit = max(fit, KNOWN_REQUEST)
             own = bits + max(fit, known) + (ADJACENT if step.end == start else edge)
             if candidate.zeros:
                 own += zero_bits(window, candidate, step.expected, fit)
             reached = step.worth + worth(own, candidate.length)
-            if total is None or reached > total:
-                total, before = reached, step
-        if total is None:
-            return
-        after = expectation(before.expected, octets, candidate.request, candidate.response)
-        step = _Step(total, candidate, before, end, after)
-        self._ends.append(end)
-        self._best.append(step if total > self._best[-1].worth else self._best[-1])
-        self._touching.setdefault(end, []).append(step)
-        self._remember_awaiting(end, step)
+            answers = either and step.expected is not None and step.expected.is_for(octets, 0)
+            if answers not in chosen or reached > chosen[answers][0]:
+                chosen[answers] = reached, step
+        for total, before in chosen.values():
+            after = expectation(before.expected, octets, candidate.request, candidate.response)
+            step = _Step(total, candidate, before, end, after, before.asked if after is None else octets)
+            self._ends.append(end)
+            self._best.append(step if total > self._best[-1].worth else self._best[-1])
+            self._touching.setdefault(end, []).append(step)
+            self._remember_awaiting(end, step)
 
     def _options(self, start: int, unit: int, code: int) -> Sequence[_Step]:
         """Paths that a frame may follow; the best of them is among these."""

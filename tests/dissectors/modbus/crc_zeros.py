@@ -14,6 +14,7 @@ from typing import Final
 from dissectors.checksums import crc16_modbus
 from dissectors.frame import Chunk, Event, Frame, Role
 from dissectors.line import LineSettings, Timing
+from dissectors.modbus.candidates import is_text
 from dissectors.modbus.framing import RtuFramer
 from dissectors.modbus.functions import BROADCAST, EXCEPTION_BIT
 from dissectors.modbus.header import peek_rtu
@@ -125,6 +126,8 @@ def exchanges_with_zeros(code: int, dice: random.Random, count: int) -> Iterator
         elif tried % 8 == 2:
             answered = bytes([code | EXCEPTION_BIT, dice.choice([1, 2, 3, 4])])
         frames = sealed(unit + asked), sealed(unit + answered)
+        if any(frame.endswith(b"\0\0\0") or is_text(frame) for frame in frames) and code not in CODES:
+            continue  # nothing but a length could tell the former from zeros after a frame, the latter from text
         if zeros_of(frames[0]) or zeros_of(frames[1]):
             yield frames
             given += 1
