@@ -75,7 +75,9 @@ class Past:
         self._lengths[key] = self._lengths.get(key, 0) | 1 << len(octets)
         if not known:
             length, times = self._constant.get(key, (len(octets), 0))
-            self._constant[key] = (length, min(times + 1, _CONSTANT)) if length == len(octets) and times >= 0 else (0, -1)
+            self._constant[key] = (
+                (length, min(times + 1, _CONSTANT)) if length == len(octets) and times >= 0 else (0, -1)
+            )
 
     def note_stray_zero(self) -> None:
         """A zero behind a frame that cannot be its last octet."""

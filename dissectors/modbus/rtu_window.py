@@ -9,7 +9,7 @@ from dissectors.checksums import crc16_modbus
 from dissectors.frame import Check, Damage, Event, Found, Frame, Noise, Place, Reason
 from dissectors.framer import UNKNOWN_SILENCE, OctetWindow
 from dissectors.line import Timing
-from dissectors.modbus.candidates import Candidate, Reading, readings
+from dissectors.modbus.candidates import SHORT_FRAME, Candidate, Reading, octet_bits, readings
 from dissectors.modbus.expectation import Expected, expectation
 from dissectors.modbus.functions import is_open_length
 from dissectors.modbus.past import Past
@@ -184,12 +184,15 @@ class RtuWindow:
             self._take_damaged(count, hurt)
 
     def _note_stray_zeros(self, count: int) -> None:
-        """Zeros follow a frame: they teach where they cannot be the end of it."""
+        """Zeros follow a frame: they teach where no well-formed frame ends with them."""
         good = self._last_good
-        lengths = [len(good) + zeros for zeros in range(1, min(count, 2) + 1)]
+        if is_open_length(good):
+            return
         whole = good + bytes(min(count, 2))
-        if not any(length in lengths for length, _, _ in readings(whole, 0, len(whole))) and not is_open_length(good):
-            self.past.note_stray_zero()
+        for reading in readings(whole, 0, len(whole)):
+            if reading.length > len(good) and octet_bits(whole, 0, reading) >= SHORT_FRAME:
+                return
+        self.past.note_stray_zero()
 
     def _take_noise(self, count: int, before: Side, after: Side, reason: Reason | None) -> None:
         place = self._place(count, before, after)
