@@ -48,6 +48,10 @@ class Past:
             return KNOWN_LENGTH
         return 0
 
+    def has_asked(self, octets: bytes) -> bool:
+        """Whether octets were a request before, octet for octet."""
+        return octets in self._requests
+
     def knows_length(self, unit: int, code: int, length: int) -> bool:
         """Whether a frame of this length has answered."""
         return bool(self._lengths.get(_key(unit, code, True), 0) >> length & 1)

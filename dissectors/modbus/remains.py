@@ -6,7 +6,7 @@ from enum import Enum, auto
 from typing import NamedTuple
 
 from dissectors.frame import Damage, LineError, Mark, Place, Reason
-from dissectors.modbus.candidates import SHORT_FRAME, octet_bits, readings
+from dissectors.modbus.candidates import SHORT_FRAME, Reading, octet_bits, readings
 from dissectors.modbus.expectation import Expected
 from dissectors.modbus.functions import (
     BROADCAST,
@@ -79,6 +79,20 @@ def injury(octets: bytes, before: Side, after: Side, heard: bool | None, expecte
     if right is None or count < right:
         return Injury(right, Damage.SHORT)
     return Injury(right, Damage.LONG)
+
+
+def cut_echo_of(octets: bytes, expected: Expected | None) -> int | None:
+    """The length of the open request, where octets are its begin, given back and cut short, rather than that of its
+    answer; else None.
+
+    Of functions whose answer repeats the request it may be either; the length that is missed is the same.
+    """
+    count = len(octets)
+    if expected is None or not 3 <= count < len(expected.octets) or not expected.octets.startswith(octets):
+        return None
+    if count == 3 and readings(octets, 0, count)[-1:] == (Reading(expected.length or 0, False, True),):
+        return None  # its third octet is the byte count of the answer as well
+    return len(expected.octets)
 
 
 def predicted(octets: bytes) -> int | None:

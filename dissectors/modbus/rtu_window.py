@@ -6,7 +6,7 @@ framing.py decides what is a frame; here is what it knows, and what becomes of i
 from __future__ import annotations
 
 from dissectors.checksums import crc16_modbus
-from dissectors.frame import Check, Damage, Event, Found, Frame, Noise, Place, Reason
+from dissectors.frame import Check, Damage, Event, Flaw, Found, Frame, Noise, Place, Reason, Repair
 from dissectors.framer import UNKNOWN_SILENCE, OctetWindow
 from dissectors.line import Timing
 from dissectors.modbus.candidates import SHORT_FRAME, Candidate, Reading, octet_bits, readings
@@ -17,13 +17,17 @@ from dissectors.modbus.remains import (
     ODD_LENGTH,
     Injury,
     Side,
+    cut_echo_of,
     injury,
     noise_place,
     noise_reason,
     predicted,
     zeros_at_start,
 )
+from dissectors.modbus.repair import repaired
 from dissectors.modbus.segmentation import LIKELY, PROVED
+
+_ALL_AGREES = frozenset({Flaw.CHECK_SWAPPED, Flaw.FIRST_MISSING, Flaw.FIRST_SPOILT})
 
 
 class RtuWindow:
@@ -175,13 +179,28 @@ class RtuWindow:
                 before, stretch, count = Side.NOISE, stretch[zeros:], count - zeros
         heard = stretch[0] in self.units if self.units else None
         hurt = injury(stretch, before, after, heard, self.expected)
-        if hurt is None:
+        bounded = before is not Side.NOISE and after is not Side.NOISE
+        if bounded and (echoed := cut_echo_of(stretch, self.expected)):
+            self._take_damaged(count, Injury(echoed, Damage.SHORT), None)
+        elif bounded and crc16_modbus(stretch) and (repair := repaired(stretch, self.expected, self.past, self.units)):
+            self._take_repaired(count, repair)
+        elif hurt is None:
             self._take_noise(count, before, after, None)
         elif not crc16_modbus(stretch):  # too weak to be found in a run of octets, but nothing else is beside it
             fits = [r for r in readings(stretch, 0, count) if r.length == count]
             self.take_frame(count, any(r.request for r in fits), any(r.response for r in fits))
         else:
-            self._take_damaged(count, hurt)
+            self._take_damaged(count, hurt, None)
+
+    def _take_repaired(self, count: int, repair: Repair) -> None:
+        """Give a damaged frame that is known all the same. A request of which all of the check agrees is open now."""
+        whole = repair.octets
+        self._take_damaged(count, Injury(len(whole), Damage.CHECK if len(whole) == count else Damage.SHORT), repair)
+        fits = [r for r in readings(whole, 0, len(whole)) if r.length == len(whole)]
+        request = any(r.request for r in fits) or is_open_length(whole)
+        if request and (repair.flaw in _ALL_AGREES or self.past.has_asked(whole)):
+            response = any(r.response for r in fits) or is_open_length(whole)
+            self.expected = expectation(self.expected, whole, request, response)
 
     def _note_stray_zeros(self, count: int) -> None:
         """Zeros follow a frame: they teach where no well-formed frame ends with them."""
@@ -203,16 +222,27 @@ class RtuWindow:
         self._skipped += count
         self._out.append(Noise(taken.octets, taken.start, taken.end, place, reason, taken.marks))
 
-    def _take_damaged(self, count: int, hurt: Injury) -> None:
+    def _take_damaged(self, count: int, hurt: Injury, repair: Repair | None) -> None:
         found = self._found(count)
         octets, start, end, slack, marks = self._octets.take(count)
         check = Check.ABSENT if hurt.damage is Damage.SHORT else Check.BAD
+        skipped, self._skipped = self._skipped, 0
         self._out.append(
             Frame(
-                "modbus-rtu", octets, start, end, check, found, hurt.damage, hurt.expected, self._skipped, slack, marks
+                "modbus-rtu",
+                octets,
+                start,
+                end,
+                check,
+                found,
+                hurt.damage,
+                hurt.expected,
+                skipped,
+                slack,
+                marks,
+                repair=repair,
             )
         )
-        self._skipped = 0
         self._taken(count, Side.FRAME)
 
     def _taken(self, count: int, kind: Side) -> None:

@@ -16,7 +16,7 @@ that fits it, and neither alone.
 
 A good frame and zeros is good again (the CRC is 0), and one frame in 256 ends with a zero: two readings of the same
 octets. The request that is open decides between them; where none speaks, a request is likelier than an answer that
-nobody asked for, and between two silences the reading that uses all octets is likelier than one that leaves a zero over.
+nobody asked for, and between two silences the reading that uses all octets is likelier than one that leaves a zero.
 More zeros than a CRC has, or a bus on which zeros tend to follow frames, speak for the shorter reading.
 
 A path is extended by a candidate from the best path before it, the best that ends directly before it, and the best

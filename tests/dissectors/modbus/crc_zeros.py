@@ -120,7 +120,7 @@ def exchanges_with_zeros(code: int, dice: random.Random, count: int) -> Iterator
         asked, answered = exchange(code, dice)
         if tried % 8 == 0 and len(answered) > 6 and asked != answered:
             answered = _with_both(unit, answered)
-        elif tried % 8 == 1 and code in (6, 8, 0x16) or tried % 8 == 1 and code not in CODES and len(asked) > 4:
+        elif tried % 8 == 1 and (code in (6, 8, 0x16) or (code not in CODES and len(asked) > 4)):
             body = _with_both(unit, asked)
             asked, answered = body, body if asked == answered else answered
         elif tried % 8 == 2:
@@ -145,7 +145,7 @@ def _with_both(unit: bytes, body: bytes) -> bytes:
 
 @dataclass(frozen=True, slots=True)
 class Pace:
-    """How fast a bus is: silences before an answer and before the next request, and after a request nobody answers, ms."""
+    """How fast a bus is: silences before an answer, before the next request, after a request nobody answers, ms."""
 
     answer: float
     pause: float
