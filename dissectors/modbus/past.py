@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import Final
 
+from dissectors.frame import Flaw
 from dissectors.modbus.functions import EXCEPTION_BIT, FUNCTIONS
 
 KNOWN_REQUEST: Final = 8
@@ -32,12 +33,13 @@ _STRAY_BUS: Final = 1500
 class Past:
     """Requests and lengths of answers by station and function; whether zeros tend to follow frames on this bus."""
 
-    __slots__ = ("_constant", "_lengths", "_requests", "_strays")
+    __slots__ = ("_constant", "_flaws", "_lengths", "_requests", "_strays")
 
     def __init__(self) -> None:
         self._requests: dict[bytes, None] = {}  # the newest last
         self._lengths: dict[int, int] = {}  # unit, function, direction → a bit for each length
         self._constant: dict[int, tuple[int, int]] = {}  # of functions of unknown layout: first length, how often
+        self._flaws: dict[int, Flaw] = {}  # of the newest answer, by station
         self._strays = 0
 
     def bits(self, octets: bytes, request: bool, response: bool) -> int:
@@ -61,9 +63,17 @@ class Past:
         length, times = self._constant.get(_key(unit, code, answer), (0, 0))
         return length if times >= _CONSTANT else None
 
+    def is_habit(self, unit: int, flaw: Flaw) -> bool:
+        """Whether the answer before of this station had the same flaw; the answer under way has it."""
+        before = self._flaws.get(unit)
+        self._flaws[unit] = flaw
+        return before is flaw
+
     def note(self, octets: bytes, request: bool) -> None:
         """A good frame, and what it was taken for."""
         self._strays -= self._strays >> 6
+        if not request:
+            self._flaws.pop(octets[0], None)
         code = octets[1]
         known = code & ~EXCEPTION_BIT in FUNCTIONS
         if request:

@@ -85,10 +85,12 @@ def cut_echo_of(octets: bytes, expected: Expected | None) -> int | None:
     """The length of the open request, where octets are its begin, given back and cut short, rather than that of its
     answer; else None.
 
-    Of functions whose answer repeats the request it may be either; the length that is missed is the same.
+    Of functions whose answer repeats the request it may be either: it is no echo here, but misses the same length.
     """
     count = len(octets)
-    if expected is None or not 3 <= count < len(expected.octets) or not expected.octets.startswith(octets):
+    if expected is None or expected.length == len(expected.octets):
+        return None
+    if not 3 <= count < len(expected.octets) or not expected.octets.startswith(octets):
         return None
     if count == 3 and readings(octets, 0, count)[-1:] == (Reading(expected.length or 0, False, True),):
         return None  # its third octet is the byte count of the answer as well

@@ -9,8 +9,9 @@ that are good but for it. Put it right, and see whether the check agrees:
                                 the open request, or be a request that was made before
     last two octets missing     none is left: the same, and nothing but the check may be missing
 
-What merely could be put right is not told: one damaged frame in 65536 would seem to have any of the first three flaws by
-chance, one in 256 of those whose length is right the fourth.
+What merely could be put right is not told. By chance one damaged frame in 65536 would have one of the first three
+flaws; but one in 256 with a wrong check seems to have only its last octet spoilt, and any frame that lost two octets
+somewhere to lack its check. So an answer with one of those must follow another of that station with the same flaw.
 """
 
 from __future__ import annotations
@@ -37,6 +38,7 @@ from dissectors.modbus.past import Past
 _SHORTEST: Final = MIN_FRAME + 1
 """Octets of the shortest frame that is put right: of fewer, too little agrees beside the check."""
 
+_BY_HABIT: Final = frozenset({Flaw.LAST_SPOILT, Flaw.LAST_TWO_MISSING})
 _WELL_FORMED: Final = 5
 """Bits that tell a request whose counts are right from octets that merely could be one."""
 
@@ -48,12 +50,15 @@ def repaired(octets: bytes, expected: Expected | None, past: Past, heard: Set[in
     """
     if not MIN_FRAME - 1 <= len(octets) <= MAX_FRAME:
         return None
-    return (
+    repair = (
         _swapped(octets, expected, heard)
         or _without_first(octets, expected, heard)
         or _without_last(octets, expected, past)
         or _last_spoilt(octets, expected, past)
     )
+    if repair is None or repair.flaw not in _BY_HABIT or past.has_asked(repair.octets):
+        return repair
+    return repair if past.is_habit(repair.octets[0], repair.flaw) else None
 
 
 def _sealed(body: bytes) -> bytes:

@@ -25,6 +25,7 @@ from dissectors.modbus.header import peek_ascii, peek_rtu
 from dissectors.modbus.tracker import ModbusTracker
 from tests.bus_delivery import FTDI_LATENCY, MS
 
+VERBOSE = False
 UNITS = (1, 2, 3, 7, 17)
 
 
@@ -309,6 +310,8 @@ def score(total: Score, bus: Bus, events: list[Event], tracker: ModbusTracker) -
             at += len(event.octets)
             continue
         header = (peek_ascii if event.protocol == "modbus-ascii" else peek_rtu)(event)
+        if event.repair is not None and VERBOSE and not any(o.octets == event.repair.octets for o in hurt):
+            print("   wrongly", event.repair.flaw.value, event.octets.hex(" "), "|", event.repair.octets.hex(" "))
         placement = tracker.track(number, event, header).placement
         if event.ok:
             one = reached.get(at)
