@@ -37,7 +37,15 @@ from dissectors.modbus.candidates import (
     readings,
     whole_stretch,
 )
-from dissectors.modbus.functions import BROADCAST, EXCEPTION_BIT, FUNCTIONS, MAX_FRAME, MAX_UNIT, MORE
+from dissectors.modbus.functions import (
+    BROADCAST,
+    EXCEPTION_BIT,
+    FUNCTIONS,
+    MAX_FRAME,
+    MAX_UNIT,
+    MORE,
+    is_open_length,
+)
 from dissectors.modbus.open_length import OpenLengthFinder
 from dissectors.modbus.past import KNOWN_LENGTH
 from dissectors.modbus.remains import Side
@@ -48,6 +56,7 @@ WINDOW: Final = 2 * MAX_FRAME
 """Most octets held without silence: then all but the last MAX_FRAME are given out."""
 
 _FIRST = 24  # a first look at a window: on a bus with silences most frames need none
+_FIRST_OPEN = 56  # the same where nothing predicts the length of what the window begins with
 _STEP = 32  # fewest octets between looks at a window that does not begin with a frame
 _PATIENT_STEP = 64  # the same while its begin may still become one
 _MOST_CUTS = 3  # silences over which a frame is pieced together
@@ -158,6 +167,9 @@ class RtuFramer:
         found = window.readings(count) if window.in_step() else ()
         if found and self._take_head(found, count, True):
             self._next = max(_FIRST, count - window.base + base)
+            return
+        if not found and count < _FIRST_OPEN and window.in_step() and is_open_length(window.octets):
+            self._next = _FIRST_OPEN
             return
         wait = WINDOW + 1  # until the shortest reading of the head that is still open is complete
         for length, _, _ in found:

@@ -36,7 +36,7 @@ class Past:
     __slots__ = ("_constant", "_flaws", "_lengths", "_requests", "_strays")
 
     def __init__(self) -> None:
-        self._requests: dict[bytes, None] = {}  # the newest last
+        self._requests: dict[bytes, None] = {}  # in the order they came first
         self._lengths: dict[int, int] = {}  # unit, function, direction → a bit for each length
         self._constant: dict[int, tuple[int, int]] = {}  # of functions of unknown layout: first length, how often
         self._flaws: dict[int, Flaw] = {}  # of the newest answer, by station
@@ -71,16 +71,17 @@ class Past:
 
     def note(self, octets: bytes, request: bool) -> None:
         """A good frame, and what it was taken for."""
-        self._strays -= self._strays >> 6
+        if self._strays:
+            self._strays -= self._strays >> 6
         if not request:
             self._flaws.pop(octets[0], None)
         code = octets[1]
         known = code & ~EXCEPTION_BIT in FUNCTIONS
         if request:
-            self._requests.pop(octets, None)
-            self._requests[octets] = None
-            if len(self._requests) > _MOST_REQUESTS:
-                del self._requests[next(iter(self._requests))]
+            if octets not in self._requests:
+                self._requests[octets] = None
+                if len(self._requests) > _MOST_REQUESTS:
+                    del self._requests[next(iter(self._requests))]
         if (known and request) or code & EXCEPTION_BIT or code in _FIXED:
             return
         key = _key(octets[0], code, not request)

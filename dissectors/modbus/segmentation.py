@@ -33,7 +33,7 @@ from collections.abc import Iterable, Sequence
 from typing import Final, NamedTuple, Protocol
 
 from dissectors.modbus.candidates import CRC_BITS, ZERO_TAIL, Candidate, Pending, Reading, octet_hope
-from dissectors.modbus.expectation import LOOSE, Expected, expectation
+from dissectors.modbus.expectation import LOOSE, SAME_UNKNOWN, Expected, expectation
 from dissectors.modbus.functions import EXCEPTION_BIT, MORE
 from dissectors.modbus.past import KNOWN_LENGTH, KNOWN_REQUEST, Past
 
@@ -50,6 +50,7 @@ SILENCE_INSIDE: Final = -6
 WHOLE: Final = 4
 """A frame whose last octets are zeros, and that fills the room between two silences: good without them, too."""
 
+_MOST_FROM_CONTEXT: Final = ADJACENT + SAME_UNKNOWN
 _CRC_OCTETS: Final = 2
 
 
@@ -117,7 +118,7 @@ class Paths:
     Valid until something is taken out of the window.
     """
 
-    __slots__ = ("_awaiting", "_best", "_ends", "_touching", "_window", "base")
+    __slots__ = ("_awaiting", "_best", "_ends", "_steps", "_touching", "_window", "base")
 
     def __init__(self, window: Surroundings) -> None:
         self._window = window
@@ -125,6 +126,7 @@ class Paths:
         root = _Step(0, None, None, window.base if window.good_before else -1, window.expected, b"")
         self._ends = [window.base]  # of every path found, ascending
         self._best = [root]  # the best of those that end there or before
+        self._steps = [root]
         self._touching: dict[int, list[_Step]] = {window.base: [root]}  # by the position that they end at
         self._awaiting: dict[int, tuple[list[int], list[_Step]]] = {}  # as the first two, by request left open
         self._remember_awaiting(window.base, root)
@@ -148,8 +150,11 @@ class Paths:
         if winner.candidate is None:
             return []
         hope: _Step | None = None
-        most = winner.worth
+        most, end = winner.worth, winner.candidate.start + winner.candidate.length
+        rivalled = self._is_rivalled(winner)
         for start, reading in pending:
+            if start >= end and not rivalled:
+                continue  # it follows the best path, whatever becomes of it
             total, step = self._hope(start, reading, count)
             if total > most:
                 most, hope = total, step
@@ -162,6 +167,15 @@ class Paths:
                 break
             agreed.append(ours)
         return agreed
+
+    def _is_rivalled(self, winner: _Step) -> bool:
+        """Whether another path is so near that what follows could make it the better one."""
+        near, path = winner.worth - _MOST_FROM_CONTEXT * SCALE, set()
+        step: _Step | None = winner
+        while step is not None:
+            path.add(id(step))
+            step = step.before
+        return any(each.worth > near and id(each) not in path for each in self._steps)
 
     def _add(self, candidate: Candidate) -> None:
         window, start, end = self._window, candidate.start, candidate.end
@@ -188,6 +202,7 @@ class Paths:
             self._ends.append(end)
             self._best.append(step if total > self._best[-1].worth else self._best[-1])
             self._touching.setdefault(end, []).append(step)
+            self._steps.append(step)
             self._remember_awaiting(end, step)
 
     def _options(self, start: int, unit: int, code: int) -> Sequence[_Step]:

@@ -1,4 +1,4 @@
-"""Damage that is always the same at one end of a frame: the framer says what the frame was, and only where it is proved."""
+"""Damage at one end of a frame that is always the same: the framer says what the frame was, only where it is proved."""
 
 from __future__ import annotations
 
