@@ -50,6 +50,9 @@ SILENCE_INSIDE: Final = -6
 WHOLE: Final = 4
 """A frame whose last octets are zeros, and that fills the room between two silences: good without them, too."""
 
+_WELL_TOLD: Final = frozenset({0x0F, 0x10, 0x17})
+"""Functions whose first octets are ill formed by chance nearly always."""
+
 _MOST_FROM_CONTEXT: Final = ADJACENT + SAME_UNKNOWN
 _CRC_OCTETS: Final = 2
 
@@ -155,6 +158,8 @@ class Paths:
         for start, reading in pending:
             if start >= end and not rivalled:
                 continue  # it follows the best path, whatever becomes of it
+            if not self._is_spoken_for(start):
+                continue
             total, step = self._hope(start, reading, count)
             if total > most:
                 most, hope = total, step
@@ -167,6 +172,20 @@ class Paths:
                 break
             agreed.append(ours)
         return agreed
+
+    def _is_spoken_for(self, start: int) -> bool:
+        """Whether anything but its first octets speaks for a frame that is not complete: of 65536 that nothing speaks
+        for, one becomes a frame."""
+        window = self._window
+        at = start - window.base
+        unit, code = window.octets[at], window.octets[at + 1]
+        return (
+            window.heard(unit)
+            or code in _WELL_TOLD
+            or start in self._touching
+            or unit << 8 | code & ~EXCEPTION_BIT in self._awaiting
+            or window.edge(start) > 0
+        )
 
     def _is_rivalled(self, winner: _Step) -> bool:
         """Whether another path is so near that what follows could make it the better one."""
