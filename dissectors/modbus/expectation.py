@@ -17,13 +17,13 @@ from dissectors.modbus.functions import (
     answer_length,
 )
 
-EXACT = 10
+EXACT = 14
 """Bits that an answer of the right station, function and length is worth."""
 
-LOOSE = 8
+LOOSE = 12
 """The same where the request leaves the length open."""
 
-REPEATED = 8
+REPEATED = 14
 """Bits for the open request once more, octet for octet: a retry, or an answer that echoes."""
 
 ODD = 2
