@@ -6,7 +6,7 @@ from enum import Enum, auto
 from typing import NamedTuple
 
 from dissectors.frame import Damage, LineError, Mark, Place, Reason
-from dissectors.modbus.candidates import SHORT_FRAME, octet_bits, readings
+from dissectors.modbus.candidates import SHORT_FRAME, Reading, octet_bits, readings
 from dissectors.modbus.expectation import Expected
 from dissectors.modbus.functions import (
     BROADCAST,
@@ -57,6 +57,8 @@ def injury(octets: bytes, before: Side, after: Side, heard: bool | None, expecte
     function = FUNCTIONS.get(code & ~EXCEPTION_BIT)
     if function is None:
         # the function octet itself may be hit: the length of the awaited answer tells
+        if awaited is not None and code & ~EXCEPTION_BIT == awaited.function:
+            return Injury(None, Damage.CHECK)
         return Injury(count, Damage.CHECK) if awaited is not None and count == awaited.length else None
     if not heard and not (1 <= unit <= MAX_UNIT or (unit == BROADCAST and function.writes)):
         return None
@@ -77,6 +79,22 @@ def injury(octets: bytes, before: Side, after: Side, heard: bool | None, expecte
     if right is None or count < right:
         return Injury(right, Damage.SHORT)
     return Injury(right, Damage.LONG)
+
+
+def cut_echo_of(octets: bytes, expected: Expected | None) -> int | None:
+    """The length of the open request, where octets are its begin, given back and cut short, rather than that of its
+    answer; else None.
+
+    Of functions whose answer repeats the request it may be either: it is no echo here, but misses the same length.
+    """
+    count = len(octets)
+    if expected is None or expected.length == len(expected.octets):
+        return None
+    if not 3 <= count < len(expected.octets) or not expected.octets.startswith(octets):
+        return None
+    if count == 3 and readings(octets, 0, count)[-1:] == (Reading(expected.length or 0, False, True),):
+        return None  # its third octet is the byte count of the answer as well
+    return len(expected.octets)
 
 
 def predicted(octets: bytes) -> int | None:

@@ -6,23 +6,28 @@ framing.py decides what is a frame; here is what it knows, and what becomes of i
 from __future__ import annotations
 
 from dissectors.checksums import crc16_modbus
-from dissectors.frame import Check, Damage, Event, Found, Frame, Noise, Place, Reason
+from dissectors.frame import Check, Damage, Event, Flaw, Found, Frame, Noise, Place, Reason, Repair
 from dissectors.framer import UNKNOWN_SILENCE, OctetWindow
 from dissectors.line import Timing
-from dissectors.modbus.candidates import Candidate, Reading, readings
+from dissectors.modbus.candidates import SHORT_FRAME, Candidate, Reading, octet_bits, readings
 from dissectors.modbus.expectation import Expected, expectation
 from dissectors.modbus.functions import is_open_length
+from dissectors.modbus.past import Past
 from dissectors.modbus.remains import (
     ODD_LENGTH,
     Injury,
     Side,
+    cut_echo_of,
     injury,
     noise_place,
     noise_reason,
     predicted,
     zeros_at_start,
 )
+from dissectors.modbus.repair import repaired
 from dissectors.modbus.segmentation import LIKELY, PROVED
+
+_ALL_AGREES = frozenset({Flaw.CHECK_SWAPPED, Flaw.FIRST_MISSING, Flaw.FIRST_SPOILT})
 
 
 class RtuWindow:
@@ -31,11 +36,12 @@ class RtuWindow:
     `octets`: the window. `base`: position of its first octet. `cuts`: positions of proved silences inside it.
     `end`: index at which silence or the end of the capture follows, None while octets may follow at once;
     `end_proved`: that it is silence. `units`: stations that good frames named. `expected`: the open request.
-    `good_before`: a good frame stands directly before the window.
+    `good_before`: a good frame stands directly before the window. `past`: what was said before.
     """
 
     __slots__ = (
         "_before",
+        "_last_good",
         "_latency",
         "_octets",
         "_out",
@@ -51,6 +57,7 @@ class RtuWindow:
         "expected",
         "good_before",
         "octets",
+        "past",
         "units",
     )
 
@@ -65,6 +72,8 @@ class RtuWindow:
         self.units: set[int] = set()
         self.expected: Expected | None = None
         self.good_before = False
+        self.past = Past()
+        self._last_good = b""
         self._out: list[Event] = []
         self._before = Side.SILENCE  # what stands directly before the window
         self._start: int | None = None  # evidence that a frame begins with the window; None until it is asked for
@@ -144,6 +153,8 @@ class RtuWindow:
         self._taken(count, Side.FRAME)
         self.good_before = True
         self.expected = expectation(self.expected, octets, request, response)
+        self.past.note(octets, self.expected is not None or not response)
+        self._last_good = octets
         self.units.add(octets[0])
 
     def take_rest(self, count: int, after: Side) -> None:
@@ -161,19 +172,46 @@ class RtuWindow:
         if self.good_before and before is Side.FRAME:
             zeros = zeros_at_start(stretch)
             if zeros == count or zeros > 1:
+                self._note_stray_zeros(zeros)
                 self._take_noise(zeros, before, after if zeros == count else Side.NOISE, Reason.ZEROS)
                 if zeros == count:
                     return
                 before, stretch, count = Side.NOISE, stretch[zeros:], count - zeros
         heard = stretch[0] in self.units if self.units else None
         hurt = injury(stretch, before, after, heard, self.expected)
-        if hurt is None:
+        bounded = before is not Side.NOISE and after is not Side.NOISE
+        if bounded and (echoed := cut_echo_of(stretch, self.expected)):
+            self._take_damaged(count, Injury(echoed, Damage.SHORT), None)
+        elif bounded and crc16_modbus(stretch) and (repair := repaired(stretch, self.expected, self.past, self.units)):
+            self._take_repaired(count, repair)
+        elif hurt is None:
             self._take_noise(count, before, after, None)
         elif not crc16_modbus(stretch):  # too weak to be found in a run of octets, but nothing else is beside it
             fits = [r for r in readings(stretch, 0, count) if r.length == count]
             self.take_frame(count, any(r.request for r in fits), any(r.response for r in fits))
         else:
-            self._take_damaged(count, hurt)
+            self._take_damaged(count, hurt, None)
+
+    def _take_repaired(self, count: int, repair: Repair) -> None:
+        """Give a damaged frame that is known all the same. A request of which all of the check agrees is open now."""
+        whole = repair.octets
+        self._take_damaged(count, Injury(len(whole), Damage.CHECK if len(whole) == count else Damage.SHORT), repair)
+        fits = [r for r in readings(whole, 0, len(whole)) if r.length == len(whole)]
+        request = any(r.request for r in fits) or is_open_length(whole)
+        if request and (repair.flaw in _ALL_AGREES or self.past.has_asked(whole)):
+            response = any(r.response for r in fits) or is_open_length(whole)
+            self.expected = expectation(self.expected, whole, request, response)
+
+    def _note_stray_zeros(self, count: int) -> None:
+        """Zeros follow a frame: they teach where no well-formed frame ends with them."""
+        good = self._last_good
+        if is_open_length(good):
+            return
+        whole = good + bytes(min(count, 2))
+        for reading in readings(whole, 0, len(whole)):
+            if reading.length > len(good) and octet_bits(whole, 0, reading) >= SHORT_FRAME:
+                return
+        self.past.note_stray_zero()
 
     def _take_noise(self, count: int, before: Side, after: Side, reason: Reason | None) -> None:
         place = self._place(count, before, after)
@@ -184,16 +222,27 @@ class RtuWindow:
         self._skipped += count
         self._out.append(Noise(taken.octets, taken.start, taken.end, place, reason, taken.marks))
 
-    def _take_damaged(self, count: int, hurt: Injury) -> None:
+    def _take_damaged(self, count: int, hurt: Injury, repair: Repair | None) -> None:
         found = self._found(count)
         octets, start, end, slack, marks = self._octets.take(count)
         check = Check.ABSENT if hurt.damage is Damage.SHORT else Check.BAD
+        skipped, self._skipped = self._skipped, 0
         self._out.append(
             Frame(
-                "modbus-rtu", octets, start, end, check, found, hurt.damage, hurt.expected, self._skipped, slack, marks
+                "modbus-rtu",
+                octets,
+                start,
+                end,
+                check,
+                found,
+                hurt.damage,
+                hurt.expected,
+                skipped,
+                slack,
+                marks,
+                repair=repair,
             )
         )
-        self._skipped = 0
         self._taken(count, Side.FRAME)
 
     def _taken(self, count: int, kind: Side) -> None:
