@@ -47,8 +47,11 @@ def of_next(request: Exchange, start: int, resembles: bool, learnt: Learnt) -> V
         return of_run(request)
     if pause + learnt.tolerance < gap * 9 // 10:
         return Verdict.ANSWERED  # nobody gives up sooner on the repeat
-    if learnt.pauses_after_answers(gap, pause, start - request.request.frame.start):
+    cycle = start - request.request.frame.start
+    if learnt.pauses_after_answers(gap, pause, cycle):
         return Verdict.ANSWERED
+    if learnt.pauses_after_timeouts(gap, pause, cycle) and not learnt.knows(request.unit):
+        return Verdict.NO_RESPONSE
     copy = request.copies[0]
     is_other = copy.octets != request.octets and len(copy.octets) != len(request.octets)
     if is_other and (resembles or not learnt.is_same(gap, pause)):
@@ -112,6 +115,8 @@ class Doubts:
         timeout, limit = learnt.timeout, learnt.response_limit(unit, doubt.exchange.writes)
         if timeout is not None and doubt.gap < timeout * 9 // 10:
             return Verdict.ANSWERED  # the master was still waiting
+        if limit is None:  # a write takes no less than a read
+            limit = learnt.response_limit(unit, not doubt.exchange.writes)
         if (limit is not None and doubt.gap <= limit) or unit in varying:
             return Verdict.ANSWERED
         return None

@@ -61,11 +61,22 @@ class Learnt:
 
         False while too little is known, and of a master that sends by the clock (`cycle` from request to request).
         """
-        if len(self._pauses) < 2 or any(self.is_same(cycle, one) for one in self._cycles):
+        if self._sends_by_the_clock(cycle):
             return False
+        return self._is_pause(pause) and pause + self._margin < gap + min(self._pauses) * 9 // 10
+
+    def pauses_after_timeouts(self, gap: int, pause: int, cycle: int) -> bool:
+        """Whether `pause` is what a master leaves that waited `gap` in vain once more, and no pause after an answer."""
+        if len(self._pauses) < 4 or self._sends_by_the_clock(cycle):
+            return False
+        return not self._is_pause(pause) and pause >= gap and self._is_pause(pause - gap)
+
+    def _sends_by_the_clock(self, cycle: int) -> bool:
+        return len(self._pauses) < 2 or any(self.is_same(cycle, one) for one in self._cycles)
+
+    def _is_pause(self, pause: int) -> bool:
         least, most = min(self._pauses), max(self._pauses)
-        as_usual = least - least // 10 <= pause + self._margin and pause <= most + most // 10 + self._margin
-        return as_usual and pause + self._margin < gap + least * 9 // 10
+        return least - least // 10 <= pause + self._margin and pause <= most + most // 10 + self._margin
 
     @property
     def timeout(self) -> int | None:
@@ -128,8 +139,10 @@ class Learnt:
     def in_time(self, unit: int, write: bool, gap: int) -> bool:
         """Whether a frame `gap` after a request may be its answer; where nothing is learnt, a fixed limit decides."""
         limit = self.response_limit(unit, write)
-        if limit is None:
-            limit = UNLEARNT_LIMIT if self._timeout is None else self._patience(unit)
+        if limit is None and self._timeout is not None:
+            limit = self._patience(unit)
+        if limit is None:  # a write takes no less than a read
+            limit = max(UNLEARNT_LIMIT, self.response_limit(unit, not write) or 0)
         return gap <= limit
 
     def too_soon(self, silence: int) -> int:

@@ -69,6 +69,7 @@ class ModbusTracker:
         self._given_up: deque[Exchange] = deque(maxlen=8)
         self._echoing: bool | None = None  # whether this bus repeats requests at once; None while unlearnt
         self._mute: set[int] = set()  # units in listen-only mode
+        self._only: bytes | None = None  # what all frames so far say; empty when they differ
         self._doubts = Doubts(self.learnt)
         self._chain: list[Exchange] = []  # equal requests before the open one, whose verdicts wait for it
 
@@ -86,6 +87,8 @@ class ModbusTracker:
             self._noise(event)
             return Tracked(None, self._take_closed())
         seen = Seen(no, event, header, readable_adu(event))
+        if self._only is None or self._only != seen.octets:
+            self._only = b"" if self._last_end is not None else seen.octets
         if not header.ok or len(seen.octets) < 2:
             placement = self._damaged(seen)
         elif header.role is Role.RESPONSE:
@@ -126,6 +129,7 @@ class ModbusTracker:
         if self._open is not None and self._open.copies:
             self._finish_copies(self._open, seen)
         before = self._open
+        copied = None if self._last is None else self._last.copied
         self._learn_from_next(seen, sure)
         request = Exchange(self._take_tx(), seen, sure, fault=fault)
         request.silent = is_listen_only(seen.octets) or (request.unit in self._mute and is_restart(seen.octets))
@@ -140,13 +144,10 @@ class ModbusTracker:
                 self._open, self._last = None, before
                 self._chain.append(before)
             else:
-                perhaps_answer = hasty and not (before.sure or before.attempt > 1 or before.echoed)
-                self._close_open(Verdict.UNDECIDED if perhaps_answer and self._is_plain(before) else None)
+                before.may_be_answer |= hasty and not (before.sure or before.attempt > 1 or before.echoed)
+                self._close_open()
         elif self._last is not None and not sure and not fault:
-            gap = self._last.gap(seen.frame.start)
-            request.after_broadcast = (
-                self._last.unit == BROADCAST and self._last.octets[1:] == seen.octets[1:] and gap < _TURNAROUND
-            )
+            self._note_likeness(request, self._last, copied)
         if not sure and not fault and self._last is None:
             request.remark = _FIRST_SEEN
         self._note_mode(request)
@@ -156,6 +157,15 @@ class ModbusTracker:
             return Placement(seen.no, request.tx, Role.BROADCAST, destination=BROADCAST)
         self._open = request
         return Placement(seen.no, request.tx, Role.REQUEST, destination=seen.unit)
+
+    def _note_likeness(self, request: Exchange, last: Exchange, copied: int | None) -> None:
+        """Whether what looks like a request may be the answer to the broadcast before it, or to what an echo seemed to
+        answer after `copied` ns."""
+        gap = last.gap(request.request.frame.start)
+        if last.unit == BROADCAST and last.octets[1:] == request.octets[1:]:
+            request.after_broadcast = gap < _TURNAROUND
+        elif last.octets == request.octets and copied is not None:
+            request.may_be_answer = copied <= self._echo_limit + self._timing.latency
 
     def _response(self, seen: Seen) -> Placement:
         """An answer: to the open request, a late, a second or an unsolicited one."""
@@ -366,7 +376,8 @@ class ModbusTracker:
             if last.copied is not None and last.octets != seen.octets:
                 self.learnt.answered(last.unit, last.writes, last.copied)
             last.copied = None
-            if sure and last.answered and self._last_was_answer and self._last_end is not None:
+            asks = sure or seen.unit != last.unit
+            if asks and last.answered and self._last_was_answer and self._last_end is not None:
                 cycle = seen.frame.start - last.request.frame.start
                 self.learnt.paused(max(0, seen.frame.start - self._last_end), cycle)
 
@@ -453,6 +464,8 @@ class ModbusTracker:
                 error = f"unit {request.unit} answered a broadcast"
                 self._closed.append(answer_apart(request.tx, request.request, Verdict.UNSOLICITED, None, error))
                 return
+            elif request.may_be_answer or (request.echoed and not request.sure and not self._echoing):
+                verdict = Verdict.UNDECIDED
             elif request.remark is _FIRST_SEEN and request.tx == 1:
                 verdict = Verdict.OPEN
             else:
@@ -479,6 +492,8 @@ class ModbusTracker:
             verdict = of_next(request, following.frame.start, resembles, self.learnt)
         elif len(request.copies) > 1:
             verdict = of_run(request)
+        if verdict is Verdict.ANSWERED and self._only == request.octets:
+            verdict = Verdict.UNDECIDED  # where nothing else is said, an answer may have been the first frame
         if verdict is None:
             self._doubts.add(request)
         else:
