@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
+from itertools import pairwise
 
 from dissectors.line import NS_PER_S
 from dissectors.modbus.exchange import Exchange
@@ -72,7 +73,7 @@ def is_full(request: Exchange) -> bool:
 
 def of_chain(chain: list[Exchange], learnt: Learnt) -> Verdict:
     """What requests are that equal each other and had no sure answer, where answers are known to come sooner."""
-    gaps = [before.gap(after.request.frame.start) for before, after in zip(chain, chain[1:], strict=False)]
+    gaps = [before.gap(after.request.frame.start) for before, after in pairwise(chain)]
     if any(learnt.is_timeout(gap) for gap in gaps):
         return Verdict.NO_RESPONSE
     steady = all(learnt.is_same(gap, gaps[0]) for gap in gaps)

@@ -35,7 +35,7 @@ _COUNTERS = frozenset((0x02, *range(0x0B, 0x13)))  # diagnostics whose request c
 
 
 def peek_rtu(frame: Frame) -> Header:
-    """The header of an RTU frame. Total; of a damaged frame, what its first octets say, or those of its repair."""
+    """The header of an RTU frame. Total; of a damaged frame, what its first octets or its repair say."""
     if frame.repair is not None:
         return _repaired(peek_rtu(readable(frame)), frame.repair)
     error = None if frame.ok else _damage(frame, "CRC error: 0x{:04X}, computed 0x{:04X}", rtu_check(frame))
@@ -43,7 +43,7 @@ def peek_rtu(frame: Frame) -> Header:
 
 
 def peek_ascii(frame: Frame) -> Header:
-    """The header of an ASCII frame. Total; of a damaged frame, what its first characters say, or those of its repair."""
+    """The header of an ASCII frame. Total; of a damaged frame, what its first characters or its repair say."""
     if frame.repair is not None:
         return _repaired(peek_ascii(readable(frame)), frame.repair)
     octets = ascii_octets(frame)

@@ -294,7 +294,7 @@ class ModbusTracker:
         return request.octets == seen.octets or seen.header.function not in FUNCTIONS
 
     def _may_be_answered_by(self, before: Exchange, seen: Seen) -> bool:
-        """Whether an equal request that comes later than answers are known to come may be a slow answer all the same."""
+        """Whether an equal request that comes later than answers usually do may be a slow answer all the same."""
         if before.sure or not self._is_plain(before) or before.echoed:
             return False
         gap = before.gap(seen.frame.start)
