@@ -35,6 +35,7 @@ _SPACING_LEAST = 8
 AT_ONCE = 50 * MS
 """No master repeats a request so soon."""
 
+_NO_WAIT = 10 * MS  # no master gives up so soon: it does not wait for one answer before it asks for the next
 _LOST_KEPT = 64
 _FINAL_KEPT = 64
 _SLOW_KEPT = 2
@@ -103,6 +104,7 @@ class ModbusFindings:
         self._newest: int | None = None  # the transaction of the newest request
         self._stray: dict[int, bytes] = {}  # octets that are no good frame, by the transaction they came in
         self._lost: dict[int, Lost] = {}  # requests without answer, by transaction
+        self._waits: dict[int, int] = {}  # by request that nothing followed: until the next one, ns
         self._slow: deque[_Slow] = deque()  # answers that took long, until the pause after them is known
         self._pauses: deque[int] = deque(maxlen=_SPACING_KEPT)  # the master's, between an answer and its next request
         self._answered: Frame | None = None  # the newest frame, if it was an answer
@@ -179,12 +181,7 @@ class ModbusFindings:
             first = self._final.get(transaction.of or 0)
             station.same_twice += not answer or first is None or first == answer
         elif verdict in (Verdict.LATE, Verdict.ANSWERED_TWICE):  # each try has its answer, the first one came late
-            station.late.add(transaction.start, transaction.response)
-            station.heard(transaction.end)
-            self._seen.late(transaction.response)
-            lost = self._lost.pop(transaction.of or 0, None)
-            if lost is not None:
-                station.forgive(lost)
+            self._settle_late(station, transaction)
         elif asked is not None:
             if answer:
                 self._final[transaction.id] = answer
@@ -242,11 +239,14 @@ class ModbusFindings:
         gap = max(0, asked.frame.start - before.frame.end)
         if asked.octets == before.octets:
             if gap > self._timing.t35 + self._timing.latency and before.header.role is Role.REQUEST:  # no echo
-                self._learnt.unanswered(gap)
+                self._learnt.unanswered(gap, repeated=True)
             return
         if before.header.role is not Role.REQUEST:  # a write has the shape of its answer, which may have come late
             return
         self._learnt.unanswered(gap)
+        self._waits[before.no] = gap
+        if len(self._waits) > _LOST_KEPT:
+            del self._waits[next(iter(self._waits))]
         if len(self._seen.hasty) < _HASTY_KEPT:
             self._seen.hasty.append((gap + before.frame.slack, before.unit, asked.frame.start, before.no, asked.no))
 
@@ -291,9 +291,10 @@ class ModbusFindings:
         if frame.protocol != RTU_NAME:
             return
         sender = _sender(placement)
+        # frames that touch came in one read, which says nothing of the silence between them
         if before is not None and header.ok and not frame.skipped and before.octets != frame.octets:
             longest = max(0, frame.start - before.end) + before.slack
-            if longest < timing.t35 - timing.line.bits(1):
+            if before.end < frame.start and longest < timing.t35 - timing.line.bits(1):
                 self._seen.too_close(sender, frame.start, no - 1, no)
         self._see_pause(no, frame, sender)
 
@@ -427,6 +428,18 @@ class ModbusFindings:
         if len(self._pauses) >= _SPACING_LEAST and 2 * pause < middle(self._pauses) - self._timing.latency:
             self._hurried.append(no - 1)
         self._pauses.append(pause)
+        self._learnt.paused(pause, 0)
+
+    def _settle_late(self, station: Station, transaction: Transaction) -> None:
+        """An answer after the next request: its own request is not lost; late only if the master has waited at all."""
+        station.heard(transaction.end)
+        self._seen.late(transaction.response)
+        lost = self._lost.pop(transaction.of or 0, None)
+        if lost is not None:
+            station.forgive(lost)
+            if self._waits.get(lost.no, AT_ONCE) < _NO_WAIT:
+                return
+        station.late.add(transaction.start, transaction.response)
 
     def _settle_for_nobody(self, transaction: Transaction, asked: _Asked) -> None:
         """A read of address 0, and who answered it."""

@@ -6,35 +6,44 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from dissectors.findings import Finding, Severity, Tally, counted, found, times
+from dissectors.modbus.damage_shares import Damage, shares_of_damage
 from dissectors.modbus.evidence import Evidence
-from dissectors.modbus.judgement_words import MS, ms, note_if, request_words, seconds, units, wilson
+from dissectors.modbus.judgement_words import MS, ms, note_if, request_words, seconds, units
 from dissectors.modbus.rules import RULES
 from dissectors.modbus.station_judgement import FLAWS, is_absent, of_station
 
 _WASTE = 0.05
 _HABIT = 10  # a sender that is too quick is so once in so many frames at least; what a computer holds up is rarer
+_HABIT_LEAST = 6
 _CUT_LEAST = 3
 _COMMON_LEAST = 4
 
 
 def judge(seen: Evidence, timeout: int | None) -> tuple[Finding, ...]:
     """All findings: the bus first, then station by station. `timeout`: the master's, ns, None while unlearnt."""
-    common = _common_damage(seen)
-    made = [*_of_bus(seen, bool(common)), *_of_masters(seen), *_of_gaps(seen), *common]
+    damage = shares_of_damage(seen)
+    made = [
+        *_of_bus(seen, "master" in damage.blamed),
+        *_of_masters(seen),
+        *_of_gaps(seen),
+        *_common_damage(seen, damage),
+    ]
     for unit in sorted(seen.stations):
-        made += of_station(seen, unit, seen.stations[unit], timeout, bool(common))
+        made += of_station(seen, unit, seen.stations[unit], timeout, f"station {unit}" not in damage.blamed)
     return tuple(made)
 
 
 # ---- the bus
 
 
-def _of_bus(seen: Evidence, is_common: bool) -> Iterator[Finding]:
+def _of_bus(seen: Evidence, is_blamed: bool) -> Iterator[Finding]:
     requests = sum(station.asked for station in seen.stations.values()) + seen.damaged_requests.count
     damaged = seen.damaged_requests
     if damaged.count:
         words = f"{damaged.count} of {counted(requests, 'request')} damaged"
-        yield damaged.found(RULES["MB009"], "master", words, note_if(seen.rare(damaged.count, requests) or is_common))
+        yield damaged.found(
+            RULES["MB009"], "master", words, note_if(seen.rare(damaged.count, requests) or not is_blamed)
+        )
     yield from _of_requests(seen)
     scanned = seen.scanned()
     if scanned:
@@ -128,9 +137,9 @@ def _of_masters(seen: Evidence) -> Iterator[Finding]:
     gaps = sorted(row[0] for row in hasty)
     if len(hasty) < 3:
         return
-    same = max(2 * MS + seen.timing.latency, gaps[-1] // 10)
+    same = MS + seen.timing.latency
     habitual = max(sum(abs(one - gap) <= same for one in gaps) for gap in gaps)
-    if len(gaps) > 3 and habitual > len(gaps) // 2 and 4 * same < alive[hasty[0][1]].times.quickest:
+    if len(gaps) >= _HABIT_LEAST and 4 * habitual > 3 * len(gaps):
         return
     tally = Tally()
     for _, _, time, before, no in hasty:
@@ -163,29 +172,22 @@ def _of_gaps(seen: Evidence) -> Iterator[Finding]:
         yield found(RULES["MB303"], "adapter", words, first=seen.first or 0, last=seen.now)
 
 
-def _common_damage(seen: Evidence) -> list[Finding]:
-    """Whether damage falls on all that is sent alike: on nobody much more than on its share of the octets."""
-    stations = {f"station {unit}": (unit, one) for unit, one in seen.stations.items() if one.answered or one.damaged}
-    hits = {sender: one.damaged.count - one.explained for sender, (_, one) in stations.items()}
-    hits["master"] = seen.damaged_requests.count
-    hits = {sender: count for sender, count in hits.items() if count > 0}
-    struck = [unit for sender, (unit, _) in stations.items() if sender in hits]
-    damaged, octets = sum(hits.values()), sum(seen.octets[sender] for sender in (*stations, "master"))
-    if len(hits) < 2 or not struck or damaged < _COMMON_LEAST or not octets:
+def _common_damage(seen: Evidence, damage: Damage) -> list[Finding]:
+    """What is damaged of senders none of which has more of it than its share."""
+    hits, struck = damage.common, [int(sender.split()[1]) for sender in damage.common if sender != "master"]
+    damaged = sum(hits.values())
+    if len(hits) < 2 or not struck or damaged < _COMMON_LEAST:
         return []
-    for sender, count in hits.items():
-        if wilson(count, damaged)[0] > seen.octets[sender] / octets:
-            return []
-    asked = sum(one.asked for _, one in stations.values())
-    answers = sum(count for sender, count in hits.items() if sender != "master")
+    asked = sum(seen.stations[unit].asked for unit in struck)
+    answers = damaged - hits.get("master", 0)
     tally = Tally()
     for unit in struck:
         for no in seen.stations[unit].damaged.evidence:
             tally.add(seen.stations[unit].damaged.first, no)
-    words = f"{answers} of {asked} answers damaged ({answers / max(1, asked):.1%}), of {units(struck)}"
+    words = f"{answers} of {counted(asked, 'answer')} damaged ({answers / max(1, asked):.1%}), of {units(struck)}"
     if "master" in hits:
         words += f", and {counted(hits['master'], 'request')}"
-    words += ": of everybody about as much as it sends"
+    words += ": of each about as much as it sends"
     finding = tally.found(RULES["MB007"], "bus", words, note_if(seen.rare(damaged, asked)))
     last = max(seen.stations[unit].damaged.last for unit in struck)
     return [replace(finding, count=answers, last=last)]

@@ -12,6 +12,7 @@ from itertools import pairwise
 from dissectors.line import Timing
 
 _SAMPLES = 16
+_ANSWER_CHARS = 32  # of an answer as long as most
 _MARGIN = 2_000_000  # of a host clock: no limit is finer than 2 ms
 UNLEARNT_LIMIT = 100_000_000
 """A copy of a request within 100 ms is its answer while nothing is learnt: hardly a master gives up so soon. Later
@@ -21,10 +22,21 @@ than that it may be the answer of a slow station as well as the request again.""
 class Learnt:
     """Response times by unit, the master's timeout, its pauses between an answer and the next request."""
 
-    __slots__ = ("_cycles", "_margin", "_pauses", "_reads", "_timeout", "_tolerance", "_unanswered", "_writes")
+    __slots__ = (
+        "_answer",
+        "_cycles",
+        "_margin",
+        "_pauses",
+        "_reads",
+        "_timeout",
+        "_tolerance",
+        "_unanswered",
+        "_writes",
+    )
 
     def __init__(self, timing: Timing) -> None:
         self._margin = _MARGIN + timing.latency
+        self._answer = _ANSWER_CHARS * timing.char
         self._tolerance = _MARGIN + timing.latency + 4 * timing.char
         self._reads: dict[int, deque[int]] = {}
         self._writes: dict[int, deque[int]] = {}
@@ -41,12 +53,14 @@ class Learnt:
             self._unanswered = deque((gap for gap in self._unanswered if gap > latency), maxlen=_SAMPLES)
             self._timeout = self._agreed()
 
-    def unanswered(self, elapsed: int) -> None:
-        """A sure request got nothing for `elapsed`; then a master sent another.
+    def unanswered(self, elapsed: int, repeated: bool = False) -> None:
+        """A sure request got nothing for `elapsed`; then a master sent another, or the same one again (`repeated`).
 
         Not a timeout when answers have been waited for longer: then a second master broke in, or the answer was missed.
+        Nor when it is no longer than an answer and the pause after it may take: then the answer was missed, too.
         """
-        if elapsed <= self._slowest():
+        cycle = self._slowest() + self._answer + max(self._pauses, default=0) * 11 // 10
+        if elapsed <= (self._slowest() if repeated or not self._pauses else cycle):
             return
         self._unanswered.append(elapsed)
         self._timeout = self._agreed()

@@ -333,6 +333,8 @@ class ModbusTracker:
             return False
         if self._echoing is not None:
             return self._echoing
+        if not latency.nominal:
+            return False  # both came in one read, which says nothing of the time between
         if latency.high < self._silence:
             return True
         fastest = self.learnt.fastest(request.unit)
@@ -371,7 +373,7 @@ class ModbusTracker:
         if before is not None:
             undisturbed = not (before.disturbed or before.fault or before.garble or before.silent)
             if sure and before.sure and undisturbed:
-                self.learnt.unanswered(before.gap(seen.frame.start))
+                self.learnt.unanswered(before.gap(seen.frame.start), before.octets == seen.octets)
         elif last is not None:
             if last.copied is not None and last.octets != seen.octets:
                 self.learnt.answered(last.unit, last.writes, last.copied)
