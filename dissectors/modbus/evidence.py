@@ -12,7 +12,7 @@ from dissectors.line import NS_PER_S, Timing
 from dissectors.modbus.station_record import Cycles, Station
 
 _SENDERS_KEPT = 300
-_SCAN_LEAST = 8
+_SCAN_LEAST = 4
 _CLOSE_KEPT = 4096
 _LATE_KEPT = 4096
 

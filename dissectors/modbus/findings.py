@@ -197,7 +197,7 @@ class ModbusFindings:
 
     def findings(self) -> tuple[Finding, ...]:
         """See `dissectors.findings.Judge`."""
-        while len(self._slow) > 1:  # of the last one the pause may still come
+        while self._slow:
             self._judge_slow(self._slow.popleft())
         return judge(self._seen, self._learnt.timeout)
 

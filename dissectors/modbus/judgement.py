@@ -16,7 +16,7 @@ _WASTE = 0.05
 _HABIT = 10  # a sender that is too quick is so once in so many frames at least; what a computer holds up is rarer
 _HABIT_LEAST = 6
 _CUT_LEAST = 3
-_COMMON_LEAST = 4
+_COMMON_LEAST = 3
 
 
 def judge(seen: Evidence, timeout: int | None) -> tuple[Finding, ...]:

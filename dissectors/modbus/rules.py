@@ -79,8 +79,8 @@ _ALL = (
     Rule(
         "MB007",
         Severity.WARNING,
-        "damage to all stations",
-        "At least four damaged frames, none of whose senders has a greater part in them than its part of all octets "
+        "damage whoever sends",
+        "At least three damaged frames, none of whose senders has a greater part in them than its part of all octets "
         "sent explains (95% confidence).",
         "a cause common to all: termination, bias, ground, cable, or noise near the master",
         "120 Ω at both ends only, one bias, the shield grounded once; then halve the line to find the place",
@@ -372,7 +372,7 @@ _ALL = (
         "MB402",
         Severity.INFO,
         "addresses searched",
-        "At least eight addresses that the master asked once, and that nobody has.",
+        "At least four addresses that the master asked once, and that nobody has.",
         "somebody searched the bus for stations",
         "nothing",
     ),

@@ -70,7 +70,7 @@ def _missing(seen: Evidence, name: str, unit: int, station: Station) -> Iterator
     if not missing.count:
         return
     if is_absent(station):
-        if station.turns > 1:
+        if missing.count > 1 and not seen.is_scanned(unit):
             words = f"no answer to any of {station.asked} requests"
             stray = station.damaged.count
             words += f"; octets that are no good answer followed {times(stray)}" if stray else ""

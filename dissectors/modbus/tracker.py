@@ -174,10 +174,13 @@ class ModbusTracker:
         if request is not None:
             if request.is_for(seen.octets):
                 why = mismatch(request.octets, seen.octets)
+                if why and late is None and self._repeats_last(seen):
+                    request.disturbed = True
+                    return self._answer_apart(seen, Verdict.ANSWERED_TWICE, self._last)
                 if late is None or not (why or self._is_too_soon(request, seen)):
                     return self._answer(request, seen, why)
             elif request.unit == seen.unit and late is None and not request.fault:
-                return self._answer(request, seen, another_function(request.octets, seen.octets))
+                return self._another_function(request, seen)
             elif request.fault and self._in_time(request, seen):
                 return self._answer(request, seen, None)
             elif late is None:
@@ -189,6 +192,22 @@ class ModbusTracker:
         if self._is_second_answer(seen):
             return self._answer_apart(seen, Verdict.ANSWERED_TWICE, self._last)
         return self._answer_apart(seen, Verdict.UNSOLICITED)
+
+    def _another_function(self, request: Exchange, seen: Seen) -> Placement:
+        """An answer of the station that was asked, to something else: to the request before, or to this one, wrong."""
+        if self._repeats_last(seen):
+            request.disturbed = True
+            return self._answer_apart(seen, Verdict.ANSWERED_TWICE, self._last)
+        if request.latency(seen.frame).high < self._silence:
+            return self._from_elsewhere(request, seen)
+        return self._answer(request, seen, another_function(request.octets, seen.octets))
+
+    def _repeats_last(self, seen: Seen) -> bool:
+        """Whether an answer fits the request before the open one, which was answered already."""
+        last = self._last
+        if last is None or not last.answered or last.fault or not last.is_for(seen.octets):
+            return False
+        return mismatch(last.octets, seen.octets) is None
 
     # ---- what only time decides
 
@@ -324,7 +343,7 @@ class ModbusTracker:
         gap = newest.gap(seen.frame.start)
         if self.timeout is not None:
             return gap < self._echo_limit or gap * 8 < self.timeout
-        return gap < max(self._echo_limit, _AT_ONCE)
+        return gap < self._echo_limit or (gap < _AT_ONCE and newest.unit != BROADCAST)
 
     def _is_echo_of_write(self, request: Exchange, seen: Seen) -> bool:
         """Whether a copy that could be an answer comes too soon to be one."""
