@@ -51,7 +51,11 @@ def _of_bus(seen: Evidence, is_blamed: bool) -> Iterator[Finding]:
         first = min(seen.stations[unit].missing.first for unit in scanned)
         last = max(seen.stations[unit].missing.last for unit in scanned)
         yield found(RULES["MB402"], "bus", words, first=first, last=last, count=len(scanned))
-    absent = {unit: station for unit, station in seen.stations.items() if is_absent(station) and station.turns > 1}
+    absent = {
+        unit: station
+        for unit, station in seen.stations.items()
+        if is_absent(station) and station.missing.count > 1 and unit not in scanned
+    }
     waited = sum(station.waited for station in absent.values())
     if waited:
         share = waited / seen.span

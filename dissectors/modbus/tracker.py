@@ -66,6 +66,7 @@ class ModbusTracker:
         self._last: Exchange | None = None  # the exchange that closed last
         self._last_end: int | None = None  # of the newest frame
         self._last_was_answer = False
+        self._answered: deque[Exchange] = deque(maxlen=4)  # the exchanges that were answered last
         self._given_up: deque[Exchange] = deque(maxlen=8)
         self._echoing: bool | None = None  # whether this bus repeats requests at once; None while unlearnt
         self._mute: set[int] = set()  # units in listen-only mode
@@ -174,9 +175,10 @@ class ModbusTracker:
         if request is not None:
             if request.is_for(seen.octets):
                 why = mismatch(request.octets, seen.octets)
-                if why and late is None and self._repeats_last(seen):
+                before = self._repeats(request, seen) if why and late is None else None
+                if before is not None:
                     request.disturbed = True
-                    return self._answer_apart(seen, Verdict.ANSWERED_TWICE, self._last)
+                    return self._answer_apart(seen, Verdict.ANSWERED_TWICE, before)
                 if late is None or not (why or self._is_too_soon(request, seen)):
                     return self._answer(request, seen, why)
             elif request.unit == seen.unit and late is None and not request.fault:
@@ -194,20 +196,22 @@ class ModbusTracker:
         return self._answer_apart(seen, Verdict.UNSOLICITED)
 
     def _another_function(self, request: Exchange, seen: Seen) -> Placement:
-        """An answer of the station that was asked, to something else: to the request before, or to this one, wrong."""
-        if self._repeats_last(seen):
+        """An answer of the station that was asked, to something else: to a request before, or to this one, wrong."""
+        before = self._repeats(request, seen)
+        if before is not None:
             request.disturbed = True
-            return self._answer_apart(seen, Verdict.ANSWERED_TWICE, self._last)
+            return self._answer_apart(seen, Verdict.ANSWERED_TWICE, before)
         if request.latency(seen.frame).high < self._silence:
             return self._from_elsewhere(request, seen)
         return self._answer(request, seen, another_function(request.octets, seen.octets))
 
-    def _repeats_last(self, seen: Seen) -> bool:
-        """Whether an answer fits the request before the open one, which was answered already."""
-        last = self._last
-        if last is None or not last.answered or last.fault or not last.is_for(seen.octets):
-            return False
-        return mismatch(last.octets, seen.octets) is None
+    def _repeats(self, request: Exchange, seen: Seen) -> Exchange | None:
+        """The request answered lately that an answer fits which comes sooner than the station has ever answered."""
+        fastest = self.learnt.fastest(request.unit)
+        if fastest is None or request.latency(seen.frame).high >= fastest:
+            return None
+        fitting = (before for before in reversed(self._answered) if before.is_for(seen.octets) and not before.fault)
+        return next((before for before in fitting if mismatch(before.octets, seen.octets) is None), None)
 
     # ---- what only time decides
 
@@ -427,6 +431,7 @@ class ModbusTracker:
     def _answer(self, request: Exchange, seen: Seen, why: str | None) -> Placement:
         self._learn_from_answer(request, seen, why)
         request.answered = True
+        self._answered.append(request)
         self._drop_chain(Verdict.NO_RESPONSE)
         self._open, self._last = None, request
         self._mute.discard(seen.octets[0])
