@@ -179,7 +179,9 @@ class MstpTracker:
             return self._at(no, waiting.id, header, Role.RESPONSE)
         if back and frame_type not in (FrameType.TOKEN, FrameType.POLL_FOR_MASTER):
             message, key = read(frame)
-            fits = waiting.damaged or key == waiting.key
+            if waiting.damaged:
+                waiting.key = key
+            fits = key == waiting.key
             if fits and (message is None or message.apdu is None or message.apdu.type != 0):
                 return self._answered(waiting, no, frame, header, message, closed)
             if waiting.key is not None:  # another answer went first: this one can only come later
