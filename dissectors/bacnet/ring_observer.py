@@ -106,7 +106,7 @@ class RingObserver:
         self._doubt = True  # something may have been missed since the last good frame
         self._before: Frame | None = None  # the last good frame
         self._quiet_since: int | None = None  # end of the last event of any kind
-        self._run_since = self._run_length = 0  # ns, of the octets that stand back to back at the end
+        self._alone_since: int | None = None  # where the last event has a time of its own: the earliest it may begin
         self._quiet_slack = 0  # of the last event
         self._missed: int | None = None  # where octets may be lost, until an event comes after it
         self._unanswered: OrderedDict[tuple[int, int], _Asked] = OrderedDict()  # by server and client
@@ -149,15 +149,15 @@ class RingObserver:
                 self._turn.see(event, header.function, header.source, header.destination)
                 self._before = event
                 self._doubt = False
-        self._add_to_run(event)
+        self._see_gap(event)
         self._quiet_since = event.end
 
-    def _add_to_run(self, event: FramerEvent) -> None:
-        """How long what stands back to back takes, and when the event before it ended at the earliest."""
+    def _see_gap(self, event: FramerEvent) -> None:
+        """Frames that stand back to back came in one read, maybe a late one, and have no times of their own."""
         if self._quiet_since is None or event.start - self._quiet_since >= self._least_gap:
-            self._run_since = event.start if self._quiet_since is None else self._quiet_since - self._quiet_slack
-            self._run_length = 0
-        self._run_length += event.end - event.start
+            self._alone_since = None if self._quiet_since is None else self._quiet_since - self._quiet_slack
+        else:
+            self._alone_since = None
         self._quiet_slack = event.slack if isinstance(event, Frame) else self._tally.timing.latency
 
     def miss(self, time: int) -> None:
@@ -345,9 +345,11 @@ class RingObserver:
             node.polls_waited += 1
         if self._surely_over(frame, asked.frame, T_GO_ON):
             self._late(What.SLOW_SEARCH, no, frame, frame.octets[4], asked.destination, took)
-        # what stands back to back may have come in one late read, and begun directly after what was before
-        longest = frame.start - self._run_since - self._run_length
-        if longest < T_USAGE_DELAY // 2 and not self._doubt and frame.octets != asked.frame.octets:
+        if self._alone_since is None or took < self._least_gap or self._doubt or frame.octets == asked.frame.octets:
+            return
+        # the poll may have come in a late read too, and begun directly after what was before it
+        longest = frame.start - self._alone_since - (asked.frame.end - asked.frame.start)
+        if longest < T_USAGE_DELAY // 2:
             self._tally.note(What.TOO_SOON, frame.start, no, frame.octets[4], asked.destination, took)
 
     def _unanswered_request(self, asked: _Asked) -> None:
