@@ -29,6 +29,7 @@ from dissectors.bacnet.limits import (
     T_USAGE_TIMEOUT,
     TURNAROUND_BITS,
 )
+from dissectors.bacnet.message import data_of
 from dissectors.bacnet.ring import EVENTS_MAX, Event, Ring, What
 from dissectors.bacnet.ring_damage import count_damage, speaker_of
 from dissectors.bacnet.ring_tally import NodeTally, RingTally
@@ -549,5 +550,4 @@ class RingObserver:
 
 def _same_data(frame: Frame, other: Frame) -> bool:
     """Whether two frames carry the same data; a pad behind them does not count."""
-    length = frame.octets[5] << 8 | frame.octets[6]
-    return frame.octets[5 : HEADER + length] == other.octets[5 : HEADER + length]
+    return data_of(frame.octets) == data_of(other.octets)
