@@ -180,7 +180,7 @@ def with_consequences(findings: Iterable[Finding], rules: Mapping[str, Rule]) ->
         codes = rules[cause.code].explains
         for other, finding in enumerate(made):
             if other != at and finding.cause is None and codes and _is_explained(finding, cause, codes):
-                made[other] = _as_consequence(finding, cause, rules)
+                made[other] = as_consequence(finding, cause, rules)
     return tuple(made)
 
 
@@ -191,7 +191,8 @@ def _is_explained(finding: Finding, cause: Finding, codes: tuple[str, ...]) -> b
     return everybody or finding.subject == cause.subject
 
 
-def _as_consequence(finding: Finding, cause: Finding, rules: Mapping[str, Rule]) -> Finding:
+def as_consequence(finding: Finding, cause: Finding, rules: Mapping[str, Rule]) -> Finding:
+    """The same finding as a note that names what most likely explains it."""
     return replace(
         finding,
         severity=min(finding.severity, Severity.NOTE),

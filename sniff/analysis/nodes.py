@@ -14,7 +14,7 @@ from sniff.engine import Row
 
 @dataclass(slots=True)
 class Node:
-    """One station. Times are ns; `damaged` counts frames to or from it that were not good.
+    """One station. Times are ns; `damaged` counts frames from it that were not good, and those to it of unknown sender.
 
     `verdicts`: of requests and data to it. Tokens and polls for masters are `passed` to it instead; a token that it did
     not use is `unused`, and no request without answer.
@@ -24,7 +24,7 @@ class Node:
     sent: int = 0  # frames from it
     received: int = 0  # frames to it
     damaged: int = 0
-    heard: int = 0  # good frames from it: a damaged frame may name a station that there is not
+    heard: int = 0  # good frames from it, or put right: a damaged frame may name a station that there is not
     first: int | None = None
     last: int | None = None
     verdicts: Counter[Verdict] = field(default_factory=Counter)
@@ -99,8 +99,8 @@ class NodeTable:
             node = self._node(address)
             node.sent += sends
             node.received += not sends
-            node.damaged += not row.event.ok
-            node.heard += sends and row.event.ok
+            node.damaged += not row.event.ok and (sends or source is None)
+            node.heard += sends and (row.event.ok or row.event.repair is not None)
             node.first = row.event.start if node.first is None else node.first
             node.last = row.event.end
 
