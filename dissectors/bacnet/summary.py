@@ -13,7 +13,7 @@ from dissectors.bacnet.header import error_text
 from dissectors.bacnet.limits import BROADCAST
 from dissectors.bacnet.message import Message
 from dissectors.bacnet.values import Record, escape, show, show_tag
-from dissectors.frame import Frame, Header, Role
+from dissectors.frame import Assembly, Frame, Header, Role
 
 LENGTH_MAX = 160
 """Longest line; longer ones end with an ellipsis."""
@@ -24,7 +24,7 @@ def text(frame: Frame, header: Header, role: Role) -> str:
     message = messages.read(frame)
     line = f"{_party(header.source)} → {_party(header.destination)} {header.kind}"
     if message is not None:
-        detail = _detail(message)
+        detail = _detail(frame, message)
         if detail:
             line += " " + detail
     if not header.ok:
@@ -39,7 +39,7 @@ def _party(address: int | None) -> str:
     return "*" if address == BROADCAST else str(address)
 
 
-def _detail(message: Message) -> str:
+def _detail(frame: Frame, message: Message) -> str:
     npdu = message.npdu
     if npdu is None:
         return _plain_data(message)
@@ -52,7 +52,20 @@ def _detail(message: Message) -> str:
         parts.append(_network(message, npdu))
     elif message.apdu is not None:
         parts.append(apdu_text(message.apdu, message.parameters))
+        if frame.assembly is not None:
+            parts.append(_assembled(frame.assembly, message))
     return " ".join(part for part in parts if part)
+
+
+def _assembled(assembly: Assembly, message: Message) -> str:
+    """What all segments say together, behind the last one."""
+    if message.whole is not None:
+        apdu, parameters = message.whole
+        decoded = messages.decode_parameters(apdu, parameters)
+        return f"of {len(assembly.frames)}: " + (parameters_text(apdu, decoded) if decoded is not None else "")
+    lost = len(assembly.missing)
+    which = ", ".join(map(str, assembly.missing[:4])) + (" …" if lost > 4 else "")
+    return f"({'segment' if lost == 1 else 'segments'} {which} not seen)"
 
 
 def _remote(net: int, address: bytes | None) -> str:
