@@ -249,7 +249,7 @@ def _kind(value: Any) -> tuple[str, Value] | None:
     if isinstance(value, Enumerated):
         return "enum_index", value.value
     if isinstance(value, (Date, Time)):
-        return type(value).__name__.lower(), str(value)
+        return type(value).__name__.lower(), value.plain
     return ("object_id", str(value)) if isinstance(value, ObjectId) else None
 
 

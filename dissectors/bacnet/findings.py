@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable
 
+from dissectors.bacnet.content_findings import ContentFindings
 from dissectors.bacnet.limits import MAX_MASTER, N_POLL, T_REPLY_DELAY, T_USAGE_DELAY
 from dissectors.bacnet.ring import Happened, Node, Ring, What
 from dissectors.bacnet.ring_observer import RingObserver
@@ -278,12 +279,14 @@ class MstpFindings:
 
     def __init__(self, timing: Timing) -> None:
         self._observer = RingObserver(timing)
+        self._content = ContentFindings()
         self._asked: Counter[tuple[int, str]] = Counter()  # answered requests, by station and service
         self._refused: dict[tuple[int, str, str], Tally] = {}  # by station, service, and class and code in words
 
     def see(self, no: int, event: Event, header: Header | None, placement: Placement | None = None) -> None:
         """Take the next row: event, its header and placement (None for noise)."""
         self._observer.see(no, event, header)
+        self._content.see(no, event, header)
 
     def settle(self, transaction: Transaction) -> None:
         """Take a transaction that closed; the ring model has its own view of them, but for error answers."""
@@ -303,7 +306,7 @@ class MstpFindings:
 
     def findings(self) -> tuple[Finding, ...]:
         """All findings so far, the gravest first."""
-        made = (*judge(self._observer.ring()), *self._error_answers())
+        made = (*judge(self._observer.ring()), *self._error_answers(), *self._content.findings())
         return tuple(sorted(made, key=_gravest_first))
 
     def _error_answers(self) -> Iterable[Finding]:

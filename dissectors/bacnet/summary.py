@@ -8,10 +8,12 @@ from dissectors.bacnet import message as messages
 from dissectors.bacnet import npdu as npdus
 from dissectors.bacnet.apdu import Apdu, PduType, reason_text
 from dissectors.bacnet.codec import Decoded
+from dissectors.bacnet.content import reply_flaw
 from dissectors.bacnet.frame_types import PROPRIETARY, FrameType
 from dissectors.bacnet.header import error_text
 from dissectors.bacnet.limits import BROADCAST
 from dissectors.bacnet.message import Message
+from dissectors.bacnet.station_address import remote
 from dissectors.bacnet.values import Record, escape, show, show_tag
 from dissectors.frame import Assembly, Frame, Header, Role
 
@@ -24,6 +26,9 @@ def text(frame: Frame, header: Header, role: Role) -> str:
     message = messages.read(frame)
     line = f"{_party(header.source)} → {_party(header.destination)} {header.kind}"
     if message is not None:
+        flaw = reply_flaw(message)
+        if flaw is not None:
+            line += f" ({flaw.value})"
         detail = _detail(frame, message)
         if detail:
             line += " " + detail
@@ -45,9 +50,9 @@ def _detail(frame: Frame, message: Message) -> str:
         return _plain_data(message)
     parts = []
     if npdu.dnet is not None:
-        parts.append("to " + ("all networks" if npdu.dnet == npdus.GLOBAL_BROADCAST else _remote(npdu.dnet, npdu.dadr)))
+        parts.append("to " + ("all networks" if npdu.dnet == npdus.GLOBAL_BROADCAST else remote(npdu.dnet, npdu.dadr)))
     if npdu.snet is not None:
-        parts.append("from " + _remote(npdu.snet, npdu.sadr))
+        parts.append("from " + remote(npdu.snet, npdu.sadr))
     if npdu.message is not None:
         parts.append(_network(message, npdu))
     elif message.apdu is not None:
@@ -66,10 +71,6 @@ def _assembled(assembly: Assembly, message: Message) -> str:
     lost = len(assembly.missing)
     which = ", ".join(map(str, assembly.missing[:4])) + (" …" if lost > 4 else "")
     return f"({'segment' if lost == 1 else 'segments'} {which} not seen)"
-
-
-def _remote(net: int, address: bytes | None) -> str:
-    return f"network {net}" + (f":{address.hex()}" if address else "")
 
 
 def _plain_data(message: Message) -> str:
@@ -131,6 +132,8 @@ def parameters_text(apdu: Apdu, decoded: Decoded) -> str:
             line = ""
     if not line:
         line = " ".join(f"{name}={show(value)}" for name, value in record)
+    if decoded.wrong:
+        line += f" ({decoded.wrong[0].found}, not {decoded.wrong[0].expected})"
     if decoded.rest:
         line += " " + " ".join(show_tag(tag) for tag in decoded.rest[:8])
     if decoded.error is not None:

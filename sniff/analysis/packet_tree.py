@@ -185,7 +185,7 @@ def _whole(built: Any) -> bytes:
 
 
 def _text(description: Any, layer: Any, value: Any) -> str:
-    if isinstance(value, bytes):
+    if isinstance(value, bytes) and type(description).i2repr.__module__.startswith("scapy."):
         return octets_text(value)
     try:
         shown = plain(description.i2repr(layer, value))

@@ -84,7 +84,7 @@ def test_a_worked_frame(good: bool, octets: bytes, note: str):
         ("", "1 → 2 reject-message-to-network 100: not directly connected to the network"),
         ("", "2 → 1 read-property to network 100:c0a8010abac0 device,55 object-name"),
         ("", '5 → * i-have device-identifier=device,1234 object-identifier=analog-input,1 object-name="AHU1"'),
-        ("", "2 → * time-synchronization time=(date=2024-10-15 time=13:30:45.00)"),
+        ("", "2 → * time-synchronization time=(date=2024-10-15 Tuesday time=13:30:45.00)"),
         ("", "2 → 5 proprietary-128 vendor 461, 2 octets"),
         ("", "2 → * data-not-expecting-reply [data CRC]"),
         ("", "5 → 2 read-property-multiple ack segment 0, more follow"),
