@@ -1,9 +1,9 @@
-"""What a good frame says that cannot be right: reply bits, dates that do not exist, values of another type. Pure, total.
+"""What a good frame says that cannot be right: reply bits, dates that are none, values of another type. Pure, total.
 
-Reply expected, said twice: by the frame type (5, 32: the receiver answers at once; ANSI/ASHRAE 135, 9.3) and by bit 2 of
-the network header (6.2.2, which a router makes the frame type from). A confirmed request has both (5.4.1), a request
-that is not confirmed neither. Answers are free: an answer to a frame that expects one is sent as type 6 whatever its bit
-says, and segments of an answer ask for their acknowledgement.
+Whether a reply is expected is said twice: by the frame type (5, 32: the receiver answers at once; ANSI/ASHRAE 135, 9.3)
+and by bit 2 of the network header (6.2.2, which a router makes the frame type from). A confirmed request has both
+(5.4.1), a request that is not confirmed neither. Answers are free: an answer to a frame that expects one is sent as
+type 6 whatever its bit says, and segments of an answer ask for their acknowledgement.
 """
 
 from __future__ import annotations

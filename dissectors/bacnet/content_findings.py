@@ -40,7 +40,7 @@ CONTENT_RULES = (
         "value of another type",
         "The value of a standard property of a standard object has another primitive type than the standard gives it "
         "(ASHRAE 135, clause 12). Null is not judged: written, it gives a property up.",
-        "an error in the sender's data or a gateway's mapping; strict clients refuse such a value, others show it wrong",
+        "an error in the sender's data or a gateway's mapping; strict clients refuse it, others show it wrong",
         "the object named, in the sender's configuration",
     ),
 )

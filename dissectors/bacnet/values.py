@@ -188,8 +188,8 @@ class Date:
     def __str__(self) -> str:
         """The date, its weekday where it has one, and what does not fit: "2024-04-05 Thursday (it is a Friday)"."""
         known = 1 <= self.weekday <= 7
-        words = "" if self.weekday == ANY else " " + (WEEKDAYS[self.weekday - 1] if known else f"weekday {self.weekday}")
-        flaw = self.flaw
+        weekday = WEEKDAYS[self.weekday - 1] if known else f"weekday {self.weekday}"
+        words, flaw = "" if self.weekday == ANY else " " + weekday, self.flaw
         if flaw is WhenFlaw.OTHER_WEEKDAY and self.true_weekday is not None:
             words += f" (it is a {WEEKDAYS[self.true_weekday - 1]})"
         elif flaw is not None:
