@@ -48,6 +48,7 @@ class Exchange:
     response: int | None = None  # its newest frame, while more segments follow
     latency: Interval | None = None
     last: int = 0  # end of the newest frame that belongs to it
+    unconfirmed: bool = False  # nobody answers it, whatever its frame type says
     segmented: bool = False  # request or answer came in segments
     ends_with: int | None = None  # sequence number of the answer's last segment, once that was seen
     becomes: Verdict | None = None  # of segments that answer what is closed, or nothing: the verdict at their end

@@ -43,6 +43,12 @@ def fields(frame: Frame, role: Role) -> dict[str, Value]:
         _network(message.npdu, message, found)
     if message.apdu is not None:
         _application(message.apdu, found)
+    assembly = frame.assembly
+    if assembly is not None and message.whole is not None:
+        for no in assembly.frames:
+            _add(found, "bacapp.fragment", no)
+        _add(found, "bacapp.fragment.count", len(assembly.frames))
+        _add(found, "bacapp.reassembled.length", len(message.whole[1]))
     spoken = message.spoken()
     if spoken is not None:
         _said(*spoken, found)

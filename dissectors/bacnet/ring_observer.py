@@ -27,7 +27,7 @@ from dissectors.bacnet.limits import (
 from dissectors.bacnet.ring import EVENTS_MAX, Ring, What
 from dissectors.bacnet.ring_tally import NodeTally, RingTally
 from dissectors.bacnet.values import ObjectId
-from dissectors.frame import Damage, Frame, Header, Noise
+from dissectors.frame import Damage, Frame, Header, Noise, Role
 from dissectors.frame import Event as FramerEvent
 from dissectors.line import Timing
 
@@ -230,7 +230,7 @@ class RingObserver:
         if frame_type in EXPECTING and not answers:
             if destination == BROADCAST:
                 self._tally.note(What.BROADCAST_REQUEST, frame.start, no, source)
-            else:
+            elif header.role is not Role.DATA:  # nobody answers an unconfirmed request, whatever the frame type says
                 node.requests_sent += 1
                 self._tally.node(destination).requests_received += 1
                 self._asked = _Asked(frame_type, source, destination, frame, no)

@@ -11,9 +11,11 @@ BACnet uses (47808 … 47823) or the address is one of those set aside for priva
 
 from __future__ import annotations
 
-from ipaddress import IPv4Address
+from ipaddress import IPv4Address, IPv4Network
 
 BACNET_PORTS = range(0xBAC0, 0xBAD0)
+PRIVATE = tuple(map(IPv4Network, ("10.0.0.0/8", "172.16.0.0/12", "192.168.0.0/16", "169.254.0.0/16")))
+"""RFC 1918 and 3927."""
 
 
 def mac_text(address: bytes) -> str:
@@ -22,7 +24,7 @@ def mac_text(address: bytes) -> str:
         return str(address[0])
     if len(address) == 6:
         host, port = IPv4Address(address[:4]), int.from_bytes(address[4:], "big")
-        private = host.is_private and not host.is_unspecified and port >= 1024
+        private = port >= 1024 and any(host in network for network in PRIVATE)
         return f"{host}:{port}" if port in BACNET_PORTS or private else address.hex("-").upper()
     return f"0x{address.hex().upper()}" if address else ""
 

@@ -67,7 +67,9 @@ def _assembled(assembly: Assembly, message: Message) -> str:
     if message.whole is not None:
         apdu, parameters = message.whole
         decoded = messages.decode_parameters(apdu, parameters)
-        return f"of {len(assembly.frames)}: " + (parameters_text(apdu, decoded) if decoded is not None else "")
+        last = message.apdu is not None and not message.apdu.more_follows
+        so_far = f"of {len(assembly.frames)}" if last else f"(all {len(assembly.frames)} seen)"
+        return f"{so_far}: " + (parameters_text(apdu, decoded) if decoded is not None else "")
     lost = len(assembly.missing)
     which = ", ".join(map(str, assembly.missing[:4])) + (" …" if lost > 4 else "")
     return f"({'segment' if lost == 1 else 'segments'} {which} not seen)"

@@ -114,7 +114,7 @@ class MstpTracker:
         """Nobody answered what held the bus."""
         self._waiting = None
         unused_poll = waiting.octets[2:3] == bytes((FrameType.POLL_FOR_MASTER,))
-        return self._end(waiting, Verdict.DATA if unused_poll else Verdict.NO_RESPONSE)
+        return self._end(waiting, Verdict.DATA if unused_poll or waiting.unconfirmed else Verdict.NO_RESPONSE)
 
     def _end(self, exchange: Exchange, verdict: Verdict) -> Transaction:
         self._remember(exchange, verdict)
@@ -240,6 +240,7 @@ class MstpTracker:
                 return self._at(no, over[0].id, header, Role.REQUEST)
         exchange = self._open(no, frame, header, key)
         exchange.segmented = apdu is not None and apdu.segmented
+        exchange.unconfirmed = apdu is not None and apdu.type == PduType.UNCONFIRMED_REQUEST
         if key is not None:
             self._count_attempt(exchange, key, closed, further)
         if expecting:

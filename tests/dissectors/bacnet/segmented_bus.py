@@ -120,13 +120,15 @@ class SegmentedBus:
             at, width = end, window
             self.acknowledge(self.server, invoke, at - 1, window)
 
-    def reply(self, invoke: int, service: int, body: bytes | None = None) -> None:
-        """The server's answer in one piece, when it has the token."""
-        self.turn(self.server.mac)
+    def reply(self, invoke: int, service: int, body: bytes | None = None, at_once: bool = False) -> None:
+        """The server's answer in one piece: at once, or when it has the token."""
+        if not at_once:
+            self.turn(self.server.mac)
         kind = 2 if body is None else 3
         octets = apdus.encode(kind, body or b"", invoke_id=invoke, service=service)
         self.send("answer", self.server, octets, FrameType.DATA_NOT_EXPECTING_REPLY, False)
-        self.turn(self.client.mac)
+        if not at_once:
+            self.turn(self.client.mac)
 
     def rounds(self, count: int = 3) -> None:
         """Nothing but tokens, as at the begin and end of a capture."""
