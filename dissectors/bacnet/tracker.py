@@ -70,7 +70,7 @@ class MstpTracker:
     def track(self, no: int, event: Event, header: Header | None) -> Tracked:
         """Take the next event."""
         if isinstance(event, Noise) or header is None:
-            return Tracked(None, ())
+            return Tracked(None, tuple(self._expire(event.start)))
         closed = self._expire(event.start)
         self._clock = event.end if self._clock is None else max(self._clock, event.end)
         self._assembly = self._reassembler.add(no, event)

@@ -333,6 +333,11 @@ def test_whatever_passes_each_transaction_closes_once(steps: list[tuple[float, b
         assert transaction.of is None or transaction.of < transaction.id
 
 
+def test_noise_after_a_long_silence_ends_what_waited():
+    run = track((10, request()), (11_000, b"\x00\xff"))
+    assert [t.verdict for t in run.closed] == [Verdict.NO_RESPONSE]
+
+
 @settings(max_examples=80, deadline=None)
 @given(st.lists(st.tuples(st.sampled_from([1, 20, 260, 600, 11_000]), BUS), max_size=15), st.data())
 def test_live_and_saved_give_the_same(steps: list[tuple[float, bytes]], data: st.DataObject):
