@@ -50,6 +50,7 @@ class Exchange:
     last: int = 0  # end of the newest frame that belongs to it
     unconfirmed: bool = False  # nobody answers it, whatever its frame type says
     segmented: bool = False  # request or answer came in segments
+    more_follows: bool = False  # of a request: its newest segment is not the last
     ends_with: int | None = None  # sequence number of the answer's last segment, once that was seen
     becomes: Verdict | None = None  # of segments that answer what is closed, or nothing: the verdict at their end
 

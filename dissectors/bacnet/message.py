@@ -76,6 +76,12 @@ def read(frame: Frame, *, trusting: bool = False) -> Message | None:
     return Message(frame_type, octets[3], source, length, data, npdu, apdu, rest, whole)
 
 
+def more_follows(frame: Frame) -> bool:
+    """Whether it is a segment that is not the last one: within a window nobody need acknowledge it."""
+    message = read(frame)
+    return message is not None and message.apdu is not None and message.apdu.more_follows
+
+
 def _whole(assembly: Assembly) -> tuple[Apdu, bytes] | None:
     header = apdus.decode(assembly.octets)
     return None if header is None else (header, assembly.octets[header.body :])

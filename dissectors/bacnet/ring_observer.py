@@ -292,7 +292,7 @@ class RingObserver:
 
     def _unanswered_request(self, asked: _Asked) -> None:
         self._unanswered = asked
-        if not self._doubt:
+        if not self._doubt and not messages.more_follows(asked.frame):
             self._tally.note(What.NO_REPLY, asked.frame.end, asked.no, asked.destination, asked.source)
 
     def _is_late_answer(self, no: int, frame: Frame, source: int, destination: int) -> bool:

@@ -95,10 +95,10 @@ class MstpTracker:
     # What time alone ends
 
     def _expire(self, now: int) -> list[Transaction]:
-        closed = []
+        closed: list[Transaction] = []
         waiting = self._waiting
         if waiting is not None and now - waiting.last >= T_NO_TOKEN:
-            closed.append(self._give_up(waiting))
+            self._let_go(waiting, closed)
         if not self._postponed:
             return closed
         over = [
@@ -109,6 +109,14 @@ class MstpTracker:
         for key in over:
             closed.append(self._stop(self._postponed.pop(key)))
         return closed
+
+    def _let_go(self, waiting: Exchange, closed: list[Transaction]) -> None:
+        """No answer came at once: that is no answer, but to a segment that more follow it is nothing yet."""
+        if waiting.more_follows:
+            self._waiting = None
+            self._keep(waiting, closed)
+        else:
+            closed.append(self._give_up(waiting))
 
     def _give_up(self, waiting: Exchange) -> Transaction:
         """Nobody answered what held the bus."""
@@ -203,10 +211,10 @@ class MstpTracker:
         if waiting.segmented and header.source == waiting.source:
             message, key = read(frame)
             if key == waiting.key and message is not None and message.apdu is not None and message.apdu.sequence:
-                self._waiting = None  # one more segment of the window
+                self._waiting = None  # the same segment again
                 self._keep(waiting, closed)
                 return None
-        closed.append(self._give_up(waiting))
+        self._let_go(waiting, closed)
         return None
 
     def _keep(self, exchange: Exchange, closed: list[Transaction]) -> None:
@@ -234,12 +242,14 @@ class MstpTracker:
         if key is not None and further:
             begun = self._postponed.pop(key, None)
             if begun is not None:
+                begun.more_follows = apdu is not None and apdu.more_follows
                 return self._next_segment(begun, no, frame, header, expecting, closed)
             over = self._past.get(key)
             if over is not None and over[0].segmented and over[1] in _ENDED and frame.start - over[2] < LATE_WITHIN:
                 return self._at(no, over[0].id, header, Role.REQUEST)
         exchange = self._open(no, frame, header, key)
         exchange.segmented = apdu is not None and apdu.segmented
+        exchange.more_follows = apdu is not None and apdu.more_follows
         exchange.unconfirmed = apdu is not None and apdu.type == PduType.UNCONFIRMED_REQUEST
         if key is not None:
             self._count_attempt(exchange, key, closed, further)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from itertools import pairwise
 
 import pytest
 from hypothesis import given, settings
@@ -11,6 +12,7 @@ from hypothesis import strategies as st
 from dissectors.bacnet import MSTP, Reassembler
 from dissectors.bacnet import apdu as apdus
 from dissectors.bacnet.apdu import SEGMENTED_ACCEPTED, SERVER, Apdu
+from dissectors.bacnet.frame_making import frame
 from dissectors.bacnet.frame_types import CARRIES_NPDU
 from dissectors.bacnet.readings import readings
 from dissectors.bacnet.segmentation import OCTETS_MAX, OPEN_MAX
@@ -126,6 +128,32 @@ def test_a_request_in_segments_is_one_request(count: int, window: int):
     )
     assert assembly(output, one.request).octets == expected
     assert told(output, one) == [float(number) for number in range(count)]
+
+
+@pytest.mark.parametrize("postponed", [True, False])
+def test_a_segment_within_a_window_need_not_be_acknowledged(postponed: bool):
+    """All segments expect a reply by their frame type; within a window a Reply Postponed comes, or nothing."""
+    bus, made = written(12, 3), SegmentedBus()
+    for step, following in pairwise(bus.steps):
+        if not step.name.startswith("request"):
+            made.steps.append(step)
+            continue
+        made.say(step.name, frame(5, 5, 1, step.octets[8:-2]), 3.0)
+        if following.name.startswith("ack"):
+            continue
+        if postponed:
+            made.say("postponed", frame(7, 1, 5), 240.0)
+        else:
+            made.say("token", frame(0, 5, 1), 260.0)
+            made.say("token", frame(0, 1, 5))
+    output = run(made.steps)
+    (one,) = exchanges(output)
+    assert one.verdict is Verdict.ANSWERED
+    assert told(output, one) == [float(number) for number in range(12)]
+    findings = MSTP.extras["findings"](SESSION.timing)
+    for row in output.rows:
+        findings.see(row.no, row.event, row.header, row.placement)
+    assert findings.findings() == ()
 
 
 def test_request_and_answer_may_both_be_segmented():
@@ -248,8 +276,6 @@ def test_a_server_flag_set_wrongly_is_understood():
 
 
 def _turned(octets: bytes) -> bytes:
-    from dissectors.bacnet.frame_making import frame
-
     data = octets[8:-2]
     return frame(octets[2], octets[3], octets[4], data[:2] + bytes((data[2] ^ SERVER,)) + data[3:])
 
@@ -356,8 +382,8 @@ def test_what_is_called_whole_is_whole(rng: random.Random, lost: int):
     steps = [step for line in sent for step in line if step.name.startswith("segment")]
     steps = [rng.choice(steps) for _ in steps] + rng.sample(steps, len(steps))
     reassembler = Reassembler()
-    for no, frame in enumerate(frames_of(steps[min(lost, len(steps) - 1) :])):
-        found = reassembler.add(no, frame)
+    for no, event in enumerate(frames_of(steps[min(lost, len(steps) - 1) :])):
+        found = reassembler.add(no, event)
         if found is not None and found.complete:
             assert found.octets in {whole_answer(n) for n in (12, 13, 14)}
 
@@ -374,14 +400,14 @@ def test_memory_is_bounded():
         )
         bus.steps.clear()
         bus.send("segment", Party(5, 7, bytes((number % 250,))), octets, 6, True)
-        for frame in frames_of(bus.steps):
-            reassembler.add(number, frame)
+        for event in frames_of(bus.steps):
+            reassembler.add(number, event)
     assert len(reassembler._open) <= OPEN_MAX
     for number in range(3000):
         octets = apdus.encode(3, piece, invoke_id=1, service=14, flags=12, sequence=number & 0xFF)
         bus.steps.clear()
         bus.send("segment", bus.server, octets, 6, True)
-        for frame in frames_of(bus.steps):
-            reassembler.add(number, frame)
+        for event in frames_of(bus.steps):
+            reassembler.add(number, event)
     assert reassembler._octets == sum(one.size for one in reassembler._open.values()) <= OCTETS_MAX
     assert LINE.baud == 38400
