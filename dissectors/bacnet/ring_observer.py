@@ -230,7 +230,7 @@ class RingObserver:
         if frame_type in EXPECTING and not answers:
             if destination == BROADCAST:
                 self._tally.note(What.BROADCAST_REQUEST, frame.start, no, source)
-            elif header.role is not Role.DATA:  # nobody answers an unconfirmed request, whatever the frame type says
+            elif header.role is Role.REQUEST:  # answers and what is unconfirmed ask for nothing, whatever the type says
                 node.requests_sent += 1
                 self._tally.node(destination).requests_received += 1
                 self._asked = _Asked(frame_type, source, destination, frame, no)

@@ -162,6 +162,10 @@ class MstpTracker:
         if frame_type == FrameType.TEST_REQUEST:
             self._waiting = exchange = self._open(no, frame, header)
             return self._at(no, exchange.id, header)
+        if frame_type == FrameType.REPLY_POSTPONED and self._previous is not None:
+            before, tx = self._previous  # a segment or an acknowledgement of an exchange that goes on
+            if before.octets[2] in EXPECTING and before.octets[3:5] == bytes((frame.octets[4], frame.octets[3])):
+                return self._at(no, tx, header, Role.RESPONSE)
         if frame_type in (FrameType.REPLY_TO_POLL_FOR_MASTER, FrameType.TEST_RESPONSE, FrameType.REPLY_POSTPONED):
             return self._single(no, frame, header, Verdict.UNSOLICITED, closed, station=header.source)
         return self._data(no, frame, header, closed)

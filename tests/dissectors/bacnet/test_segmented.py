@@ -14,8 +14,10 @@ from dissectors.bacnet import apdu as apdus
 from dissectors.bacnet.apdu import SEGMENTED_ACCEPTED, SERVER, Apdu
 from dissectors.bacnet.frame_making import frame
 from dissectors.bacnet.frame_types import CARRIES_NPDU
+from dissectors.bacnet.npdu import EXPECTS_REPLY
 from dissectors.bacnet.readings import readings
 from dissectors.bacnet.segmentation import OCTETS_MAX, OPEN_MAX
+from dissectors.findings import Finding
 from dissectors.frame import Assembly, Chunk, Frame, Role
 from dissectors.tracker import Transaction, Verdict
 from sniff.analysis.packet_tree import fields_of
@@ -104,6 +106,7 @@ def is_clean(output: Output) -> Transaction:
 def test_an_answer_in_segments_is_one_answer(count: int, window: int):
     output = run(answered(count, window).steps)
     one = is_clean(output)
+    assert found_by_rules(output) == ()
     assert assembly(output, one.response).octets == whole_answer(count)
     assert told(output, one) == [number + 0.5 for number in range(count)]
 
@@ -122,6 +125,7 @@ def test_segments_may_be_extended_frames():
 def test_a_request_in_segments_is_one_request(count: int, window: int):
     output = run(written(count, window).steps)
     one = is_clean(output)
+    assert found_by_rules(output) == ()
     assert one.response is not None
     expected = apdus.encode(
         0, writes(count), invoke_id=INVOKE, service=WRITE_MULTIPLE, flags=SEGMENTED_ACCEPTED, max_segments=7
@@ -150,10 +154,38 @@ def test_a_segment_within_a_window_need_not_be_acknowledged(postponed: bool):
     (one,) = exchanges(output)
     assert one.verdict is Verdict.ANSWERED
     assert told(output, one) == [float(number) for number in range(12)]
+    assert found_by_rules(output) == ()
+
+
+@pytest.mark.parametrize("postponed", [True, False])
+@pytest.mark.parametrize("names", [("segment",), ("ack",), ("segment", "ack")])
+def test_segments_and_acknowledgements_may_expect_a_reply(names: tuple[str, ...], postponed: bool):
+    """Sent as Data Expecting Reply when the station has the token; a Reply Postponed comes at once, or nothing."""
+    made = SegmentedBus()
+    for step in answered(12, 2).steps:
+        if step.name.startswith(names) and step.name != "segment 0":
+            source, destination = step.octets[4], step.octets[3]
+            data = step.octets[8:-2]
+            data = data[:1] + bytes((data[1] | EXPECTS_REPLY,)) + data[2:]
+            made.say(step.name, frame(5, destination, source, data), step.silence)
+            if postponed:
+                made.say("postponed", frame(7, source, destination), 200.0)
+        else:
+            made.steps.append(step)
+    output = run(made.steps)
+    (one,) = exchanges(output)
+    assert one.verdict is Verdict.ANSWERED
+    assert told(output, one) == [number + 0.5 for number in range(12)]
+    assert found_by_rules(output) == ()
+
+
+def found_by_rules(output: Output) -> tuple[Finding, ...]:
     findings = MSTP.extras["findings"](SESSION.timing)
     for row in output.rows:
         findings.see(row.no, row.event, row.header, row.placement)
-    assert findings.findings() == ()
+    for one in output.transactions:
+        findings.settle(one)
+    return tuple(findings.findings())
 
 
 def test_request_and_answer_may_both_be_segmented():
