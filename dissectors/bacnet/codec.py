@@ -25,6 +25,7 @@ from dissectors.bacnet.values import (
     pack,
     primitive,
     show,
+    show_part,
     type_of,
 )
 
@@ -180,14 +181,14 @@ def _field(field: Field, tags: Sequence[Tag], at: int, scope: _Scope, depth: int
     if field.tag is None:
         value, after = _in_place(field.type, tags, at, scope, depth)
         if base(field.type) is not None:
-            scope.name(tags[at], f"{field.name}: {show(value)}")
+            scope.name(tags[at], f"{field.name}: {show_part(field.name, value)}")
         return value, after
     tag = tags[at]
     if base(field.type) is not None:
         if tag.children is not None:
             raise _Misfit(f"{field.name} is no primitive value")
         value = _primitive(field.type, tag)
-        scope.name(tag, f"{field.name}: {show(value)}")
+        scope.name(tag, f"{field.name}: {show_part(field.name, value)}")
         return value, at + 1
     if tag.children is None:
         raise _Misfit(f"{field.name} has no opening tag")
@@ -280,9 +281,10 @@ def _note_type(expected: str, tags: Sequence[Tag], scope: _Scope) -> None:
     if tag.context or tag.number == NUMBER_OF["Null"] or not tag.number < len(APPLICATION):
         return
     found = APPLICATION[tag.number]
-    if found != kind:
-        scope.wrong.append(WrongType(about, scope.property, kind, found))
-        scope.name(tag, f"{found} {show(plain(tag))} (the property is {kind})")
+    if found == kind:  # the right type, but no such value
+        found = f"{found} of {len(tag.octets)} octets"
+    scope.wrong.append(WrongType(about, scope.property, kind, found))
+    scope.name(tag, f"{found} {show(plain(tag))} (the property is {kind})")
 
 
 def plain(tag: Tag) -> Any:

@@ -16,6 +16,7 @@ from enum import Enum
 from typing import Any
 
 from dissectors.bacnet import names
+from dissectors.bacnet.station_address import mac_text
 from dissectors.bacnet.tags import Tag
 
 APPLICATION = (
@@ -407,13 +408,20 @@ def show(value: Any, depth: int = 0) -> str:
     if isinstance(value, Record):
         if depth > 16:
             return "…"
-        inner = " ".join(f"{name}={show(entry, depth + 1)}" for name, entry in value.entries)
+        inner = " ".join(f"{name}={show_part(name, entry, depth + 1)}" for name, entry in value.entries)
         return inner if len(value.entries) == 1 else "(" + inner + ")"
     if isinstance(value, (tuple, list)):
         return "[" + ", ".join(show(entry, depth + 1) for entry in value) + "]" if depth <= 16 else "…"
     if isinstance(value, Tag):
         return show_tag(value)
     return str(value)
+
+
+def show_part(name: str, value: Any, depth: int = 0) -> str:
+    """The value of a named part: station addresses as their network writes them, else as `show` does."""
+    if isinstance(value, bytes) and name.endswith("mac-address"):
+        return mac_text(value) or "broadcast"
+    return show(value, depth)
 
 
 def show_tag(tag: Tag, depth: int = 0) -> str:

@@ -7,6 +7,7 @@ from datetime import date
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scapy.packet import Raw
 
 from dissectors.bacnet import MSTP, codec, npdu, services
 from dissectors.bacnet import apdu as apdus
@@ -14,11 +15,12 @@ from dissectors.bacnet.content import Odd, ReplyFlaw, oddities
 from dissectors.bacnet.content_findings import ContentFindings
 from dissectors.bacnet.frame_making import frame
 from dissectors.bacnet.station_address import mac_text, remote
-from dissectors.bacnet.values import Date, Time, WhenFlaw
+from dissectors.bacnet.summary import text
+from dissectors.bacnet.values import Date, ObjectId, Record, Time, WhenFlaw
 from dissectors.frame import Chunk, Frame, Role
 from dissectors.line import LineSettings, Timing
 from sniff.analysis.packet_tree import fields_of
-from tests.dissectors.bacnet.samples import every_alternative, every_answer, every_property
+from tests.dissectors.bacnet.samples import every_alternative, every_answer, every_property, every_service
 
 TIMING = Timing(LineSettings(38400))
 
@@ -157,6 +159,34 @@ def test_writes_and_changes_of_value_are_looked_at_too():
     assert kinds(frame(5, 5, 2, npdu.encode(body, expects_reply=True))) == [Odd.TYPE]
 
 
+def test_each_value_of_several_is_looked_at():
+    results = [
+        {
+            "object-identifier": "analog-input,1",
+            "list-of-results": [
+                {"property-identifier": 85, "read-result": {"property-value": 1.5}},
+                {"property-identifier": 77, "read-result": {"property-value": 7}},
+            ],
+        },
+        {
+            "object-identifier": "multi-state-input,2",
+            "list-of-results": [{"property-identifier": 85, "read-result": {"property-value": 1.5}}],
+        },
+    ]
+    body = codec.encode(services.ACK[14], {"list-of-read-access-results": results})
+    found = oddities(frame_of(frame(6, 5, 2, npdu.encode(apdus.encode(3, body, invoke_id=1, service=14)))))
+    assert [one.words for one in found] == [
+        "analog-input,1 object-name is Unsigned, not CharacterString",
+        "multi-state-input,2 present-value is Real, not Unsigned",
+    ]
+
+
+def test_a_real_of_three_octets_is_none():
+    octets = bytes.fromhex("0c00000001 1955 3e 43 41c800 3f".replace(" ", ""))
+    found = oddities(frame_of(frame(6, 5, 2, npdu.encode(apdus.encode(3, octets, invoke_id=1, service=12)))))
+    assert [one.words for one in found] == ["analog-input,1 present-value is Real of 3 octets, not Real"]
+
+
 def test_nothing_that_the_standard_allows_is_odd():
     """Every event, answer and property of every object with its own type; only their dates are drawn at random."""
     for sample in [*every_alternative(), *every_answer(), *every_property()]:
@@ -214,3 +244,42 @@ def test_findings_are_bounded():
 def test_addresses_are_written_as_their_network_writes_them(address: str, words: str):
     assert mac_text(bytes.fromhex(address)) == words
     assert remote(13, bytes.fromhex(address)) == (f"network 13:{words}" if words else "network 13")
+
+
+@pytest.mark.parametrize(
+    ("mac", "words"), [(b"\x3d", "61"), (b"", "broadcast"), (bytes.fromhex("c0a80114bac0"), "192.168.1.20:")]
+)
+def test_addresses_in_parameters_are_written_alike(mac: bytes, words: str):
+    binding = Record(
+        "AddressBinding",
+        (
+            ("device-object-identifier", ObjectId(8, 61)),
+            ("device-address", Record("DeviceAddress", (("network-number", 13), ("mac-address", mac)))),
+        ),
+    )
+    event = frame_of(answer("device,1", 30, (binding,)))
+    line = text(event, MSTP.peek(event), Role.RESPONSE)
+    assert f"network-number=13 mac-address={words}" in line
+    assert f"mac-address: {words}" in str(fields_of(MSTP, event, Role.RESPONSE))
+
+
+def test_the_tree_goes_on_behind_a_null():
+    values = {
+        "object-identifier": "analog-output,1",
+        "property-identifier": 85,
+        "property-value": None,
+        "priority": 8,
+    }
+    body = apdus.encode(0, codec.encode(services.CONFIRMED[15], values), invoke_id=1, service=15)
+    shown = str(fields_of(MSTP, frame_of(frame(5, 5, 2, npdu.encode(body, expects_reply=True))), Role.REQUEST))
+    assert "value='Null null'" in shown
+    assert "priority: 8" in shown
+    assert "Raw" not in shown
+
+
+def test_every_tree_is_read_to_its_end():
+    for sample in [*every_service(), *every_alternative(), *every_answer(), *every_property()]:
+        found = MSTP.packet(frame_of(sample.octets), Role.DATA)
+        tags = found["Parameters"].tags if found.haslayer("Parameters") else []
+        assert not found.haslayer(Raw), sample.name
+        assert not [tag for tag in tags if isinstance(tag, Raw)], sample.name
