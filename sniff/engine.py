@@ -96,6 +96,8 @@ class Engine:
             header = peek(event) if isinstance(event, Frame) else None
             tracked = track(no, event, header)
             placement = tracked.placement
+            if tracked.assembly is not None and isinstance(event, Frame):
+                event = replace(event, assembly=tracked.assembly)
             if placement is not None:
                 if self._before_tx:
                     placement = replace(placement, tx=placement.tx + self._before_tx)

@@ -51,6 +51,5 @@ MSTP = Dissector(
         "ring_window": ring_window,  # two of its Rings → RingWindow
         "judge": judge,  # Ring → findings
         "readings": readings,
-        "reassembler": Reassembler,  # (): add(no, frame) → Gathered | None
     },
 )

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable
 
+from dissectors.bacnet.content_findings import ContentFindings
 from dissectors.bacnet.findings_of_damage import damage, duplicates
 from dissectors.bacnet.findings_of_use import polls, use
 from dissectors.bacnet.limits import MAX_MASTER, T_REPLY_DELAY, T_USAGE_DELAY
-from dissectors.bacnet.ring import COARSE_LIMIT, Node, Ring, What
+from dissectors.bacnet.ring import COARSE_LIMIT, Happened, Node, Ring, What
 from dissectors.bacnet.ring_observer import RingObserver
 from dissectors.bacnet.ring_remarks import Remark, listed, milliseconds, of, plain
 from dissectors.bacnet.rules import RULES
@@ -251,12 +252,14 @@ class MstpFindings:
 
     def __init__(self, timing: Timing) -> None:
         self._observer = RingObserver(timing)
+        self._content = ContentFindings()
         self._asked: Counter[tuple[int, str]] = Counter()  # answered requests, by station and service
         self._refused: dict[tuple[int, str, str], Tally] = {}  # by station, service, and class and code in words
 
     def see(self, no: int, event: Event, header: Header | None, placement: Placement | None = None) -> None:
         """Take the next row: event, its header and placement (None for noise)."""
         self._observer.see(no, event, header)
+        self._content.see(no, event, header)
 
     def settle(self, transaction: Transaction) -> None:
         """Take a transaction that closed; the ring model has its own view of them, but for error answers."""
@@ -276,7 +279,7 @@ class MstpFindings:
 
     def findings(self) -> tuple[Finding, ...]:
         """All findings so far, the gravest first."""
-        made = (*judge(self._observer.ring()), *self._error_answers())
+        made = (*judge(self._observer.ring()), *self._error_answers(), *self._content.findings())
         return tuple(sorted(made, key=_gravest_first))
 
     def _error_answers(self) -> Iterable[Finding]:

@@ -36,7 +36,7 @@ from dissectors.bacnet.ring_tally import NodeTally, RingTally
 from dissectors.bacnet.storms import Storms
 from dissectors.bacnet.turn import Turn
 from dissectors.bacnet.values import ObjectId
-from dissectors.frame import Damage, Frame, Header, Noise
+from dissectors.frame import Damage, Frame, Header, Noise, Role
 from dissectors.frame import Event as FramerEvent
 from dissectors.line import Timing
 
@@ -275,7 +275,7 @@ class RingObserver:
         if frame_type in EXPECTING and not answers:
             if destination == BROADCAST:
                 self._tally.note(What.BROADCAST_REQUEST, frame.start, no, source)
-            else:
+            elif header.role is Role.REQUEST:  # answers and what is unconfirmed ask for nothing, whatever the type says
                 node.requests_sent += 1
                 self._tally.node(destination).requests_received += 1
                 self._asked = _Asked(frame_type, source, destination, frame, no)
@@ -361,7 +361,7 @@ class RingObserver:
         self._unanswered.move_to_end(key)
         if len(self._unanswered) > _UNANSWERED_MAX:
             self._unanswered.popitem(last=False)
-        if not self._doubt:
+        if not self._doubt and not messages.more_follows(asked.frame):
             self._tally.note(What.NO_REPLY, asked.frame.end, asked.no, asked.destination, asked.source)
 
     def _is_late_answer(self, no: int, frame: Frame, source: int, destination: int) -> bool:

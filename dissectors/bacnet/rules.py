@@ -1,9 +1,10 @@
 """The rules of MS/TP: what each finds, against which limit, and what to check next. MS1 token, MS2 polls, MS3 answers,
-MS4 octets and frames, MS5 addresses, MS6 who uses the line.
+MS4 octets and frames, MS5 addresses, MS6 who uses the line, MS7 content (`content_findings.py`).
 """
 
 from __future__ import annotations
 
+from dissectors.bacnet.content_findings import CONTENT_RULES
 from dissectors.findings import Rule, Severity
 
 _WIRING = "termination and bias at both ends, the shield, and the line's length and stubs"
@@ -287,4 +288,4 @@ _ALL = (
     ),
 )
 
-RULES: dict[str, Rule] = {rule.code: rule for rule in _ALL}
+RULES: dict[str, Rule] = {rule.code: rule for rule in (*_ALL, *CONTENT_RULES)}

@@ -35,6 +35,7 @@ from dissectors.bacnet.packets.network import (
     Route,
     RoutingTable,
 )
+from dissectors.bacnet.packets.segments import Assembled, assembled
 from dissectors.bacnet.packets.tags import Parameters, Tag, parameters
 from dissectors.frame import Frame, Role
 
@@ -42,6 +43,7 @@ __all__ = [
     "MSTP",
     "NPDU",
     "Abort",
+    "Assembled",
     "ComplexAck",
     "ConfirmedRequest",
     "Connection",
@@ -67,8 +69,11 @@ __all__ = [
 
 
 def packet(frame: Frame, role: Role) -> Packet:
-    """The packet of a frame; its role makes no difference."""
-    return dissect(frame.octets)
+    """The packet of a frame; its role makes no difference. Behind a last segment stands the message as a whole."""
+    found = dissect(frame.octets)
+    if frame.assembly is not None and isinstance(found, MSTP):
+        found.lastlayer().add_payload(assembled(frame.assembly))
+    return found
 
 
 def dissect(octets: bytes) -> Packet:

@@ -62,7 +62,7 @@ def _plain_meaning(pkt: Any) -> str:
     number = pkt.extended_number if pkt.number == 15 else pkt.number
     if number >= len(APPLICATION):
         return ""
-    content = bytes((pkt.lvt,)) if number == 1 and pkt.lvt < 5 else bytes(pkt.value)
+    content = bytes((pkt.lvt,)) if number == 1 and pkt.lvt < 5 else bytes(pkt.value or b"")
     try:
         return escape(f"{APPLICATION[number]} {show(primitive(APPLICATION[number], content))}")
     except ValueError:
