@@ -17,9 +17,9 @@ from dataclasses import dataclass, replace
 
 from dissectors.frame import Event, Frame, Header, Noise, Reason, Role
 from dissectors.line import NS_PER_S, Timing
-from dissectors.n2.commands import Command, fields_of, parse_command
+from dissectors.n2.commands import parse_command
+from dissectors.n2.forms import fits
 from dissectors.n2.header import BROADCAST
-from dissectors.n2.objects import holds_current_value
 from dissectors.tracker import Interval, Placement, Tracked, Transaction, Verdict
 
 GIVE_UP = 3 * NS_PER_S
@@ -248,28 +248,6 @@ def _transaction(exchange: _Exchange, verdict: Verdict, error: str | None = None
         of=exchange.of,
         error=error,
     )
-
-
-_ACKNOWLEDGED = frozenset(
-    ("synchronise-time", "warm-reset", "write-attribute", "write-value", "override", "release-override")
-)
-
-
-def fits(command: Command, answer: bytes) -> bool | None:
-    """Whether an answer has the form that a command asks for; None where any form may be right."""
-    if answer[:1] != b"A":
-        return None
-    length = len(fields_of(answer))
-    kind = command.type.kind
-    if kind in _ACKNOWLEDGED:
-        return length == 0
-    if kind == "identify":
-        return length == 2
-    if kind == "read-attribute" and command.encoding is not None:
-        width = command.encoding.width
-        current = holds_current_value(command.region or 0, command.attribute or 0)
-        return length == width or (current and length == width + 2)
-    return None
 
 
 def _answers_rather(missed: _Exchange, open_: _Exchange, frame: Frame) -> bool:

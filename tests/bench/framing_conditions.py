@@ -36,9 +36,12 @@ OnWire = list[Octet]
 
 
 def laid_out(said: Sequence[Said], line: LineSettings, *, back_to_back: bool = False) -> OnWire:
-    """What was said as it stands on the wire."""
+    """What was said as it stands on the wire; without any pause nobody can have waited for an answer in vain."""
     now, wire = 100 * MS, []
+    answered = {frame.answers for frame in said}
     for index, frame in enumerate(said):
+        if back_to_back and frame.asks and index not in answered:
+            continue
         now += 0 if back_to_back else frame.pause
         for value in frame.octets:
             now += line.char

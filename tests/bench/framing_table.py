@@ -5,7 +5,8 @@ python -m tests.bench.framing_table [rtu] [ascii] [n2] [mstp] [--frames 4000] [-
 conserved   octets of all events, in order, are those read
 found       of the frames that came through whole, those that were given as good frames
 invented    good frames that nobody sent, by 1000 frames
-attributed  of the damaged ones, those that stand at the right station (as a frame, or in its transaction)
+attributed  of the damaged ones of which at least half came right, those that stand at the right station (as a frame,
+            or in its transaction)
 direction   of those found, those that are told right to be requests or answers
 verdict     of the exchanges whose request came through, those whose end is told right
 """
@@ -13,12 +14,13 @@ verdict     of the exchanges whose request came through, those whose end is told
 from __future__ import annotations
 
 import argparse
+from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 from random import Random
 
 from dissectors import registry
-from dissectors.frame import Event, Frame, Role
+from dissectors.frame import Chunk, Event, Frame, Role
 from dissectors.line import Timing
 from dissectors.tracker import Placement, Transaction, Verdict
 from tests.bench.framing_conditions import CONDITIONS, NOBODY, OnWire, Row, by_ftdi, exact, laid_out
@@ -64,7 +66,7 @@ class Heard:
     transactions: list[Transaction]
 
 
-def listen(traffic: Traffic, chunks: Sequence[object], latency: int) -> Heard:
+def listen(traffic: Traffic, chunks: Sequence[Chunk], latency: int) -> Heard:
     """Frame and pair what was read."""
     dissector = registry.get(traffic.protocol)
     timing = Timing(traffic.line, latency)
@@ -122,8 +124,9 @@ def judged(traffic: Traffic, wire: OnWire, heard: Heard) -> Measured:
     ]
     failed += [f"invented: {heard.events[no - 1].octets!r}" for no in invented]
     struck = _struck(whole, wire)
-    by_request = {t.request: t for t in heard.transactions if t.request is not None}
-    held = {index: _holder(places, heard) for index, places in struck.items()}
+    told = {index: places for index, places in struck.items() if _is_half_right(said[index], places, wire)}
+    by_request: dict[int | None, Transaction] = {t.request: t for t in heard.transactions if t.request is not None}
+    held = {index: _holder(places, heard) for index, places in told.items()}
     attributed = 0
     for index, no in held.items():
         right = _is_attributed(said[index], heard, no, good, by_request)
@@ -139,7 +142,7 @@ def judged(traffic: Traffic, wire: OnWire, heard: Heard) -> Measured:
         b"".join(event.octets for event in heard.events) == octets,
         Share(len(good), len(whole)),
         Share(len(invented), len(said)),
-        Share(attributed, len(struck)),
+        Share(attributed, len(told)),
         Share(direction, len(turned)),
         Share(sum(right for _, _, right in ends), len(ends)),
         tuple(failed),
@@ -168,11 +171,13 @@ def _struck(whole: dict[int, int], wire: OnWire) -> dict[int, list[int]]:
     return struck
 
 
+def _is_half_right(said: Said, places: Sequence[int], wire: OnWire) -> bool:
+    return 2 * sum(wire[place].right for place in places) >= len(said.octets)
+
+
 def _holder(places: Sequence[int], heard: Heard) -> int:
     """The event that holds most of these octets."""
     counts: dict[int, int] = {}
-    from bisect import bisect_right
-
     for place in places:
         no = bisect_right(heard.begins, place)
         counts[no] = counts.get(no, 0) + 1
