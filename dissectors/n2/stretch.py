@@ -196,6 +196,8 @@ class Stretch:
             return False
         if not (has_check or self.proved):
             return None
+        if answer[0] == REFUSAL and not silence and before[:1] in (b">", b"A") and _HEX.issuperset(before[1:]):
+            return None  # one spoilt octet of what began there
         if silence and not waits:
             return False
         if not waits or (asked is not None and not may_answer(asked, answer)):
