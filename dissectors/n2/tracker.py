@@ -12,8 +12,8 @@
    the two answers either may be the late one), else answered twice. Whether that means two stations is for the rules
    to say: the same octets again may be a repeater's.
 6. How long a master waits is its own setting (NAE 250 ms to 3 s), so silence alone closes a command after GIVE_UP.
-7. A damaged command is for the station that it names where that one is known; and for the one known station whose
-   address makes its checksum right.
+7. A damaged command is for the station that it names where that one is known; else for the one known station whose
+   address makes its checksum right, and is most like what was sent.
 """
 
 from __future__ import annotations
@@ -149,13 +149,19 @@ class N2Tracker:
 
     def _station_of(self, octets: bytes, header: Header) -> int | None:
         """Whom a damaged command is for (rule 7)."""
-        if not self._times:
-            return header.destination
-        if len(octets) >= 7 and octets.endswith(b"\r"):
-            fitting = [known for known in self._times if is_good(b">%02X" % known + octets[3:])]
-            if len(fitting) == 1:
-                return fitting[0]
-        return header.destination if header.destination in self._times else None
+        named = header.destination
+        if not self._times or named in self._times:
+            return named
+        sent, best, station = octets[1:3], (False, 0), None
+        for known in self._times:
+            name = b"%02X" % known
+            alike = sum(one == other for one, other in zip(name, sent, strict=False))
+            mine = (octets.endswith(b"\r") and len(octets) >= 7 and is_good(b">" + name + octets[3:]), alike)
+            if mine == best:
+                station = None
+            elif mine > best:
+                best, station = mine, known
+        return station
 
     def _close_unanswered(self, exchange: _Exchange) -> Transaction:
         self._open, self._missed, self._done = None, exchange, None
@@ -306,7 +312,7 @@ class N2Tracker:
 
 
 def _best_owed(exchanges: list[_Exchange], frame: Frame) -> _Exchange | None:
-    """The command that an answer belongs to: the oldest whose form it surely has, else the oldest that it may answer."""
+    """The command that an answer belongs to: the oldest whose form it surely has, else the oldest it may answer."""
     able = [e for e in exchanges if not e.damaged and may_answer(parse_command(e.octets), frame.octets)]
     sure = [e for e in able if fits(parse_command(e.octets), frame.octets)]
     return next(iter(sure or able), None)
