@@ -258,16 +258,16 @@ class Stretch:
             rest = octets[at:]
             if rest[0] in _STARTS:
                 return None
-            repair = repaired_command(rest)
-            if answers and (repair is None or self._is_asked(rest)):
-                repair = repaired_answer(rest, self.asked) or repair
+            repair = repaired_answer(rest, self.asked) if answers else None
+            if repair is None or not self._is_asked(repair.octets):
+                repair = repaired_command(rest) or repair
             if repair is not None and len(rest) > 1:
                 return [*self._noise(at), Piece(size, Check.BAD, Damage.FORM, repair=repair)]
         return None
 
-    def _is_asked(self, rest: bytes) -> bool:
-        """Whether octets without a start have surely the form that is asked for."""
-        return self.asked is not None and fits(self.asked, b"A" + rest) is True
+    def _is_asked(self, answer: bytes) -> bool:
+        """Whether an answer has surely the form that is asked for."""
+        return self.asked is not None and fits(self.asked, answer) is True
 
     def _answer_from(self, at: int) -> Piece | None:
         """A damaged answer that begins with its own start character."""

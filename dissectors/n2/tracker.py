@@ -178,9 +178,11 @@ class N2Tracker:
 
     def _hear_noise(self, event: Event) -> None:
         """A few stray octets are nobody's answer; more, or what ends like one, may be."""
+        octets = event.octets
+        if len(octets) > STRAY:
+            self._done = None  # it may have been a command
         if self._open is None or not isinstance(event, Noise) or event.reason is Reason.PAD:
             return
-        octets = event.octets
         self._open.spoilt |= len(octets) > STRAY or (len(octets) > 1 and octets.endswith(b"\r"))
 
     # --- answers ---
@@ -241,7 +243,7 @@ class N2Tracker:
             station = done.station if done is not None else missed.station if missed is not None else None
             return self._separate(no, frame, header, Verdict.UNSOLICITED, None, closed, station)
         if done is not None:
-            owed = [exchange for exchange in self._within(frame.start) if frame.start - exchange.end <= GIVE_UP]
+            owed = self._within(frame.start)
             same = [exchange for exchange in owed if exchange.station == done.station]
             owing = _best_owed(same, frame) or _best_owed(owed, frame)
             if owing is not None:
@@ -249,7 +251,7 @@ class N2Tracker:
                 return self._separate(no, frame, header, Verdict.LATE, owing, closed)
             if frame.octets == done.answer and frame.start - done.answer_end <= self._at_once:
                 return self._echo(no, frame, Role.RESPONSE, done, closed)
-            if frame.start - done.end <= GIVE_UP:
+            if frame.start - done.end <= GIVE_UP and may_answer(parse_command(done.octets), frame.octets):
                 return self._separate(no, frame, header, Verdict.ANSWERED_TWICE, done, closed)
         elif missed is not None and frame.start - missed.end <= 2 * GIVE_UP:
             self._forget(missed)
