@@ -87,7 +87,7 @@ RULES: dict[str, Rule] = {
             "command may not have been heard here.",
             "two stations have the same address",
             "switch the station off and see whether something still answers",
-            explains=("N2004", "N2011", "LN101", "LN103", "LN2"),
+            explains=("N2004", "N2011", "N2013", "LN101", "LN103", "LN2"),
         ),
         Rule(
             "N2009",
