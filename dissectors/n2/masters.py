@@ -23,7 +23,7 @@ from dissectors.tracker import Transaction
 HASTE: Final = 100_000_000
 """No master gives up sooner, ns (the shortest timeout of an NAE is 250 ms)."""
 
-KNOWN: Final = 3
+KNOWN: Final = 8
 """Answers of a station after which its shortest time says something."""
 
 _SAME = 6  # octets of two commands: start, address, command and what it asks

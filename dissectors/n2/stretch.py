@@ -200,7 +200,8 @@ class Stretch:
             return False
         if not (has_check or self.proved):
             return None
-        if answer[0] == REFUSAL and not silence and before[:1] in (b">", b"A") and _HEX.issuperset(before[1:]):
+        begun = len(before) > 1 and before[:1] in (b">", b"A") and _HEX.issuperset(before[1:])
+        if answer[0] == REFUSAL and not silence and begun:
             return None  # one spoilt octet of what began there
         if silence and not waits:
             return False

@@ -35,7 +35,7 @@ GIVE_UP = 3 * NS_PER_S
 
 _LONGEST = 256  # characters of an answer that may have begun in time and not be read yet
 _OWING = 16  # commands remembered that a late answer may still answer
-_FEW = 3  # answers of a station after which its shortest time says something
+_FEW = 16  # answers of a station after which its shortest time says something
 
 
 @dataclass(slots=True)
