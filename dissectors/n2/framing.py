@@ -17,7 +17,7 @@ from dissectors.frame import Check, Chunk, Damage, Event, Found, Frame, LineErro
 from dissectors.framer import OctetWindow, Taken
 from dissectors.line import Timing
 from dissectors.n2.commands import Command, expected_length, parse_command
-from dissectors.n2.envelope import COMMAND, CR, NOT_TEXT, judge
+from dissectors.n2.envelope import COMMAND, CR, NOT_TEXT, is_good, judge
 from dissectors.n2.stretch import SHORTEST, Before, Piece, Stretch, good_whole
 
 __all__ = ["MAX_LENGTH", "SILENCE", "N2Framer", "judge"]
@@ -234,7 +234,8 @@ class N2Framer:
         if is_command:
             self._waits = True
             self._asked = parse_command(told) if piece.damage is None or piece.repair is not None else None
-        elif piece.damage is None:  # a damaged one may have been junk, and the answer come yet
+        elif piece.damage is None or (piece.repair is not None and is_good(told)):
+            # any other damaged one may have been junk, and the answer come yet
             self._waits, self._asked = False, None
         self._proved |= piece.damage is None and check is Check.GOOD
         self._foreign = False

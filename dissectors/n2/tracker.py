@@ -245,7 +245,7 @@ class N2Tracker:
         if done is not None:
             owed = self._within(frame.start)
             same = [exchange for exchange in owed if exchange.station == done.station]
-            owing = _best_owed(same, frame) or _best_owed(owed, frame)
+            owing = _best_owed(same, frame) or _best_owed(owed, frame) or self._crossed(owed, done, frame)
             if owing is not None:
                 self._forget(owing)
                 return self._separate(no, frame, header, Verdict.LATE, owing, closed)
@@ -257,6 +257,12 @@ class N2Tracker:
             self._forget(missed)
             return self._separate(no, frame, header, Verdict.LATE, missed, closed)
         return self._separate(no, frame, header, Verdict.UNSOLICITED, None, closed)
+
+    def _crossed(self, owed: list[_Exchange], done: _Exchange, frame: Frame) -> _Exchange | None:
+        """A command that the answer before this one rather answered, if this one may answer the last command."""
+        if not may_answer(parse_command(done.octets), frame.octets):
+            return None
+        return _best_owed(owed, replace(frame, octets=done.answer))
 
     def _separate(
         self,
