@@ -28,6 +28,7 @@ from sniff.simulation.tap import CH340, EXACT, FTDI, FTDI_LOW_LATENCY, OCTETS, U
 from tests.faults.buses import modbus, mstp, n2
 from tests.faults.case import Case, Heard
 from tests.faults.drive_cases import DRIVE_CASES
+from tests.faults.n2_cases import N2_CASES
 from tests.faults.ring_cases import RING_CASES
 from tests.faults.stations import (
     AnswersAs,
@@ -327,7 +328,6 @@ CASES: tuple[Case, ...] = (
     Case("N2 answers lost", partial(n2, (LostResponse(0.08, ("drive 2",)),)), (("N2005", "station 2"),)),
     Case("N2 bit errors of one station", partial(n2, (BitFlips(8e-3, ("drive 2",)),)), (("N2004", "station 2"),)),
     Case("N2 no such point", partial(n2, no_such_point=True), (("N2002", "station 1"),)),
-    Case("N2 answered twice", partial(n2, (DuplicateAddress("drive 2", 40 * MS),)), (("N2008", "station 2"),)),
     Case(
         "N2 two masters",
         partial(n2, second_master=True),
@@ -342,6 +342,7 @@ CASES: tuple[Case, ...] = (
     Case("N2 override forgotten", partial(n2, overrides=True, pause=20 * S), (("N2006", "station 1"),), seconds=700),
     Case("N2 late answers", partial(n2, (LateResponse(0.06, 270 * MS, ("drive 1",)),)), (("N2011", "station 1"),)),
     # device profiles, BACnet MS/TP
+    *N2_CASES,
     *DRIVE_CASES,
     *RING_CASES,
 )
