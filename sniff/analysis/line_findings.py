@@ -7,10 +7,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 from dissectors.findings import Finding, Severity, Tally, counted, found, times
-from dissectors.frame import Damage, Event, Frame, LineError, Mark, Noise, Place, Reason, Role
+from dissectors.frame import Chunk, Damage, Event, Frame, LineError, Mark, Noise, Place, Reason, Role
 from dissectors.line import NS_PER_S
 from dissectors.tracker import Transaction, Verdict
 from sniff.analysis.line_rules import LINE_RULES as RULES
+from sniff.analysis.other_settings import SAMPLE_OCTETS, Fit, what_fits
+from sniff.analysis.slower_bus import slower_by
 from sniff.analysis.wording import milliseconds
 from sniff.engine import Row
 from sniff.session import LineEvent, LineEventKind, Session
@@ -19,6 +21,10 @@ STRAY_MOST = 3
 """So many octets that are no frame are stray ones; more are the remains of something."""
 
 RUBBISH_LEAST = 60  # octets before "hardly anything is a frame" is said
+MOST_RESTS = 16
+"""Stretches that are no frame and are asked what they may be."""
+
+RUBBISH_TOLD = 40  # the same where it is known what they are
 _WRONG = LineError.PARITY | LineError.FRAMING
 
 
@@ -53,6 +59,10 @@ class LineFindings:
         self._before: str | None = None  # who sent the frame before
         self._awaiting = False  # a request was the newest frame of a known kind
         self._pending: list[tuple[int, Noise]] = []  # noise directly before the frame to come
+        self._sample: list[Chunk] = []  # what came first, to ask what else it may be
+        self._sampled = 0
+        self._rests: list[bytes] = []  # the first stretches that are no frame
+        self._fit: tuple[int, Fit | None] = (0, None)  # asked when so many octets were sampled
 
     # ---- taking in
 
@@ -66,6 +76,9 @@ class LineFindings:
         self._octets += len(event.octets)
         if len(event.octets) <= 4096:
             self._values.update(event.octets)
+        if self._sampled < SAMPLE_OCTETS:
+            self._sample.append(Chunk(event.end, event.octets[:SAMPLE_OCTETS], event.marks))
+            self._sampled += len(event.octets)
         if event.marks:
             self._see_marks(row.no, event)
         if isinstance(event, Frame):
@@ -141,6 +154,8 @@ class LineFindings:
         if len(noise.octets) > STRAY_MOST:
             self._rest.add(noise.start, no)
             self._rest_octets += len(noise.octets)
+            if len(self._rests) < MOST_RESTS and len(noise.octets) <= 300:
+                self._rests.append(noise.octets)
         elif noise.place is Place.BEFORE:
             self._pending.append((no, noise))
             del self._pending[:-8]
@@ -155,7 +170,9 @@ class LineFindings:
     def rubbish(self) -> bool:
         """Whether hardly anything is a frame, so that nothing else can be judged."""
         few = 10 * self._in_frames < 3 * self._octets and 10 * self._good < 3 * self._rows
-        return self._octets >= RUBBISH_LEAST and few
+        if not few or self._octets < RUBBISH_TOLD:
+            return False
+        return self._octets >= RUBBISH_LEAST or self._other_settings() is not None
 
     def findings(self) -> tuple[Finding, ...]:
         """All findings so far."""
@@ -207,6 +224,10 @@ class LineFindings:
         share = self._in_frames / self._octets
         how_many = "not one" if not self._in_frames else "hardly one" if share < 0.005 else f"only {share:.0%}"
         words = f"{how_many} of {self._octets} octets is part of a good frame"
+        fit = self._other_settings()
+        if fit is not None:
+            finding = self._whole("LN003", "bus", f"{words}; {fit.seen}")
+            return replace(finding, means=fit.means, next=fit.next)
         extremes = sum(self._values[value] for value in (0x00, 0x80, 0xC0, 0xE0, 0xF0, 0xF8, 0xFC, 0xFE, 0xFF))
         total = max(1, sum(self._values.values()))
         reports = self._session.adapter.reports
@@ -218,6 +239,15 @@ class LineFindings:
         elif reports and not self._marked:
             words += "; none has a line error, so the line is well and the protocol may be another one"
         return self._whole("LN003", "bus", words)
+
+    def _other_settings(self) -> Fit | None:
+        """What these octets are; asked again when there are twice as many."""
+        asked, fit = self._fit
+        if self._sampled >= 2 * asked or (asked < self._sampled >= SAMPLE_OCTETS):
+            session = self._session
+            fit = what_fits(self._sample, session.line, session.adapter.latency, session.protocol)
+            self._fit = self._sampled, fit
+        return fit
 
     def _parity_setting(self) -> Finding:
         words = (
@@ -282,11 +312,29 @@ class LineFindings:
             stretches = counted(self._rest.count, "stretch", "stretches")
             words = f"{self._rest_octets} octets in {stretches} are no frame, {share:.1%} of all"
             severity = None if share >= 0.02 and self._rest.count > 1 else Severity.NOTE
-            yield self._rest.found(RULES["LN204"], "bus", words, severity)
+            yield self._of_rests(self._rest.found(RULES["LN204"], "bus", words, severity))
         if self._echo.count:
             words = f"{self._echo.count} of {counted(self._asked, 'request')} came twice, the copy directly behind"
             severity = Severity.WARNING if 10 * self._echo.count >= self._asked else None
             yield self._echo.found(RULES["LN205"], "bus", words, severity)
+
+    def _of_rests(self, finding: Finding) -> Finding:
+        """With what the stretches that are no frame have in common."""
+        rests, line = self._rests, self._session.line
+        same, often = Counter(rests).most_common(1)[0] if rests else (b"", 0)
+        if often >= 3 and 2 * often >= len(rests):
+            words = f"{finding.seen}; the same {len(same)} octets {often} times ({same[:8].hex(' ').upper()}"
+            finding = replace(finding, seen=words + (" …)" if len(same) > 8 else ")"))
+        factor = slower_by(rests, line)
+        if not factor:
+            return finding
+        rate = f"{factor} times slower, at about {line.baud // factor} Bd" if factor < 12 else "over 10 times slower"
+        return replace(
+            finding,
+            seen=f"{finding.seen}; every level in them lasts a multiple of {factor} bits: they were sent {rate}",
+            means="a device that speaks with another baud rate, by its own protocol or by a wrong setting",
+            next="which station answers so: its baud rate and protocol; two stations with one address look otherwise",
+        )
 
     def _stray_finding(self, code: str, name: str, record: _Sender, tally: Tally, frames: int) -> Finding:
         where = {"LN201": "before", "LN202": "after"}.get(code)

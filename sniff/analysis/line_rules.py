@@ -34,7 +34,10 @@ _ALL = (
         Severity.ERROR,
         "hardly anything is a frame",
         "Under 3 in 10 octets, and under 3 in 10 of all frames and other stretches, are good frames; of at least 60 "
-        "octets. All other rules are left out then: they would judge rubbish.",
+        "octets, or 40 where it is known what they are. All other rules are left out then: they would judge rubbish. "
+        "What fits is named: another protocol whose checks agree, seven bits read as eight, data bits that the port "
+        "lacks, inverted octets, a bus that is slower (every level lasts a multiple of so many bits) or faster (the "
+        "same few octets again and again, too few for a frame).",
         "wrong baud rate, wrong parity, wrong protocol, or A and B swapped",
         "the settings of the line (-s) and the protocol (-p); then A and B",
     ),
@@ -137,7 +140,7 @@ _ALL = (
         Severity.WARNING,
         "octets that are no frame",
         "Stretches of four octets or more that are no frame, 1 in 50 octets or more of all. A smaller share is only "
-        "noted.",
+        "noted. Said is where they are always the same, and where they were sent with a slower baud rate.",
         "damaged frames beyond recognition, another protocol on the same line, or a device with another baud rate",
         "what the stretches have in common: their place, time and first octets",
     ),
