@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 from dissectors.findings import Finding, Severity, Tally, counted, found, times
-from dissectors.frame import Chunk, Damage, Event, Frame, LineError, Mark, Noise, Place, Reason, Role
+from dissectors.frame import Chunk, Damage, Event, Frame, LineError, Noise, Place, Reason, Role
 from dissectors.line import NS_PER_S
 from dissectors.tracker import Transaction, Verdict
 from sniff.analysis.line_rules import LINE_RULES as RULES
 from sniff.analysis.other_settings import SAMPLE_OCTETS, Fit, what_fits
+from sniff.analysis.sender_findings import BUS, WRONG, Senders
 from sniff.analysis.slower_bus import slower_by
 from sniff.analysis.wording import milliseconds
 from sniff.engine import Row
@@ -25,18 +26,6 @@ MOST_RESTS = 16
 """Stretches that are no frame and are asked what they may be."""
 
 RUBBISH_TOLD = 40  # the same where it is known what they are
-_WRONG = LineError.PARITY | LineError.FRAMING
-
-
-@dataclass(slots=True)
-class _Sender:
-    """Frames of one sender, and what went wrong with them."""
-
-    frames: int = 0
-    wrong: Tally = field(default_factory=Tally)
-    at: Counter[str] = field(default_factory=Counter)  # place of the wrong octets in the frame
-    stray: dict[str, Tally] = field(default_factory=dict)  # by rule
-    values: Counter[tuple[str, int]] = field(default_factory=Counter)  # of those octets, by rule
 
 
 class LineFindings:
@@ -44,11 +33,11 @@ class LineFindings:
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        self._packets = "whole" in session.adapter.detail  # an error flag is somewhere among the octets marked
+        timing = session.timing
+        self._senders = Senders("whole" in session.adapter.detail, timing.latency <= timing.t35)
         self._octets = self._in_frames = self._marked = self._rows = self._frames = self._good = 0
         self._first = self._now = 0
-        self._senders: dict[str, _Sender] = {}
-        self._breaks, self._overruns, self._lost = Tally(), Tally(), Tally()
+        self._overruns, self._lost = Tally(), Tally()
         self._unplugged, self._stepped, self._rest = Tally(), Tally(), Tally()
         self._counted: dict[str, Tally] = {}
         self._unplugged_at: int | None = None
@@ -56,7 +45,6 @@ class LineFindings:
         self._lost_octets = self._rest_octets = self._only_heard = 0
         self._echo, self._asked = Tally(), 0
         self._values: Counter[int] = Counter()
-        self._before: str | None = None  # who sent the frame before
         self._awaiting = False  # a request was the newest frame of a known kind
         self._pending: list[tuple[int, Noise]] = []  # noise directly before the frame to come
         self._sample: list[Chunk] = []  # what came first, to ask what else it may be
@@ -117,12 +105,13 @@ class LineFindings:
             tally.count += max(0, event.count - 1)
 
     def _see_marks(self, no: int, event: Event) -> None:
+        breaks = sum(bool(mark.error & LineError.BREAK) for mark in event.marks)
+        for _ in range(min(breaks, 1) if self._senders.packets else breaks):
+            self._senders.see_break(no, event.start, isinstance(event, Frame))
         for mark in event.marks:
-            if mark.error & LineError.BREAK:
-                self._breaks.add(event.start, no)
             if mark.error & LineError.OVERRUN:
                 self._overruns.add(event.start, no)
-            self._marked += bool(mark.error & _WRONG)
+            self._marked += bool(mark.error & WRONG)
 
     def _see_frame(self, row: Row, frame: Frame) -> None:
         sender = _sender(row)
@@ -130,21 +119,14 @@ class LineFindings:
         if role is Role.RESPONSE and not frame.ok and not self._awaiting:
             sender = "bus"  # nobody was asked: it may be anything
         self._awaiting = role is Role.REQUEST or (self._awaiting and role is not Role.RESPONSE)
-        record = self._senders.setdefault(sender, _Sender()) if len(self._senders) < 600 else _Sender()
-        record.frames += 1
         self._frames += 1
         if frame.ok:
             self._good += 1
             self._in_frames += len(frame.octets)
+        self._senders.see(sender, row.no, frame)
         for no, noise in self._pending:
-            _stray(record, "LN201", no, noise)
+            self._senders.stray(sender, "LN201", no, noise)
         self._pending.clear()
-        wrong = [mark for mark in frame.marks if mark.error & _WRONG]
-        if wrong and not (self._packets and frame.ok):
-            record.wrong.add(frame.start, row.no)
-            if not self._packets:
-                record.at.update(_place(frame, mark) for mark in wrong)
-        self._before = sender
 
     def _see_noise(self, no: int, noise: Noise) -> None:
         if noise.reason in (Reason.BREAK, Reason.PAD) or any(m.error & LineError.BREAK for m in noise.marks):
@@ -159,10 +141,10 @@ class LineFindings:
         elif noise.place is Place.BEFORE:
             self._pending.append((no, noise))
             del self._pending[:-8]
-        elif noise.place is Place.AFTER and self._before is not None:
-            _stray(self._senders.setdefault(self._before, _Sender()), "LN202", no, noise)
+        elif noise.place is Place.AFTER and self._senders.before is not None:
+            self._senders.stray(self._senders.before, "LN202", no, noise)
         else:
-            _stray(self._senders.setdefault("bus", _Sender()), "LN203", no, noise)
+            self._senders.stray(BUS, "LN203", no, noise)
 
     # ---- judging
 
@@ -181,7 +163,7 @@ class LineFindings:
             return (*made, self._whole("LN002", "bus", "not one octet was heard"))
         if self.rubbish:
             return (*made, self._rubbish())
-        many = 2 if self._packets else 10  # where one flag marks a whole packet, few errors mark many octets
+        many = 2 if self._senders.packets else 10  # where one flag marks a whole packet, few errors mark many octets
         if many * self._marked > self._octets and 10 * self._in_frames >= 8 * self._octets:
             made.append(self._parity_setting())
         else:
@@ -231,7 +213,7 @@ class LineFindings:
         extremes = sum(self._values[value] for value in (0x00, 0x80, 0xC0, 0xE0, 0xF0, 0xF8, 0xFC, 0xFE, 0xFF))
         total = max(1, sum(self._values.values()))
         reports = self._session.adapter.reports
-        if self._marked * 10 > self._octets or self._breaks.count * 10 > self._octets:
+        if self._marked * 10 > self._octets or self._senders.breaks.count * 10 > self._octets:
             words += f"; {self._marked / self._octets:.0%} of all octets have parity or framing errors"
             words += ": the baud rate or the format is wrong, or A and B are swapped"
         elif 2 * extremes > total:
@@ -257,56 +239,14 @@ class LineFindings:
         return replace(self._whole("LN004", "bus", words), count=self._marked)
 
     def _wrong_octets(self) -> Iterator[Finding]:
-        struck = {name: record for name, record in sorted(self._senders.items()) if record.wrong.count}
-        whole = {name for name, record in self._senders.items() if record.frames >= 20}
-        if len(whole) >= 3 and all(
-            name in struck and self._note_if(struck[name].wrong.count, struck[name].frames) is None for name in whole
-        ):
-            yield self._wrong_everywhere(struck)
-            struck = {}
-        for name, record in struck.items():
-            kinds = "line errors somewhere in" if self._packets else "parity or framing errors in"
-            words = f"{kinds} {record.wrong.count} of {counted(record.frames, 'frame')}"
-            if record.at:
-                words += f" ({', '.join(f'{count} {place}' for place, count in record.at.most_common())})"
-            finding = record.wrong.found(RULES["LN101"], name, words, self._note_if(record.wrong.count, record.frames))
-            if 4 * record.at["at the last octet"] >= 3 * sum(record.at.values()) > 8:
-                finding = replace(
-                    finding,
-                    means="the station releases its driver before the last octet is out",
-                    next="its turnaround or transmit-delay setting; its converter's direction control",
-                )
-            yield finding
+        yield from self._senders.wrong_octets(self._note_if)
         for kind, tally in sorted(self._counted.items()):
             words = counted(tally.count, f"{kind or 'line'} error") + " counted by the driver"
             yield tally.found(RULES["LN102"], "bus", words)
 
-    def _wrong_everywhere(self, struck: dict[str, _Sender]) -> Finding:
-        """One finding in place of one for each sender."""
-        tally = Tally()
-        for record in struck.values():
-            for no in record.wrong.evidence:
-                tally.add(record.wrong.first, no)
-        count = sum(record.wrong.count for record in struck.values())
-        each = ", ".join(f"{name} {record.wrong.count}" for name, record in struck.items())
-        words = f"parity or framing errors in {count} of {self._frames} frames, whoever sends ({each})"
-        finding = tally.found(RULES["LN101"], "bus", words)
-        return replace(
-            finding,
-            count=count,
-            last=max(record.wrong.last for record in struck.values()),
-            means="a cause common to all: termination, bias, ground, cable, or noise at the tap",
-            next="120 Ω at both ends only, one bias, the shield grounded once; the tap's own wires",
-        )
-
     def _of_bus(self) -> Iterator[Finding]:
-        if self._breaks.count:
-            words = f"the line was held low {times(self._breaks.count)}"
-            yield self._breaks.found(RULES["LN103"], "bus", words, self._note_if(self._breaks.count, self._frames))
-        for name, record in sorted(self._senders.items()):
-            for code, tally in sorted(record.stray.items()):
-                frames = self._frames if name == "bus" else record.frames
-                yield self._stray_finding(RULES[code].code, name, record, tally, frames)
+        yield from self._senders.breaks_found(self._note_if)
+        yield from self._senders.strays_found(self._note_if)
         if self._rest.count:
             share = self._rest_octets / self._octets
             stretches = counted(self._rest.count, "stretch", "stretches")
@@ -336,21 +276,6 @@ class LineFindings:
             next="which station answers so: its baud rate and protocol; two stations with one address look otherwise",
         )
 
-    def _stray_finding(self, code: str, name: str, record: _Sender, tally: Tally, frames: int) -> Finding:
-        where = {"LN201": "before", "LN202": "after"}.get(code)
-        if where is None:
-            words = f"stray octets {times(tally.count)} in the silence between {counted(frames, 'frame')}"
-        elif tally.count > frames:
-            words = f"stray octets {times(tally.count)} {where} {counted(frames, 'frame')}"
-        else:
-            words = f"stray octets {where} {tally.count} of {counted(frames, 'frame')}"
-        values = [(value, count) for (rule, value), count in record.values.most_common() if rule == code]
-        most = values[:4]
-        if 2 * sum(count for _, count in most) > sum(count for _, count in values):
-            mostly = "" if len(values) == len(most) else "mostly "
-            words += f" ({mostly}{', '.join(f'{value:02X}' for value, _ in most)})"
-        return tally.found(RULES[code], name, words, self._note_if(tally.count, frames))
-
     def _whole(self, code: str, subject: str, words: str) -> Finding:
         return found(RULES[code], subject, words, first=self._first, last=self._now)
 
@@ -370,14 +295,3 @@ def _sender(row: Row) -> str:
         return f"MAC {source}" if header is not None and header.protocol == "mstp" else f"station {source}"
     role = placement.role if placement is not None else header.role if header is not None else Role.UNKNOWN
     return "master" if role in (Role.REQUEST, Role.BROADCAST) else "bus"
-
-
-def _place(frame: Frame, mark: Mark) -> str:
-    if mark.offset >= len(frame.octets) - 1:
-        return "at the last octet"
-    return "at the first octet" if mark.offset == 0 else "inside"
-
-
-def _stray(record: _Sender, code: str, no: int, noise: Noise) -> None:
-    record.stray.setdefault(code, Tally()).add(noise.start, no)
-    record.values.update((code, octet) for octet in noise.octets)

@@ -79,8 +79,11 @@ _ALL = (
         Severity.WARNING,
         "parity or framing errors",
         "Octets of frames that the adapter marked, counted at the station that sent the frame (a master's frames at "
-        "the master). A single one, or fewer than 1 frame in 100 and at most two a minute, is only noted. Where one "
-        "flag covers a whole packet, only damaged frames count. Where all are struck, one finding names the bus.",
+        "the master). A single one, or fewer than 1 frame in 100 and at most two a minute, is only noted. A sender is "
+        "named that is struck clearly more often than the octets that it sends explain (2.5 times the rate of the "
+        "other stations, by chance less than once in a thousand); else one finding names the bus. Where one flag "
+        "covers a whole packet, damaged frames count, and packets with a flag: a station is named that is in nearly all "
+        "of them while the others are mostly in packets without one.",
         "noise while this station sends, weak levels from it, or two that send at once",
         "this station's connector, stub and ground; " + _WIRING,
     ),
@@ -96,7 +99,8 @@ _ALL = (
         "LN103",
         Severity.WARNING,
         "breaks",
-        "The line was held low for longer than a character. A single one is only noted.",
+        "The line was held low for longer than a character. A single one is only noted. Where 8 in 10 of them are in "
+        "or directly after the frames of one station, far more than its share, that station is named.",
         "no fail-safe bias while nobody drives the line, A and B swapped at one device, or a short circuit",
         "bias resistors at one place of the line; A and B of devices added last",
     ),
@@ -113,9 +117,12 @@ _ALL = (
         Severity.WARNING,
         "stray octets before frames",
         "One to three octets that are no frame directly before a frame, counted at the station that sent the frame. A "
-        "single one, or fewer than 1 frame in 100 and at most two a minute, is only noted.",
+        "single one, or fewer than 1 frame in 100 and at most two a minute, is only noted. A sender is named that has "
+        "clearly more of them than its share of the frames; what falls before everybody's frames is the bus's, told "
+        "once, and what falls anywhere is LN203.",
         "the driver is switched on too late or the line floats until then; weak bias",
         "the turnaround of that station; bias; its converter's direction control",
+        explains=("LN204",),
     ),
     Rule(
         "LN202",
@@ -125,15 +132,17 @@ _ALL = (
         "limits as in LN201.",
         "the driver lets go too late or the line falls when it does; weak bias",
         "bias; the turnaround of that station; its converter's direction control",
+        explains=("LN204",),
     ),
     Rule(
         "LN203",
         Severity.WARNING,
         "stray octets in silence",
-        "One to three octets that are no frame, with silence on both sides. A single one, or fewer than 1 to 100 "
-        "frames and at most two a minute, is only noted.",
+        "One to three octets that are no frame, with silence on both sides, or anywhere, whoever sends before or "
+        "after. A single one, or fewer than 1 to 100 frames and at most two a minute, is only noted.",
         "the line floats when nobody drives it: no or weak fail-safe bias; or noise coupled in",
         "bias at one place of the line; the cable's way along power lines and motors",
+        explains=("LN204",),
     ),
     Rule(
         "LN204",
