@@ -14,6 +14,7 @@ from sniff.analysis.line_rules import LINE_RULES as RULES
 from sniff.analysis.other_settings import SAMPLE_OCTETS, Fit, what_fits
 from sniff.analysis.sender_findings import BUS, WRONG, Senders
 from sniff.analysis.slower_bus import slower_by
+from sniff.analysis.time_patterns import TimePatterns
 from sniff.analysis.wording import milliseconds
 from sniff.engine import Row
 from sniff.session import LineEvent, LineEventKind, Session
@@ -34,6 +35,7 @@ class LineFindings:
     def __init__(self, session: Session) -> None:
         self._session = session
         timing = session.timing
+        self._patterns = TimePatterns(session)
         self._senders = Senders("whole" in session.adapter.detail, timing.latency <= timing.t35)
         self._octets = self._in_frames = self._marked = self._rows = self._frames = self._good = 0
         self._first = self._now = 0
@@ -70,9 +72,11 @@ class LineFindings:
         if event.marks:
             self._see_marks(row.no, event)
         if isinstance(event, Frame):
-            self._see_frame(row, event)
+            sender = self._see_frame(row, event)
         else:
+            sender = BUS
             self._see_noise(row.no, event)
+        self._patterns.see(row.no, event, sender)
 
     def pass_by(self, row: Row) -> None:
         """Take a row of a search for settings: the bus was not silent, and that is all it says."""
@@ -80,6 +84,7 @@ class LineFindings:
 
     def settle(self, transaction: Transaction) -> None:
         """Take a transaction that closed."""
+        self._patterns.settle(transaction)
         if transaction.verdict is Verdict.ECHO:
             self._echo.add(transaction.start, transaction.request)
         elif transaction.request is not None:
@@ -87,6 +92,7 @@ class LineFindings:
 
     def add_line_event(self, event: LineEvent) -> None:
         """Take something that happened to the line."""
+        self._patterns.add_line_event(event)
         kind = event.kind
         if kind is LineEventKind.DROPPED:
             self._lost.add(event.time)
@@ -113,7 +119,8 @@ class LineFindings:
                 self._overruns.add(event.start, no)
             self._marked += bool(mark.error & WRONG)
 
-    def _see_frame(self, row: Row, frame: Frame) -> None:
+    def _see_frame(self, row: Row, frame: Frame) -> str:
+        """Gives the sender."""
         sender = _sender(row)
         role = row.placement.role if row.placement is not None else Role.UNKNOWN
         if role is Role.RESPONSE and not frame.ok and not self._awaiting:
@@ -127,6 +134,7 @@ class LineFindings:
         for no, noise in self._pending:
             self._senders.stray(sender, "LN201", no, noise)
         self._pending.clear()
+        return sender
 
     def _see_noise(self, no: int, noise: Noise) -> None:
         if noise.reason in (Reason.BREAK, Reason.PAD) or any(m.error & LineError.BREAK for m in noise.marks):
@@ -169,6 +177,7 @@ class LineFindings:
         else:
             made += self._wrong_octets()
         made += self._of_bus()
+        made += self._patterns.findings()
         return tuple(made)
 
     def _can_tell(self) -> Finding:

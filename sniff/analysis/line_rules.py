@@ -1,6 +1,7 @@
 """The rules of the line itself, whatever protocol runs on it: what each measures, what it means, what to check next.
 
-LN0xx what this capture can tell, LN1xx octets that arrive wrong, LN2xx octets that nobody should have sent.
+LN0xx what this capture can tell, LN1xx octets that arrive wrong, LN2xx octets that nobody should have sent, LN3xx
+patterns in time.
 Where noise lies tells its cause; the table behind it was collected from reports of users and is worded as
 "consistent with", never as proof.
 """
@@ -10,6 +11,9 @@ from __future__ import annotations
 from dissectors.findings import Rule, Severity
 
 _WIRING = "termination at both ends and nowhere else, one fail-safe bias, A and B, ground"
+
+_DAMAGE = ("LN1", "LN2", "MB002", "MB005", "MB006", "MB007", "MB009", "MB104", "MB401", "N2004", "N2010", "MS4")
+"""What damage to frames is told by, in every protocol."""
 
 _ALL = (
     Rule(
@@ -82,8 +86,8 @@ _ALL = (
         "the master). A single one, or fewer than 1 frame in 100 and at most two a minute, is only noted. A sender is "
         "named that is struck clearly more often than the octets that it sends explain (2.5 times the rate of the "
         "other stations, by chance less than once in a thousand); else one finding names the bus. Where one flag "
-        "covers a whole packet, damaged frames count, and packets with a flag: a station is named that is in nearly all "
-        "of them while the others are mostly in packets without one.",
+        "covers a whole packet, damaged frames count, and packets with a flag: a station is named that is in nearly "
+        "all of them while the others are mostly in packets without one.",
         "noise while this station sends, weak levels from it, or two that send at once",
         "this station's connector, stub and ground; " + _WIRING,
     ),
@@ -160,6 +164,58 @@ _ALL = (
         "An exact copy of a request directly behind it. A warning from 1 in 10 requests on.",
         "a repeater or converter that gives back what it hears, or an adapter that hears itself",
         "the echo setting of the master's adapter or of the converter; it halves the time left on the bus",
+    ),
+    Rule(
+        "LN301",
+        Severity.WARNING,
+        "disturbances in step with the mains",
+        "Marked octets, stray octets and short damaged frames that follow one another at whole waves or half waves of "
+        "50 or 60 Hz: at least 15 within 2 s of each other, seven tenths locked to it, by chance less than once in a "
+        "million, while the undisturbed frames are not in step with it. Needs times that are known to 2 ms.",
+        "hum: a mains cable beside the bus, a missing or twofold ground, a dimmer, a drive or a supply that couples in",
+        "the cable's way beside mains cables; the shield, grounded at one end; the ground between far stations; "
+        "supplies and drives, one switched off after the other",
+        explains=_DAMAGE,
+    ),
+    Rule(
+        "LN302",
+        Severity.WARNING,
+        "disturbances at a steady interval",
+        "At least six bursts of damage or noise with 8% between their intervals, a second or more apart, that strike "
+        "several senders, with good frames between: no single station's rhythm.",
+        "something that switches at that interval: a contactor, a pump, a heater, a compressor, a thermostat",
+        "what in the plant switches at that interval, and its cable beside the bus; a suppressor at its coil",
+        explains=_DAMAGE,
+    ),
+    Rule(
+        "LN303",
+        Severity.WARNING,
+        "unreadable for a while",
+        "At least 40 octets without one good frame, while there are good frames before or after, and the octets are no "
+        "noise: other settings fit them, or a third of them have line errors.",
+        "for a while somebody spoke with another baud rate, format or protocol: a device that searches for the rate, a "
+        "service tool, a gateway that starts",
+        "what was switched on or configured at that time",
+        explains=_DAMAGE,
+    ),
+    Rule(
+        "LN304",
+        Severity.WARNING,
+        "silent for a while",
+        "Not one octet for 5 s or more and 30 times as long as all but 2 in 100 pauses, in the middle of traffic that "
+        "goes on as before; not where such pauses are regular, and not where octets were lost or the adapter was away.",
+        "the master stopped: a restart, a busy controller, a changeover, a program that was loaded",
+        "the master's log and watchdog at that time",
+    ),
+    Rule(
+        "LN305",
+        Severity.ERROR,
+        "several stations lost at one moment",
+        "Two stations or more that had answered, and then left three requests in a row without answer, all from the "
+        "same moment on as far as their polls tell. A warning where they came back.",
+        "something they share: a supply, a fuse, a stretch of cable, a repeater",
+        "what these stations have in common: supply, cabinet, the piece of cable behind the last one that answers",
+        explains=("MB001", "MB002", "MB003", "MB104", "MB105", "N2005", "N2010"),
     ),
 )
 

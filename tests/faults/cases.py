@@ -28,6 +28,7 @@ from sniff.simulation.tap import CH340, EXACT, FTDI, FTDI_LOW_LATENCY, OCTETS, U
 from tests.faults.buses import modbus, mstp, n2
 from tests.faults.case import Case, Heard
 from tests.faults.drive_cases import DRIVE_CASES
+from tests.faults.line_cases import LINE_CASES
 from tests.faults.ring_cases import RING_CASES
 from tests.faults.stations import (
     AnswersAs,
@@ -344,4 +345,5 @@ CASES: tuple[Case, ...] = (
     # device profiles, BACnet MS/TP
     *DRIVE_CASES,
     *RING_CASES,
+    *LINE_CASES,
 )
