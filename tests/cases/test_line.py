@@ -26,3 +26,8 @@ def test_another_rate_on_the_same_line() -> None:
     assert "about 2400 Bd" in told.seen
     assert "the same 15 octets" in told.seen
     assert "another baud rate" in f"{told.means} {told.next}" or told.severity < Severity.WARNING
+
+
+def test_reads_that_a_busy_computer_bunched_accuse_nobody() -> None:
+    read = reading(case("mstp/bunched-reads-3ms.cap.txt"))
+    assert ("MS501", "MAC 4") not in read.graves()
