@@ -11,6 +11,7 @@ from dissectors.frame import Chunk, Damage, Event, Frame, LineError, Noise, Plac
 from dissectors.line import NS_PER_S
 from dissectors.tracker import Transaction, Verdict
 from sniff.analysis.line_rules import LINE_RULES as RULES
+from sniff.analysis.line_use import LineUse
 from sniff.analysis.other_settings import SAMPLE_OCTETS, Fit, what_fits
 from sniff.analysis.sender_findings import BUS, WRONG, Senders
 from sniff.analysis.slower_bus import slower_by
@@ -36,6 +37,7 @@ class LineFindings:
         self._session = session
         timing = session.timing
         self._patterns = TimePatterns(session)
+        self._use = LineUse(session.line)
         self._senders = Senders("whole" in session.adapter.detail, timing.latency <= timing.t35)
         self._octets = self._in_frames = self._marked = self._rows = self._frames = self._good = 0
         self._first = self._now = 0
@@ -77,6 +79,7 @@ class LineFindings:
             sender = BUS
             self._see_noise(row.no, event)
         self._patterns.see(row.no, event, sender)
+        self._use.see(row.no, event, row.placement.role if row.placement is not None else Role.UNKNOWN)
 
     def pass_by(self, row: Row) -> None:
         """Take a row of a search for settings: the bus was not silent, and that is all it says."""
@@ -178,6 +181,7 @@ class LineFindings:
             made += self._wrong_octets()
         made += self._of_bus()
         made += self._patterns.findings()
+        made += self._use.findings()
         return tuple(made)
 
     def _can_tell(self) -> Finding:

@@ -1,7 +1,7 @@
 """The rules of the line itself, whatever protocol runs on it: what each measures, what it means, what to check next.
 
 LN0xx what this capture can tell, LN1xx octets that arrive wrong, LN2xx octets that nobody should have sent, LN3xx
-patterns in time.
+patterns in time, LN4xx who uses the line.
 Where noise lies tells its cause; the table behind it was collected from reports of users and is worded as
 "consistent with", never as proof.
 """
@@ -216,6 +216,24 @@ _ALL = (
         "something they share: a supply, a fuse, a stretch of cable, a repeater",
         "what these stations have in common: supply, cabinet, the piece of cable behind the last one that answers",
         explains=("MB001", "MB002", "MB003", "MB104", "MB105", "N2005", "N2010"),
+    ),
+    Rule(
+        "LN401",
+        Severity.NOTE,
+        "bus near its limit",
+        "Octets on the line in over 80% of 10 s; a warning over 92% of 30 s. The gaps that a protocol needs between "
+        "its frames come on top of that.",
+        "more is asked than the line can carry, or it waits for nobody: a lost frame costs the next ones their turn",
+        "poll less often, read whole blocks, a higher baud rate, or another line for some of the stations",
+    ),
+    Rule(
+        "LN402",
+        Severity.NOTE,
+        "many broadcasts",
+        "At least 30 broadcasts that make up 1 in 5 of all octets; a warning from 2 in 5 on. Every station must listen "
+        "to each of them.",
+        "a device or a tool that looks for others again and again, or a gateway that lets all broadcasts through",
+        "who sends them (`show` with their frames) and why; what the gateway lets through",
     ),
 )
 
