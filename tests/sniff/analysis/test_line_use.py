@@ -33,7 +33,7 @@ def used(shares: list[float], broadcast: float = 0.0) -> dict[str, Finding]:
 
 def test_a_bus_with_room_is_not_spoken_of() -> None:
     assert used([0.7] * 60) == {}
-    assert used([1.0] * 9 + [0.1] * 20) == {}
+    assert used([1.0] * 7 + [0.1] * 20) == {}
 
 
 def test_a_busy_bus_is_noted_a_full_one_warned_of() -> None:
