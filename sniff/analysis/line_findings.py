@@ -35,10 +35,9 @@ class LineFindings:
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        timing = session.timing
         self._patterns = TimePatterns(session)
         self._use = LineUse(session.line)
-        self._senders = Senders("whole" in session.adapter.detail, timing.latency <= timing.t35)
+        self._senders = Senders(session.timing, "whole" in session.adapter.detail)
         self._octets = self._in_frames = self._marked = self._rows = self._frames = self._good = 0
         self._first = self._now = 0
         self._overruns, self._lost = Tally(), Tally()

@@ -24,7 +24,9 @@ LEAST_OCTETS = 24
 BURSTS = 16
 """Stretches between two silences that are asked whether the bus is slower."""
 
-_SILENCE = 20  # characters after which a stretch ends, also on a bus that is much slower
+SHORT_SILENCE, LONG_SILENCE = 4, 20
+"""Characters after which a stretch ends; on a bus that is much slower there is silence within characters."""
+
 _TEXT = frozenset(b"\r\n\t") | frozenset(range(0x20, 0x7F))
 
 
@@ -117,8 +119,8 @@ def _by_values(sample: Sequence[Chunk], line: LineSettings) -> Iterator[Fit]:
 
 def _by_rate(sample: Sequence[Chunk], line: LineSettings) -> Iterator[Fit]:
     """A bus that is slower, or faster, than the port listens."""
-    bursts = _bursts(sample, line)
-    factor = slower_by(bursts[:BURSTS], line)
+    factor = slower_by(_bursts(sample, line, LONG_SILENCE)[:BURSTS], line)
+    bursts = _bursts(sample, line, SHORT_SILENCE)
     if factor:
         about = f"{factor} times slower, about {line.baud // factor} Bd" if factor < 12 else "over 10 times slower"
         yield Fit(
@@ -147,13 +149,13 @@ def _too_short(bursts: Sequence[bytes]) -> bool:
     return len(bursts) >= 8 and len(often) >= 2 and sum(often.values()) >= 0.7 * len(bursts) <= short
 
 
-def _bursts(sample: Sequence[Chunk], line: LineSettings) -> list[bytes]:
-    """The octets between two silences."""
+def _bursts(sample: Sequence[Chunk], line: LineSettings, silence: int) -> list[bytes]:
+    """The octets between two silences of so many characters."""
     bursts: list[bytes] = []
     end: int | None = None
     for chunk in sample:
         start = chunk.time - len(chunk.octets) * line.char
-        if end is None or start - end > _SILENCE * line.char:
+        if end is None or start - end > silence * line.char:
             bursts.append(b"")
         bursts[-1] += chunk.octets
         end = chunk.time

@@ -12,12 +12,16 @@ from dataclasses import dataclass, field, replace
 
 from dissectors.findings import Finding, Severity, Tally, counted, times
 from dissectors.frame import Frame, LineError, Mark, Noise
+from dissectors.line import Timing
 from sniff.analysis.line_rules import LINE_RULES as RULES
 from sniff.analysis.shares import UNLIKELY, at_least, standing_out
 
 WRONG = LineError.PARITY | LineError.FRAMING
 MOST_SENDERS = 600
 BREAKS_LEAST = 4
+NEAR = 12
+"""Characters behind a frame within which a break belongs to whoever sent it."""
+
 PACKETS_LEAST = 4
 BUS, MASTER = "bus", "master"
 
@@ -40,12 +44,13 @@ class Sender:
 
 
 class Senders:
-    """All senders of a bus. `packets`: an error flag is somewhere among the octets marked (USB packets). `beside`:
-    whether it is known that octets stand directly beside a frame: adapters that hold octets back hide that."""
+    """All senders of a bus. `packets`: an error flag is somewhere among the octets marked (USB packets)."""
 
-    def __init__(self, packets: bool, beside: bool) -> None:
+    def __init__(self, timing: Timing, packets: bool) -> None:
         self.packets = packets
-        self.beside = beside
+        self.beside = timing.latency <= timing.t35  # else octets beside a frame may be far from it
+        self._near = timing.latency + NEAR * timing.char
+        self._end = 0  # of the frame before
         self.by_name: dict[str, Sender] = {}
         self.frames = 0
         self.breaks = Tally()
@@ -80,13 +85,13 @@ class Senders:
         breaks = sum(bool(mark.error & LineError.BREAK) for mark in frame.marks)
         for _ in range(min(breaks, 1) if self.packets else breaks):
             sender.breaks.add(frame.start, no)
-        self.before = name
+        self.before, self._end = name, frame.end
         return sender
 
     def see_break(self, no: int, time: int, inside: bool) -> None:
         """Take a break; those inside a frame were counted with it."""
         self.breaks.add(time, no)
-        if not inside and self.before is not None:
+        if not inside and self.before is not None and time - self._end <= self._near:
             self.of(self.before).breaks.add(time, no)
 
     def stray(self, name: str, code: str, no: int, noise: Noise) -> None:

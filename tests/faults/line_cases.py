@@ -10,7 +10,7 @@ from sniff.simulation.faults import Break, MarkParity, NoiseInGaps
 from sniff.simulation.tap import FTDI
 from tests.faults.buses import modbus, n2
 from tests.faults.case import Case
-from tests.faults.line_faults import Anywhere, AtTimes, as_protocol, masked, paused, with_settings
+from tests.faults.line_faults import Anywhere, AtTimes, as_protocol, by_other_uart, masked, paused, with_settings
 from tests.faults.stations import Dies, Of
 
 MS = 1_000_000
@@ -64,6 +64,13 @@ LINE_CASES: tuple[Case, ...] = (
     ),
     Case("line, read as another protocol", modbus, (("LN003", "bus"),), hear=partial(as_protocol, "n2"), seconds=5),
     Case("line, read as RTU", n2, (("LN003", "bus"),), hear=partial(as_protocol, "modbus-rtu"), seconds=10),
+    Case(
+        "line, a much faster bus",
+        partial(modbus, line=LineSettings.parse("57600,8N1"), pause=200 * MS),
+        (("LN003", "bus"),),
+        hear=partial(by_other_uart, "9600,8N1"),
+        seconds=20,
+    ),
     Case("line, seven data bits", modbus, (("LN003", "bus"),), hear=partial(masked, 0x7F), seconds=5),
 )
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from random import Random
 from typing import ClassVar
 
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
-from sniff.session import Adapter, Item
+from sniff.session import Item
 from sniff.simulation.faults import NOISE, Transmission
 from sniff.simulation.line_mix import low_times, receive
 from sniff.simulation.scenarios import Scenario, simulate
@@ -60,14 +60,6 @@ class Anywhere:
         return (sent, Transmission(NOISE, start, octets, octets, faults=(self.name,)))
 
 
-def nobody_named(
-    hear: Callable[[Scenario, float, TapModel], Heard], plan: Scenario, seconds: float, tap: TapModel
-) -> Heard:
-    """As heard, by a program that does not say through which adapter."""
-    session, items = hear(plan, seconds, tap)
-    return replace(session, adapter=Adapter()), items
-
-
 def with_settings(
     settings: str, spans: tuple[tuple[float, float], ...], plan: Scenario, seconds: float, tap: TapModel
 ) -> Heard:
@@ -105,6 +97,20 @@ def as_protocol(protocol: str, plan: Scenario, seconds: float, tap: TapModel) ->
     """Read as something that it is not."""
     session, items = simulate(plan, seconds, tap)
     return replace(session, protocol=protocol), items
+
+
+def by_other_uart(settings: str, plan: Scenario, seconds: float, tap: TapModel) -> Heard:
+    """Heard by a UART with other settings that reports no errors."""
+    session, _ = simulate(plan, seconds, tap)
+    other = LineSettings.parse(settings)
+
+    def items() -> Iterator[Item]:
+        for burst in plan.wire().run(int(seconds * S)):
+            if burst.octets:
+                received = receive(other, low_times(plan.line, burst.start, burst.octets, {}))
+                yield Chunk(max(received.ends), received.octets)
+
+    return replace(session, line=other), items()
 
 
 def masked(mask: int, plan: Scenario, seconds: float, tap: TapModel) -> Heard:
