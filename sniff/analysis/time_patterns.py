@@ -108,7 +108,7 @@ class TimePatterns:
     def __init__(self, session: Session) -> None:
         self._session = session
         self._char = session.line.char
-        self._can_time = session.adapter.latency <= 2 * MS
+        self._latency = session.adapter.latency
         self._first: int | None = None
         self._now = 0
         self._rows = self._good = self._good_since = 0
@@ -260,9 +260,11 @@ class TimePatterns:
         yield from self._lost_together()
 
     def _in_step_with_mains(self) -> Iterator[Finding]:
-        if not self._can_time or self._steps < HUM_LEAST:
+        if self._steps < HUM_LEAST:
             return
         for period, words in MAINS.items():
+            if 6 * self._latency > period:
+                continue
             lock = self._locks[period]
             locked = abs(lock.trouble) / self._steps
             own = abs(lock.others) / self._other_steps if self._other_steps else 0.0

@@ -59,3 +59,17 @@ def test_what_a_computer_missed_may_come_in_several_reads() -> None:
     frames, _ = read([(10, ASK), (130, ANSWER[:3]), (139, ANSWER[3:] + OTHER + ANSWER), (500, ASK)])
     assert frames[1].slack > 100 * MS
     assert frames[-1].slack == 0
+
+
+def test_an_adapter_that_is_slower_than_it_says_gives_every_frame_slack() -> None:
+    late = [(number * 100.0 + part, ASK) for number in range(1, 9) for part in (0, 1)]  # 8 octets take 4.2 ms
+    frames, _ = read(late)
+    assert frames[0].slack == 0
+    assert frames[-1].slack > 2 * MS
+
+
+def test_a_computer_that_is_busy_now_and_then_does_not() -> None:
+    times = [(number * 100.0, ASK) for number in range(1, 2500)]
+    busy = sorted([*times, (50_001.0, ASK), (100_001.0, ASK), (150_001.0, ASK)])
+    frames, _ = read(busy)
+    assert frames[-1].slack == 0
