@@ -23,7 +23,7 @@ from dataclasses import dataclass
 from dissectors.line import LineSettings
 
 MS = 1_000_000
-LOOKED_AT = 4096
+LOOKED_AT = 2048
 """Reads of a capture that are looked at."""
 
 PERIODS = (64, 50, 40, 32, 25, 20, 16, 12, 10, 8, 6, 5, 4, 3, 2, 1)
