@@ -203,7 +203,7 @@ def _is_explained(finding: Finding, cause: Finding, codes: tuple[str, ...]) -> b
     about, of_cause = finding.about, cause.about
     if cause.stations and about.station is not None:
         return about.station in cause.stations
-    return about.is_whole_bus or of_cause.is_whole_bus or about.is_of(of_cause)
+    return about.is_whole_bus or of_cause.reaches_all or about.is_of(of_cause)
 
 
 def _as_consequence(finding: Finding, cause: Finding, rules: Mapping[str, Rule]) -> Finding:

@@ -40,6 +40,7 @@ class LineFindings:
         self._senders = Senders(session.timing, "whole" in session.adapter.detail)
         self._octets = self._in_frames = self._marked = self._rows = self._frames = self._good = 0
         self._first = self._now = 0
+        self._damaged = self._damaged_here = 0  # rows that are no good frame, and those of them with an overrun
         self._overruns, self._lost = Tally(), Tally()
         self._unplugged, self._stepped, self._rest = Tally(), Tally(), Tally()
         self._counted: dict[str, Tally] = {}
@@ -72,6 +73,9 @@ class LineFindings:
             self._sampled += len(event.octets)
         if event.marks:
             self._see_marks(row.no, event)
+        if not isinstance(event, Frame) or not event.ok:
+            self._damaged += 1
+            self._damaged_here += any(mark.error & LineError.OVERRUN for mark in event.marks)
         if isinstance(event, Frame):
             sender = self._see_frame(row, event)
         else:
@@ -212,7 +216,9 @@ class LineFindings:
             yield self._stepped.found(RULES["LN007"], "adapter", f"the clock stepped {times(self._stepped.count)}")
         if self._overruns.count:
             words = f"overrun reported {times(self._overruns.count)}"
-            yield self._overruns.found(RULES["LN104"], "adapter", words)
+            mostly = 4 * self._damaged_here >= 3 * self._damaged
+            words += f", in {self._damaged_here} of {self._damaged} that are no good frames" if self._damaged else ""
+            yield self._overruns.found(RULES["LN104"], "adapter", words, None if mostly else Severity.NOTE)
 
     def _rubbish(self) -> Finding:
         share = self._in_frames / self._octets

@@ -112,9 +112,11 @@ _ALL = (
         "LN104",
         Severity.WARNING,
         "octets lost in the adapter",
-        "The adapter reported overruns: octets came faster than they were fetched from it.",
+        "The adapter reported overruns: octets came faster than they were fetched from it. A note where most of what "
+        "is damaged is so without an overrun.",
         "an adapter or computer that is too slow for this baud rate; the bus itself may be in order",
         "another adapter; fewer programs on the computer; a UART with a FIFO",
+        explains=(*_DAMAGE, "MB003", "N2005"),
     ),
     Rule(
         "LN201",

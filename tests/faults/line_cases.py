@@ -6,6 +6,7 @@ from functools import partial
 
 from dissectors.frame import Place
 from dissectors.line import LineSettings
+from dissectors.modbus.simulated_master import write_register
 from sniff.simulation.faults import Break, MarkParity, NoiseInGaps
 from sniff.simulation.tap import FTDI
 from tests.faults.buses import modbus, n2
@@ -72,6 +73,17 @@ LINE_CASES: tuple[Case, ...] = (
         seconds=20,
     ),
     Case("line, seven data bits", modbus, (("LN003", "bus"),), hear=partial(masked, 0x7F), seconds=5),
+    Case(
+        "line, near its limit",
+        partial(modbus, is_ascii=True, pause=MS, delays={1: MS, 2: MS, 3: MS}),
+        (("LN401", "bus"),),
+        seconds=40,
+    ),
+    Case(
+        "line, many broadcasts",
+        partial(modbus, extra=(write_register(0, 3, 7),) * 24),
+        (("LN402", "bus"),),
+    ),
 )
 
 NO_PATTERN: tuple[Case, ...] = (
