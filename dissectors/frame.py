@@ -124,7 +124,7 @@ class Frame:
     """One frame as it was on the wire, good or damaged; `octets` include delimiters and check.
 
     `start`, `end`: ns, latest possible begin of its first octet and end of its last octet.
-    `slack`: ns by which `end` may in truth be earlier (0 … `Timing.latency`).
+    `slack`: ns by which `end` may in truth be earlier (0 … `Timing.latency`, more where the computer read late).
     `expected`: total octets predicted from its first octets, None where nothing predicts it.
     `skipped`: octets of noise directly before it since the frame before.
     `flags`: protocol-specific oddities in words ("lower-case", "trailing-pad"), ascending.

@@ -29,6 +29,7 @@ from tests.faults.buses import modbus, mstp, n2
 from tests.faults.case import Case, Heard
 from tests.faults.drive_cases import DRIVE_CASES
 from tests.faults.n2_cases import N2_CASES
+from tests.faults.line_cases import LINE_CASES
 from tests.faults.ring_cases import RING_CASES
 from tests.faults.stations import (
     AnswersAs,
@@ -345,4 +346,5 @@ CASES: tuple[Case, ...] = (
     *N2_CASES,
     *DRIVE_CASES,
     *RING_CASES,
+    *LINE_CASES,
 )

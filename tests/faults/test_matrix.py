@@ -13,7 +13,15 @@ from tests.faults.cases import CASES, Case, clean_cases, unsteady_cases
 from tests.faults.matrix import run
 
 RING = "MS/TP"  # a second of a token ring is some hundred frames
-TIMED = ("slow", "dies", "away", "drifting", "unplugged", "lost token")  # something happens at a time of the run
+TIMED = (
+    "slow",
+    "dies",
+    "away",
+    "drifting",
+    "unplugged",
+    "lost token",
+    "line, ",
+)  # something happens at a time of the run
 DRIVE = "drive"  # wrong in each round
 QUIET = ("slow round", "override forgotten")  # hardly a frame a second
 BIT_BY_BIT = ("wrong baud", "wrong parity", "swapped")
