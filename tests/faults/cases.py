@@ -28,8 +28,8 @@ from sniff.simulation.tap import CH340, EXACT, FTDI, FTDI_LOW_LATENCY, OCTETS, U
 from tests.faults.buses import modbus, mstp, n2
 from tests.faults.case import Case, Heard
 from tests.faults.drive_cases import DRIVE_CASES
-from tests.faults.n2_cases import N2_CASES
-from tests.faults.line_cases import LINE_CASES
+from tests.faults.n2_rule_cases import N2_RULE_CASES
+from tests.faults.line_rule_cases import LINE_RULE_CASES
 from tests.faults.ring_cases import RING_CASES
 from tests.faults.stations import (
     AnswersAs,
@@ -343,8 +343,8 @@ CASES: tuple[Case, ...] = (
     Case("N2 override forgotten", partial(n2, overrides=True, pause=20 * S), (("N2006", "station 1"),), seconds=700),
     Case("N2 late answers", partial(n2, (LateResponse(0.06, 270 * MS, ("drive 1",)),)), (("N2011", "station 1"),)),
     # device profiles, BACnet MS/TP
-    *N2_CASES,
+    *N2_RULE_CASES,
     *DRIVE_CASES,
     *RING_CASES,
-    *LINE_CASES,
+    *LINE_RULE_CASES,
 )

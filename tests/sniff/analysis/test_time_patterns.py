@@ -11,7 +11,7 @@ from sniff.simulation.faults import BitFlips, MarkParity, NoiseInGaps
 from sniff.simulation.tap import EXACT, FTDI
 from tests.faults.buses import modbus, mstp, n2
 from tests.faults.case import Case
-from tests.faults.line_cases import LINE_CASES, NO_PATTERN
+from tests.faults.line_rule_cases import LINE_RULE_CASES, NO_PATTERN
 from tests.faults.line_faults import AtTimes, paused
 from tests.faults.matrix import run
 from tests.faults.stations import Dies
@@ -51,7 +51,7 @@ def test_random_damage_is_no_pattern(make: partial, tap) -> None:  # type: ignor
 
 
 def test_hum_is_not_told_from_times_that_do_not_allow_it() -> None:
-    hum = next(case for case in LINE_CASES if "50 Hz" in case.name)
+    hum = next(case for case in LINE_RULE_CASES if "50 Hz" in case.name)
     assert patterns(Case("", hum.make, (), FTDI)) == set()
     assert patterns(hum) == {"LN301"}
 

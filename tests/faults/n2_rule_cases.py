@@ -80,7 +80,7 @@ def _swapped(octets: bytes) -> bytes:
 _INNOCENT = ("N2007", "N2008")
 _DRIVE = (("N2012", "station 2"),)
 
-N2_CASES: tuple[Case, ...] = (
+N2_RULE_CASES: tuple[Case, ...] = (
     Case(
         "N2 answered twice",
         partial(n2, change={2: partial(Twinned, address=2, after=3 * MS)}, pause=150 * MS),

@@ -20,7 +20,7 @@ S = 1_000_000_000
 _five = partial(modbus, units=(1, 2, 3, 4, 5))
 _quick = partial(modbus, line=LineSettings.parse("38400,8E1"))
 
-LINE_CASES: tuple[Case, ...] = (
+LINE_RULE_CASES: tuple[Case, ...] = (
     Case("line, hum at 50 Hz", partial(_quick, (AtTimes(20 * MS, 2 * MS, 0.1),)), (("LN301", "bus"),)),
     Case("line, hum at 60 Hz, half waves", partial(_quick, (AtTimes(8_333_333, MS, 0.06),)), (("LN301", "bus"),)),
     Case("line, contactor", partial(_five, (AtTimes(7 * S, 150 * MS, 0.2),)), (("LN302", "bus"),)),
