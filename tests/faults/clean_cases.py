@@ -180,7 +180,11 @@ def _asks_slaves(*, seed: int) -> Station:
 
 
 def _no_token(*, seed: int = 0) -> Scenario:
-    others = {"reader": _asks_slaves, "slave 5": partial(_slave, 5), "slave 9": partial(_slave, 9)}
+    others: dict[str, Callable[..., Station]] = {
+        "reader": _asks_slaves,
+        "slave 5": partial(_slave, 5),
+        "slave 9": partial(_slave, 9),
+    }
     return Ring((), others=others)(seed=seed)
 
 

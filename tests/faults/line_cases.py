@@ -49,11 +49,11 @@ _ringing = NoiseInGaps(0.3, most=1, places=(Place.AFTER,), values=b"\xff\xfe\xf8
 
 
 def _with(bus: Modbus, **more: object) -> Modbus:
-    return Modbus(**{**bus.__dict__, **more})  # type: ignore[arg-type]
+    return Modbus(**{**bus.__dict__, **more})
 
 
 def _with_n2(**more: object) -> N2:
-    return N2(**{**_n2.__dict__, **more})  # type: ignore[arg-type]
+    return N2(**{**_n2.__dict__, **more})
 
 
 def _dying(*units: int) -> dict[int, partial[Dies]]:
@@ -94,7 +94,7 @@ LINE_CASES: tuple[Case, ...] = (
     Case(
         "RTU baud rate another one for a while",
         partial(modbus, pause=60 * MS),
-        (Said(_bus, words=r"baud|9600|settings"),),
+        (Said(_bus, words=r"baud|9600", own_words=True),),
         hear=partial(sent_otherwise, partial(from_to, 20 * S, 34 * S, LineSettings(9600, 8, "E", 1))),
         seconds=60,
         seeds=1,
@@ -189,9 +189,10 @@ LINE_CASES: tuple[Case, ...] = (
             usual_stations(_FOUR),
             others={"bacnet drive": _bacnet_drive},
             line=RTU_8N1,
-            interval=2 * S,
+            interval=1_300 * MS,
         ),
         (Said(_bus, ("LN204",), _OTHER),),
+        also=("LN003",),
         never=("MB203",),
         seeds=1,
     ),
@@ -234,6 +235,7 @@ LINE_CASES: tuple[Case, ...] = (
         "listens with 7 data bits",
         partial(modbus, line=RTU_8N1),
         (Said(_bus, words=r"(7|seven) data bits|data bits", own_words=True),),
+        also=("LN003",),
         hear=partial(other_settings, "19200,7E1"),
         seconds=20,
         seeds=1,
@@ -242,6 +244,7 @@ LINE_CASES: tuple[Case, ...] = (
         "listens twice as fast",
         modbus,
         (Said(_bus, words=r"19200|half", own_words=True),),
+        also=("LN003",),
         hear=partial(other_settings, "38400,8E1"),
         seconds=20,
         seeds=1,
@@ -250,6 +253,7 @@ LINE_CASES: tuple[Case, ...] = (
         "pair swapped, and it says so",
         modbus,
         (Said(_bus, words=r"swap|revers", own_words=True),),
+        also=("LN003",),
         hear=swapped,
         seconds=20,
         seeds=1,
@@ -258,6 +262,7 @@ LINE_CASES: tuple[Case, ...] = (
         "N2 heard as RTU",
         n2,
         (Said(_bus, words=r"\bn2\b", own_words=True),),
+        also=("LN003",),
         hear=partial(as_protocol, "modbus-rtu"),
         seeds=1,
     ),
@@ -265,6 +270,7 @@ LINE_CASES: tuple[Case, ...] = (
         "MS/TP heard as RTU",
         mstp,
         (Said(_bus, words=r"ms/?tp|bacnet", own_words=True),),
+        also=("LN003",),
         hear=partial(as_protocol, "modbus-rtu"),
         seconds=20,
         seeds=1,
@@ -273,6 +279,7 @@ LINE_CASES: tuple[Case, ...] = (
         "RTU heard as MS/TP",
         modbus,
         (Said(_bus, words=r"rtu", own_words=True),),
+        also=("LN003",),
         hear=partial(as_protocol, "mstp"),
         seeds=1,
     ),
@@ -280,6 +287,7 @@ LINE_CASES: tuple[Case, ...] = (
         "ASCII heard as RTU",
         partial(modbus, is_ascii=True),
         (Said(_bus, words=r"ascii", own_words=True),),
+        also=("LN003",),
         hear=partial(as_protocol, "modbus-rtu"),
         seeds=1,
     ),
@@ -287,6 +295,7 @@ LINE_CASES: tuple[Case, ...] = (
         "RTU heard as N2",
         modbus,
         (Said(_bus, words=r"rtu", own_words=True),),
+        also=("LN003",),
         hear=partial(as_protocol, "n2"),
         seeds=1,
     ),

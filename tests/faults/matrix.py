@@ -1,6 +1,7 @@
 """Runs cases of the matrix and prints them as a table: `python -m tests.faults.matrix`, or `make faults`.
 
-Words choose cases by their names. Cases run on all cores; progress goes to standard error, the table to standard output.
+Words choose cases by their names. Cases run on all cores; progress goes to standard error, the table to standard
+output.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from dataclasses import dataclass
 from functools import cache
 
 from tests.faults.case import Case
-from tests.faults.cases import CASES
+from tests.faults.cases import CASES, FURTHER_CASES
 from tests.faults.clean_cases import clean_cases
 from tests.faults.judged import Outcome, run
 
@@ -47,7 +48,7 @@ class Done:
 @cache
 def every_case(minutes: float) -> tuple[Case, ...]:
     """All faults, then all clean buses, each heard for that many minutes."""
-    return (*CASES, *clean_cases(60 * minutes))
+    return (*CASES, *FURTHER_CASES, *clean_cases(60 * minutes))
 
 
 def work(job: Job) -> Done:

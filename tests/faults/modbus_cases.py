@@ -323,7 +323,7 @@ MODBUS_CASES: tuple[Case, ...] = (
         FTDI,
     ),
     Case(
-        "RTU one station sends six in a hundred too slowly",
+        "RTU one station's clock six in a hundred too slow",
         modbus,
         (Said(_second, ("MB005", "MB006", "LN101"), r"damag|framing|baud|parity"),),
         hear=partial(sent_otherwise, partial(of_party, "unit 2", LineSettings(18_048, 8, "E", 1))),

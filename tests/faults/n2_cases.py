@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from functools import partial
+from typing import Any
 
 from dissectors.bacnet.application import Application, Poller
 from dissectors.frame import Place
 from dissectors.modbus.simulated_master import read_holding
+from dissectors.n2.simulated import reading
 from dissectors.simulated import Station
 from sniff.simulation.faults import BitFlips, LateResponse, NoiseInGaps
 from sniff.simulation.tap import FTDI
@@ -24,6 +26,11 @@ _others_values = {(1, number): 50.0 + number for number in range(1, 9) if number
 _LAST = r"\blast\b|too early|too soon|\bends?\b.*missing|lets go|cut (off|short)|carriage return|\bCR\b"
 _LATE = r"\blate|after (the|its|another|it was) |next (turn|command)|nobody asked|gave up"
 _TWO = r"two (stations|devices|drives)|second (station|device)|same (address|number)|answered twice"
+
+
+def _status_by_turns() -> list[Any]:
+    """Readings of the binary inputs of both drives, the status among them."""
+    return [reading(address, 2, number) for number in (1, 2, 3) for address in (1, 2)]
 
 
 def _twin(delay: int, *, seed: int) -> Station:
@@ -118,7 +125,7 @@ N2_CASES: tuple[Case, ...] = (
     Case(
         "N2 drive reports a fault",
         N2(
-            partial(by_turns, 1, 2, count=16),
+            _status_by_turns,
             {"drive 1": partial(follower, 1), "drive 2": partial(follower, 2, 18 * MS, values={(2, 3): 1.0})},
             devices={1: "teco-f510", 2: "teco-f510"},
         ),
