@@ -212,4 +212,4 @@ CASES: tuple[Case, ...] = (  # of each a capture is kept in captures/findings
 )
 
 FURTHER_CASES: tuple[Case, ...] = (*MODBUS_CASES, *N2_CASES, *LINE_CASES, *MSTP_CASES)
-"""What is the same each time, time patterns, tokens. Written from the true cause alone; no captures are made of them."""
+"""What is the same each time, time patterns, tokens. Written from the true cause; no captures are kept of them."""

@@ -88,7 +88,7 @@ class Table:
     def __init__(self, jobs: Sequence[Job]) -> None:
         self._left = {job.place: sum(other.place == job.place for other in jobs) for job in jobs}
         self._of: dict[int, list[Done]] = {}
-        self.faults = self.clean = self.runs = self.found = self.said_all = 0
+        self.faults = self.clean = self.runs = self.found = self.graves = 0
         self.accusations: list[str] = []
         self.false_alarms: list[str] = []
 
@@ -109,6 +109,7 @@ class Table:
             self.faults += 1
             self.runs += len(results)
             self.found += sum(not one.missed for one in results)
+            self.graves += sum(len(one.graves) for one in results)
             self.accusations += [f"{case.name}: {what}" for what in (*accused, *mistaken)]
         else:
             self.clean += 1
@@ -125,6 +126,8 @@ class Table:
         """Print what it adds up to; give the exit code."""
         recall = self.found / self.runs if self.runs else 1.0
         print(f"\n{self.faults} cases with a fault, {self.runs} runs, recall {recall:.1%}")
+        if self.runs:
+            print(f"{self.graves / self.runs:.2f} findings at warning or above a run (one cause, one finding: 1.00)")
         print(f"{len(self.accusations)} accusations of innocents or wrong errors")
         for what in self.accusations:
             print(f"  {what}")

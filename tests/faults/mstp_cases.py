@@ -190,6 +190,7 @@ MSTP_CASES: tuple[Case, ...] = (
         "MS/TP noise after polls",
         Ring(_four, (When(_is_poll, NoiseInGaps(0.5, places=(Place.BETWEEN,))),)),
         (Said(("bus",), ("MS403", "LN203", "MS401", "LN202"), r"noise|stray"),),
+        struck=("MAC 2", "MAC 5", "MAC 9"),  # who polls; nobody is at the addresses polled
         seconds=60,
     ),
     # who talks too much

@@ -10,6 +10,7 @@ from dataclasses import replace
 import pytest
 
 from sniff.simulation.scenarios import bursts
+from tests.faults import matrix
 from tests.faults.case import Case
 from tests.faults.cases import CASES, FURTHER_CASES
 from tests.faults.clean_cases import CLEAN, Clean, clean_cases
@@ -171,9 +172,18 @@ def test_of_a_clean_bus_nothing_is_said(case: Case) -> None:
     assert outcome.findings != ()  # what the adapter can tell is always said
 
 
-def test_every_pending_case_exists() -> None:
-    names = {case.name for case in (*FAULTY, *BRIEF_CLEAN)}
-    assert names.issuperset(PENDING)
+def test_every_pending_case_exists_and_names_are_told_apart() -> None:
+    names = [case.name for case in (*FAULTY, *BRIEF_CLEAN)]
+    assert len(set(names)) == len(names)
+    assert set(names).issuperset(PENDING)
+
+
+def test_the_table_adds_up(capsys: pytest.CaptureFixture[str]) -> None:
+    assert matrix.main(["RTU station absent", "N2 clean, exact", "--jobs=1", "--seeds=1", "--clean-minutes=0.1"]) == 0
+    told = capsys.readouterr().out
+    assert "1 cases with a fault, 1 runs, recall 100.0%" in told
+    assert "0 accusations" in told
+    assert "1 clean buses, 0 false alarms" in told
 
 
 @pytest.mark.parametrize("kind", CLEAN, ids=lambda kind: kind.name)
