@@ -155,7 +155,14 @@ LINE_CASES: tuple[Case, ...] = (
     ),
     Case(
         "ASCII noise anywhere, mostly on the one with long answers",
-        Modbus(_uneven, usual_stations(_FOUR, is_ascii=True), others={"sparks": _sparks}, pause=40 * MS, is_ascii=True),
+        Modbus(
+            _uneven,
+            usual_stations(_FOUR, is_ascii=True),
+            others={"sparks": _sparks},
+            pause=40 * MS,
+            timeout=500 * MS,
+            is_ascii=True,
+        ),
         (Said(_bus, _NOISE, r"noise|stray|damag"),),
         seconds=120,
     ),
@@ -215,6 +222,16 @@ LINE_CASES: tuple[Case, ...] = (
             usual_stations(_FOUR, is_ascii=True, unit_1=5 * MS, unit_2=5 * MS, unit_3=5 * MS, unit_4=5 * MS),
             pause=5 * MS,
             is_ascii=True,
+        ),
+        (Said(("bus", "master"), words=_LOAD),),
+        seeds=1,
+    ),
+    Case(
+        "N2 bus near its limit",
+        N2(
+            partial(by_turns, 1, 2),
+            {"drive 1": partial(follower, 1, 2 * MS), "drive 2": partial(follower, 2, 2 * MS)},
+            pause=2 * MS,
         ),
         (Said(("bus", "master"), words=_LOAD),),
         seeds=1,
