@@ -143,7 +143,9 @@ class Recorder:
         self._batcher = Batcher()
         self._open_octets = 0
         self._now: int | None = None
-        self._oldest: int | None = None  # time of the oldest thing that is not in the file
+        self._ticked: int | None = None
+        self._oldest: int | None = None  # time of the oldest thing that was not sent to be written
+        self._oldest_came = 0  # the same on the clock of `tick`, which is not that of a replayed capture
         self._unsynced: int | None = None
         self._sequences: dict[str, int] = {}
         self._sent = 0
@@ -209,6 +211,7 @@ class Recorder:
 
     def tick(self, now_ns: int) -> None:
         """Say what time it is on the capture's clock, at least every 0.25 s: closes, flushes and syncs what is due."""
+        self._ticked = now_ns
         if not self._closed:
             self._step(now_ns)
 
@@ -230,13 +233,17 @@ class Recorder:
         """After `finish`: wait no longer; what is not in the file is lost, and counted."""
         self._given_up = not self.finished
 
+    def synced(self, seconds: float) -> bool:
+        """Once `finished`: wait until the disk has everything, at most so long; whether it has. The system has it."""
+        return self._keeper.synced(seconds)
+
     def close(self, patience: float = 60.0) -> None:
         """Finish the file; wait so many seconds for the disk. Never raises."""
         self.finish()
         self._thread.join(patience)
         self.give_up()
         if self.finished:
-            self._keeper.synced(SYNC_PATIENCE)
+            self.synced(SYNC_PATIENCE)
 
     # what it tells
 
@@ -286,8 +293,9 @@ class Recorder:
         """Age of the oldest thing that is not in the file yet (ns at `now`, the capture's clock), 0 for nothing."""
         while self._flushes and self._flushes[0][0] <= self._keeper.flushed:
             self._flushes.popleft()
-        oldest = self._flushes[0][1] if self._flushes else self._oldest
-        return 0 if oldest is None or self.finished else max(0, now - oldest)
+        if self.finished or not (self._flushes or self._oldest is not None):
+            return 0
+        return max(0, now - (self._flushes[0][1] if self._flushes else self._oldest_came))
 
     @property
     def syncing(self) -> int:
@@ -299,6 +307,7 @@ class Recorder:
     def _note(self, time: int) -> None:
         if self._oldest is None:
             self._oldest = time
+            self._oldest_came = time if self._ticked is None else self._ticked
 
     def _step(self, now: int) -> None:
         self._now = now
@@ -306,7 +315,7 @@ class Recorder:
             self._close_batch()
             self._flush_number += 1
             if len(self._flushes) < MOST_FLUSHES:
-                self._flushes.append((self._flush_number, self._oldest))
+                self._flushes.append((self._flush_number, self._oldest_came))
             self._keeper.orders.put(Flush(self._flush_number))
             self._oldest = None
             if self._unsynced is None:

@@ -265,6 +265,7 @@ def test_a_folder_that_is_removed(tmp_path: Path, rotation: Rotation | None) -> 
     folder.mkdir(parents=True)
     running = Running(Recorder(folder / "a.mcap", SESSION, rotation))
     running.run(3)
+    eventually(lambda: running.recorder._keeper.orders.empty(), "the thread is stuck")
     shutil.rmtree(tmp_path / "g")
     until_noticed(running)
     running.run(3)
@@ -281,6 +282,7 @@ def test_a_folder_that_cannot_be_made_again(tmp_path: Path) -> None:
     folder.mkdir()
     running = Running(Recorder(folder / "a.mcap", SESSION))
     running.run(3)
+    eventually(lambda: running.recorder._keeper.orders.empty(), "the thread is stuck")
     shutil.rmtree(folder)
     folder.write_text("in the way")
     deadline = time.monotonic() + 20
