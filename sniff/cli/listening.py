@@ -305,7 +305,8 @@ def lost_something(live: LiveBus) -> bool:
     status, ended = live.status, live.ended
     if not live.link.paths:
         return False
-    killed = ended is not None and not ended.clean and status.unwritten > 0
+    late = status.closing or status.behind  # else it lacks the last second, as a killed process may
+    killed = ended is not None and not ended.clean and late and status.unwritten > 0
     return bool(status.error or status.lost or killed or (ended is not None and ended.lossy) or not_there(live))
 
 

@@ -105,9 +105,7 @@ def test_a_sync_that_hangs_keeps_nothing_from_the_file(record, bus, disk) -> Non
     wait_until(lambda: len(octets_of(record.folder / "x.mcap")) > before + 500, "the file grows no more")
     for pid in capture_processes(record.folder):
         os.kill(pid, signal.SIGKILL)
-    code = command.end()
-    assert code in (3, 4)
-    assert (code == 3) == any("NOT RECORDED" in line for line in command.said), "at most what came in the last second"
+    assert command.end() in (3, 4), "4, but that the sync was late"
     assert any("was ended by SIGKILL" in line for line in command.said)
     assert any("recorded to x.mcap, cut where the capture was ended" in line for line in command.said)
 
