@@ -323,10 +323,10 @@ def _gone_for_good(live: LiveBus) -> bool:
 
 @contextlib.contextmanager
 def _stopped_by_its_reader(live: LiveBus) -> Iterator[None]:
-    """End the capture when whoever reads our output goes away (`| head`): a recording would go on for ever."""
+    """End the capture when nobody takes our output any more (`| head`, a full disk): it would go on for ever."""
     try:
         yield
-    except BrokenPipeError:
+    except OSError:
         live.stop()
         raise
 
