@@ -23,7 +23,7 @@ from sniff.simulation.scenarios import scenario, simulate
 from sniff.simulation.tap import CH340
 
 STARTED = 1_772_359_200_000_000_000
-READS_A_PART = 600
+READS_A_PART = 700
 
 
 @pytest.fixture(scope="module")
