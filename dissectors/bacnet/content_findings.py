@@ -14,7 +14,7 @@ from dissectors.frame import Event, Frame, Header
 
 CONTENT_RULES = (
     Rule(
-        "MS601",
+        "MS701",
         Severity.NOTE,
         "reply expected or not",
         "Frame type, the reply bit of the network header and the kind of message contradict each other: a confirmed "
@@ -25,7 +25,7 @@ CONTENT_RULES = (
         "the firmware of the sender; behind a router, that of the station named",
     ),
     Rule(
-        "MS602",
+        "MS702",
         Severity.NOTE,
         "date or time that cannot be",
         "A date whose weekday is another one in the calendar, a day or time of day that does not exist "
@@ -35,7 +35,7 @@ CONTENT_RULES = (
         "how the sender makes its dates; send the weekday as 255 where it does not matter",
     ),
     Rule(
-        "MS603",
+        "MS703",
         Severity.NOTE,
         "value of another type",
         "The value of a standard property of a standard object has another primitive type than the standard gives it "
@@ -45,7 +45,7 @@ CONTENT_RULES = (
     ),
 )
 
-_CODES = {Odd.REPLY: "MS601", Odd.DATE: "MS602", Odd.TYPE: "MS603"}
+_CODES = {Odd.REPLY: "MS701", Odd.DATE: "MS702", Odd.TYPE: "MS703"}
 _RULES = {rule.code: rule for rule in CONTENT_RULES}
 
 SENDERS_KEPT = 512

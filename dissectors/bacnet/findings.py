@@ -9,7 +9,7 @@ from dissectors.bacnet.content_findings import ContentFindings
 from dissectors.bacnet.findings_of_damage import damage, duplicates
 from dissectors.bacnet.findings_of_use import polls, use
 from dissectors.bacnet.limits import MAX_MASTER, T_REPLY_DELAY, T_USAGE_DELAY
-from dissectors.bacnet.ring import COARSE_LIMIT, Happened, Node, Ring, What
+from dissectors.bacnet.ring import COARSE_LIMIT, Node, Ring, What
 from dissectors.bacnet.ring_observer import RingObserver
 from dissectors.bacnet.ring_remarks import Remark, listed, milliseconds, of, plain
 from dissectors.bacnet.rules import RULES

@@ -65,7 +65,7 @@ def test_a_weekday_that_does_not_fit_is_said():
     words = "2024-04-05 Thursday (it is a Friday)"
     assert words in line(found, 2)
     assert f"date: {words}" in values(found, 2)["meaning"]
-    (note,) = [one for one in found.findings if one.code == "MS602"]
+    (note,) = [one for one in found.findings if one.code == "MS702"]
     assert (note.severity, note.subject, note.evidence) == (Severity.NOTE, "MAC 1", (2,))
     assert words in note.seen
     assert found.graves() == set()
@@ -75,7 +75,7 @@ def test_a_confirmed_request_without_the_reply_bit_is_said():
     found = reading(case("mstp/issue916-confirmed-without-reply-bit.cap.txt"))
     assert "(confirmed, no reply expected)" in line(found, 2)
     assert any("cannot be answered at once" in value for value in values(found, 2)["expects reply"])
-    (note,) = [one for one in found.findings if one.code == "MS601"]
+    (note,) = [one for one in found.findings if one.code == "MS701"]
     assert (note.severity, note.subject, note.count) == (Severity.NOTE, "MAC 1", 4)
     assert found.graves() == set()
     asked = [one for one in found.transactions if not one.is_passing]

@@ -209,7 +209,7 @@ def test_who_is_behind_a_router_is_named():
     event = frame_of(octets)
     found.see(4, event, MSTP.peek(event))
     (finding,) = found.findings()
-    assert (finding.code, finding.subject, finding.evidence) == ("MS601", "MAC 2", (4,))
+    assert (finding.code, finding.subject, finding.evidence) == ("MS701", "MAC 2", (4,))
     assert "network 13:61 behind it" in finding.seen
 
 

@@ -11,8 +11,8 @@ from sniff.simulation.faults import BitFlips, MarkParity, NoiseInGaps
 from sniff.simulation.tap import EXACT, FTDI
 from tests.faults.buses import modbus, mstp, n2
 from tests.faults.case import Case
-from tests.faults.line_rule_cases import LINE_RULE_CASES, NO_PATTERN
 from tests.faults.line_faults import AtTimes, paused
+from tests.faults.line_rule_cases import LINE_RULE_CASES, NO_PATTERN
 from tests.faults.matrix import run
 from tests.faults.stations import Dies
 
