@@ -11,7 +11,7 @@ from typing import Final
 from dissectors.frame import Flaw
 from dissectors.modbus.functions import EXCEPTION_BIT, FUNCTIONS
 
-KNOWN_REQUEST: Final = 8
+KNOWN_REQUEST: Final = 14
 """Bits for octets that were a request before, octet for octet."""
 
 KNOWN_LENGTH: Final = 6

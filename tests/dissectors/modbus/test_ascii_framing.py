@@ -158,7 +158,9 @@ def test_a_start_at_the_end_of_noise_waits_for_its_frame() -> None:
 
 
 @pytest.mark.parametrize("gap", [0, 20 * MS])
-@pytest.mark.parametrize(("flaw", "first"), [(Flaw.FIRST_MISSING, b""), (Flaw.FIRST_SPOILT, b"\xba"), (Flaw.FIRST_SPOILT, b"A")])
+@pytest.mark.parametrize(
+    ("flaw", "first"), [(Flaw.FIRST_MISSING, b""), (Flaw.FIRST_SPOILT, b"\xba"), (Flaw.FIRST_SPOILT, b"A")]
+)
 def test_a_start_that_is_missing_or_spoilt(flaw: Flaw, first: bytes, gap: int) -> None:
     spoilt = first + RESPONSE[1:]
     if first == b"\xba":
