@@ -77,11 +77,10 @@ class Past:
             self._flaws.pop(octets[0], None)
         code = octets[1]
         known = code & ~EXCEPTION_BIT in FUNCTIONS
-        if request:
-            if octets not in self._requests:
-                self._requests[octets] = None
-                if len(self._requests) > _MOST_REQUESTS:
-                    del self._requests[next(iter(self._requests))]
+        if request and octets not in self._requests:
+            self._requests[octets] = None
+            if len(self._requests) > _MOST_REQUESTS:
+                del self._requests[next(iter(self._requests))]
         if (known and request) or code & EXCEPTION_BIT or code in _FIXED:
             return
         key = _key(octets[0], code, not request)
