@@ -42,6 +42,9 @@ ODD_BROADCAST: Final = -8
 WHOLE_STRETCH: Final = 12
 """All octets between two silences with a good CRC, whatever their function: good with both gaps proved, only then."""
 
+ANY_END: Final = CRC_BITS - 7
+"""A good CRC that was looked for at every place behind a begin."""
+
 ZERO_TAIL: Final = -8
 """A good frame and zeros after it is good again as a whole (the CRC is 0): where zeros stray, or are more than a CRC
 has, the shorter reading wins (segmentation.py)."""

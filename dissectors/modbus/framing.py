@@ -286,7 +286,7 @@ class RtuFramer:
             paths.extend(finder.good + unpredicted)
         else:
             paths = self._extended_paths()
-        return paths.winner(), paths.agreed(finder.pending(), count)
+        return paths.winner(), paths.agreed(finder.pending(), self._open.unfinished, count)
 
     def _extended_paths(self) -> Paths:
         """The paths through all candidates found, kept from look to look while nothing is taken."""

@@ -14,6 +14,7 @@ from typing import Final
 
 from dissectors.checksums import crc16_modbus
 from dissectors.modbus.candidates import (
+    ANY_END,
     CRC_BITS,
     WHOLE_STRETCH,
     Candidate,
@@ -32,9 +33,6 @@ from dissectors.modbus.functions import (
     is_open_length,
 )
 from dissectors.modbus.past import Past
-
-ANY_END: Final = CRC_BITS - 7
-"""Bits of a good CRC that was looked for at every place behind a begin."""
 
 _MOST_BEGINS: Final = 32
 _INITIAL: Final = 0xFFFF
@@ -72,11 +70,15 @@ class _Begin:
 
 
 class OpenLengthFinder:
-    """Finds such frames in a growing window. Positions count from the first octet ever fed."""
+    """Finds such frames in a growing window. Positions count from the first octet ever fed.
 
-    __slots__ = ("_begins",)
+    `unfinished`: where, when last looked, a frame began behind one of its station and function and had no end yet.
+    """
+
+    __slots__ = ("_begins", "unfinished")
 
     def __init__(self) -> None:
+        self.unfinished: list[int] = []
         self._begins: dict[int, _Begin] = {}
 
     def look(
@@ -101,6 +103,7 @@ class OpenLengthFinder:
         good = list(good)
         starts = {candidate.start for candidate in good}
         ahead = {p for p in (*begins, *(candidate.end for candidate in good)) if self._opens(known, p - base)}
+        self.unfinished = []
         if not ahead:
             return []
         found: dict[tuple[int, int], Candidate] = {}
@@ -110,7 +113,10 @@ class OpenLengthFinder:
         while ahead:
             position = min(ahead)
             ahead.discard(position)
-            for candidate in self._frames(known, base, position, partner[position], starts, silent, heard):
+            frames = self._frames(known, base, position, partner[position], starts, silent, heard)
+            if not frames and partner[position] and not silent and base + len(known) - position < MAX_FRAME:
+                self.unfinished.append(position)
+            for candidate in frames:
                 if silent and candidate.end == base + len(known) and not known[-1]:
                     bare = without_zeros(candidate.octets, past, partner[position])
                     candidate = candidate._replace(length=len(bare), octets=bare)
@@ -119,6 +125,8 @@ class OpenLengthFinder:
                 answers = _same(known, position - base, end - base)
                 if end not in partner and self._opens(known, end - base):
                     ahead.add(end)
+                elif answers and not silent and end - base > len(known) - MIN_FRAME:
+                    self.unfinished.append(end)  # no more than its head is there
                 partner[end] = partner.get(end, False) or answers
         return list(found.values())
 
@@ -158,10 +166,9 @@ class OpenLengthFinder:
             after = position_after - base
             last = silent and after == end
             agreed = last or position_after in starts or _same(known, at, after)
-            if not agreed:
-                if not partner or after + 2 > end or not known[after]:
-                    continue
-                partner = False  # where nothing agrees but what is before, only its first end counts
+            if not agreed and not (partner and after + 2 <= end and known[after]):
+                continue
+            partner = False  # where nothing agrees but what is before, only its first end counts
             stretch = known[at:after]
             if known_station or not is_text(stretch):
                 bits = WHOLE_STRETCH if last else ANY_END

@@ -11,7 +11,7 @@ from typing import Final
 from dissectors.frame import Flaw
 from dissectors.modbus.functions import EXCEPTION_BIT, FUNCTIONS
 
-KNOWN_REQUEST: Final = 8
+KNOWN_REQUEST: Final = 14
 """Bits for octets that were a request before, octet for octet."""
 
 KNOWN_LENGTH: Final = 6
@@ -33,12 +33,13 @@ _STRAY_BUS: Final = 1500
 class Past:
     """Requests and lengths of answers by station and function; whether zeros tend to follow frames on this bus."""
 
-    __slots__ = ("_constant", "_flaws", "_lengths", "_requests", "_strays")
+    __slots__ = ("_calls", "_constant", "_flaws", "_lengths", "_requests", "_strays")
 
     def __init__(self) -> None:
         self._requests: dict[bytes, None] = {}  # in the order they came first
         self._lengths: dict[int, int] = {}  # unit, function, direction → a bit for each length
         self._constant: dict[int, tuple[int, int]] = {}  # of functions of unknown layout: first length, how often
+        self._calls: set[int] = set()  # unit and function of all requests
         self._flaws: dict[int, Flaw] = {}  # of the newest answer, by station
         self._strays = 0
 
@@ -53,6 +54,10 @@ class Past:
     def has_asked(self, octets: bytes) -> bool:
         """Whether octets were a request before, octet for octet."""
         return octets in self._requests
+
+    def has_called(self, unit: int, code: int) -> bool:
+        """Whether this station was asked for this function before."""
+        return unit << 8 | code in self._calls
 
     def knows_length(self, unit: int, code: int, length: int) -> bool:
         """Whether a frame of this length has answered."""
@@ -78,10 +83,11 @@ class Past:
         code = octets[1]
         known = code & ~EXCEPTION_BIT in FUNCTIONS
         if request:
-            if octets not in self._requests:
-                self._requests[octets] = None
-                if len(self._requests) > _MOST_REQUESTS:
-                    del self._requests[next(iter(self._requests))]
+            self._calls.add(octets[0] << 8 | code)
+        if request and octets not in self._requests:
+            self._requests[octets] = None
+            if len(self._requests) > _MOST_REQUESTS:
+                del self._requests[next(iter(self._requests))]
         if (known and request) or code & EXCEPTION_BIT or code in _FIXED:
             return
         key = _key(octets[0], code, not request)

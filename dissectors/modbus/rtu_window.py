@@ -11,7 +11,7 @@ from dissectors.framer import UNKNOWN_SILENCE, OctetWindow
 from dissectors.line import Timing
 from dissectors.modbus.candidates import SHORT_FRAME, Candidate, Reading, octet_bits, readings
 from dissectors.modbus.expectation import Expected, expectation
-from dissectors.modbus.functions import is_open_length
+from dissectors.modbus.functions import EXCEPTION_BIT, is_open_length
 from dissectors.modbus.past import Past
 from dissectors.modbus.remains import (
     ODD_LENGTH,
@@ -178,7 +178,8 @@ class RtuWindow:
                     return
                 before, stretch, count = Side.NOISE, stretch[zeros:], count - zeros
         heard = stretch[0] in self.units if self.units else None
-        hurt = injury(stretch, before, after, heard, self.expected)
+        called = count > 1 and self.past.has_called(stretch[0], stretch[1] & ~EXCEPTION_BIT)
+        hurt = injury(stretch, before, after, heard, called, self.expected)
         bounded = before is not Side.NOISE and after is not Side.NOISE
         if bounded and (echoed := cut_echo_of(stretch, self.expected)):
             self._take_damaged(count, Injury(echoed, Damage.SHORT), None)

@@ -6,7 +6,7 @@ Evidence is counted in bits. A candidate brings those of its octets (candidates.
     +2  silence of 1.5 characters proved there
     +4  a station that has been heard before
     +2 … +14  it answers the open request, or repeats it (expectation.py)
-    +6 … +8   this station was asked the same before, or answered at this length (past.py)
+    +6 … +14  this station was asked the same before, or answered at this length (past.py)
     -6  each silence proved inside it
 
 and THRESHOLD is taken off. What remains is its worth. A candidate that stands on its own gains a sixteenth of a bit an
@@ -23,7 +23,7 @@ A path is extended by a candidate from the best path before it, the best that en
 that left the request open which it would answer.
 
 A stretch that would be a frame if the octets to come make its CRC good is weighed too, at its best. Frames are
-committed as far as the best path and the best path that ends in such a hope agree.
+committed as far as the best path and all better ones that end in such a hope agree.
 """
 
 from __future__ import annotations
@@ -32,10 +32,10 @@ from bisect import bisect_right
 from collections.abc import Iterable, Sequence
 from typing import Final, NamedTuple, Protocol
 
-from dissectors.modbus.candidates import CRC_BITS, ZERO_TAIL, Candidate, Pending, Reading, octet_hope
-from dissectors.modbus.expectation import LOOSE, SAME_UNKNOWN, Expected, expectation
-from dissectors.modbus.functions import EXCEPTION_BIT, MORE
-from dissectors.modbus.past import KNOWN_LENGTH, KNOWN_REQUEST, Past
+from dissectors.modbus.candidates import ANY_END, CRC_BITS, ZERO_TAIL, Candidate, Pending, Reading, octet_hope
+from dissectors.modbus.expectation import LOOSE, REPEATED, SAME_UNKNOWN, Expected, expectation
+from dissectors.modbus.functions import EXCEPTION_BIT, MIN_FRAME, MORE
+from dissectors.modbus.past import KNOWN_LENGTH, Past
 
 THRESHOLD: Final = 20
 SCALE: Final = 16
@@ -47,8 +47,11 @@ ADJACENT: Final = 4
 HEARD: Final = 4
 SILENCE_INSIDE: Final = -6
 
-WHOLE: Final = 4
-"""A frame whose last octets are zeros, and that fills the room between two silences: good without them, too."""
+WHOLE: Final = 12
+"""A request whose last octets are zeros, and that fills the room between two silences: good without them, too."""
+
+WHOLE_ANSWER: Final = 4
+"""An answer whose last octets are zeros, and that is as long as was asked for."""
 
 _WELL_TOLD: Final = frozenset({0x0F, 0x10, 0x17})
 """Functions whose first octets are ill formed by chance nearly always."""
@@ -106,7 +109,7 @@ def worth(bits: int, length: int) -> int:
 def zero_bits(window: Surroundings, candidate: Candidate, expected: Expected | None, fit: int) -> int:
     """Bits for a frame that is good without its last zeros too; `fit`: those it has from the open request."""
     if fit >= LOOSE:
-        return 0
+        return 0 if window.past.zeros_stray else WHOLE_ANSWER
     if candidate.zeros > _CRC_OCTETS or window.past.zeros_stray:
         return ZERO_TAIL
     if candidate.request and window.edge(candidate.start) == PROVED and window.edge(candidate.end) == PROVED:
@@ -147,31 +150,35 @@ class Paths:
         """The frames of the best path, in order."""
         return _frames(self._best[-1])
 
-    def agreed(self, pending: Sequence[Pending], count: int) -> list[Candidate]:
-        """Those of them that nothing yet to come can undo. `count`: how many octets of the window are known."""
+    def agreed(self, pending: Sequence[Pending], unfinished: Sequence[int], count: int) -> list[Candidate]:
+        """Those of them that nothing yet to come can undo. `count`: how many octets of the window are known.
+
+        `unfinished`: where frames of unpredicted length have begun (open_length.py).
+        """
         winner = self._best[-1]
         if winner.candidate is None:
             return []
-        hope: _Step | None = None
-        most, end = winner.worth, winner.candidate.start + winner.candidate.length
+        path = _frames(winner)
+        end = path[-1].end
         rivalled = self._is_rivalled(winner)
+        hoping: dict[int, _Step] = {}  # paths that would be better than the best if their last frame comes true
         for start, reading in pending:
             if start >= end and not rivalled:
                 continue  # it follows the best path, whatever becomes of it
-            if not self._is_spoken_for(start):
-                continue
-            total, step = self._hope(start, reading, count)
-            if total > most:
-                most, hope = total, step
-        path = _frames(winner)
-        if hope is None:
-            return path
-        agreed = []
-        for ours, theirs in zip(path, _frames(hope), strict=False):
-            if ours is not theirs:
-                break
-            agreed.append(ours)
-        return agreed
+            if self._is_spoken_for(start):
+                total, step = self._hope(start, reading, count)
+                if total > winner.worth:
+                    hoping[id(step)] = step
+        for start in unfinished:
+            total, step = self._open_hope(start)
+            if total > winner.worth:
+                hoping[id(step)] = step
+        agreed = len(path)
+        for step in hoping.values():
+            other = _frames(step)
+            while other[:agreed] != path[:agreed]:
+                agreed -= 1
+        return path[:agreed]
 
     def _is_spoken_for(self, start: int) -> bool:
         """Whether anything but its first octets speaks for a frame that is not complete: of 65536 that nothing speaks
@@ -207,7 +214,7 @@ class Paths:
         for step in self._options(start, candidate.unit, octets[1]):
             fit = step.expected.fit(octets, candidate.response) if step.expected is not None else 0
             if candidate.request and octets == step.asked:
-                fit = max(fit, KNOWN_REQUEST)
+                fit = max(fit, REPEATED)
             own = bits + max(fit, known) + (ADJACENT if step.end == start else edge)
             if candidate.zeros:
                 own += zero_bits(window, candidate, step.expected, fit)
@@ -253,6 +260,22 @@ class Paths:
             own = bits + (ADJACENT if step.end == start else edge)
             own += max(known, step.expected.hope(octets, at, length) if step.expected is not None else 0)
             total = step.worth + worth(own, length)
+            if total > most:
+                most, best = total, step
+        return most, best
+
+    def _open_hope(self, start: int) -> tuple[int, _Step]:
+        """The same for a frame of unpredicted length, which answers one of its station and function."""
+        window = self._window
+        octets, at = window.octets, start - window.base
+        unit, code = octets[at], octets[at + 1]
+        edge = window.edge(start)
+        most, best = -1, self._best[0]
+        for step in self._options(start, unit, code):
+            bits = ANY_END + (ADJACENT if step.end == start else edge) + (HEARD if window.heard(unit) else 0)
+            if step.expected is not None and step.expected.is_for(octets, at):
+                bits += SAME_UNKNOWN
+            total = step.worth + worth(bits, MIN_FRAME)
             if total > most:
                 most, best = total, step
         return most, best

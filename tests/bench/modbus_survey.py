@@ -323,6 +323,7 @@ def score(total: Score, bus: Bus, events: list[Event], tracker: ModbusTracker) -
             one = reached.get(at)
             if one is None and any(_same_message(event.octets, o.octets) for o in hurt):
                 total.mended += 1
+                total.damaged -= 1
             elif one is not None and one.octets == event.octets:
                 total.found += 1
                 if placement is not None:
@@ -347,7 +348,8 @@ def score(total: Score, bus: Bus, events: list[Event], tracker: ModbusTracker) -
 
 
 def _same_message(read: bytes, sent: bytes) -> bool:
-    return read[:1] == b":" and read.upper().rstrip(b"\r\n") == sent.rstrip(b"\r\n")
+    plain = bytes(octet & 0x7F for octet in read)  # a line of 7 data bits
+    return plain[:1] == b":" and plain.upper().rstrip(b"\r\n") == sent.rstrip(b"\r\n")
 
 
 def _unit(octets: bytes) -> int:
