@@ -17,7 +17,7 @@ from dissectors.modbus.evidence import Evidence
 from dissectors.modbus.exchange import is_begin_of
 from dissectors.modbus.functions import BROADCAST, EXCEPTION_BIT, FUNCTIONS, answer_length
 from dissectors.modbus.judgement import judge
-from dissectors.modbus.learnt import Learnt
+from dissectors.modbus.learnt import READ, Learnt
 from dissectors.modbus.response_groups import Answered
 from dissectors.modbus.station_record import Key, Lost, Station, middle
 from dissectors.tracker import Placement, Transaction, Verdict
@@ -35,6 +35,7 @@ _SPACING_LEAST = 8
 AT_ONCE = 50 * MS
 """No master repeats a request so soon."""
 
+_BEGIN = 5  # octets of a request that no noise makes by chance: unit, function, address, half a quantity
 _NO_WAIT = 10 * MS  # no master gives up so soon: it does not wait for one answer before it asks for the next
 _LOST_KEPT = 64
 _FINAL_KEPT = 64
@@ -104,6 +105,7 @@ class ModbusFindings:
         self._newest: int | None = None  # the transaction of the newest request
         self._stray: dict[int, bytes] = {}  # octets that are no good frame, by the transaction they came in
         self._lost: dict[int, Lost] = {}  # requests without answer, by transaction
+        self._begins: set[bytes] = set()  # the first octets of good requests
         self._waits: dict[int, int] = {}  # by request that nothing followed: until the next one, ns
         self._slow: deque[_Slow] = deque()  # answers that took long, until the pause after them is known
         self._pauses: deque[int] = deque(maxlen=_SPACING_KEPT)  # the master's, between an answer and its next request
@@ -123,10 +125,13 @@ class ModbusFindings:
             return
         if isinstance(event, Noise) or header is None or placement is None:
             self._gather(event.octets)
+            self._see_broken(no, event, event.octets)
             self._see_noise(no, event)
             self._before = self._open = self._answered = None
             return
         octets = readable_adu(event)
+        if not header.ok:
+            self._see_broken(no, event, octets)
         self._see_gaps(no, event, header, placement)
         self._see_pause_before(no, event, header, placement)
         if placement.role is Role.RESPONSE:
@@ -213,6 +218,8 @@ class ModbusFindings:
             self._open = self._broadcast = None
             return
         self._seen.requests += 1
+        if asked.header.ok and len(asked.octets) > _BEGIN and len(self._begins) < _OPEN_KEPT:
+            self._begins.add(asked.octets[:_BEGIN])
         if self._open is not None:
             self._waited_in_vain(self._open, asked)
         is_broadcast = placement.role is Role.BROADCAST or (asked.unit == BROADCAST and not asked.is_for_nobody)
@@ -384,7 +391,7 @@ class ModbusFindings:
         if transaction.latency is not None:
             station.times.add(transaction.latency)
             if asked.header.ok and transaction.attempt == 1:
-                self._learnt.answered(transaction.station or 0, False, transaction.latency.nominal)
+                self._learnt.answered(transaction.station or 0, READ, transaction.latency.nominal)
             self._compare_with_timeout(station, transaction, transaction.latency.low)
             if verdict is Verdict.ANSWERED and transaction.error is None and transaction.response is not None:
                 came = Answered(transaction.response, transaction.end, transaction.latency, answer)
@@ -484,6 +491,15 @@ class ModbusFindings:
             self._flaws[tx] = frame.repair.flaw
             if len(self._flaws) > _OPEN_KEPT:
                 self._flaws.clear()
+
+    def _see_broken(self, no: int, event: Event, octets: bytes) -> None:
+        """A damaged frame that begins as a request to another station, while one is asked: somebody else spoke."""
+        asked, begin = self._open, octets[:_BEGIN]
+        if asked is None or begin not in self._begins or begin[0] == asked.unit:
+            return
+        gap = max(0, event.start - asked.frame.end)
+        if len(self._seen.broken_in) < _HASTY_KEPT:
+            self._seen.broken_in.append((gap + asked.frame.slack, asked.unit, event.start, asked.no, no))
 
     def _is_cut_echo(self, event: Event) -> bool:
         """Whether it is the begin of the request before it, given back at once and cut short."""

@@ -137,18 +137,22 @@ def _of_masters(seen: Evidence) -> Iterator[Finding]:
     always: both are left out.
     """
     alive = {unit: s for unit, s in seen.stations.items() if s.answered >= 3 and 2 * s.answered > s.asked}
-    hasty = [row for row in seen.hasty if row[1] in alive and 10 * row[0] < 9 * alive[row[1]].times.quickest]
-    gaps = sorted(row[0] for row in hasty)
-    if len(hasty) < 3:
+
+    def too_soon(row: tuple[int, int, int, int, int]) -> bool:
+        return row[1] in alive and 10 * row[0] < 9 * alive[row[1]].times.quickest
+
+    hasty, broken_in = list(filter(too_soon, seen.hasty)), list(filter(too_soon, seen.broken_in))
+    gaps = sorted(row[0] for row in (*hasty, *broken_in))
+    if len(gaps) < 3:
         return
     same = MS + seen.timing.latency
     habitual = max(sum(abs(one - gap) <= same for one in gaps) for gap in gaps)
-    if len(gaps) >= _HABIT_LEAST and 4 * habitual > 3 * len(gaps):
+    if not broken_in and len(gaps) >= _HABIT_LEAST and 4 * habitual > 3 * len(gaps):
         return
     tally = Tally()
-    for _, _, time, before, no in hasty:
+    for _, _, time, before, no in sorted((*hasty, *broken_in), key=lambda row: row[2]):
         tally.add(time, before, no)
-    words = f"{len(hasty)} requests came while another one waited for a station that answers, and never so soon"
+    words = f"{len(gaps)} requests came while another one waited for a station that answers, and never so soon"
     if gaps[len(gaps) // 2] < 10 * MS:
         words += f"; half of them within {ms(gaps[len(gaps) // 2])}"
     yield tally.found(RULES["MB203"], "bus", words)
