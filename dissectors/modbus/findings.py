@@ -40,7 +40,7 @@ _NO_WAIT = 10 * MS  # no master gives up so soon: it does not wait for one answe
 _LOST_KEPT = 64
 _FINAL_KEPT = 64
 _SLOW_KEPT = 2
-_STRAY_KEPT = 300  # octets, more than the longest frame
+_STRAY_KEPT = 600  # octets, more than the longest frame; of more nothing is said
 _EXCESS_KEPT = 256
 _WORDS_KEPT = 16
 _TALKED_OVER = 3  # octets by which an answer must be too long before somebody else has spoken
@@ -464,6 +464,8 @@ class ModbusFindings:
             station.flaw(flaw).add(transaction.end, transaction.request, transaction.response)
             return
         if not stray:
+            return
+        if len(stray) == _STRAY_KEPT:
             return
         station.garbage.add(stray, transaction.end, transaction.request, transaction.response)
         if asked.frame.protocol != RTU_NAME or stray[:2] != asked.octets[:2] or stray[1] not in FUNCTIONS:

@@ -15,6 +15,8 @@ from dissectors.modbus.station_judgement import FLAWS, is_absent, of_station
 _WASTE = 0.05
 _HABIT = 10  # a sender that is too quick is so once in so many frames at least; what a computer holds up is rarer
 _HABIT_LEAST = 6
+_EVERYBODY = 3  # senders with the same pauses: no three of them fail alike
+_FRAMES_LEAST = 20
 _CUT_LEAST = 3
 _COMMON_LEAST = 3
 
@@ -168,10 +170,18 @@ def _of_gaps(seen: Evidence) -> Iterator[Finding]:
         if tally.count >= 3 and _HABIT * tally.count >= seen.frames[sender]:
             words = f"{tally.count} frames began less than {ms(timing.t35)} after the frame before"
             yield tally.found(RULES["MB301"], sender, words)
-    for sender, tally in sorted(seen.paused.items()):
-        if tally.count >= 3 and seen.judges_pauses:
-            words = f"{tally.count} frames with over {ms(timing.t15)} of silence inside"
-            yield tally.found(RULES["MB302"], sender, words)
+    paused = {sender: tally for sender, tally in seen.paused.items() if tally.count >= 3 and seen.judges_pauses}
+    if len(paused) >= _EVERYBODY and all(sender in paused for sender, n in seen.frames.items() if n >= _FRAMES_LEAST):
+        count = sum(tally.count for tally in paused.values())
+        words = f"{count} frames of {len(paused)} senders, of everybody, with over {ms(timing.t15)} of silence inside"
+        evidence = tuple(sorted(no for tally in paused.values() for no in tally.evidence))
+        yield found(
+            RULES["MB304"], "adapter", words, first=seen.first or 0, last=seen.now, count=count, evidence=evidence
+        )
+        paused = {}
+    for sender, tally in sorted(paused.items()):
+        words = f"{tally.count} frames with over {ms(timing.t15)} of silence inside"
+        yield tally.found(RULES["MB302"], sender, words)
     if not seen.judges_pauses and seen.stations:
         words = (
             f"the adapter may hold octets back for {ms(timing.latency)}; limits are {ms(timing.t15)} inside a frame "

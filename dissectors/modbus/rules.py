@@ -361,6 +361,15 @@ _ALL = (
         "lower the adapter's latency timer, or use a port of the computer itself",
     ),
     Rule(
+        "MB304",
+        Severity.NOTE,
+        "pauses in everybody's frames",
+        "Pauses of over 1.5 characters inside the frames of at least three senders, and of all that sent twenty frames.",
+        "the adapter or the computer hands octets over late, though this capture says nothing of it",
+        "the adapter's latency timer; what else the computer does; whether the capture names its adapter",
+        explains=("MB302",),
+    ),
+    Rule(
         "MB401",
         Severity.INFO,
         "poll cycle",

@@ -178,7 +178,7 @@ def _foreign(seen: Evidence, name: str, unit: int, station: Station) -> Finding 
     same, factor = garbage.always(), garbage.slower_by()
     if (same is None and factor is None) or 2 * garbage.tally.count < station.damaged.count:
         return None
-    if same is not None and len(same) > 2 and same[0] == unit:
+    if same is not None and len(same) > 2 and (same[0] == unit or same[:1] == b":"):
         words = f"{counted(garbage.tally.count, 'damaged answer')}, always the same {_octets(len(same))}: {_hex(same)}"
         return garbage.tally.found(RULES["MB015"], name, words)
     words = f"{times(garbage.tally.count)} something that is not this protocol came in answer"

@@ -274,14 +274,14 @@ class ModbusTracker:
 
     def _damaged(self, seen: Seen) -> Placement:
         """A damaged frame: in answer to the open request, a damaged request, or neither."""
-        request, role = self._open, seen.header.role
+        request = self._open
         if request is not None and self._is_cut_echo(request, seen.frame.octets, seen.frame.start):
             return self._echo(seen, f"the echo ends after {len(seen.frame.octets)} octets")
         error = seen.header.error or "damaged"
         if request is None:
-            if role is Role.RESPONSE:
+            if seen.header.role is Role.RESPONSE:
                 return self._answer_apart(seen, Verdict.UNSOLICITED)
-        elif role is not Role.REQUEST and (request.is_for(seen.octets) or self._in_time(request, seen)):
+        elif self._is_damaged_answer(request, seen):
             if request.garble is None:
                 request.garble = Garble(seen.no, seen.frame.end, error)
             return Placement(seen.no, request.tx, Role.RESPONSE, source=request.unit)
@@ -307,6 +307,13 @@ class ModbusTracker:
 
     def _knows(self, request: Exchange) -> bool:
         return self.learnt.response_limit(request.unit, request.pace) is not None
+
+    def _is_damaged_answer(self, request: Exchange, seen: Seen) -> bool:
+        """Whether a damaged frame came in answer. One that was cut may have the length of a request by chance: it is
+        an answer all the same when it comes as soon as that station's answers do, which no master does."""
+        if seen.header.role is Role.REQUEST:
+            return request.is_for(seen.octets) and self._is_prompt(request, seen)
+        return request.is_for(seen.octets) or self._in_time(request, seen)
 
     def _is_prompt(self, request: Exchange, seen: Seen) -> bool:
         """Whether it comes as soon as answers of that station are known to come."""
