@@ -106,6 +106,7 @@ class ModbusFindings:
         self._stray: dict[int, bytes] = {}  # octets that are no good frame, by the transaction they came in
         self._lost: dict[int, Lost] = {}  # requests without answer, by transaction
         self._begins: set[bytes] = set()  # the first octets of good requests
+        self._marked: deque[int] = deque(maxlen=64)  # transactions with line errors in what came in answer
         self._waits: dict[int, int] = {}  # by request that nothing followed: until the next one, ns
         self._slow: deque[_Slow] = deque()  # answers that took long, until the pause after them is known
         self._pauses: deque[int] = deque(maxlen=_SPACING_KEPT)  # the master's, between an answer and its next request
@@ -124,7 +125,7 @@ class ModbusFindings:
             seen.cut_echoes.add(event.start, no)
             return
         if isinstance(event, Noise) or header is None or placement is None:
-            self._gather(event.octets)
+            self._gather(event)
             self._see_broken(no, event, event.octets)
             self._see_noise(no, event)
             self._before = self._open = self._answered = None
@@ -275,7 +276,7 @@ class ModbusFindings:
                     self._answers.clear()
         elif placement.source is not None:
             self._damaged.append(placement.tx)
-            self._gather(frame.octets)
+            self._gather(frame)
             self._note_flaw(placement.tx, frame)
             station = self._station(placement.source)
             station.cut += frame.damage is Damage.SHORT
@@ -467,7 +468,9 @@ class ModbusFindings:
             return
         if len(stray) == _STRAY_KEPT:
             return
-        station.garbage.add(stray, transaction.end, transaction.request, transaction.response)
+        station.garbage.add(
+            stray, transaction.id in self._marked, transaction.end, transaction.request, transaction.response
+        )
         if asked.frame.protocol != RTU_NAME or stray[:2] != asked.octets[:2] or stray[1] not in FUNCTIONS:
             return
         expected = answer_length(asked.frame.octets)
@@ -478,13 +481,15 @@ class ModbusFindings:
             if len(station.excess) < _EXCESS_KEPT:
                 station.excess.append(len(stray) - expected)
 
-    def _gather(self, octets: bytes) -> None:
+    def _gather(self, event: Event) -> None:
         """Keep octets that are no good frame, in the transaction of the newest request."""
         tx = self._newest
         if tx is None:
             return
         before = self._stray.get(tx, b"")
-        self._stray[tx] = (before + octets)[:_STRAY_KEPT]
+        self._stray[tx] = (before + event.octets)[:_STRAY_KEPT]
+        if event.marks:
+            self._marked.append(tx)
         if len(self._stray) > _OPEN_KEPT:
             self._stray.clear()
 

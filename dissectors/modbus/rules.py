@@ -230,7 +230,7 @@ _ALL = (
         "Good answers that come after the master's timeout, often into the next request.",
         "the master's timeout is too short for this station",
         "raise the master's response timeout above the times seen here",
-        explains=("MB002", "MB101", "MB104", "MB201", "MB301", "MB010"),
+        explains=("MB101", "MB104", "MB201", "MB301", "MB010"),
     ),
     Rule(
         "MB104",
@@ -364,7 +364,7 @@ _ALL = (
         "MB304",
         Severity.NOTE,
         "pauses in everybody's frames",
-        "Pauses of over 1.5 characters inside the frames of at least three senders, and of all that sent twenty frames.",
+        "Pauses of over 1.5 characters inside the frames of three senders or more, and of all that sent twenty frames.",
         "the adapter or the computer hands octets over late, though this capture says nothing of it",
         "the adapter's latency timer; what else the computer does; whether the capture names its adapter",
         explains=("MB302",),
