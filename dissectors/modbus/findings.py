@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 
+from dissectors.checksums import crc16_modbus
 from dissectors.findings import ExceptionWords, Finding, Tally
 from dissectors.frame import Damage, Event, Flaw, Frame, Header, Noise, Role
 from dissectors.line import Timing
@@ -527,7 +528,10 @@ def _sender(placement: Placement) -> str:
 def _ends_badly(frame: Frame) -> bool:
     """Whether a damaged frame is right up to its last octet, or ends just before it."""
     if frame.damage is Damage.SHORT:
-        return frame.expected is not None and frame.expected - len(frame.octets) == 1
+        if frame.expected is None or frame.expected - len(frame.octets) != 1:
+            return False
+        # an octet lost further in leaves a wrong check
+        return frame.protocol != RTU_NAME or frame.octets[-1] == crc16_modbus(frame.octets[:-1]) & 0xFF
     if frame.damage is not Damage.CHECK:
         return False
     if frame.marks:
