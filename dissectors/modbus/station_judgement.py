@@ -124,7 +124,7 @@ def _damaged(seen: Evidence, name: str, station: Station, is_common: bool) -> It
         if 4 * ends.count >= 3 * damaged.count:
             return
     over = station.talked_over
-    if over.count >= 3 and 4 * over.count >= station.asked and _is_steady(station.excess) and not is_common:
+    if over.count >= 3 and 4 * over.count >= station.asked and _is_steady(station.excess):
         words = (
             f"{over.count} of {counted(station.asked, 'answer')} begin as they should and go on for "
             f"{_octets(middle(station.excess))} more than they can have, damaged: two talk at once"
