@@ -316,9 +316,10 @@ class ModbusTracker:
         return request.is_for(seen.octets) or self._in_time(request, seen)
 
     def _is_prompt(self, request: Exchange, seen: Seen) -> bool:
-        """Whether it comes as soon as answers of that station are known to come."""
+        """Whether it comes as soon as answers of that station are known to come, or sooner than any master goes on."""
         limits = (self.learnt.response_limit(request.unit, pace) for pace in (request.pace, READ))
-        return request.gap(seen.frame.start) <= max((limit for limit in limits if limit is not None), default=-1)
+        limit = max((limit for limit in limits if limit is not None), default=_AT_ONCE)
+        return request.gap(seen.frame.start) <= limit
 
     def _is_doubtful(self, request: Exchange, seen: Seen) -> bool:
         """Whether a frame that comes late, for all that is learnt, may be the answer of a slow station."""
