@@ -26,14 +26,32 @@ class Damage:
 
 
 def shares_of_damage(seen: Evidence) -> Damage:
-    """Sort all senders into those that are to blame and those that are not."""
+    """Sort all senders into those that are to blame and those that are not.
+
+    Stations are compared with each other, and the master with all: what strikes all answers is no station's fault.
+    """
     hits = {f"station {unit}": one.damaged.count - one.explained for unit, one in seen.stations.items()}
-    hits["master"] = seen.damaged_requests.count
-    octets = {sender: max(1, seen.octets[sender]) for sender in hits}
-    left, blamed = dict(hits), set()
+    octets = {sender: max(1, seen.octets[sender]) for sender in (*hits, "master")}
+    requests = seen.damaged_requests.count
+    if len(hits) == 1:
+        hits["master"] = requests
+    blamed = _to_blame(hits, octets)
+    hits["master"] = requests
+    if requests and "master" not in blamed:
+        share = octets["master"] / sum(octets.values())
+        alone = not any(count for sender, count in hits.items() if sender != "master")
+        if chance(requests, sum(hits.values()), share) < (_SELDOM_ALONE if alone else _SELDOM):
+            blamed.add("master")
+    common = {sender: count for sender, count in hits.items() if count > 0 and sender not in blamed}
+    return Damage(frozenset(blamed), common)
+
+
+def _to_blame(hits: dict[str, int], octets: dict[str, int]) -> set[str]:
+    """Those with more than their share, the worst one first, then the others among themselves."""
+    left, blamed = dict(hits), set[str]()
     while len(left) > 1:
         damaged, sent = sum(left.values()), sum(octets[sender] for sender in left)
-        chances = {sender: chance(count, damaged, octets[sender] / sent) for sender, count in left.items() if count}
+        chances = {sender: chance(count, damaged, octets[sender] / sent) for sender, count in left.items() if count > 0}
         if not chances:
             break
         worst = min(chances, key=lambda sender: chances[sender])
@@ -41,7 +59,7 @@ def shares_of_damage(seen: Evidence) -> Damage:
             break
         blamed.add(worst)
         del left[worst]
-    return Damage(frozenset(blamed), {sender: count for sender, count in left.items() if count > 0})
+    return blamed
 
 
 def chance(count: int, of: int, share: float) -> float:

@@ -18,7 +18,7 @@ from itertools import pairwise
 
 from dissectors.line import NS_PER_S
 from dissectors.modbus.exchange import Exchange
-from dissectors.modbus.learnt import Learnt
+from dissectors.modbus.learnt import READ, Learnt
 from dissectors.tracker import Verdict
 
 _KEPT = 16
@@ -51,7 +51,7 @@ def of_next(request: Exchange, start: int, resembles: bool, learnt: Learnt) -> V
     cycle = start - request.request.frame.start
     if learnt.pauses_after_answers(gap, pause, cycle):
         return Verdict.ANSWERED
-    if learnt.pauses_after_timeouts(gap, pause, cycle) and not learnt.knows(request.unit):
+    if learnt.pauses_after_timeouts(gap, pause, cycle):
         return Verdict.NO_RESPONSE
     copy = request.copies[0]
     is_other = copy.octets != request.octets and len(copy.octets) != len(request.octets)
@@ -113,11 +113,11 @@ class Doubts:
         learnt, unit = self._learnt, doubt.exchange.unit
         if learnt.is_timeout(doubt.gap):
             return Verdict.NO_RESPONSE
-        timeout, limit = learnt.timeout, learnt.response_limit(unit, doubt.exchange.writes)
+        timeout, limit = learnt.timeout, learnt.response_limit(unit, doubt.exchange.pace)
         if timeout is not None and doubt.gap < timeout * 9 // 10:
             return Verdict.ANSWERED  # the master was still waiting
         if limit is None:  # a write takes no less than a read
-            limit = learnt.response_limit(unit, not doubt.exchange.writes)
+            limit = learnt.response_limit(unit, READ)
         if (limit is not None and doubt.gap <= limit) or unit in varying:
             return Verdict.ANSWERED
         return None

@@ -29,7 +29,9 @@ class Evidence:
     """What was seen on the bus. Times are ns.
 
     `hasty`: requests after another that nothing had followed: (longest reading of the silence between, unit asked
-    before, time, frame before, frame). `close`, `paused`: by sender; of the first, (time, frame before, frame).
+    before, time, frame before, frame). `broken_in`: the same of
+    damaged frames that begin as a request to another station. `close`, `paused`: by sender; of the first, (time, frame
+    before, frame).
     `malformed`: requests that contradict themselves, with the exceptions they got. `to_nobody`: reads of address 0, and
     who answered. `cut_echoes`: requests given back in part. `octets`, `frames`: of each sender ("master", "station 3").
     `late_frames`: answers that came too late. `broadcast_answers`: who answered broadcasts. `pairs`: (unit asked, unit
@@ -49,6 +51,7 @@ class Evidence:
     answers_to_broadcast: Tally = field(default_factory=Tally)
     noise_after_broadcast: Tally = field(default_factory=Tally)
     hasty: list[tuple[int, int, int, int, int]] = field(default_factory=list)
+    broken_in: list[tuple[int, int, int, int, int]] = field(default_factory=list)
     close: dict[str, list[tuple[int, int, int]]] = field(default_factory=dict)
     paused: dict[str, Tally] = field(default_factory=dict)
     pairs: dict[tuple[int, int], Tally] = field(default_factory=dict)

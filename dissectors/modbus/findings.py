@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 
+from dissectors.checksums import crc16_modbus
 from dissectors.findings import ExceptionWords, Finding, Tally
 from dissectors.frame import Damage, Event, Flaw, Frame, Header, Noise, Role
 from dissectors.line import Timing
@@ -17,7 +18,7 @@ from dissectors.modbus.evidence import Evidence
 from dissectors.modbus.exchange import is_begin_of
 from dissectors.modbus.functions import BROADCAST, EXCEPTION_BIT, FUNCTIONS, answer_length
 from dissectors.modbus.judgement import judge
-from dissectors.modbus.learnt import Learnt
+from dissectors.modbus.learnt import READ, Learnt
 from dissectors.modbus.response_groups import Answered
 from dissectors.modbus.station_record import Key, Lost, Station, middle
 from dissectors.tracker import Placement, Transaction, Verdict
@@ -35,11 +36,12 @@ _SPACING_LEAST = 8
 AT_ONCE = 50 * MS
 """No master repeats a request so soon."""
 
+_BEGIN = 5  # octets of a request that no noise makes by chance: unit, function, address, half a quantity
 _NO_WAIT = 10 * MS  # no master gives up so soon: it does not wait for one answer before it asks for the next
 _LOST_KEPT = 64
 _FINAL_KEPT = 64
 _SLOW_KEPT = 2
-_STRAY_KEPT = 300  # octets, more than the longest frame
+_STRAY_KEPT = 600  # octets, more than the longest frame; of more nothing is said
 _EXCESS_KEPT = 256
 _WORDS_KEPT = 16
 _TALKED_OVER = 3  # octets by which an answer must be too long before somebody else has spoken
@@ -104,6 +106,8 @@ class ModbusFindings:
         self._newest: int | None = None  # the transaction of the newest request
         self._stray: dict[int, bytes] = {}  # octets that are no good frame, by the transaction they came in
         self._lost: dict[int, Lost] = {}  # requests without answer, by transaction
+        self._begins: set[bytes] = set()  # the first octets of good requests
+        self._marked: deque[int] = deque(maxlen=64)  # transactions with line errors in what came in answer
         self._waits: dict[int, int] = {}  # by request that nothing followed: until the next one, ns
         self._slow: deque[_Slow] = deque()  # answers that took long, until the pause after them is known
         self._pauses: deque[int] = deque(maxlen=_SPACING_KEPT)  # the master's, between an answer and its next request
@@ -122,11 +126,14 @@ class ModbusFindings:
             seen.cut_echoes.add(event.start, no)
             return
         if isinstance(event, Noise) or header is None or placement is None:
-            self._gather(event.octets)
+            self._gather(event)
+            self._see_broken(no, event, event.octets)
             self._see_noise(no, event)
             self._before = self._open = self._answered = None
             return
         octets = readable_adu(event)
+        if not header.ok:
+            self._see_broken(no, event, octets)
         self._see_gaps(no, event, header, placement)
         self._see_pause_before(no, event, header, placement)
         if placement.role is Role.RESPONSE:
@@ -213,6 +220,8 @@ class ModbusFindings:
             self._open = self._broadcast = None
             return
         self._seen.requests += 1
+        if asked.header.ok and len(asked.octets) > _BEGIN and len(self._begins) < _OPEN_KEPT:
+            self._begins.add(asked.octets[:_BEGIN])
         if self._open is not None:
             self._waited_in_vain(self._open, asked)
         is_broadcast = placement.role is Role.BROADCAST or (asked.unit == BROADCAST and not asked.is_for_nobody)
@@ -268,7 +277,7 @@ class ModbusFindings:
                     self._answers.clear()
         elif placement.source is not None:
             self._damaged.append(placement.tx)
-            self._gather(frame.octets)
+            self._gather(frame)
             self._note_flaw(placement.tx, frame)
             station = self._station(placement.source)
             station.cut += frame.damage is Damage.SHORT
@@ -384,7 +393,7 @@ class ModbusFindings:
         if transaction.latency is not None:
             station.times.add(transaction.latency)
             if asked.header.ok and transaction.attempt == 1:
-                self._learnt.answered(transaction.station or 0, False, transaction.latency.nominal)
+                self._learnt.answered(transaction.station or 0, READ, transaction.latency.nominal)
             self._compare_with_timeout(station, transaction, transaction.latency.low)
             if verdict is Verdict.ANSWERED and transaction.error is None and transaction.response is not None:
                 came = Answered(transaction.response, transaction.end, transaction.latency, answer)
@@ -458,7 +467,11 @@ class ModbusFindings:
             return
         if not stray:
             return
-        station.garbage.add(stray, transaction.end, transaction.request, transaction.response)
+        if len(stray) == _STRAY_KEPT:
+            return
+        station.garbage.add(
+            stray, transaction.id in self._marked, transaction.end, transaction.request, transaction.response
+        )
         if asked.frame.protocol != RTU_NAME or stray[:2] != asked.octets[:2] or stray[1] not in FUNCTIONS:
             return
         expected = answer_length(asked.frame.octets)
@@ -469,13 +482,15 @@ class ModbusFindings:
             if len(station.excess) < _EXCESS_KEPT:
                 station.excess.append(len(stray) - expected)
 
-    def _gather(self, octets: bytes) -> None:
+    def _gather(self, event: Event) -> None:
         """Keep octets that are no good frame, in the transaction of the newest request."""
         tx = self._newest
         if tx is None:
             return
         before = self._stray.get(tx, b"")
-        self._stray[tx] = (before + octets)[:_STRAY_KEPT]
+        self._stray[tx] = (before + event.octets)[:_STRAY_KEPT]
+        if event.marks:
+            self._marked.append(tx)
         if len(self._stray) > _OPEN_KEPT:
             self._stray.clear()
 
@@ -484,6 +499,15 @@ class ModbusFindings:
             self._flaws[tx] = frame.repair.flaw
             if len(self._flaws) > _OPEN_KEPT:
                 self._flaws.clear()
+
+    def _see_broken(self, no: int, event: Event, octets: bytes) -> None:
+        """A damaged frame that begins as a request to another station, while one is asked: somebody else spoke."""
+        asked, begin = self._open, octets[:_BEGIN]
+        if asked is None or begin not in self._begins or begin[0] == asked.unit:
+            return
+        gap = max(0, event.start - asked.frame.end)
+        if len(self._seen.broken_in) < _HASTY_KEPT:
+            self._seen.broken_in.append((gap + asked.frame.slack, asked.unit, event.start, asked.no, no))
 
     def _is_cut_echo(self, event: Event) -> bool:
         """Whether it is the begin of the request before it, given back at once and cut short."""
@@ -504,7 +528,10 @@ def _sender(placement: Placement) -> str:
 def _ends_badly(frame: Frame) -> bool:
     """Whether a damaged frame is right up to its last octet, or ends just before it."""
     if frame.damage is Damage.SHORT:
-        return frame.expected is not None and frame.expected - len(frame.octets) == 1
+        if frame.expected is None or frame.expected - len(frame.octets) != 1:
+            return False
+        # an octet lost further in leaves a wrong check
+        return frame.protocol != RTU_NAME or frame.octets[-1] == crc16_modbus(frame.octets[:-1]) & 0xFF
     if frame.damage is not Damage.CHECK:
         return False
     if frame.marks:

@@ -63,10 +63,12 @@ class Garbage:
 
     tally: Tally = field(default_factory=Tally)
     stretches: deque[bytes] = field(default_factory=lambda: deque(maxlen=_STRETCHES_KEPT))
+    marked: int = 0  # of them with line errors
     _counts: Counter[bytes] = field(default_factory=Counter)
 
-    def add(self, octets: bytes, time: int, *frames: int | None) -> None:
-        """Count one more."""
+    def add(self, octets: bytes, is_marked: bool, time: int, *frames: int | None) -> None:
+        """Count one more; `is_marked`: with line errors."""
+        self.marked += is_marked
         self.tally.add(time, *frames)
         self.stretches.append(octets)
         if octets in self._counts or len(self._counts) < _DIFFERENT_KEPT:

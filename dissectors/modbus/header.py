@@ -31,6 +31,7 @@ _DAMAGE = {
 NO_EXCEPTIONS = frozenset((EXCEPTION_BIT, 0xFF))
 """Function octets with bit 7 set that are no exception: there is no function 00, and FF is all ones rather than 7F."""
 
+_WITH_MEI = 4  # octets of a frame of function 43 that ends before its type of interface
 _COUNTERS = frozenset((0x02, *range(0x0B, 0x13)))  # diagnostics whose request carries 0000, whose answer a value
 
 
@@ -96,7 +97,7 @@ def _peek(protocol: str, octets: bytes, frame: Frame, error: str | None, expecte
     if function is None:
         kind, role = kind_of(code), Role.EITHER
     else:
-        kind = function.name if code != 0x2B else kind_of(code, octets[2] if size > 2 else None)
+        kind = function.name if code != 0x2B else kind_of(code, octets[2] if size > _WITH_MEI else None)
         role = _role(function, octets, size, expected)
         if role is Role.UNKNOWN and ok:
             error = f"{size} octets fit neither request nor response"
@@ -144,7 +145,7 @@ def _role(function: Function, octets: bytes, size: int, expected: int | None) ->
         return Role.REQUEST if request else Role.RESPONSE
     if function.code == 0x08 and octets[2:4] == b"\0\0" and size >= 6:
         return Role.EITHER  # loop-back of any length
-    if function.code == 0x2B and octets[2:3] != b"\x0e":
+    if function.code == 0x2B and octets[2:3] != b"\x0e" and size > _WITH_MEI:
         return Role.EITHER  # an interface that this table does not know
     return Role.UNKNOWN
 

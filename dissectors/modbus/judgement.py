@@ -15,6 +15,8 @@ from dissectors.modbus.station_judgement import FLAWS, is_absent, of_station
 _WASTE = 0.05
 _HABIT = 10  # a sender that is too quick is so once in so many frames at least; what a computer holds up is rarer
 _HABIT_LEAST = 6
+_EVERYBODY = 3  # senders with the same pauses: no three of them fail alike
+_FRAMES_LEAST = 20
 _CUT_LEAST = 3
 _COMMON_LEAST = 3
 
@@ -137,18 +139,22 @@ def _of_masters(seen: Evidence) -> Iterator[Finding]:
     always: both are left out.
     """
     alive = {unit: s for unit, s in seen.stations.items() if s.answered >= 3 and 2 * s.answered > s.asked}
-    hasty = [row for row in seen.hasty if row[1] in alive and 10 * row[0] < 9 * alive[row[1]].times.quickest]
-    gaps = sorted(row[0] for row in hasty)
-    if len(hasty) < 3:
+
+    def too_soon(row: tuple[int, int, int, int, int]) -> bool:
+        return row[1] in alive and 10 * row[0] < 9 * alive[row[1]].times.quickest
+
+    hasty, broken_in = list(filter(too_soon, seen.hasty)), list(filter(too_soon, seen.broken_in))
+    gaps = sorted(row[0] for row in (*hasty, *broken_in))
+    if len(gaps) < 3:
         return
     same = MS + seen.timing.latency
     habitual = max(sum(abs(one - gap) <= same for one in gaps) for gap in gaps)
-    if len(gaps) >= _HABIT_LEAST and 4 * habitual > 3 * len(gaps):
+    if not broken_in and len(gaps) >= _HABIT_LEAST and 4 * habitual > 3 * len(gaps):
         return
     tally = Tally()
-    for _, _, time, before, no in hasty:
+    for _, _, time, before, no in sorted((*hasty, *broken_in), key=lambda row: row[2]):
         tally.add(time, before, no)
-    words = f"{len(hasty)} requests came while another one waited for a station that answers, and never so soon"
+    words = f"{len(gaps)} requests came while another one waited for a station that answers, and never so soon"
     if gaps[len(gaps) // 2] < 10 * MS:
         words += f"; half of them within {ms(gaps[len(gaps) // 2])}"
     yield tally.found(RULES["MB203"], "bus", words)
@@ -164,10 +170,18 @@ def _of_gaps(seen: Evidence) -> Iterator[Finding]:
         if tally.count >= 3 and _HABIT * tally.count >= seen.frames[sender]:
             words = f"{tally.count} frames began less than {ms(timing.t35)} after the frame before"
             yield tally.found(RULES["MB301"], sender, words)
-    for sender, tally in sorted(seen.paused.items()):
-        if tally.count >= 3 and seen.judges_pauses:
-            words = f"{tally.count} frames with over {ms(timing.t15)} of silence inside"
-            yield tally.found(RULES["MB302"], sender, words)
+    paused = {sender: tally for sender, tally in seen.paused.items() if tally.count >= 3 and seen.judges_pauses}
+    if len(paused) >= _EVERYBODY and all(sender in paused for sender, n in seen.frames.items() if n >= _FRAMES_LEAST):
+        count = sum(tally.count for tally in paused.values())
+        words = f"{count} frames of {len(paused)} senders, of everybody, with over {ms(timing.t15)} of silence inside"
+        evidence = tuple(sorted(no for tally in paused.values() for no in tally.evidence))
+        yield found(
+            RULES["MB304"], "adapter", words, first=seen.first or 0, last=seen.now, count=count, evidence=evidence
+        )
+        paused = {}
+    for sender, tally in sorted(paused.items()):
+        words = f"{tally.count} frames with over {ms(timing.t15)} of silence inside"
+        yield tally.found(RULES["MB302"], sender, words)
     if not seen.judges_pauses and seen.stations:
         words = (
             f"the adapter may hold octets back for {ms(timing.latency)}; limits are {ms(timing.t15)} inside a frame "

@@ -230,7 +230,7 @@ _ALL = (
         "Good answers that come after the master's timeout, often into the next request.",
         "the master's timeout is too short for this station",
         "raise the master's response timeout above the times seen here",
-        explains=("MB002", "MB101", "MB104", "MB201", "MB301", "MB010"),
+        explains=("MB101", "MB104", "MB201", "MB301", "MB010"),
     ),
     Rule(
         "MB104",
@@ -359,6 +359,15 @@ _ALL = (
         "that; gaps of 3.5 characters between frames only where it is shorter than they are.",
         "that MB301 and MB302 say nothing does not mean that all gaps are as they should be",
         "lower the adapter's latency timer, or use a port of the computer itself",
+    ),
+    Rule(
+        "MB304",
+        Severity.NOTE,
+        "pauses in everybody's frames",
+        "Pauses of over 1.5 characters inside the frames of three senders or more, and of all that sent twenty frames.",
+        "the adapter or the computer hands octets over late, though this capture says nothing of it",
+        "the adapter's latency timer; what else the computer does; whether the capture names its adapter",
+        explains=("MB302",),
     ),
     Rule(
         "MB401",

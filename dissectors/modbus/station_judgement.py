@@ -124,7 +124,7 @@ def _damaged(seen: Evidence, name: str, station: Station, is_common: bool) -> It
         if 4 * ends.count >= 3 * damaged.count:
             return
     over = station.talked_over
-    if over.count >= 3 and 4 * over.count >= station.asked and _is_steady(station.excess) and not is_common:
+    if over.count >= 3 and 4 * over.count >= station.asked and _is_steady(station.excess):
         words = (
             f"{over.count} of {counted(station.asked, 'answer')} begin as they should and go on for "
             f"{_octets(middle(station.excess))} more than they can have, damaged: two talk at once"
@@ -174,11 +174,13 @@ def _flawed(seen: Evidence, name: str, station: Station) -> Iterator[Finding]:
 
 def _foreign(seen: Evidence, name: str, unit: int, station: Station) -> Finding | None:
     """Octets in place of answers that are always the same, or those of another baud rate."""
-    garbage = station.garbage
+    garbage, own = station.garbage, bytes((unit,))
     same, factor = garbage.always(), garbage.slower_by()
     if (same is None and factor is None) or 2 * garbage.tally.count < station.damaged.count:
         return None
-    if same is not None and len(same) > 2 and same[0] == unit:
+    if same is not None and 2 * garbage.marked > garbage.tally.count and factor is None and same[:1] in (b":", own):
+        return None  # what breaks characters on the way is no device's
+    if same is not None and len(same) > 2 and (same[0] == unit or same[:1] == b":"):
         words = f"{counted(garbage.tally.count, 'damaged answer')}, always the same {_octets(len(same))}: {_hex(same)}"
         return garbage.tally.found(RULES["MB015"], name, words)
     words = f"{times(garbage.tally.count)} something that is not this protocol came in answer"
@@ -237,7 +239,9 @@ def _times(name: str, station: Station, timeout: int | None, seen: Evidence, is_
     if station.late.count:
         words = f"{counted(station.late.count, 'answer')} came after the master had given up"
         waits = f"; it waits {ms(timeout)}" if timeout is not None else ""
-        yield station.late.found(RULES["MB103"], name, words + waits, note_if(station.late.count == 1))
+        yield station.late.found(
+            RULES["MB103"], name, words + waits, note_if(seen.rare(station.late.count, station.asked))
+        )
     if station.answered and station.repeats.count:
         share = station.repeats_cost / seen.span
         words = (

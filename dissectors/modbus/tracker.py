@@ -26,7 +26,7 @@ from dissectors.modbus.adu import readable_adu
 from dissectors.modbus.doubts import Doubts, is_full, of_chain, of_next, of_run
 from dissectors.modbus.exchange import Exchange, Garble, Seen, answer_apart, echo_of, is_begin_of
 from dissectors.modbus.functions import BROADCAST, FUNCTIONS
-from dissectors.modbus.learnt import Learnt
+from dissectors.modbus.learnt import READ, Learnt
 from dissectors.modbus.pairing import another_function, is_listen_only, is_restart, mismatch
 from dissectors.tracker import Placement, Tracked, Transaction, Verdict
 
@@ -229,7 +229,7 @@ class ModbusTracker:
                 return self._request(seen, sure=False)
             why = None if request.fault else mismatch(request.octets, seen.octets)
             # a station may answer with the value that it really took, or with a wrong length
-            near = self._knows(request) and request.octets[:4] == seen.octets[:4]
+            near = request.octets[:4] == seen.octets[:4] and self._is_prompt(request, seen)
             if (why is None or near or seen.header.role is Role.UNKNOWN) and self._in_time(request, seen):
                 return self._answer(request, seen, why)
             if self._is_doubtful(request, seen):
@@ -251,7 +251,7 @@ class ModbusTracker:
             return self._answer_apart(seen, Verdict.ANSWERED_TWICE, request)
         if newest.octets != request.octets:  # the newest was a request, and this answers it
             return self._request(seen, sure=False)
-        if self.learnt.in_time(request.unit, request.writes, pause) and not self.learnt.is_same(gap, pause):
+        if self.learnt.in_time(request.unit, request.pace, pause) and not self.learnt.is_same(gap, pause):
             return self._answer(request, seen, None)
         if self.learnt.is_same(gap, pause) and not is_full(request):
             return self._join(request, seen)
@@ -274,14 +274,14 @@ class ModbusTracker:
 
     def _damaged(self, seen: Seen) -> Placement:
         """A damaged frame: in answer to the open request, a damaged request, or neither."""
-        request, role = self._open, seen.header.role
+        request = self._open
         if request is not None and self._is_cut_echo(request, seen.frame.octets, seen.frame.start):
             return self._echo(seen, f"the echo ends after {len(seen.frame.octets)} octets")
         error = seen.header.error or "damaged"
         if request is None:
-            if role is Role.RESPONSE:
+            if seen.header.role is Role.RESPONSE:
                 return self._answer_apart(seen, Verdict.UNSOLICITED)
-        elif role is not Role.REQUEST and (request.is_for(seen.octets) or self._in_time(request, seen)):
+        elif self._is_damaged_answer(request, seen):
             if request.garble is None:
                 request.garble = Garble(seen.no, seen.frame.end, error)
             return Placement(seen.no, request.tx, Role.RESPONSE, source=request.unit)
@@ -297,16 +297,29 @@ class ModbusTracker:
             return
         if request.garble or noise.reason in _QUIET_NOISE or len(noise.octets) < _GARBLE:
             return
-        if self.learnt.in_time(request.unit, request.writes, request.gap(noise.start)):
+        if self.learnt.in_time(request.unit, request.pace, request.gap(noise.start)):
             request.garble = Garble(None, noise.end, f"{len(noise.octets)} octets came in answer, but no frame")
 
     # ---- judging
 
     def _in_time(self, request: Exchange, seen: Seen) -> bool:
-        return self.learnt.in_time(request.unit, request.writes, request.gap(seen.frame.start))
+        return self.learnt.in_time(request.unit, request.pace, request.gap(seen.frame.start))
 
     def _knows(self, request: Exchange) -> bool:
-        return self.learnt.response_limit(request.unit, request.writes) is not None
+        return self.learnt.response_limit(request.unit, request.pace) is not None
+
+    def _is_damaged_answer(self, request: Exchange, seen: Seen) -> bool:
+        """Whether a damaged frame came in answer. One that was cut may have the length of a request by chance: it is
+        an answer all the same when it comes as soon as that station's answers do, which no master does."""
+        if seen.header.role is Role.REQUEST:
+            return request.is_for(seen.octets) and self._is_prompt(request, seen)
+        return request.is_for(seen.octets) or self._in_time(request, seen)
+
+    def _is_prompt(self, request: Exchange, seen: Seen) -> bool:
+        """Whether it comes as soon as answers of that station are known to come, or sooner than any master goes on."""
+        limits = (self.learnt.response_limit(request.unit, pace) for pace in (request.pace, READ))
+        limit = max((limit for limit in limits if limit is not None), default=_AT_ONCE)
+        return request.gap(seen.frame.start) <= limit
 
     def _is_doubtful(self, request: Exchange, seen: Seen) -> bool:
         """Whether a frame that comes late, for all that is learnt, may be the answer of a slow station."""
@@ -399,7 +412,7 @@ class ModbusTracker:
                 self.learnt.unanswered(before.gap(seen.frame.start), before.octets == seen.octets)
         elif last is not None:
             if last.copied is not None and last.octets != seen.octets:
-                self.learnt.answered(last.unit, last.writes, last.copied)
+                self.learnt.answered(last.unit, last.pace, last.copied)
             last.copied = None
             asks = sure or seen.unit != last.unit
             if asks and last.answered and self._last_was_answer and self._last_end is not None:
@@ -411,7 +424,7 @@ class ModbusTracker:
         if request.octets == seen.octets:
             request.copied = gap
         elif request.sure and seen.header.role is Role.RESPONSE and not (why or request.fault):
-            self.learnt.answered(request.unit, request.writes, gap)
+            self.learnt.answered(request.unit, request.pace, gap)
             if self._echoing is None or request.echoed:
                 self._echoing = request.echoed
 
@@ -529,7 +542,7 @@ class ModbusTracker:
         if verdict is Verdict.ANSWERED:
             answer = request.copies[0]
             request.answered = True
-            self.learnt.answered(request.unit, request.writes, request.gap(answer.frame.start))
+            self.learnt.answered(request.unit, request.pace, request.gap(answer.frame.start))
             self._closed.append(request.close_with(answer, None))
             return
         if verdict is Verdict.NO_RESPONSE:

@@ -41,13 +41,14 @@ class Node:
 
     @property
     def asked(self) -> int:
-        """Transactions that expected an answer from it."""
-        return sum(self.verdicts[verdict] for verdict in EXPECTING)
+        """Requests that expected an answer from it; an answer that came late has its request among them."""
+        late = min(self.verdicts[Verdict.LATE], self.verdicts[Verdict.NO_RESPONSE])
+        return sum(self.verdicts[verdict] for verdict in EXPECTING) - late
 
     @property
     def unanswered(self) -> int:
-        """Those of them that got none in time."""
-        return self.verdicts[Verdict.NO_RESPONSE]
+        """Those of them that got none, not even late."""
+        return max(0, self.verdicts[Verdict.NO_RESPONSE] - self.verdicts[Verdict.LATE])
 
     def merge(self, other: Node) -> Node:
         """Both together, as a new value."""
