@@ -79,7 +79,7 @@ def impatient() -> list[Step]:
 def storm() -> list[Step]:
     """5 sends Who-Is without pause."""
     steps: list[Step] = []
-    for _ in range(360):
+    for _ in range(460):
         steps += [(2, data(5, 255)), (2, data(5, 255)), (2, token(5, 60)), (14, token(60, 5))]
     return steps
 
