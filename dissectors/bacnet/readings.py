@@ -12,7 +12,7 @@ from dissectors.bacnet import names
 from dissectors.bacnet.apdu import PduType
 from dissectors.bacnet.frame_types import HEADER
 from dissectors.bacnet.message import Message
-from dissectors.bacnet.values import BitString, Double, Enumerated, ObjectId, Record, show
+from dissectors.bacnet.values import BitString, Date, Double, Enumerated, ObjectId, Record, Time, show
 from dissectors.frame import Frame
 from dissectors.readings import How, Reading
 
@@ -144,7 +144,7 @@ def _shown(value: Any) -> tuple[int | None, int | float | str | None]:
         return int.from_bytes(struct.pack(">f", value), "big"), _shortest(value)
     if isinstance(value, str):
         return None, value
-    if isinstance(value, BitString | ObjectId):
+    if isinstance(value, BitString | ObjectId | Date | Time):
         return None, show(value)
     return None, None
 

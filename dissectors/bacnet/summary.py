@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 from dissectors.bacnet import message as messages
@@ -65,14 +66,19 @@ def _detail(frame: Frame, message: Message) -> str:
 def _assembled(assembly: Assembly, message: Message) -> str:
     """What all segments say together, behind the last one."""
     if message.whole is not None:
-        apdu, parameters = message.whole
-        decoded = messages.decode_parameters(apdu, parameters)
         last = message.apdu is not None and not message.apdu.more_follows
         so_far = f"of {len(assembly.frames)}" if last else f"(all {len(assembly.frames)} seen)"
-        return f"{so_far}: " + (parameters_text(apdu, decoded) if decoded is not None else "")
+        return f"{so_far}: {_whole_text(*message.whole)}"
     lost = len(assembly.missing)
     which = ", ".join(map(str, assembly.missing[:4])) + (" …" if lost > 4 else "")
     return f"({'segment' if lost == 1 else 'segments'} {which} not seen)"
+
+
+@lru_cache(maxsize=64)
+def _whole_text(apdu: Apdu, parameters: bytes) -> str:
+    """As much of a long message as a line can hold; a list asks for its lines again and again."""
+    decoded = messages.decode_parameters(apdu, parameters)
+    return parameters_text(apdu, decoded)[:LENGTH_MAX] if decoded is not None else ""
 
 
 def _plain_data(message: Message) -> str:

@@ -319,9 +319,9 @@ class MstpTracker:
                 return self._at(no, before.id, header, _side(apdu))
             if not apdu.is_answer or apdu.type == PduType.SEGMENT_ACK:
                 return self._single(no, frame, header, Verdict.DATA, closed)
-            if verdict in (Verdict.NO_RESPONSE, Verdict.DAMAGED_ANSWER) and age < LATE_WITHIN:
+            if before.response is None and age < LATE_WITHIN:  # a second answer needs a first
                 return self._afterwards(before, Verdict.LATE, no, frame, header, apdu, closed)
-            if verdict is not Verdict.NO_RESPONSE and age < TWICE_WITHIN:
+            if before.response is not None and age < TWICE_WITHIN:
                 return self._afterwards(before, Verdict.ANSWERED_TWICE, no, frame, header, apdu, closed)
         if not apdu.is_answer or apdu.type == PduType.SEGMENT_ACK:  # asks for nothing and answers nothing
             return self._single(no, frame, header, Verdict.DATA, closed)
@@ -402,6 +402,7 @@ class MstpTracker:
             )
         )
         if before.key is not None and verdict is Verdict.LATE:
+            before.response = no
             self._remember(before, Verdict.LATE)
         return self._at(no, exchange.id, header, Role.RESPONSE)
 

@@ -10,6 +10,8 @@ Lengths and checks are computed where they are None. Types 32 … 127 are encode
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 from scapy.packet import Packet, Raw
 
 from dissectors.bacnet.frame_types import HEADER, is_encoded, total
@@ -72,7 +74,8 @@ def packet(frame: Frame, role: Role) -> Packet:
     """The packet of a frame; its role makes no difference. Behind a last segment stands the message as a whole."""
     found = dissect(frame.octets)
     if frame.assembly is not None and isinstance(found, MSTP):
-        found.lastlayer().add_payload(assembled(frame.assembly))
+        with suppress(Exception):  # as in `dissect`: the frame must show whatever its message holds
+            found.lastlayer().add_payload(assembled(frame.assembly))
     return found
 
 

@@ -381,6 +381,19 @@ def test_line_and_tree_of_the_last_segment_show_the_whole():
     assert bytes(MSTP.packet(last.event, Role.RESPONSE)) == last.event.octets
 
 
+def test_the_tree_of_a_huge_message_ends_with_octets():
+    """A thousand values are some seven thousand tags; the line and the values are complete all the same."""
+    bus = SegmentedBus()
+    bus.ask(INVOKE, READ_MULTIPLE, reads(5))
+    bus.answer_in_segments(INVOKE, READ_MULTIPLE, results(1000), 480, 8)
+    output = run(bus.steps)
+    one = is_clean(output)
+    whole = fields_of(MSTP, row(output, one.response).event, Role.RESPONSE)[-1]  # type: ignore[arg-type]
+    assert [layer.name for layer in whole.children[-1].children] == ["ComplexACK", "Parameters", "Raw"]
+    assert "analog-value,400" in str(whole)
+    assert len(told(output, one)) == 1000
+
+
 # Whatever comes
 
 

@@ -333,6 +333,13 @@ def test_whatever_passes_each_transaction_closes_once(steps: list[tuple[float, b
         assert transaction.of is None or transaction.of < transaction.id
 
 
+def test_a_second_answer_needs_a_first():
+    """What came first was damaged: the good answer is late, and only one more after it is a second one."""
+    damaged = answer()[:-1] + bytes((answer()[-1] ^ 1,))
+    run = track((10, request()), (10, damaged), (300, answer()), (300, answer()))
+    assert [t.verdict for t in run.closed] == [Verdict.DAMAGED_ANSWER, Verdict.LATE, Verdict.ANSWERED_TWICE]
+
+
 def test_noise_after_a_long_silence_ends_what_waited():
     run = track((10, request()), (11_000, b"\x00\xff"))
     assert [t.verdict for t in run.closed] == [Verdict.NO_RESPONSE]
