@@ -29,6 +29,7 @@ from tests.faults.buses import modbus, mstp, n2
 from tests.faults.case import Case, Heard
 from tests.faults.drive_cases import DRIVE_CASES
 from tests.faults.n2_cases import N2_CASES
+from tests.faults.n2_clean_cases import n2_clean_cases
 from tests.faults.ring_cases import RING_CASES
 from tests.faults.stations import (
     AnswersAs,
@@ -55,6 +56,7 @@ def clean_cases(seconds: float) -> Iterator[Case]:
             yield Case(
                 f"{protocol} clean, {tap.name}", make, (), tap, seconds if tap in (EXACT, FTDI) else seconds / 10
             )
+    yield from n2_clean_cases(seconds / 6)
 
 
 def unsteady_cases() -> Iterator[Case]:
