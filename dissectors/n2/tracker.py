@@ -8,9 +8,9 @@
 3. A command closes the one before it: no response, or a damaged answer where one came, or octets that may be one.
 4. The same octets again, at once, are an echo; within GIVE_UP of the unanswered try, with no other command between,
    a retry.
-5. A second good answer without a command between: late where a command within GIVE_UP is owed one of that form (of
-   the two answers either may be the late one), else answered twice. Whether that means two stations is for the rules
-   to say: the same octets again may be a repeater's.
+5. A second good answer without a command between: late where a command a short while ago is owed one of that form (of
+   the two answers either may be the late one), or was damaged or had a damaged answer, else answered twice. Whether
+   that means two stations is for the rules to say: the same octets again may be a repeater's.
 6. How long a master waits is its own setting (NAE 250 ms to 3 s), so silence alone closes a command after GIVE_UP.
 7. A damaged command is for the station that it names where that one is known; else for the one known station whose
    address makes its checksum right, and is most like what was sent.
@@ -59,6 +59,11 @@ class _Exchange:
     answer_end: int = 0
 
     @property
+    def is_owed(self) -> bool:
+        """Whether it is known what was asked, and nothing came that may have been the answer."""
+        return not self.damaged and not self.spoilt and self.bad is None
+
+    @property
     def first_try(self) -> int:
         return self.id if self.of is None else self.of
 
@@ -85,7 +90,7 @@ class N2Tracker:
         self._next = 1
         self._open: _Exchange | None = None
         self._missed: _Exchange | None = None  # the last command, closed without a good answer
-        self._owing: deque[_Exchange] = deque(maxlen=_OWING)  # commands without any answer, oldest first
+        self._owing: deque[_Exchange] = deque(maxlen=_OWING)  # commands without a good answer, oldest first
         self._done: _Exchange | None = None  # the last command, when it was closed by an answer
         self._times: dict[int, _Times] = {}  # by station that was named in a good command
 
@@ -165,6 +170,8 @@ class N2Tracker:
 
     def _close_unanswered(self, exchange: _Exchange) -> Transaction:
         self._open, self._missed, self._done = None, exchange, None
+        if exchange.station != BROADCAST:
+            self._owing.append(exchange)
         if exchange.bad is not None:
             return exchange.bad
         if exchange.spoilt:
@@ -173,7 +180,6 @@ class N2Tracker:
             return _transaction(exchange, Verdict.DAMAGED_REQUEST)
         if exchange.station == BROADCAST:
             return _transaction(exchange, Verdict.BROADCAST)
-        self._owing.append(exchange)
         return _transaction(exchange, Verdict.NO_RESPONSE)
 
     def _hear_noise(self, event: Event) -> None:
@@ -222,13 +228,13 @@ class N2Tracker:
         soon = times is not None and times.count >= _FEW and 2 * latest < times.least
         if not (formless or soon):
             return None
-        candidates = [e for e in self._within(frame.start) if e.octets != open_.octets or not formless]
+        candidates = [e for e in self._within(frame.start) if e.is_owed and (e.octets != open_.octets or not formless)]
         if self._missed is not None and self._missed not in candidates and self._missed.bad is None:
             candidates.append(self._missed)
         return _best_owed(candidates, frame)
 
     def _within(self, now: int) -> list[_Exchange]:
-        """Commands that had no answer and may still get one."""
+        """Commands that had no good answer and may still get one."""
         return [exchange for exchange in self._owing if now - exchange.end <= 2 * GIVE_UP]
 
     def _forget(self, exchange: _Exchange) -> None:
@@ -246,6 +252,7 @@ class N2Tracker:
             owed = self._within(frame.start)
             same = [exchange for exchange in owed if exchange.station == done.station]
             owing = _best_owed(same, frame) or _best_owed(owed, frame) or self._crossed(owed, done, frame)
+            owing = owing or next((exchange for exchange in owed if not exchange.is_owed), None)
             if owing is not None:
                 self._forget(owing)
                 return self._separate(no, frame, header, Verdict.LATE, owing, closed)
@@ -321,7 +328,7 @@ class N2Tracker:
 
 def _best_owed(exchanges: list[_Exchange], frame: Frame) -> _Exchange | None:
     """The command that an answer belongs to: the oldest whose form it surely has, else the oldest it may answer."""
-    able = [e for e in exchanges if not e.damaged and may_answer(parse_command(e.octets), frame.octets)]
+    able = [e for e in exchanges if e.is_owed and may_answer(parse_command(e.octets), frame.octets)]
     sure = [e for e in able if fits(parse_command(e.octets), frame.octets)]
     return next(iter(sure or able), None)
 

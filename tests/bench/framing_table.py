@@ -230,8 +230,8 @@ def _is_attributed(
 ) -> bool:
     placement = heard.placements.get(no)
     if placement is not None:
-        named = placement.destination if said.asks else placement.source
-        return named == said.station
+        named = (placement.source,) if said.asks is None else (placement.source, placement.destination)
+        return said.station in named
     if said.answers is None:
         return False
     ended = by_request.get(good.get(said.answers))
