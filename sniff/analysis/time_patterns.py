@@ -117,6 +117,8 @@ class TimePatterns:
         self._trouble_at: int | None = None
         self._steps = self._other_steps = 0
         self._hum = Tally()
+        self._struck: Counter[str] = Counter()  # senders of what is disturbed
+        self._apart: Counter[int] = Counter()  # ms from disturbance to disturbance
         # bursts
         self._bursts: list[_Burst] = []
         # stretches that cannot be read
@@ -151,6 +153,7 @@ class TimePatterns:
             moment = None  # somewhere in a long frame
         if moment is not None and self._step(moment, True):
             self._hum.add(moment, no)
+            self._struck[sender] += 1
         self._see_trouble(no, event, sender)
         if is_good:
             self._end_stretch()
@@ -214,6 +217,7 @@ class TimePatterns:
                 lock.others += vector
         if is_trouble:
             self._steps += 1
+            self._apart[(moment - before) // MS] += 1
             self._trouble_at = moment
         else:
             self._other_steps += 1
@@ -262,6 +266,8 @@ class TimePatterns:
     def _in_step_with_mains(self) -> Iterator[Finding]:
         if self._steps < HUM_LEAST:
             return
+        if 3 * max(self._apart.values()) > self._steps or 10 * max(self._struck.values()) > 9 * self._struck.total():
+            return  # one rhythm of the bus, or one sender's
         for period, words in MAINS.items():
             if 6 * self._latency > period:
                 continue
