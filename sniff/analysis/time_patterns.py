@@ -38,6 +38,7 @@ QUIET = NS_PER_S // 2
 
 BURSTS_LEAST = 6
 BURSTS_KEPT = 500
+MOST_ROUNDS = 300
 STEADY = 0.08
 
 UNREADABLE_OCTETS = 40
@@ -72,6 +73,15 @@ class _Burst:
     senders: set[str]
     rows: list[int]
     good_before: int  # good frames since the burst before
+
+
+@dataclass(slots=True)
+class _Round:
+    """One frame that comes again and again: when first and last, and how often after the first time."""
+
+    first: int
+    last: int
+    count: int = 0
 
 
 @dataclass(slots=True)
@@ -121,6 +131,7 @@ class TimePatterns:
         self._apart: Counter[int] = Counter()  # ms from disturbance to disturbance
         # bursts
         self._bursts: list[_Burst] = []
+        self._rounds: dict[bytes, _Round] = {}
         # stretches that cannot be read
         self._stretch: _Stretch | None = None
         self._stretches: list[_Stretch] = []
@@ -142,6 +153,7 @@ class TimePatterns:
         if is_good and wrong is None:
             self._good += 1
             self._good_since += 1
+            self._see_round(event)
             self._end_stretch()
             self._step(event.end, False)
             return
@@ -234,6 +246,25 @@ class TimePatterns:
             bursts.append(_Burst(event.start, event.end, {sender}, [no], self._good_since))
             self._good_since = 0
 
+    def _see_round(self, event: Event) -> None:
+        """Measure how often the same frame comes: the bus's own rhythm."""
+        rounds = self._rounds
+        known = rounds.get(event.octets)
+        if known is not None:
+            known.count += 1
+            known.last = event.start
+        elif len(rounds) < MOST_ROUNDS:
+            rounds[event.octets] = _Round(event.start, event.start)
+
+    def _is_own_rhythm(self, interval: int) -> bool:
+        """Whether something on this bus comes at that interval anyhow, or at a half or a third of it."""
+        for one in self._rounds.values():
+            if one.count >= 4:
+                every = (one.last - one.first) / one.count
+                if any(abs(interval - times * every) <= 0.1 * interval for times in (1, 2, 3)):
+                    return True
+        return False
+
     def _see_unreadable(self, no: int, event: Event) -> None:
         stretch = self._stretch
         if stretch is None:
@@ -297,6 +328,8 @@ class TimePatterns:
         elsewhere = struck[1] if len(struck) > 1 else sum("bus" in burst.senders for burst in bursts)
         between = sorted(burst.good_before for burst in bursts[1:])[len(intervals) // 2]
         if usual < NS_PER_S or steady < 0.75 * len(intervals) or between < 10:
+            return
+        if self._is_own_rhythm(usual):
             return
         if not struck or (10 * struck[0] >= 9 * len(bursts) and 10 * elsewhere < 3 * len(bursts)):
             return  # one sender's own rhythm, or somebody who speaks at that interval
