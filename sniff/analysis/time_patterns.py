@@ -8,17 +8,18 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
-from dissectors.findings import Finding, Severity, Tally, counted, found
+from dissectors.findings import Finding, Tally, counted, found
 from dissectors.frame import Chunk, Event, Frame, LineError
 from dissectors.histogram import Histogram
 from dissectors.line import NS_PER_S
-from dissectors.tracker import Transaction, Verdict
+from dissectors.tracker import Transaction
 from sniff.analysis.line_rules import LINE_RULES as RULES
+from sniff.analysis.lost_together import LostTogether
 from sniff.analysis.other_settings import Fit, what_fits
 from sniff.analysis.wording import milliseconds
 from sniff.session import LineEvent, Session
@@ -50,10 +51,6 @@ SILENT_LEAST = 5 * NS_PER_S
 SILENT_TIMES = 30
 SILENT_KEPT = 8
 ROWS_AROUND = 50
-
-LOST_IN_A_ROW = 3
-ANSWERED_BEFORE = 5
-MOST_STATIONS = 300
 
 _MARKS = LineError.PARITY | LineError.FRAMING | LineError.BREAK
 
@@ -100,18 +97,6 @@ class _Stretch:
     asked: bool = False
 
 
-@dataclass(slots=True)
-class _Station:
-    """How a station answers. `gone`: between which moments it stopped, while it does not answer."""
-
-    answered: int = 0
-    last_answer: int = 0
-    missed: int = 0
-    first_missed: int = 0
-    rows: list[int] = field(default_factory=list)
-    losses: deque[tuple[int, int, int]] = field(default_factory=lambda: deque(maxlen=16))  # last answer, miss, back (0)
-
-
 class TimePatterns:
     """Fed rows, transactions and line events of one bus; `findings` may be asked at any time."""
 
@@ -139,8 +124,7 @@ class TimePatterns:
         self._gaps = Histogram()
         self._silences: list[tuple[int, int, int]] = []  # begin, end, rows before
         self._hole = False
-        # stations
-        self._stations: dict[int, _Station] = {}
+        self._lost = LostTogether()
 
     # ---- taking in
 
@@ -174,33 +158,12 @@ class TimePatterns:
 
     def settle(self, transaction: Transaction) -> None:
         """Take a transaction that closed."""
-        number = transaction.station
-        if number is None or transaction.is_passing or transaction.request is None:
-            return
-        station = self._stations.get(number)
-        if station is None:
-            if len(self._stations) >= MOST_STATIONS:
-                return
-            station = self._stations[number] = _Station()
-        if transaction.verdict is Verdict.NO_RESPONSE:
-            if not station.missed:
-                station.first_missed, station.rows = transaction.start, []
-            station.missed += 1
-            station.rows = [*station.rows[:3], transaction.request]
-        elif transaction.response is not None:
-            self._back(station, transaction.start)
-            station.answered += 1
-            station.last_answer = transaction.end
+        self._lost.settle(transaction)
 
     def add_line_event(self, event: LineEvent) -> None:
         """Take something that happened to the line: over a hole nothing is known."""
         if event.kind.is_hole:
             self._hole = True
-
-    def _back(self, station: _Station, time: int) -> None:
-        if station.missed >= LOST_IN_A_ROW and station.answered >= ANSWERED_BEFORE:
-            station.losses.append((station.last_answer, station.first_missed, time))
-        station.missed = 0
 
     def _see_silence(self, event: Event) -> None:
         if self._first is None:
@@ -292,7 +255,7 @@ class TimePatterns:
         yield from self._in_bursts()
         yield from self._unreadable()
         yield from self._silent()
-        yield from self._lost_together()
+        yield from self._lost.findings(self._first or 0, self._now)
 
     def _in_step_with_mains(self) -> Iterator[Finding]:
         if self._steps < HUM_LEAST:
@@ -400,41 +363,6 @@ class TimePatterns:
             f"here; from {at} on, and everything went on as before"
         )
         yield tally.found(RULES["LN304"], "bus", seen)
-
-    def _lost_together(self) -> Iterator[Finding]:
-        """Stations that stopped answering at what may be one moment, while the master went on asking."""
-        losses: list[tuple[int, int, int, int]] = []  # last answer, first miss, back, station
-        for number, station in self._stations.items():
-            losses += [(*loss, number) for loss in station.losses]
-            if station.missed >= LOST_IN_A_ROW and station.answered >= ANSWERED_BEFORE:
-                losses.append((station.last_answer, station.first_missed, 0, number))
-        losses.sort(key=lambda loss: loss[1])
-        span = self._now - (self._first or 0)
-        while losses:
-            moment = losses[0][1]  # the first miss: who answered after it was not lost then
-            together = [loss for loss in losses if loss[0] <= moment]
-            names = sorted({loss[3] for loss in together})
-            window = max(loss[1] for loss in together) - min(loss[0] for loss in together)
-            losses = [loss for loss in losses if loss not in together]
-            if len(names) >= 2 and 10 * window <= span:
-                yield self._lost(together, names, moment)
-
-    def _lost(self, together: list[tuple[int, int, int, int]], names: list[int], moment: int) -> Finding:
-        tally = Tally()
-        for number in names:
-            tally.add(moment, *self._stations[number].rows[:2])
-        others = [one for number, one in self._stations.items() if number not in names and one.last_answer > moment]
-        who = "all of them" if not others else f"{counted(len(others), 'other station')} went on"
-        seen = (
-            f"{len(names)} stations ({', '.join(map(str, names))}) stopped answering at the same moment, "
-            f"{(moment - (self._first or 0)) / NS_PER_S:.1f} s after the begin: {who}"
-        )
-        back = [loss[2] for loss in together if loss[2]]
-        if len(back) == len(together):
-            seen += f"; they were back after {(max(back) - moment) / NS_PER_S:.1f} s"
-        severity = Severity.WARNING if back else Severity.ERROR
-        finding = tally.found(RULES["LN305"], "bus", seen, severity)
-        return replace(finding, count=len(names), stations=tuple(names))
 
 
 def _is_unreadable(stretch: _Stretch) -> bool:
