@@ -173,7 +173,8 @@ _ALL = (
         "disturbances in step with the mains",
         "Marked octets, stray octets and short damaged frames that follow one another at whole waves or half waves of "
         "50 or 60 Hz: at least 15 within 2 s of each other, seven tenths locked to it, by chance less than once in a "
-        "million, while the undisturbed frames are not in step with it. Times must be known to a sixth of a wave.",
+        "million, while the undisturbed frames are not in step with it, whoever sends, and at many intervals. "
+        "Times must be known to a sixth of a wave.",
         "hum: a mains cable beside the bus, a missing or twofold ground, a dimmer, a drive or a supply that couples in",
         "the cable's way beside mains cables; the shield, grounded at one end; the ground between far stations; "
         "supplies and drives, one switched off after the other",
@@ -184,7 +185,8 @@ _ALL = (
         Severity.WARNING,
         "disturbances at a steady interval",
         "At least six bursts of damage or noise with 8% between their intervals, a second or more apart, that strike "
-        "several senders, with good frames between: no single station's rhythm.",
+        "several senders, with good frames between: no single station's rhythm, and none at "
+        "which anything is sent on this bus.",
         "something that switches at that interval: a contactor, a pump, a heater, a compressor, a thermostat",
         "what in the plant switches at that interval, and its cable beside the bus; a suppressor at its coil",
         explains=_DAMAGE,

@@ -8,17 +8,18 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
-from dissectors.findings import Finding, Severity, Tally, counted, found
+from dissectors.findings import Finding, Tally, counted, found
 from dissectors.frame import Chunk, Event, Frame, LineError
 from dissectors.histogram import Histogram
 from dissectors.line import NS_PER_S
-from dissectors.tracker import Transaction, Verdict
+from dissectors.tracker import Transaction
 from sniff.analysis.line_rules import LINE_RULES as RULES
+from sniff.analysis.lost_together import LostTogether
 from sniff.analysis.other_settings import Fit, what_fits
 from sniff.analysis.wording import milliseconds
 from sniff.session import LineEvent, Session
@@ -38,6 +39,7 @@ QUIET = NS_PER_S // 2
 
 BURSTS_LEAST = 6
 BURSTS_KEPT = 500
+MOST_ROUNDS = 300
 STEADY = 0.08
 
 UNREADABLE_OCTETS = 40
@@ -49,10 +51,6 @@ SILENT_LEAST = 5 * NS_PER_S
 SILENT_TIMES = 30
 SILENT_KEPT = 8
 ROWS_AROUND = 50
-
-LOST_IN_A_ROW = 3
-ANSWERED_BEFORE = 5
-MOST_STATIONS = 300
 
 _MARKS = LineError.PARITY | LineError.FRAMING | LineError.BREAK
 
@@ -75,6 +73,15 @@ class _Burst:
 
 
 @dataclass(slots=True)
+class _Round:
+    """One frame that comes again and again: when first and last, and how often after the first time."""
+
+    first: int
+    last: int
+    count: int = 0
+
+
+@dataclass(slots=True)
 class _Stretch:
     """Octets without a good frame among them."""
 
@@ -88,18 +95,6 @@ class _Stretch:
     sampled: int = 0
     fit: Fit | None = None
     asked: bool = False
-
-
-@dataclass(slots=True)
-class _Station:
-    """How a station answers. `gone`: between which moments it stopped, while it does not answer."""
-
-    answered: int = 0
-    last_answer: int = 0
-    missed: int = 0
-    first_missed: int = 0
-    rows: list[int] = field(default_factory=list)
-    losses: deque[tuple[int, int, int]] = field(default_factory=lambda: deque(maxlen=16))  # last answer, miss, back (0)
 
 
 class TimePatterns:
@@ -117,8 +112,11 @@ class TimePatterns:
         self._trouble_at: int | None = None
         self._steps = self._other_steps = 0
         self._hum = Tally()
+        self._struck: Counter[str] = Counter()  # senders of what is disturbed
+        self._apart: Counter[int] = Counter()  # ms from disturbance to disturbance
         # bursts
         self._bursts: list[_Burst] = []
+        self._rounds: dict[bytes, _Round] = {}
         # stretches that cannot be read
         self._stretch: _Stretch | None = None
         self._stretches: list[_Stretch] = []
@@ -126,8 +124,7 @@ class TimePatterns:
         self._gaps = Histogram()
         self._silences: list[tuple[int, int, int]] = []  # begin, end, rows before
         self._hole = False
-        # stations
-        self._stations: dict[int, _Station] = {}
+        self._lost = LostTogether()
 
     # ---- taking in
 
@@ -140,6 +137,7 @@ class TimePatterns:
         if is_good and wrong is None:
             self._good += 1
             self._good_since += 1
+            self._see_round(event)
             self._end_stretch()
             self._step(event.end, False)
             return
@@ -151,6 +149,7 @@ class TimePatterns:
             moment = None  # somewhere in a long frame
         if moment is not None and self._step(moment, True):
             self._hum.add(moment, no)
+            self._struck[sender] += 1
         self._see_trouble(no, event, sender)
         if is_good:
             self._end_stretch()
@@ -159,33 +158,12 @@ class TimePatterns:
 
     def settle(self, transaction: Transaction) -> None:
         """Take a transaction that closed."""
-        number = transaction.station
-        if number is None or transaction.is_passing or transaction.request is None:
-            return
-        station = self._stations.get(number)
-        if station is None:
-            if len(self._stations) >= MOST_STATIONS:
-                return
-            station = self._stations[number] = _Station()
-        if transaction.verdict is Verdict.NO_RESPONSE:
-            if not station.missed:
-                station.first_missed, station.rows = transaction.start, []
-            station.missed += 1
-            station.rows = [*station.rows[:3], transaction.request]
-        elif transaction.response is not None:
-            self._back(station, transaction.start)
-            station.answered += 1
-            station.last_answer = transaction.end
+        self._lost.settle(transaction)
 
     def add_line_event(self, event: LineEvent) -> None:
         """Take something that happened to the line: over a hole nothing is known."""
         if event.kind.is_hole:
             self._hole = True
-
-    def _back(self, station: _Station, time: int) -> None:
-        if station.missed >= LOST_IN_A_ROW and station.answered >= ANSWERED_BEFORE:
-            station.losses.append((station.last_answer, station.first_missed, time))
-        station.missed = 0
 
     def _see_silence(self, event: Event) -> None:
         if self._first is None:
@@ -214,6 +192,7 @@ class TimePatterns:
                 lock.others += vector
         if is_trouble:
             self._steps += 1
+            self._apart[(moment - before) // MS] += 1
             self._trouble_at = moment
         else:
             self._other_steps += 1
@@ -229,6 +208,25 @@ class TimePatterns:
         elif len(bursts) < BURSTS_KEPT:
             bursts.append(_Burst(event.start, event.end, {sender}, [no], self._good_since))
             self._good_since = 0
+
+    def _see_round(self, event: Event) -> None:
+        """Measure how often the same frame comes: the bus's own rhythm."""
+        rounds = self._rounds
+        known = rounds.get(event.octets)
+        if known is not None:
+            known.count += 1
+            known.last = event.start
+        elif len(rounds) < MOST_ROUNDS:
+            rounds[event.octets] = _Round(event.start, event.start)
+
+    def _is_own_rhythm(self, interval: int) -> bool:
+        """Whether something on this bus comes at that interval anyhow, or at a half or a third of it."""
+        for one in self._rounds.values():
+            if one.count >= 4:
+                every = (one.last - one.first) / one.count
+                if any(abs(interval - times * every) <= 0.1 * interval for times in (1, 2, 3)):
+                    return True
+        return False
 
     def _see_unreadable(self, no: int, event: Event) -> None:
         stretch = self._stretch
@@ -257,11 +255,13 @@ class TimePatterns:
         yield from self._in_bursts()
         yield from self._unreadable()
         yield from self._silent()
-        yield from self._lost_together()
+        yield from self._lost.findings(self._first or 0, self._now)
 
     def _in_step_with_mains(self) -> Iterator[Finding]:
         if self._steps < HUM_LEAST:
             return
+        if 3 * max(self._apart.values()) > self._steps or 10 * max(self._struck.values()) > 9 * self._struck.total():
+            return  # one rhythm of the bus, or one sender's
         for period, words in MAINS.items():
             if 6 * self._latency > period:
                 continue
@@ -291,6 +291,8 @@ class TimePatterns:
         elsewhere = struck[1] if len(struck) > 1 else sum("bus" in burst.senders for burst in bursts)
         between = sorted(burst.good_before for burst in bursts[1:])[len(intervals) // 2]
         if usual < NS_PER_S or steady < 0.75 * len(intervals) or between < 10:
+            return
+        if self._is_own_rhythm(usual):
             return
         if not struck or (10 * struck[0] >= 9 * len(bursts) and 10 * elsewhere < 3 * len(bursts)):
             return  # one sender's own rhythm, or somebody who speaks at that interval
@@ -361,41 +363,6 @@ class TimePatterns:
             f"here; from {at} on, and everything went on as before"
         )
         yield tally.found(RULES["LN304"], "bus", seen)
-
-    def _lost_together(self) -> Iterator[Finding]:
-        """Stations that stopped answering at what may be one moment, while the master went on asking."""
-        losses: list[tuple[int, int, int, int]] = []  # last answer, first miss, back, station
-        for number, station in self._stations.items():
-            losses += [(*loss, number) for loss in station.losses]
-            if station.missed >= LOST_IN_A_ROW and station.answered >= ANSWERED_BEFORE:
-                losses.append((station.last_answer, station.first_missed, 0, number))
-        losses.sort(key=lambda loss: loss[1])
-        span = self._now - (self._first or 0)
-        while losses:
-            moment = losses[0][1]  # the first miss: who answered after it was not lost then
-            together = [loss for loss in losses if loss[0] <= moment]
-            names = sorted({loss[3] for loss in together})
-            window = max(loss[1] for loss in together) - min(loss[0] for loss in together)
-            losses = [loss for loss in losses if loss not in together]
-            if len(names) >= 2 and 10 * window <= span:
-                yield self._lost(together, names, moment)
-
-    def _lost(self, together: list[tuple[int, int, int, int]], names: list[int], moment: int) -> Finding:
-        tally = Tally()
-        for number in names:
-            tally.add(moment, *self._stations[number].rows[:2])
-        others = [one for number, one in self._stations.items() if number not in names and one.last_answer > moment]
-        who = "all of them" if not others else f"{counted(len(others), 'other station')} went on"
-        seen = (
-            f"{len(names)} stations ({', '.join(map(str, names))}) stopped answering at the same moment, "
-            f"{(moment - (self._first or 0)) / NS_PER_S:.1f} s after the begin: {who}"
-        )
-        back = [loss[2] for loss in together if loss[2]]
-        if len(back) == len(together):
-            seen += f"; they were back after {(max(back) - moment) / NS_PER_S:.1f} s"
-        severity = Severity.WARNING if back else Severity.ERROR
-        finding = tally.found(RULES["LN305"], "bus", seen, severity)
-        return replace(finding, count=len(names), stations=tuple(names))
 
 
 def _is_unreadable(stretch: _Stretch) -> bool:

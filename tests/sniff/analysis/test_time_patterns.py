@@ -6,7 +6,10 @@ from functools import partial
 
 import pytest
 
+from dissectors.frame import Check, Damage, Found, Frame
 from dissectors.line import LineSettings
+from sniff.analysis.time_patterns import TimePatterns
+from sniff.session import Session
 from sniff.simulation.faults import BitFlips, MarkParity, NoiseInGaps
 from sniff.simulation.tap import EXACT, FTDI
 from tests.faults.buses import modbus, mstp, n2
@@ -81,3 +84,15 @@ def test_a_station_lost_alone_is_not_explained_by_others() -> None:
 def test_regular_pauses_are_the_masters_own_way() -> None:
     pauses = tuple((float(begin), 8.0) for begin in range(5, 50, 5))
     assert patterns(Case("", modbus, (), hear=partial(paused, pauses))) == set()
+
+
+def test_one_stations_own_rhythm_is_no_hum() -> None:
+    line = LineSettings.parse("38400,8N1")
+    told = TimePatterns(Session("x", line, "modbus-rtu"))
+    for no in range(1, 121):
+        octets, start = bytes(8), no * 50 * MS
+        damage = Damage.CHECK if no % 2 else None
+        check = Check.BAD if no % 2 else Check.GOOD
+        frame = Frame("x", octets, start + no % 2 * 3 * MS, start + 5 * MS, check, Found.GAP, damage)
+        told.see(no, frame, "station 6" if no % 2 else "master")
+    assert list(told.findings()) == []
