@@ -20,7 +20,6 @@ class Outcome:
 
     `missed`: what should have been said. `accused`: findings at warning or above about somebody innocent.
     `mistaken`: errors about whoever may be named that are not what is wrong, and codes that must never come.
-    `graves`: number of findings at warning or above that are nobody's consequence. `frames`: good ones.
     """
 
     name: str
@@ -43,6 +42,16 @@ class Outcome:
     def graves(self) -> tuple[str, ...]:
         """What was said at warning or above."""
         return tuple(f"{f.code} {f.subject}" for f in self.findings if f.severity >= Severity.WARNING)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was said as a note."""
+        return tuple(f"{f.code} {f.subject}" for f in self.findings if f.severity is Severity.NOTE)
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """Every finding in full."""
+        return tuple(f"{f.severity.label} {f.code} {f.subject}: {f.seen} [{f.means}]" for f in self.findings)
 
 
 def findings_of(session: Session, items: Iterable[Item]) -> tuple[Finding, ...]:
