@@ -42,6 +42,7 @@ class Done:
     accused: tuple[str, ...]
     mistaken: tuple[str, ...]
     graves: tuple[str, ...]
+    unneeded: tuple[str, ...]
     notes: tuple[str, ...]
     sentences: tuple[str, ...]
     took: float
@@ -68,6 +69,7 @@ def work(job: Job) -> Done:
         outcome.accused,
         outcome.mistaken,
         outcome.graves,
+        outcome.unneeded,
         outcome.notes,
         outcome.sentences,
         took,
@@ -102,6 +104,7 @@ class Table:
         self._of: dict[int, list[Done]] = {}
         self.faults = self.clean = self.runs = self.found = self.graves = 0
         self.accusations: list[str] = []
+        self.about_bus: list[str] = []
         self.false_alarms: list[str] = []
 
     def add(self, result: Done) -> None:
@@ -122,6 +125,7 @@ class Table:
             self.runs += len(results)
             self.found += sum(not one.missed for one in results)
             self.graves += sum(len(one.graves) for one in results)
+            self.about_bus += [f"{case.name}: {what}" for what in sorted({w for one in results for w in one.unneeded})]
             self.accusations += [f"{case.name}: {what}" for what in (*accused, *mistaken)]
         else:
             self.clean += 1
@@ -148,6 +152,9 @@ class Table:
             print(f"{self.graves / self.runs:.2f} findings at warning or above a run (one cause, one finding: 1.00)")
         print(f"{len(self.accusations)} accusations of innocents or wrong errors")
         for what in self.accusations:
+            print(f"  {what}")
+        print(f"{len(self.about_bus)} warnings about the bus where one station, or the capture, is to blame")
+        for what in self.about_bus:
             print(f"  {what}")
         print(f"{self.clean} clean buses, {len(self.false_alarms)} false alarms")
         for what in self.false_alarms:
