@@ -21,7 +21,7 @@ bench: $(VENV)/.test
 	$(BIN)/python -m pytest tests/bench -o norecursedirs=.venv -o testpaths=tests/bench --benchmark-only --benchmark-group-by=group $(ARGS)
 
 # Every injected fault with three seeds, and an hour of every clean bus, on all cores; takes a while. ARGS: words of
-# names of cases; --clean-minutes N; --jobs N; --seeds N.
+# names of cases; --clean-minutes N; --jobs N; --seeds N; --tell.
 faults: $(VENV)/.test
 	$(BIN)/python -m tests.faults.matrix $(ARGS)
 

@@ -9,10 +9,20 @@ from dissectors.frame import Place
 from dissectors.line import LineSettings, Timing
 from dissectors.modbus.simulated_master import read_holding, write_register
 from dissectors.simulated import Station
-from sniff.simulation.faults import NoiseInGaps
+from sniff.simulation.faults import LostResponse, NoiseInGaps
+from sniff.simulation.tap import FTDI
 from tests.faults.buses import modbus, mstp, n2
 from tests.faults.case import Case, Said
-from tests.faults.hearing import as_protocol, from_to, other_settings, sent_otherwise, swapped
+from tests.faults.hearing import (
+    as_protocol,
+    busy_host,
+    echoing,
+    from_to,
+    hidden_latency,
+    other_settings,
+    sent_otherwise,
+    swapped,
+)
 from tests.faults.interference import Interference
 from tests.faults.misbehaving import Halts
 from tests.faults.ring_programs import controller, drive
@@ -31,6 +41,7 @@ _CONTACTOR = r"every (5|4\.9|5\.0)|regular|period|rhythm|contactor|switch"
 _STOPPED = r"silen|stopp?ed|paus|nothing|quiet|stood still|stands still"
 _TOGETHER = r"at (one|the same|that) (moment|time)|together|at once|same moment|in common|simultaneous"
 _OTHER = r"other protocol|another protocol|ms/?tp|bacnet|another baud|two protocols"
+_COPY = r"\becho|\bcop(y|ies|ied)|gives? back|repeats? the request"
 _LOAD = r"\bload|busy|limit|occup|capacity|in use|utili|of the (line|time)|line time"
 
 RTU_8N1 = LineSettings.parse("19200,8N1")
@@ -202,6 +213,56 @@ LINE_CASES: tuple[Case, ...] = (
         also=("LN003",),
         never=("MB203",),
         seeds=1,
+    ),
+    # a converter that gives back what the master sends
+    Case("ASCII echo", _ascii, (("LN205", "bus"),), hear=partial(echoing, 0), never=("MB203", "MB201"), seeds=1),
+    Case(
+        "ASCII echo cut short",
+        _ascii,
+        (Said(("bus", "master", "adapter"), ("LN205",), _COPY),),
+        hear=partial(echoing, 3),
+        never=("MB203", "MB201", "MB202"),
+        seeds=1,
+    ),
+    Case("N2 echo", _n2, (("LN205", "bus"),), hear=partial(echoing, 0), never=("N2007", "N2008"), seeds=1),
+    # a busy computer, or one that hides how late it was, beside a fault
+    Case("busy host, station absent", partial(modbus, absent=(4,)), (("MB001", "station 4"),), FTDI, hear=busy_host),
+    Case(
+        "busy host, answers lost",
+        partial(modbus, (LostResponse(0.1, ("unit 2",)),)),
+        (("MB002", "station 2"),),
+        hear=busy_host,
+    ),
+    Case(
+        "busy host, N2 answers lost",
+        partial(n2, (LostResponse(0.1, ("drive 2",)),)),
+        (("N2005", "station 2"),),
+        hear=busy_host,
+        seconds=120,
+    ),
+    Case(
+        "busy host, MS/TP silent drive",
+        partial(mstp, node_faults={9: {"silent": True}}),
+        (("MS301", "MAC 9"),),
+        FTDI,
+        hear=busy_host,
+        seconds=30,
+    ),
+    Case(
+        "hidden latency, N2 answers lost",
+        partial(n2, (LostResponse(0.1, ("drive 2",)),)),
+        (("N2005", "station 2"),),
+        FTDI,
+        hear=hidden_latency,
+        seconds=120,
+    ),
+    Case(
+        "hidden latency, MS/TP silent drive",
+        partial(mstp, node_faults={9: {"silent": True}}),
+        (("MS301", "MAC 9"),),
+        FTDI,
+        hear=hidden_latency,
+        seconds=30,
     ),
     # who uses the line
     Case(

@@ -42,6 +42,9 @@ class Done:
     accused: tuple[str, ...]
     mistaken: tuple[str, ...]
     graves: tuple[str, ...]
+    unneeded: tuple[str, ...]
+    notes: tuple[str, ...]
+    sentences: tuple[str, ...]
     took: float
 
 
@@ -60,7 +63,17 @@ def work(job: Job) -> Done:
     except Exception as error:  # a rule that raises is one more thing to tell of, and the table must go on
         outcome = Outcome(case.name, job.seed, (), (), (), (f"raised {type(error).__name__}: {error}",))
     took = time.monotonic() - began
-    return Done(job, outcome.missed, outcome.accused, outcome.mistaken, outcome.graves, took)
+    return Done(
+        job,
+        outcome.missed,
+        outcome.accused,
+        outcome.mistaken,
+        outcome.graves,
+        outcome.unneeded,
+        outcome.notes,
+        outcome.sentences,
+        took,
+    )
 
 
 def jobs_of(words: Sequence[str], minutes: float, seeds: int) -> list[Job]:
@@ -85,11 +98,13 @@ def done(jobs: Sequence[Job], processes: int) -> Iterator[Done]:
 class Table:
     """Prints one line a case as soon as its last run is there, and adds up."""
 
-    def __init__(self, jobs: Sequence[Job]) -> None:
+    def __init__(self, jobs: Sequence[Job], tells: bool = False) -> None:
+        self._tells = tells
         self._left = {job.place: sum(other.place == job.place for other in jobs) for job in jobs}
         self._of: dict[int, list[Done]] = {}
         self.faults = self.clean = self.runs = self.found = self.graves = 0
         self.accusations: list[str] = []
+        self.about_bus: list[str] = []
         self.false_alarms: list[str] = []
 
     def add(self, result: Done) -> None:
@@ -110,6 +125,7 @@ class Table:
             self.runs += len(results)
             self.found += sum(not one.missed for one in results)
             self.graves += sum(len(one.graves) for one in results)
+            self.about_bus += [f"{case.name}: {what}" for what in sorted({w for one in results for w in one.unneeded})]
             self.accusations += [f"{case.name}: {what}" for what in (*accused, *mistaken)]
         else:
             self.clean += 1
@@ -121,6 +137,12 @@ class Table:
         print(f"{good}/{len(results)}  {case.name:<44} {took:6.1f} s  said {said}", flush=True)
         for what in trouble:
             print(f"       {what}", flush=True)
+        notes = sorted({what for one in results for what in one.notes})
+        if missed and notes:
+            print(f"       (notes: {', '.join(notes)})", flush=True)
+        if self._tells:
+            for sentence in results[0].sentences:
+                print(f"         {sentence}", flush=True)
 
     def close(self) -> int:
         """Print what it adds up to; give the exit code."""
@@ -130,6 +152,9 @@ class Table:
             print(f"{self.graves / self.runs:.2f} findings at warning or above a run (one cause, one finding: 1.00)")
         print(f"{len(self.accusations)} accusations of innocents or wrong errors")
         for what in self.accusations:
+            print(f"  {what}")
+        print(f"{len(self.about_bus)} warnings about the bus where one station, or the capture, is to blame")
+        for what in self.about_bus:
             print(f"  {what}")
         print(f"{self.clean} clean buses, {len(self.false_alarms)} false alarms")
         for what in self.false_alarms:
@@ -144,9 +169,10 @@ def main(words: list[str]) -> int:
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes (default: one a core)")
     parser.add_argument("--clean-minutes", type=float, default=60, help="how long clean buses are heard (default: 60)")
     parser.add_argument("--seeds", type=int, default=3, help="most runs of one case (default: 3)")
+    parser.add_argument("--tell", action="store_true", help="print every finding of the first run in full")
     wanted = parser.parse_args(words)
     jobs = jobs_of(wanted.words, wanted.clean_minutes, wanted.seeds)
-    table = Table(jobs)
+    table = Table(jobs, wanted.tell)
     for count, result in enumerate(done(jobs, min(wanted.jobs, len(jobs))), 1):
         sys.stderr.write(f"\r{count}/{len(jobs)} runs\033[K")
         sys.stderr.flush()
