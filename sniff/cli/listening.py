@@ -336,7 +336,7 @@ def say_not_found(live: LiveBus, how: str) -> None:
     if live.search is None:
         return
     said = searching.sentence(live.search.outcome(), "a longer capture may find them")
-    print(f"sniff485: {live.session.port}: {how} while searching, no settings found: {said}", file=sys.stderr)
+    print(f"sniff485: {plain(live.session.port)}: {how} while searching, no settings found: {said}", file=sys.stderr)
     if live.status.path:
         print("sniff485: the recording has every octet; read it with -s and -p once they are known", file=sys.stderr)
 

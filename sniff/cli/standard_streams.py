@@ -29,8 +29,11 @@ def prepare() -> None:
     if sys.stderr is None:  # nobody listens to it: print() would take standard output instead
         sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
     if type(sys.stdout) is io.TextIOWrapper and sys.stdout is sys.__stdout__ and not sys.stdout.isatty():
-        named = io.BufferedWriter(_Output(sys.stdout.fileno(), "wb", closefd=False))
-        sys.stdout = io.TextIOWrapper(named, encoding=sys.stdout.encoding)
+        before = sys.stdout
+        named = io.BufferedWriter(_Output(before.fileno(), "wb", closefd=False))
+        sys.stdout = io.TextIOWrapper(
+            named, before.encoding, line_buffering=before.line_buffering, write_through=before.write_through
+        )
     codecs.register_error(ESCAPE, _escape)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):

@@ -17,7 +17,7 @@ import time
 from collections import deque
 from typing import Any, NoReturn, cast
 
-from serial import rfc2217
+from serial import SerialException, rfc2217
 
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
@@ -27,6 +27,8 @@ from sniff.sources.telnet import Data, Negotiation, OutOfStep, TelnetDecoder
 from sniff.sources.tty import stop_bits
 
 READ_SIZE = 65536
+MOST_HELD = 1 << 20
+"""Octets that wait to be taken."""
 
 OUT_OF_STEP = "a Telnet option without end came; what follows it cannot be told from it, and is not recorded"
 ANSWER_PATIENCE = 1.0
@@ -58,6 +60,7 @@ class _ListeningGateway(_Base):  # type: ignore[misc]
         self.wake_in.setblocking(False)
         self.wake_out.setblocking(False)
         self.listening = False  # octets from before the settings were in force belong to another line
+        self.held = self.taken = 0  # octets of the line put into `items`, and taken from there
         self.lost: str | None = None
         self.silent = False  # nothing came in answer to the last request for control lines
         self.unknown: set[str] = set()  # what it did not confirm
@@ -68,8 +71,16 @@ class _ListeningGateway(_Base):  # type: ignore[misc]
         self.rfc2217_send_subnegotiation(rfc2217.SET_LINESTATE_MASK, _MASK)
 
     def _reconfigure_port(self) -> None:
-        if not self.batch:
+        if self.batch:
+            return
+        try:
             super()._reconfigure_port()
+        except SerialException:
+            settings = self._rfc2217_port_settings.items()
+            silent = ", ".join(name for name, item in settings if item.state == rfc2217.REQUESTED)
+            if not silent:
+                raise
+            raise SerialException(f"the gateway does not confirm {silent}") from None
 
     def rfc2217_set_control(self, value: bytes) -> None:
         """Ask for RTS, DTR or no flow control; a gateway that does not answer, or refuses, is taken as it is."""
@@ -132,6 +143,10 @@ class _ListeningGateway(_Base):  # type: ignore[misc]
                     self._telnet_process_subnegotiation(sub)
 
     def _give(self, item: Item) -> None:
+        octets = len(getattr(item, "octets", b""))
+        while octets and self.held - self.taken > MOST_HELD and self.is_open:
+            time.sleep(0.01)  # the gateway is to wait: what it sends next stays in the network's buffers
+        self.held += octets
         self.items.append(item)
         self.wake()
 
@@ -193,8 +208,11 @@ class Rfc2217Stream:
         with contextlib.suppress(BlockingIOError):
             gateway.wake_out.recv(READ_SIZE)
         items: list[Item] = []
-        while gateway.items:
+        for _ in range(len(gateway.items)):  # not what comes meanwhile: a flood would never let us go
             items.append(gateway.items.popleft())
+            gateway.taken += len(getattr(items[-1], "octets", b""))
+        if gateway.items:
+            gateway.wake()
         if not items and gateway.lost is not None:
             raise ConnectionResetError(gateway.lost)
         if gateway.lost is not None:

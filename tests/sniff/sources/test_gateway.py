@@ -356,3 +356,26 @@ def test_an_option_without_end_is_no_bus_traffic(smart, monkeypatch) -> None:
     assert items[-1].kind is LineEventKind.UNPLUGGED
     assert "a Telnet option without end" in items[-1].text
     source.close()
+
+
+def test_a_flood_is_held_back_and_every_octet_comes(smart) -> None:
+    from sniff.sources.rfc2217 import MOST_HELD, READ_SIZE
+
+    source = open_source(f"rfc2217://127.0.0.1:{smart.port}", LINE)
+    assert smart.ready.wait(5)
+    sent = 16 * MOST_HELD
+    thread = threading.Thread(target=lambda: smart.client.sendall(bytes(sent)), daemon=True)
+    thread.start()
+    connection = source._stream._gateway
+    until = time.monotonic() + 20
+    while connection.held <= MOST_HELD:
+        assert time.monotonic() < until
+        time.sleep(0.01)
+    came, most = 0, 0
+    while came < sent:
+        assert time.monotonic() < until + 20
+        most = max(most, connection.held - connection.taken)
+        came += len(octets(source.read()))
+    thread.join(5)
+    assert most <= MOST_HELD + READ_SIZE
+    source.close()
