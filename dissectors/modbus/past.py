@@ -47,7 +47,7 @@ class Past:
         """Evidence for a complete frame that may be a request, a response or either."""
         if request and octets in self._requests:
             return KNOWN_REQUEST
-        if response and self.knows_length(octets[0], octets[1], len(octets)):
+        if response and octets[1] < EXCEPTION_BIT and self.knows_length(octets[0], octets[1], len(octets)):
             return KNOWN_LENGTH
         return 0
 
