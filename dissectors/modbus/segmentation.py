@@ -214,14 +214,15 @@ class Paths:
         either = candidate.request and candidate.response
         chosen: dict[bool, tuple[int, _Step]] = {}  # one that may be both is tried as request and as answer
         for step in self._options(start, candidate.unit, octets[1]):
-            fit = step.expected.fit(octets, candidate.response) if step.expected is not None else 0
+            asked = step.expected is not None and step.expected.is_for(octets, 0)
+            fit = step.expected.fit(octets, candidate.response) if asked and step.expected is not None else 0
             if candidate.request and octets == step.asked:
                 fit = max(fit, REPEATED)
             own = bits + max(fit, known) + (ADJACENT if step.end == start else edge)
             if candidate.zeros:
                 own += zero_bits(window, candidate, step.expected, fit)
             reached = step.worth + worth(own, candidate.length)
-            answers = either and step.expected is not None and step.expected.is_for(octets, 0)
+            answers = either and asked
             if answers not in chosen or reached > chosen[answers][0]:
                 chosen[answers] = reached, step
         for total, before in chosen.values():
