@@ -37,6 +37,7 @@ from dissectors.modbus.candidates import (
     readings,
     whole_stretch,
 )
+from dissectors.modbus.expectation import EXACT
 from dissectors.modbus.functions import (
     BROADCAST,
     EXCEPTION_BIT,
@@ -244,8 +245,10 @@ class RtuFramer:
                 if best is not None:
                     return False  # two good readings, one with zeros at its end: what follows is weighed too
                 bits = CRC_BITS + octet_bits(stretch, 0, reading) + window.edge(window.base + length)
-                known = window.past.bits(stretch, reading.request, reading.response)
-                bits += max(known, expected.fit(stretch, reading.response) if expected is not None else 0)
+                fit = expected.fit(stretch, reading.response) if expected is not None else 0
+                if fit < EXACT:
+                    fit = max(fit, window.past.bits(stretch, reading.request, reading.response))
+                bits += fit
                 best, best_worth = reading, self._worth(bits, length)
             else:
                 hopes = reading  # of two readings only the longer can be the one that is open

@@ -34,6 +34,11 @@ from dissectors.modbus.functions import (
 )
 from dissectors.modbus.past import Past
 
+_UNPREDICTED: Final = frozenset(range(256)) - {
+    code | bit for code in FUNCTIONS if code not in (0x08, 0x2B) for bit in (0, EXCEPTION_BIT)
+}
+"""Function octets behind which a frame may begin whose length nothing predicts."""
+
 _MOST_BEGINS: Final = 32
 _INITIAL: Final = 0xFFFF
 
@@ -102,7 +107,10 @@ class OpenLengthFinder:
             del self._begins[position]
         good = list(good)
         starts = {candidate.start for candidate in good}
-        ahead = {p for p in (*begins, *(candidate.end for candidate in good)) if self._opens(known, p - base)}
+        last = base + len(known) - MIN_FRAME
+        ends = {candidate.start + candidate.length for candidate in good}
+        ahead = {p for p in ends if p <= last and known[p - base + 1] in _UNPREDICTED and self._opens(known, p - base)}
+        ahead.update(p for p in begins if self._opens(known, p - base))
         self.unfinished = []
         if not ahead:
             return []

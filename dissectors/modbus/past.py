@@ -47,7 +47,7 @@ class Past:
         """Evidence for a complete frame that may be a request, a response or either."""
         if request and octets in self._requests:
             return KNOWN_REQUEST
-        if response and self.knows_length(octets[0], octets[1], len(octets)):
+        if response and octets[1] < EXCEPTION_BIT and self.knows_length(octets[0], octets[1], len(octets)):
             return KNOWN_LENGTH
         return 0
 
@@ -78,7 +78,7 @@ class Past:
         """A good frame, and what it was taken for."""
         if self._strays:
             self._strays -= self._strays >> 6
-        if not request:
+        if self._flaws and not request:
             self._flaws.pop(octets[0], None)
         code = octets[1]
         known = code & ~EXCEPTION_BIT in FUNCTIONS
@@ -91,9 +91,10 @@ class Past:
         if (known and request) or code & EXCEPTION_BIT or code in _FIXED:
             return
         key = _key(octets[0], code, not request)
-        if key not in self._lengths and len(self._lengths) >= _MOST_LENGTHS:
+        lengths = self._lengths.get(key, 0)
+        if not lengths and len(self._lengths) >= _MOST_LENGTHS:
             return
-        self._lengths[key] = self._lengths.get(key, 0) | 1 << len(octets)
+        self._lengths[key] = lengths | 1 << len(octets)
         if not known:
             length, times = self._constant.get(key, (len(octets), 0))
             self._constant[key] = (

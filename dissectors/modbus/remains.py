@@ -71,9 +71,8 @@ def injury(
     if count < MIN_FRAME and not answers and not (called and alone):
         return None
     fits = count in lengths or (answers and awaited is not None and count == awaited.length)
-    if not fits and not heard:
-        if not (heard is None and alone and code & ~EXCEPTION_BIT in _COMMON):
-            return None
+    if not (fits or heard or (heard is None and alone and code & ~EXCEPTION_BIT in _COMMON)):
+        return None
     if fits:
         return Injury(count, Damage.CHECK)
     right = awaited.length if answers and awaited is not None and not code & EXCEPTION_BIT else None

@@ -133,7 +133,7 @@ class Paths:
         self._ends = [window.base]  # of every path found, ascending
         self._best = [root]  # the best of those that end there or before
         self._steps = [root]
-        self._touching: dict[int, list[_Step]] = {window.base: [root]}  # by the position that they end at
+        self._touching: dict[int, tuple[_Step, ...]] = {window.base: (root,)}  # by the position that they end at
         self._awaiting: dict[int, tuple[list[int], list[_Step]]] = {}  # as the first two, by request left open
         self._remember_awaiting(window.base, root)
 
@@ -206,20 +206,23 @@ class Paths:
     def _add(self, candidate: Candidate) -> None:
         window, start, end = self._window, candidate.start, candidate.end
         octets = candidate.octets
+        if start < self.base:
+            return
         bits = candidate.bits + window.edge(end) + _standing(window, candidate.unit, start, end)
         known = window.past.bits(octets, candidate.request, candidate.response)
         edge = window.edge(start)
         either = candidate.request and candidate.response
         chosen: dict[bool, tuple[int, _Step]] = {}  # one that may be both is tried as request and as answer
         for step in self._options(start, candidate.unit, octets[1]):
-            fit = step.expected.fit(octets, candidate.response) if step.expected is not None else 0
+            asked = step.expected is not None and step.expected.is_for(octets, 0)
+            fit = step.expected.fit(octets, candidate.response) if asked and step.expected is not None else 0
             if candidate.request and octets == step.asked:
                 fit = max(fit, REPEATED)
             own = bits + max(fit, known) + (ADJACENT if step.end == start else edge)
             if candidate.zeros:
                 own += zero_bits(window, candidate, step.expected, fit)
             reached = step.worth + worth(own, candidate.length)
-            answers = either and step.expected is not None and step.expected.is_for(octets, 0)
+            answers = either and asked
             if answers not in chosen or reached > chosen[answers][0]:
                 chosen[answers] = reached, step
         for total, before in chosen.values():
@@ -227,23 +230,21 @@ class Paths:
             step = _Step(total, candidate, before, end, after, before.asked if after is None else octets)
             self._ends.append(end)
             self._best.append(step if total > self._best[-1].worth else self._best[-1])
-            self._touching.setdefault(end, []).append(step)
+            self._touching[end] = (*self._touching.get(end, ()), step)
             self._steps.append(step)
             self._remember_awaiting(end, step)
 
     def _options(self, start: int, unit: int, code: int) -> Sequence[_Step]:
         """Paths that a frame may follow; the best of them is among these."""
-        if start < self.base:
-            return ()
-        options = [self._best[bisect_right(self._ends, start) - 1]]
-        touching = self._touching.get(start)
-        if touching is not None:
-            options += touching
-        awaiting = self._awaiting.get(unit << 8 | code & ~EXCEPTION_BIT)
+        best = self._best[bisect_right(self._ends, start) - 1]
+        options = self._touching.get(start, ())
+        if best not in options:
+            options = (*options, best)
+        awaiting = self._awaiting.get(unit << 8 | code & ~EXCEPTION_BIT) if self._awaiting else None
         if awaiting is not None:
             at = bisect_right(awaiting[0], start) - 1
-            if at >= 0:
-                options.append(awaiting[1][at])
+            if at >= 0 and awaiting[1][at] not in options:
+                options = (*options, awaiting[1][at])
         return options
 
     def _hope(self, start: int, reading: Reading, count: int) -> tuple[int, _Step]:
