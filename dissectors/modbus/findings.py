@@ -107,6 +107,7 @@ class ModbusFindings:
         self._stray: dict[int, bytes] = {}  # octets that are no good frame, by the transaction they came in
         self._lost: dict[int, Lost] = {}  # requests without answer, by transaction
         self._begins: set[bytes] = set()  # the first octets of good requests
+        self._late_read = 0  # the newest frame that was read later than the adapter explains
         self._marked: deque[int] = deque(maxlen=64)  # transactions with line errors in what came in answer
         self._waits: dict[int, int] = {}  # by request that nothing followed: until the next one, ns
         self._slow: deque[_Slow] = deque()  # answers that took long, until the pause after them is known
@@ -131,6 +132,8 @@ class ModbusFindings:
             self._see_noise(no, event)
             self._before = self._open = self._answered = None
             return
+        if event.slack > self._timing.latency + MS:
+            self._late_read = no
         octets = readable_adu(event)
         if not header.ok:
             self._see_broken(no, event, octets)
@@ -162,6 +165,10 @@ class ModbusFindings:
                     self._station(transaction.station).echoed += 1
             if verdict is Verdict.BROADCAST and asked is not None:
                 self._seen.cycles.add(asked.octets, asked.key, transaction.start)
+            return
+        damaged = verdict in (Verdict.DAMAGED_ANSWER, Verdict.DAMAGED_REQUEST)
+        if damaged and self._late_read >= (transaction.request or transaction.response or 0):
+            self._seen.damaged_by_reading += 1
             return
         if verdict is Verdict.DAMAGED_REQUEST:
             self._seen.damaged_requests.add(transaction.start, transaction.request)
