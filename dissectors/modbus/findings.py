@@ -384,9 +384,10 @@ class ModbusFindings:
             return
         if len(stray) == _STRAY_KEPT:
             return
-        station.garbage.add(
-            stray, transaction.id in self._marked, transaction.end, transaction.request, transaction.response
-        )
+        begins = stray[:1] == b":" if asked.frame.protocol != RTU_NAME else stray[:1] == asked.octets[:1]
+        frames = transaction.request, transaction.response
+        marked = transaction.id in self._marked
+        station.garbage.add(stray, transaction.end, *frames, is_marked=marked, begins=begins)
         if asked.frame.protocol != RTU_NAME or stray[:2] != asked.octets[:2] or stray[1] not in FUNCTIONS:
             return
         expected = answer_length(asked.frame.octets)

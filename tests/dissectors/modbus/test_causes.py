@@ -86,7 +86,7 @@ def test_long_bits_name_the_baud_rate(bus):
 def test_noise_that_differs_is_no_other_baud_rate():
     garbage = Garbage()
     for turn in range(8):
-        garbage.add(bytes((turn * 37 + k * 59) & 0xFF for k in range(12)), False, turn)
+        garbage.add(bytes((turn * 37 + k * 59) & 0xFF for k in range(12)), turn)
     assert garbage.always() is None
     assert garbage.slower_by() is None
 
