@@ -32,6 +32,7 @@ class Evidence:
     before, time, frame before, frame). `broken_in`: the same of
     damaged frames that begin as a request to another station. `close`, `paused`: by sender; of the first, (time, frame
     before, frame).
+    `damaged_by_reading`: damage at reads that came later than the adapter explains: a frame was torn, not spoilt.
     `malformed`: requests that contradict themselves, with the exceptions they got. `to_nobody`: reads of address 0, and
     who answered. `cut_echoes`: requests given back in part. `octets`, `frames`: of each sender ("master", "station 3").
     `late_frames`: answers that came too late. `broadcast_answers`: who answered broadcasts. `pairs`: (unit asked, unit
@@ -47,6 +48,7 @@ class Evidence:
     echoes: int = 0
     stations: dict[int, Station] = field(default_factory=dict)
     damaged_requests: Tally = field(default_factory=Tally)
+    damaged_by_reading: int = 0
     unasked: Tally = field(default_factory=Tally)
     answers_to_broadcast: Tally = field(default_factory=Tally)
     noise_after_broadcast: Tally = field(default_factory=Tally)

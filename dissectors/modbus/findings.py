@@ -7,20 +7,21 @@ station: it is slow when even the shortest reading is too long, too quick when e
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass
 
 from dissectors.checksums import crc16_modbus
 from dissectors.findings import ExceptionWords, Finding, Tally
 from dissectors.frame import Damage, Event, Flaw, Frame, Header, Noise, Role
 from dissectors.line import Timing
 from dissectors.modbus.adu import RTU_NAME, readable_adu, rtu_check
+from dissectors.modbus.asked import Asked
 from dissectors.modbus.evidence import Evidence
 from dissectors.modbus.exchange import is_begin_of
-from dissectors.modbus.functions import BROADCAST, EXCEPTION_BIT, FUNCTIONS, answer_length
+from dissectors.modbus.functions import BROADCAST, FUNCTIONS, answer_length
+from dissectors.modbus.gaps import Gaps
 from dissectors.modbus.judgement import judge
 from dissectors.modbus.learnt import READ, Learnt
 from dissectors.modbus.response_groups import Answered
-from dissectors.modbus.station_record import Key, Lost, Station, middle
+from dissectors.modbus.station_record import Lost, Station
 from dissectors.tracker import Placement, Transaction, Verdict
 
 MS = 1_000_000
@@ -31,8 +32,6 @@ SLOW_UNLEARNT = 500 * MS
 _OPEN_KEPT = 4096
 _HASTY_KEPT = 256
 _LAST_STANDARD_UNIT = 247
-_SPACING_KEPT = 64
-_SPACING_LEAST = 8
 AT_ONCE = 50 * MS
 """No master repeats a request so soon."""
 
@@ -40,48 +39,11 @@ _BEGIN = 5  # octets of a request that no noise makes by chance: unit, function,
 _NO_WAIT = 10 * MS  # no master gives up so soon: it does not wait for one answer before it asks for the next
 _LOST_KEPT = 64
 _FINAL_KEPT = 64
-_SLOW_KEPT = 2
 _STRAY_KEPT = 600  # octets, more than the longest frame; of more nothing is said
 _EXCESS_KEPT = 256
 _WORDS_KEPT = 16
 _TALKED_OVER = 3  # octets by which an answer must be too long before somebody else has spoken
 _SETTLED_ELSEWHERE = (Verdict.ECHO, Verdict.DATA, Verdict.OPEN, Verdict.BROADCAST)
-
-
-@dataclass(frozen=True, slots=True)
-class _Asked:
-    """The request of an open transaction."""
-
-    no: int
-    frame: Frame
-    header: Header
-    octets: bytes
-
-    @property
-    def unit(self) -> int:
-        return self.octets[0] if self.octets else 0
-
-    @property
-    def key(self) -> Key:
-        return self.header.kind, self.header.address
-
-    @property
-    def is_for_nobody(self) -> bool:
-        """Whether it reads from address 0."""
-        return self.unit == BROADCAST and self.header.role is Role.REQUEST and self.header.ok
-
-    @property
-    def fault(self) -> str | None:
-        """What it says that contradicts itself, though its check is good."""
-        return self.header.error if self.header.ok and not self.octets[1] & EXCEPTION_BIT else None
-
-
-@dataclass(frozen=True, slots=True)
-class _Slow:
-    """An answer that took long, and where it counts."""
-
-    tally: Tally
-    transaction: Transaction
 
 
 class ModbusFindings:
@@ -91,28 +53,24 @@ class ModbusFindings:
         self._timing = timing
         self._learnt = Learnt(timing)
         self._seen = Evidence(timing)
-        self._asked: dict[int, _Asked] = {}  # by transaction
-        self._open: _Asked | None = None  # the newest request, while nothing has come after it
-        self._broadcast: _Asked | None = None  # likewise
-        self._before: Frame | None = None  # the row before, if it was a good frame
+        self._gaps = Gaps(timing, self._seen, self._learnt)
+        self._asked: dict[int, Asked] = {}  # by transaction
+        self._open: Asked | None = None  # the newest request, while nothing has come after it
+        self._broadcast: Asked | None = None  # likewise
         self._codes: dict[int, int] = {}  # exception codes by transaction
         self._answers: dict[int, bytes] = {}  # good answers by transaction
         self._elsewhere: dict[int, int] = {}  # requests (by frame) that another unit answered, and which
         self._repeats: deque[int] = deque(maxlen=64)  # the last transactions that repeated another
         self._no_requests: deque[int] = deque(maxlen=64)  # frames that the tracker takes for requests, but are none
-        self._spacing: dict[str, deque[int]] = {}  # silence an octet of the last frames of each sender, ns
         self._damaged: deque[int] = deque(maxlen=64)  # transactions of the last damaged answers
         self._flaws: dict[int, Flaw] = {}  # of damaged frames, by transaction
         self._newest: int | None = None  # the transaction of the newest request
         self._stray: dict[int, bytes] = {}  # octets that are no good frame, by the transaction they came in
         self._lost: dict[int, Lost] = {}  # requests without answer, by transaction
         self._begins: set[bytes] = set()  # the first octets of good requests
+        self._late_read = 0  # the newest frame that was read later than the adapter explains
         self._marked: deque[int] = deque(maxlen=64)  # transactions with line errors in what came in answer
         self._waits: dict[int, int] = {}  # by request that nothing followed: until the next one, ns
-        self._slow: deque[_Slow] = deque()  # answers that took long, until the pause after them is known
-        self._pauses: deque[int] = deque(maxlen=_SPACING_KEPT)  # the master's, between an answer and its next request
-        self._answered: Frame | None = None  # the newest frame, if it was an answer
-        self._hurried: deque[int] = deque(maxlen=64)  # answers after which the master seemed to pause hardly
         self._final: dict[int, bytes] = {}  # the last answers, by transaction
 
     # ---- the contract
@@ -129,24 +87,24 @@ class ModbusFindings:
             self._gather(event)
             self._see_broken(no, event, event.octets)
             self._see_noise(no, event)
-            self._before = self._open = self._answered = None
+            self._open = None
+            self._gaps.hear_noise()
             return
+        if event.slack > self._timing.latency + MS:
+            self._late_read = no
         octets = readable_adu(event)
         if not header.ok:
             self._see_broken(no, event, octets)
-        self._see_gaps(no, event, header, placement)
-        self._see_pause_before(no, event, header, placement)
+        self._gaps.see(no, event, header, placement)
         if placement.role is Role.RESPONSE:
             self._see_answer(no, event, header, placement, octets)
         elif placement.role is Role.EITHER:
             self._open = self._broadcast = None
         else:
             self._newest = placement.tx
-            self._see_request(_Asked(no, event, header, octets), placement)
+            self._see_request(Asked(no, event, header, octets), placement)
         if header.ok and octets and octets[0] > _LAST_STANDARD_UNIT:
             self._station(octets[0]).reserved.add(event.start, no)
-        self._before = event if header.ok else None
-        self._answered = event if placement.role is Role.RESPONSE and header.ok else None
 
     def settle(self, transaction: Transaction) -> None:
         """See `dissectors.findings.Judge`."""
@@ -162,6 +120,10 @@ class ModbusFindings:
                     self._station(transaction.station).echoed += 1
             if verdict is Verdict.BROADCAST and asked is not None:
                 self._seen.cycles.add(asked.octets, asked.key, transaction.start)
+            return
+        damaged = verdict in (Verdict.DAMAGED_ANSWER, Verdict.DAMAGED_REQUEST)
+        if damaged and self._late_read >= (transaction.request or transaction.response or 0):
+            self._seen.damaged_by_reading += 1
             return
         if verdict is Verdict.DAMAGED_REQUEST:
             self._seen.damaged_requests.add(transaction.start, transaction.request)
@@ -204,13 +166,12 @@ class ModbusFindings:
 
     def findings(self) -> tuple[Finding, ...]:
         """See `dissectors.findings.Judge`."""
-        while self._slow:
-            self._judge_slow(self._slow.popleft())
+        self._gaps.judge_slow(left=0)
         return judge(self._seen, self._learnt.timeout)
 
     # ---- rows
 
-    def _see_request(self, asked: _Asked, placement: Placement) -> None:
+    def _see_request(self, asked: Asked, placement: Placement) -> None:
         if len(self._asked) < _OPEN_KEPT:
             self._asked[placement.tx] = asked
         if not asked.header.ok:
@@ -228,7 +189,7 @@ class ModbusFindings:
         self._open = None if is_broadcast or not asked.header.ok else asked
         self._broadcast = asked if is_broadcast and asked.header.ok else None
 
-    def _is_no_request(self, asked: _Asked) -> bool:
+    def _is_no_request(self, asked: Asked) -> bool:
         """Whether it is an answer in the shape of a request: to a broadcast, or by another unit than the one asked."""
         if self._broadcast is not None and self._is_answer_to_broadcast(asked):
             self._seen.answers_to_broadcast.add(asked.frame.start, self._broadcast.no, asked.no)
@@ -240,7 +201,7 @@ class ModbusFindings:
             return True
         return False
 
-    def _waited_in_vain(self, before: _Asked, asked: _Asked) -> None:
+    def _waited_in_vain(self, before: Asked, asked: Asked) -> None:
         """A request after another that nothing has followed."""
         self._station(before.unit).waited += max(0, asked.frame.start - before.frame.start)
         if not asked.header.ok or before.is_for_nobody:
@@ -291,35 +252,7 @@ class ModbusFindings:
             return
         self._broadcast = None
 
-    def _see_gaps(self, no: int, frame: Frame, header: Header, placement: Placement) -> None:
-        """Silences that are provably too short between frames, or too long inside one."""
-        timing, before = self._timing, self._before
-        if placement.role is not Role.EITHER:
-            self._seen.frames[_sender(placement)] += 1
-            self._seen.octets[_sender(placement)] += max(len(frame.octets), frame.expected or 0)
-        if frame.protocol != RTU_NAME:
-            return
-        sender = _sender(placement)
-        # frames that touch came in one read, which says nothing of the silence between them
-        if before is not None and header.ok and not frame.skipped and before.octets != frame.octets:
-            longest = max(0, frame.start - before.end) + before.slack
-            if before.end < frame.start and longest < timing.t35 - timing.line.bits(1):
-                self._seen.too_close(sender, frame.start, no - 1, no)
-        self._see_pause(no, frame, sender)
-
-    def _see_pause(self, no: int, frame: Frame, sender: str) -> None:
-        """A silence inside a frame, beyond the spacing that this sender always leaves between its octets."""
-        gaps = len(frame.octets) - 1
-        if gaps < 1:
-            return
-        silence = frame.end - frame.slack - frame.start - len(frame.octets) * self._timing.char
-        usual = self._spacing.setdefault(sender, deque(maxlen=_SPACING_KEPT))
-        limit = self._timing.t15
-        if silence > limit and len(usual) >= _SPACING_LEAST and silence - gaps * max(0, middle(usual)) > limit:
-            self._seen.gap_tally(self._seen.paused, sender).add(frame.start, no)
-        usual.append(silence // gaps)
-
-    def _is_answer_to_broadcast(self, asked: _Asked) -> bool:
+    def _is_answer_to_broadcast(self, asked: Asked) -> bool:
         """Whether what looks like a request is a station's copy of the broadcast before it, as itself or as 0."""
         broadcast = self._broadcast
         if broadcast is None or asked.octets[1:] != broadcast.octets[1:] or (self._seen.echoes and not asked.unit):
@@ -327,7 +260,7 @@ class ModbusFindings:
         gap = asked.frame.start - broadcast.frame.end
         return self._timing.char + self._timing.latency < gap < TURNAROUND
 
-    def _is_answer_of_another(self, before: _Asked, asked: _Asked) -> bool:
+    def _is_answer_of_another(self, before: Asked, asked: Asked) -> bool:
         """Whether what looks like a request is the copy of the one before it, by a unit that is known to answer so."""
         return asked.octets[1:] == before.octets[1:] and (before.unit, asked.unit) in self._seen.pairs
 
@@ -353,7 +286,7 @@ class ModbusFindings:
         self._seen.unasked.add(transaction.start, transaction.response)
 
     def _settle_request(
-        self, station: Station, transaction: Transaction, asked: _Asked, code: int, answer: bytes
+        self, station: Station, transaction: Transaction, asked: Asked, code: int, answer: bytes
     ) -> None:
         verdict = transaction.verdict
         if asked.no in self._no_requests:
@@ -419,25 +352,7 @@ class ModbusFindings:
         station.slow_limit = limit
         station.slow_of += 1
         if least > (SLOW_UNLEARNT if limit is None else limit):
-            self._slow.append(_Slow(station.slow, transaction))
-            if len(self._slow) > _SLOW_KEPT:
-                self._judge_slow(self._slow.popleft())
-
-    def _judge_slow(self, slow: _Slow) -> None:
-        """Count an answer that took long, unless the computer was late for it and no later for what followed."""
-        transaction = slow.transaction
-        if transaction.response not in self._hurried:
-            slow.tally.add(transaction.end, transaction.request, transaction.response)
-
-    def _see_pause_before(self, no: int, frame: Frame, header: Header, placement: Placement) -> None:
-        """A request after an answer: a pause far below the usual says that the answer was read too late."""
-        if self._answered is None or placement.role is not Role.REQUEST or not header.ok:
-            return
-        pause = max(0, frame.start - self._answered.end)
-        if len(self._pauses) >= _SPACING_LEAST and 2 * pause < middle(self._pauses) - self._timing.latency:
-            self._hurried.append(no - 1)
-        self._pauses.append(pause)
-        self._learnt.paused(pause, 0)
+            self._gaps.took_long(station.slow, transaction)
 
     def _settle_late(self, station: Station, transaction: Transaction) -> None:
         """An answer after the next request: its own request is not lost; late only if the master has waited at all."""
@@ -450,7 +365,7 @@ class ModbusFindings:
                 return
         station.late.add(transaction.start, transaction.response)
 
-    def _settle_for_nobody(self, transaction: Transaction, asked: _Asked) -> None:
+    def _settle_for_nobody(self, transaction: Transaction, asked: Asked) -> None:
         """A read of address 0, and who answered it."""
         seen = self._seen
         seen.to_nobody.add(transaction.start, transaction.request, transaction.response)
@@ -459,7 +374,7 @@ class ModbusFindings:
         seen.cycles.add(asked.octets, asked.key, transaction.start)
 
     def _settle_damaged(
-        self, station: Station, transaction: Transaction, asked: _Asked, stray: bytes, flaw: Flaw | None
+        self, station: Station, transaction: Transaction, asked: Asked, stray: bytes, flaw: Flaw | None
     ) -> None:
         """Something came in place of an answer: in what way it is wrong."""
         if flaw is not None:
@@ -469,9 +384,10 @@ class ModbusFindings:
             return
         if len(stray) == _STRAY_KEPT:
             return
-        station.garbage.add(
-            stray, transaction.id in self._marked, transaction.end, transaction.request, transaction.response
-        )
+        begins = stray[:1] == b":" if asked.frame.protocol != RTU_NAME else stray[:1] == asked.octets[:1]
+        frames = transaction.request, transaction.response
+        marked = transaction.id in self._marked
+        station.garbage.add(stray, transaction.end, *frames, is_marked=marked, begins=begins)
         if asked.frame.protocol != RTU_NAME or stray[:2] != asked.octets[:2] or stray[1] not in FUNCTIONS:
             return
         expected = answer_length(asked.frame.octets)
@@ -519,10 +435,6 @@ class ModbusFindings:
 
     def _station(self, unit: int) -> Station:
         return self._seen.stations.setdefault(unit, Station())
-
-
-def _sender(placement: Placement) -> str:
-    return "master" if placement.role is not Role.RESPONSE else f"station {placement.source}"
 
 
 def _ends_badly(frame: Frame) -> bool:

@@ -64,11 +64,13 @@ class Garbage:
     tally: Tally = field(default_factory=Tally)
     stretches: deque[bytes] = field(default_factory=lambda: deque(maxlen=_STRETCHES_KEPT))
     marked: int = 0  # of them with line errors
+    begun: int = 0  # of them that begin as the answer should
     _counts: Counter[bytes] = field(default_factory=Counter)
 
-    def add(self, octets: bytes, is_marked: bool, time: int, *frames: int | None) -> None:
-        """Count one more; `is_marked`: with line errors."""
+    def add(self, octets: bytes, time: int, *frames: int | None, is_marked: bool = False, begins: bool = False) -> None:
+        """Count one more; `is_marked`: with line errors; `begins`: as the answer should."""
         self.marked += is_marked
+        self.begun += begins
         self.tally.add(time, *frames)
         self.stretches.append(octets)
         if octets in self._counts or len(self._counts) < _DIFFERENT_KEPT:
@@ -84,3 +86,11 @@ class Garbage:
     def slower_by(self) -> int | None:
         """See the function of that name; None where there is too little of it."""
         return slower_by(self.stretches) if self.tally.count >= _LEAST else None
+
+    @property
+    def is_system(self) -> bool:
+        """Whether the sender makes it so: always the same, or in longer bits; not what breaks characters on the way."""
+        if self.slower_by() is not None:
+            return True
+        broken_on_the_way = 2 * self.marked > self.tally.count and 2 * self.begun > self.tally.count
+        return self.always() is not None and not broken_on_the_way

@@ -9,6 +9,7 @@ from collections.abc import Callable
 
 from dissectors.modbus.functions import EXCEPTION_BIT, FUNCTIONS
 
+_SINGLE_WRITES = frozenset((0x05, 0x06))
 _DIAGNOSTIC_COPIES = frozenset((0x00, 0x01, 0x03, 0x04, 0x0A, 0x14))  # sub-functions of 8 whose answer repeats them
 
 
@@ -58,7 +59,11 @@ def _byte_count(response: bytes, expected: int, asked: str) -> str | None:
 
 
 def _copy(request: bytes, response: bytes) -> str | None:
-    return None if request[1:] == response[1:] else "does not repeat the request"
+    if request[1:] == response[1:]:
+        return None
+    if request[1] in _SINGLE_WRITES and request[2:4] == response[2:4]:
+        return "confirms another value than was written"
+    return "does not repeat the request"
 
 
 def _range(request: bytes, response: bytes) -> str | None:

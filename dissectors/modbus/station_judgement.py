@@ -38,7 +38,7 @@ _REPEATS_LEAST = 3  # fewer are no habit, however short the capture
 def of_station(seen: Evidence, unit: int, station: Station, timeout: int | None, is_common: bool) -> Iterator[Finding]:
     name = f"station {unit}"
     yield from _missing(seen, name, unit, station)
-    foreign = _foreign(seen, name, unit, station)
+    foreign = _foreign(seen, name, station)
     systematic = [*_flawed(seen, name, station), *([foreign] if foreign else [])]
     yield from systematic
     explained = sum(finding.count for finding in systematic)
@@ -172,15 +172,13 @@ def _flawed(seen: Evidence, name: str, station: Station) -> Iterator[Finding]:
         yield replace(tally.found(RULES[code], name, words, note_if(seen.rare(count, station.asked))), count=count)
 
 
-def _foreign(seen: Evidence, name: str, unit: int, station: Station) -> Finding | None:
+def _foreign(seen: Evidence, name: str, station: Station) -> Finding | None:
     """Octets in place of answers that are always the same, or those of another baud rate."""
-    garbage, own = station.garbage, bytes((unit,))
+    garbage = station.garbage
     same, factor = garbage.always(), garbage.slower_by()
-    if (same is None and factor is None) or 2 * garbage.tally.count < station.damaged.count:
+    if not garbage.is_system or 2 * garbage.tally.count < station.damaged.count:
         return None
-    if same is not None and 2 * garbage.marked > garbage.tally.count and factor is None and same[:1] in (b":", own):
-        return None  # what breaks characters on the way is no device's
-    if same is not None and len(same) > 2 and (same[0] == unit or same[:1] == b":"):
+    if same is not None and 2 * garbage.begun > garbage.tally.count:
         words = f"{counted(garbage.tally.count, 'damaged answer')}, always the same {_octets(len(same))}: {_hex(same)}"
         return garbage.tally.found(RULES["MB015"], name, words)
     words = f"{times(garbage.tally.count)} something that is not this protocol came in answer"

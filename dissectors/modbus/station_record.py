@@ -165,9 +165,7 @@ class Station:
     def explained(self) -> int:
         """How many damaged answers are no damage of the line: always the same, or always in the same way."""
         flawed = sum(tally.count for tally in self.flaws.values() if tally.count >= 3)
-        garbage = self.garbage
-        foreign = garbage.always() is not None or garbage.slower_by() is not None
-        return flawed + (garbage.tally.count if foreign else 0)
+        return flawed + (self.garbage.tally.count if self.garbage.is_system else 0)
 
     @property
     def turns(self) -> int:

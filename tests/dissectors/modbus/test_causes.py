@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from dissectors.findings import Severity
@@ -84,7 +86,7 @@ def test_long_bits_name_the_baud_rate(bus):
 def test_noise_that_differs_is_no_other_baud_rate():
     garbage = Garbage()
     for turn in range(8):
-        garbage.add(bytes((turn * 37 + k * 59) & 0xFF for k in range(12)), False, turn)
+        garbage.add(bytes((turn * 37 + k * 59) & 0xFF for k in range(12)), turn)
     assert garbage.always() is None
     assert garbage.slower_by() is None
 
@@ -221,3 +223,12 @@ def test_every_code_that_a_rule_explains_can_exist():
         assert all(code.startswith(prefixes) for code in rule.explains)
         assert all(code in RULES for code in rule.explains if code.startswith("MB"))
         assert rule.code not in rule.explains
+
+
+def test_frames_torn_by_a_late_read_are_nobodys_damage(bus):
+    for turn in range(30):
+        bus.exchange(OTHER, OTHER_VALUES).exchange(READ, VALUES)
+        if turn % 5 == 2:
+            bus.say(READ).cut(VALUES, 4).say(READ, 60).say(VALUES)
+            bus.events[-2] = replace(bus.events[-2], slack=60_000_000)
+    assert graves_of(bus) == set()

@@ -119,3 +119,19 @@ def test_another_value_than_was_written_is_said(bus):
 
 def test_frames_that_came_in_one_read_are_no_echo(bus):
     assert bus.say(WRITE).say(WRITE, 0).exchange(READ, VALUES).run().verdicts == ["answered", "answered"]
+
+
+@pytest.mark.parametrize("slow", [300, 2500])
+def test_the_same_in_ascii(paper_bus, slow):
+    bus = paper_bus(line="19200,7E1", is_ascii=True)
+    for _ in range(4):
+        bus.exchange(WRITE, WRITE, answer=slow, pause=100).exchange(READ, VALUES, pause=100)
+    assert bus.run().verdicts == ["answered"] * 8
+
+
+@pytest.mark.parametrize("slow", [300, 900, 2500])
+def test_through_an_adapter_that_holds_octets_back(paper_bus, slow):
+    bus = paper_bus(latency=16_000_000)
+    for turn in range(4):
+        bus.exchange(WRITE, WRITE, answer=slow + turn, pause=100).exchange(READ, VALUES, pause=100)
+    assert bus.run().verdicts == ["answered"] * 8

@@ -187,7 +187,7 @@ def test_an_answer_of_another_size_is_answered_with_a_word_about_it(bus):
 def test_an_answer_that_does_not_repeat_the_write_is_answered_with_a_word_about_it(known):
     reading = known.exchange(WRITE_OTHER, "010625021700").run()
     assert reading.last.verdict is Verdict.ANSWERED
-    assert reading.last.error == "does not repeat the request"
+    assert reading.last.error == "confirms another value than was written"
 
 
 def test_another_value_written_to_the_same_register_is_another_request(known):

@@ -1,0 +1,115 @@
+"""Silences on a Modbus line: between frames, inside frames, and what they say of how late the computer read.
+
+A pause that is far shorter than the master's usual one tells that the answer before it was not sent late but read late:
+the computer was busy, and had caught up when the next request came.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+
+from dissectors.findings import Tally
+from dissectors.frame import Frame, Header, Role
+from dissectors.line import Timing
+from dissectors.modbus.adu import RTU_NAME
+from dissectors.modbus.evidence import Evidence
+from dissectors.modbus.learnt import Learnt
+from dissectors.modbus.station_record import middle
+from dissectors.tracker import Placement, Transaction
+
+_SPACING_KEPT = 64
+_SPACING_LEAST = 8
+_SLOW_KEPT = 2
+
+
+@dataclass(frozen=True, slots=True)
+class _Slow:
+    """An answer that took long, and where it counts."""
+
+    tally: Tally
+    transaction: Transaction
+
+
+class Gaps:
+    """Fed frame by frame; writes what it finds into the evidence."""
+
+    def __init__(self, timing: Timing, seen: Evidence, learnt: Learnt) -> None:
+        self._timing = timing
+        self._seen = seen
+        self._learnt = learnt
+        self._before: Frame | None = None  # the row before, if it was a good frame
+        self._answered: Frame | None = None  # the row before, if it was a good answer
+        self._spacing: dict[str, deque[int]] = {}  # silence an octet of the last frames of each sender, ns
+        self._slow: deque[_Slow] = deque()  # answers that took long, until the pause after them is known
+        self._pauses: deque[int] = deque(maxlen=_SPACING_KEPT)  # the master's, between an answer and its next request
+        self._hurried: deque[int] = deque(maxlen=64)  # answers after which the master seemed to pause hardly
+
+    def see(self, no: int, frame: Frame, header: Header, placement: Placement) -> None:
+        """Take the next frame."""
+        self._see_gap(no, frame, header, placement)
+        self._see_pause_before(no, frame, header, placement)
+        self._before = frame if header.ok else None
+        self._answered = frame if placement.role is Role.RESPONSE and header.ok else None
+
+    def hear_noise(self) -> None:
+        """Take octets that are no frame."""
+        self._before = self._answered = None
+
+    def took_long(self, tally: Tally, transaction: Transaction) -> None:
+        """Count an answer that took long, once the pause after it is known."""
+        self._slow.append(_Slow(tally, transaction))
+        self.judge_slow(_SLOW_KEPT)
+
+    def judge_slow(self, left: int) -> None:
+        """Count all but the last `left` answers that took long."""
+        while len(self._slow) > left:
+            self._judge_slow(self._slow.popleft())
+
+    def _see_gap(self, no: int, frame: Frame, header: Header, placement: Placement) -> None:
+        """Silences that are provably too short between frames, or too long inside one."""
+        timing, before = self._timing, self._before
+        if placement.role is not Role.EITHER:
+            self._seen.frames[_sender(placement)] += 1
+            self._seen.octets[_sender(placement)] += max(len(frame.octets), frame.expected or 0)
+        if frame.protocol != RTU_NAME:
+            return
+        sender = _sender(placement)
+        # frames that touch came in one read, which says nothing of the silence between them
+        if before is not None and header.ok and not frame.skipped and before.octets != frame.octets:
+            longest = max(0, frame.start - before.end) + before.slack
+            if before.end < frame.start and longest < timing.t35 - timing.line.bits(1):
+                self._seen.too_close(sender, frame.start, no - 1, no)
+        self._see_pause(no, frame, sender)
+
+    def _see_pause(self, no: int, frame: Frame, sender: str) -> None:
+        """A silence inside a frame, beyond the spacing that this sender always leaves between its octets."""
+        gaps = len(frame.octets) - 1
+        if gaps < 1:
+            return
+        silence = frame.end - frame.slack - frame.start - len(frame.octets) * self._timing.char
+        usual = self._spacing.setdefault(sender, deque(maxlen=_SPACING_KEPT))
+        limit = self._timing.t15
+        if silence > limit and len(usual) >= _SPACING_LEAST and silence - gaps * max(0, middle(usual)) > limit:
+            self._seen.gap_tally(self._seen.paused, sender).add(frame.start, no)
+        usual.append(silence // gaps)
+
+    def _judge_slow(self, slow: _Slow) -> None:
+        """Count an answer that took long, unless the computer was late for it and no later for what followed."""
+        transaction = slow.transaction
+        if transaction.response not in self._hurried:
+            slow.tally.add(transaction.end, transaction.request, transaction.response)
+
+    def _see_pause_before(self, no: int, frame: Frame, header: Header, placement: Placement) -> None:
+        """A request after an answer: a pause far below the usual says that the answer was read too late."""
+        if self._answered is None or placement.role is not Role.REQUEST or not header.ok:
+            return
+        pause = max(0, frame.start - self._answered.end)
+        if len(self._pauses) >= _SPACING_LEAST and 2 * pause < middle(self._pauses) - self._timing.latency:
+            self._hurried.append(no - 1)
+        self._pauses.append(pause)
+        self._learnt.paused(pause, 0)
+
+
+def _sender(placement: Placement) -> str:
+    return "master" if placement.role is not Role.RESPONSE else f"station {placement.source}"
