@@ -9,8 +9,8 @@ The rules:
 3. A good header directly after proved silence of 60 bit times (Tframe_abort) ends the frame before it, and so does
    the silence that loses the token (500 ms). Other silence inside a frame proves nothing: hosts read late.
 4. A preamble with a bad header is kept as a damaged frame, up to the next good header, the next preamble after proved
-   silence or where a frame without data would end, or the length it claims, when that many octets make sense: a node would have to drop it, we can often still say who sent it. Of a doubled
-   preamble the second one counts.
+   silence or where a frame without data would end, or the length it claims, when that many octets make sense: a node
+   would have to drop it, we can often still say who sent it. Of a doubled preamble the second one counts.
 5. A good header whose preamble lacks an octet or has a wrong one, directly after a frame or after silence, begins a
    damaged frame where no data are announced or the data CRC is good.
 6. One FF directly after a good frame belongs to it (the tail octet that some drivers send): flag "trailing-pad".
