@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from dissectors.bacnet.limits import N_POLL, T_USAGE_TIMEOUT_MAX
 from dissectors.bacnet.ring import Ring, What
-from dissectors.bacnet.ring_observer import T_GO_ON
+from dissectors.bacnet.ring_questions import T_GO_ON
 from dissectors.bacnet.ring_remarks import Remark, listed, milliseconds, of, plain
 from dissectors.findings import Severity, counted, times
 

@@ -8,9 +8,9 @@ The rules:
    ran into its place), else where silence of over 100 ms stands inside it, else at its length.
 3. A good header directly after proved silence of 60 bit times (Tframe_abort) ends the frame before it, and so does
    the silence that loses the token (500 ms). Other silence inside a frame proves nothing: hosts read late.
-4. A preamble with a bad header is kept as a damaged frame, up to the next good header or the length it claims, when
-   that many octets make sense: a node would have to drop it, we can often still say who sent it. Of a doubled
-   preamble the second one counts.
+4. A preamble with a bad header is kept as a damaged frame, up to the next good header, the next preamble after proved
+   silence or where a frame without data would end, or the length it claims, when that many octets make sense: a node
+   would have to drop it, we can often still say who sent it. Of a doubled preamble the second one counts.
 5. A good header whose preamble lacks an octet or has a wrong one, directly after a frame or after silence, begins a
    damaged frame where no data are announced or the data CRC is good.
 6. One FF directly after a good frame belongs to it (the tail octet that some drivers send): flag "trailing-pad".
@@ -287,6 +287,11 @@ class MstpFramer:
         plausible = length <= (MAX_ENCODED if is_encoded(frame_type) else MAX_DATA)
         limit = at + (total(length) if plausible else HEADER)
         cut = self._good_header(at + 1, min(limit, stop), stop)
+        again = self._next_preamble(at, min(limit, stop) if cut is None else cut, stop, ended)
+        if again == _WAIT:
+            self._needs_pause = T_NO_TOKEN
+            return _WAIT
+        cut = cut if again is None else again
         if cut is None:
             if not ended and (limit > stop or self._undecided_header(at + 1, limit, stop)):
                 self._needs_pause = T_NO_TOKEN
@@ -319,6 +324,27 @@ class MstpFramer:
         for index, silence in self._silences:
             if begin <= index < end and silence >= limit:
                 return index
+        return None
+
+    def _next_preamble(self, at: int, end: int, stop: int, ended: bool) -> int | None:
+        """The first preamble before `end` that ends the frame at `at`, whose header is bad.
+
+        It stands directly after proved silence, or where a frame without data ends or would, had it lost octets. _WAIT
+        where its second octet may yet come.
+        """
+        octets = self._window.octets
+        nearest = octets.find(PREAMBLE, at + _NAMED, min(at + HEADER + 2, end + 1, stop))
+        if nearest != -1:
+            return nearest
+        if not ended and at + _NAMED < stop <= at + HEADER and octets[stop - 1] == PREAMBLE[0]:
+            return _WAIT
+        begin = at + 2
+        while self._silences and (silent := self._silence_in(begin, end, self._pause)) is not None:
+            if octets[silent : min(silent + 2, stop)] == PREAMBLE:
+                return silent
+            if not ended and silent + 1 == stop and octets[silent] == PREAMBLE[0]:
+                return _WAIT
+            begin = silent + 1
         return None
 
     def _good_header(self, begin: int, end: int, stop: int) -> int | None:

@@ -52,3 +52,8 @@ class HeldReads:
     def forget(self) -> None:
         """Nothing of what was late may be said: octets were missed."""
         self._late, self._before = [], None
+
+
+def surely_over(frame: Frame, before: Frame, limit: int) -> bool:
+    """Whether the time between two frames is over a limit (ns) by its smallest reading."""
+    return frame.start - frame.slack - before.end > limit

@@ -92,13 +92,11 @@ def mended(octets: bytes, damage: Damage | None) -> Repair | None:
 
 
 def _short_header(octets: bytes) -> Repair | None:
-    """Seven octets of a frame that has eight: the last one is missing, or one of the length."""
+    """Seven octets of a frame that has eight, with the length as it must be: the last one is missing."""
     header = octets[2:]
-    if header[3:] == b"\x00\x00":
-        return Repair(Flaw.LAST_MISSING, octets + bytes((crc8_mstp(header),)))
-    if header[3] == 0 and crc8_mstp(header[:4] + b"\x00") == header[4]:
-        return Repair(Flaw.ONE_MISSING, octets[:6] + b"\x00" + octets[6:])
-    return None
+    if header[3:] != b"\x00\x00":
+        return None
+    return Repair(Flaw.LAST_MISSING, octets + bytes((crc8_mstp(header),)))
 
 
 def _wrong_length(octets: bytes) -> Repair | None:

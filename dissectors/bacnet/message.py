@@ -53,16 +53,20 @@ def data_of(octets: bytes) -> bytes | None:
 def read(frame: Frame, *, trusting: bool = False) -> Message | None:
     """Read a frame; None when not even its type and destination are there.
 
-    The data of a frame whose check is bad are looked into only when `trusting`.
+    The data of a frame whose check is bad are looked into only when `trusting`, or where it could be put right.
     """
-    octets = frame.octets
+    octets = frame.octets if frame.repair is None else frame.repair.octets
     if len(octets) < 4:
         return None
     source = octets[4] if len(octets) > 4 else None
     if len(octets) < HEADER:
         return Message(octets[2], octets[3], source)
     frame_type, length = octets[2], octets[5] << 8 | octets[6]
-    sound = frame.check is Check.GOOD or (trusting and frame.damage in (Damage.CHECK, Damage.HEADER))
+    sound = (
+        frame.check is Check.GOOD
+        or frame.repair is not None
+        or (trusting and frame.damage in (Damage.CHECK, Damage.HEADER))
+    )
     data = data_of(octets) if sound else b""
     if not data or frame_type not in CARRIES_NPDU:
         return Message(frame_type, octets[3], source, length, data or b"")

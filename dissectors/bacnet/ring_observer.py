@@ -10,13 +10,12 @@ are judged by their smallest reading, and only where the read was not held back 
 
 from __future__ import annotations
 
-from collections import OrderedDict, deque
 from dataclasses import dataclass
 
 from dissectors.bacnet import message as messages
 from dissectors.bacnet.frame_types import CARRIES_NPDU, EXPECTING, HEADER, PROPRIETARY, FrameType, is_encoded
 from dissectors.bacnet.header import is_whole_header
-from dissectors.bacnet.held_reads import HeldReads
+from dissectors.bacnet.held_reads import HeldReads, surely_over
 from dissectors.bacnet.limits import (
     BROADCAST,
     MAX_DATA,
@@ -24,14 +23,13 @@ from dissectors.bacnet.limits import (
     MS,
     N_MIN_OCTETS,
     T_NO_TOKEN,
-    T_REPLY_DELAY,
     T_USAGE_DELAY,
     T_USAGE_TIMEOUT,
     TURNAROUND_BITS,
 )
-from dissectors.bacnet.message import data_of
 from dissectors.bacnet.ring import EVENTS_MAX, Event, Ring, What
 from dissectors.bacnet.ring_damage import count_damage, speaker_of
+from dissectors.bacnet.ring_questions import Asked, Questions
 from dissectors.bacnet.ring_tally import NodeTally, RingTally
 from dissectors.bacnet.storms import Storms
 from dissectors.bacnet.turn import Turn
@@ -41,17 +39,9 @@ from dissectors.frame import Event as FramerEvent
 from dissectors.line import Timing
 
 _HOLD_MAX = 64  # longest run of data frames that is counted by itself
-_POSTPONED_MAX = 64
-_UNANSWERED_MAX = 32
 _AFTER_SEARCH = 10  # tokens after a search in which a poll still looks for the one that was lost
-T_LATE_ANSWER = 2 * T_NO_TOKEN
-"""An answer that comes after its asker gave up is still one within this time."""
-
 T_LATE_USE = 2 * T_NO_TOKEN
 """So long a token that was given up may still be used, and the two that are there then last."""
-
-T_GO_ON = 100 * MS
-"""The longest time that any text lets a station wait for the answer to a poll (Tusage_timeout)."""
 
 T_STOPPED = 1_000 * MS
 """A search for a successor that takes so long has stopped the bus."""
@@ -67,17 +57,6 @@ _TOKEN, _POLL, _POLL_REPLY, _TEST, _TEST_REPLY, _POSTPONED = map(
         FrameType.REPLY_POSTPONED,
     ),
 )
-
-
-@dataclass(slots=True)
-class _Asked:
-    """The frame that waits for its answer."""
-
-    frame_type: int
-    source: int
-    destination: int
-    frame: Frame
-    no: int
 
 
 @dataclass(slots=True)
@@ -102,18 +81,15 @@ class RingObserver:
         self._given_up: _GivenUp | None = None
         self._two_until = 0  # ns; two tokens until then are known of
         self._got: int | None = None  # when the holder got the token
-        self._asked: _Asked | None = None
         self._hold = 0  # data frames sent on this token
         self._doubt = True  # something may have been missed since the last good frame
         self._before: Frame | None = None  # the last good frame
         self._quiet_since: int | None = None  # end of the last event of any kind
-        self._alone_since: int | None = None  # where the last event has a time of its own: the earliest it may begin
         self._quiet_slack = 0  # of the last event
         self._missed: int | None = None  # where octets may be lost, until an event comes after it
-        self._unanswered: OrderedDict[tuple[int, int], _Asked] = OrderedDict()  # by server and client
-        self._postponed: deque[tuple[int, int, int]] = deque(maxlen=_POSTPONED_MAX)  # server, client, end of request
         self._turn = Turn(timing)
         self._reads = HeldReads(self._least_gap)
+        self._questions = Questions(self._tally, self._reads)
         self._storms = Storms()
 
     def see(self, no: int, event: FramerEvent, header: Header | None) -> None:
@@ -134,7 +110,7 @@ class RingObserver:
                 if isinstance(event, Noise):
                     self._turn.see_noise(event)
                 if len(event.octets) >= N_MIN_OCTETS:  # fewer prove nothing: who was asked may still answer
-                    self._asked = None
+                    self._questions.asked = None
                 self._doubt = True
             else:
                 self._see_hole(event.start)
@@ -156,9 +132,9 @@ class RingObserver:
     def _see_gap(self, event: FramerEvent) -> None:
         """Frames that stand back to back came in one read, maybe a late one, and have no times of their own."""
         if self._quiet_since is None or event.start - self._quiet_since >= self._least_gap:
-            self._alone_since = None if self._quiet_since is None else self._quiet_since - self._quiet_slack
+            self._questions.alone_since = None if self._quiet_since is None else self._quiet_since - self._quiet_slack
         else:
-            self._alone_since = None
+            self._questions.alone_since = None
         self._quiet_slack = event.slack if isinstance(event, Frame) else self._tally.timing.latency
 
     def miss(self, time: int) -> None:
@@ -176,8 +152,7 @@ class RingObserver:
         self._forget()
         self._missed, self._quiet_since = None, end
         self._given_up = None
-        self._unanswered.clear()
-        self._postponed.clear()
+        self._questions.forget()
         self._reads.forget()
         self._doubt = True
         self._tally.hole = max(self._tally.hole, end)
@@ -185,10 +160,10 @@ class RingObserver:
             node.got = node.searching_since = None
 
     def _see_damage(self, no: int, frame: Frame, header: Header) -> None:
-        tally, asked = self._tally, self._asked
+        tally, asked = self._tally, self._questions.asked
         speaker = speaker_of(frame, header, self._turn)
         count_damage(tally, frame, speaker)
-        self._asked = None
+        self._questions.asked = None
         if asked is None or speaker is None or asked.frame_type == _POLL:
             pass
         elif (speaker.source, speaker.destination) == (asked.destination, asked.source):
@@ -196,13 +171,14 @@ class RingObserver:
         if is_whole_header(frame) and header.function in (*EXPECTING, _TEST) and header.destination != BROADCAST:
             assert header.source is not None
             assert header.destination is not None
-            self._asked = _Asked(header.function, header.source, header.destination, frame, no)
+            self._questions.asked = Asked(header.function, header.source, header.destination, frame, no)
         self._doubt = True
 
     # Good frames
 
     def _see_good(self, no: int, frame: Frame, frame_type: int, source: int, destination: int, header: Header) -> None:
         tally, before = self._tally, self._before
+        self._questions.doubt = self._doubt
         node = tally.nodes.get(source) or tally.node(source)
         node.first = node.first or frame.start
         node.last = frame.end
@@ -212,10 +188,9 @@ class RingObserver:
                 tally.impossible += 1
             if self._silence(frame) - frame.slack >= T_NO_TOKEN:  # lost even by the smallest reading of the silence
                 self._lose_token(no, frame, source)
-        answers = self._asked is not None and self._is_answer(no, frame, frame_type, source, destination, node)
+        self._questions.holder = self._holder
+        answers = self._questions.is_answer(no, frame, frame_type, source, destination, node)
         self._check_addresses(no, frame, frame_type, source, destination)
-        if not answers and self._unanswered:
-            answers = self._is_late_answer(no, frame, source, destination)
         if frame_type == _TOKEN:
             if not answers:
                 self._take_turn(no, frame, source, node)
@@ -235,7 +210,7 @@ class RingObserver:
             if not answers:
                 self._take_turn(no, frame, source, node)
             if frame_type == _TEST:
-                self._asked = _Asked(frame_type, source, destination, frame, no)
+                self._questions.asked = Asked(frame_type, source, destination, frame, no)
             elif frame_type in CARRIES_NPDU or frame_type >= PROPRIETARY:
                 self._see_data(no, frame, frame_type, source, destination, node, answers, header)
 
@@ -245,7 +220,7 @@ class RingObserver:
             node.polls_of_search += 1
         if node.highest_polled < destination <= MAX_MASTER:
             node.highest_polled = destination
-        self._asked = _Asked(_POLL, source, destination, frame, no)
+        self._questions.asked = Asked(_POLL, source, destination, frame, no)
         if source <= MAX_MASTER and destination <= MAX_MASTER:
             self._tally.polled[source, destination] = frame.end
         polled = self._tally.nodes.get(destination)
@@ -271,14 +246,14 @@ class RingObserver:
                 self._tally.note(What.STORM, frame.start, no, source)
         if not answers:
             self._hold += 1
-            self._end_postponed(frame, source, destination, node)
+            self._questions.end_postponed(frame, source, destination, node)
         if frame_type in EXPECTING and not answers:
             if destination == BROADCAST:
                 self._tally.note(What.BROADCAST_REQUEST, frame.start, no, source)
             elif header.role is Role.REQUEST:  # answers and what is unconfirmed ask for nothing, whatever the type says
                 node.requests_sent += 1
                 self._tally.node(destination).requests_received += 1
-                self._asked = _Asked(frame_type, source, destination, frame, no)
+                self._questions.asked = Asked(frame_type, source, destination, frame, no)
         if header.kind == "i-am":
             self._see_i_am(no, frame, source, node)
 
@@ -303,105 +278,14 @@ class RingObserver:
 
     # Who may send
 
-    def _is_answer(
-        self, no: int, frame: Frame, frame_type: int, source: int, destination: int, node: NodeTally
-    ) -> bool:
-        """Close what waits for an answer; say whether this is it."""
-        asked, self._asked = self._asked, None
-        if asked is None:
-            return False
-        back = source == asked.destination and destination == asked.source
-        took = frame.start - asked.frame.end
-        if asked.frame_type == _POLL:
-            if back and frame_type == _POLL_REPLY:
-                node.poll_reply.add(took)
-                if self._surely_over(frame, asked.frame, T_USAGE_DELAY):
-                    self._late(What.LATE_POLL_REPLY, no, frame, source, destination, took)
-                return True
-            self._unanswered_poll(frame, asked)
-            if source == asked.source:
-                self._go_on(no, frame, asked, node)
-            return False
-        if asked.frame_type == _TEST:
-            answered = back and frame_type == _TEST_REPLY
-            if answered and asked.frame.ok and source == destination and not _same_data(frame, asked.frame):
-                self._tally.note(What.OTHER_ECHO, frame.start, no, source)
-            return answered
-        if not back or frame_type in (_TOKEN, _POLL, _POLL_REPLY, _TEST):
-            self._unanswered_request(asked)
-            return False
-        node.replies += 1
-        node.reply.add(took)
-        if self._surely_over(frame, asked.frame, T_REPLY_DELAY):
-            self._late(What.LATE_REPLY, no, frame, source, destination, took)
-        if frame_type == _POSTPONED:
-            self._postponed.append((source, destination, asked.frame.end))
-        return True
-
-    def _go_on(self, no: int, frame: Frame, asked: _Asked, node: NodeTally) -> None:
-        """The station that polled has given the poll up: too soon, in time or late."""
-        took = frame.start - asked.frame.end
-        node.poll_wait.add(took)
-        if self._surely_over(frame, asked.frame, T_USAGE_DELAY):
-            node.polls_waited += 1
-        if self._surely_over(frame, asked.frame, T_GO_ON):
-            self._late(What.SLOW_SEARCH, no, frame, frame.octets[4], asked.destination, took)
-        if self._alone_since is None or took < self._least_gap or self._doubt or frame.octets == asked.frame.octets:
-            return
-        # the poll may have come in a late read too, and begun directly after what was before it
-        longest = frame.start - self._alone_since - (asked.frame.end - asked.frame.start)
-        if longest < T_USAGE_DELAY // 2:
-            self._tally.note(What.TOO_SOON, frame.start, no, frame.octets[4], asked.destination, took)
-
-    def _unanswered_request(self, asked: _Asked) -> None:
-        if not asked.frame.ok:  # it may have been damaged for everybody
-            return
-        key = asked.destination, asked.source
-        self._unanswered[key] = asked
-        self._unanswered.move_to_end(key)
-        if len(self._unanswered) > _UNANSWERED_MAX:
-            self._unanswered.popitem(last=False)
-        if not self._doubt and not messages.more_follows(asked.frame):
-            self._tally.note(What.NO_REPLY, asked.frame.end, asked.no, asked.destination, asked.source)
-
-    def _is_late_answer(self, no: int, frame: Frame, source: int, destination: int) -> bool:
-        """Data to the one that asked and has given up: late, but neither lost nor a second token."""
-        asked = self._unanswered.get((source, destination))
-        if asked is None or source == self._holder or frame.octets[2] not in CARRIES_NPDU:
-            return False
-        del self._unanswered[source, destination]
-        took = frame.start - asked.frame.end
-        if took > T_LATE_ANSWER:
-            return False
-        self._tally.take_back(What.NO_REPLY, asked.no, source)
-        self._tally.note(What.LATE_REPLY, frame.start, no, source, destination, took)
-        return True
-
     def _lose_token(self, no: int, frame: Frame, source: int) -> None:
-        asked, tally = self._asked, self._tally
-        if asked is not None and asked.frame_type == _POLL:
-            self._unanswered_poll(frame, asked)
-            if source == asked.source:
-                self._go_on(no, frame, asked, tally.node(source))
-        elif asked is not None and asked.frame_type != _TEST:
-            self._unanswered_request(asked)
+        tally = self._tally
+        self._questions.give_up(no, frame, source)
         if tally.edges:  # where no token was ever seen, none can be lost
             tally.note(What.LOST_TOKEN, frame.start, no, self._holder, source, self._silence(frame))
             tally.node(source).searches = True
             tally.node(source).searching_since = frame.start
         self._forget()
-
-    def _unanswered_poll(self, frame: Frame, asked: _Asked) -> None:
-        self._tally.poll_waste += max(0, min(frame.start - asked.frame.start, T_NO_TOKEN))
-        self._tally.node(asked.source).polls_unanswered += 1
-
-    def _end_postponed(self, frame: Frame, source: int, destination: int, node: NodeTally) -> None:
-        for waiting in self._postponed:
-            server, client, asked_at = waiting
-            if server == source and client == destination:
-                node.service.add(frame.start - asked_at)
-                self._postponed.remove(waiting)
-                return
 
     def _take_turn(self, no: int, frame: Frame, source: int, node: NodeTally) -> None:
         """A frame that only the holder of the token may send."""
@@ -410,7 +294,7 @@ class RingObserver:
                 gap = frame.start - self._token.end
                 if not self._doubt:
                     node.use.add(gap)
-                    if self._surely_over(frame, self._token, T_USAGE_DELAY):
+                    if surely_over(frame, self._token, T_USAGE_DELAY):
                         self._late(What.LATE_USE, no, frame, source, self._passed_by, gap)
                 self._token = self._passed_by = None
             return
@@ -539,15 +423,7 @@ class RingObserver:
     def _silence(self, event: FramerEvent) -> int:
         return 0 if self._quiet_since is None else max(0, event.start - self._quiet_since)
 
-    def _surely_over(self, frame: Frame, before: Frame, limit: int) -> bool:
-        """Whether the time between two frames is over a limit by its smallest reading."""
-        return frame.start - frame.slack - before.end > limit
-
     def _forget(self) -> None:
-        self._holder = self._passed_by = self._token = self._asked = self._second = self._got = None
+        self._questions.asked = None
+        self._holder = self._passed_by = self._token = self._second = self._got = None
         self._hold = 0
-
-
-def _same_data(frame: Frame, other: Frame) -> bool:
-    """Whether two frames carry the same data; a pad behind them does not count."""
-    return data_of(frame.octets) == data_of(other.octets)

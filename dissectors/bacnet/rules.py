@@ -83,7 +83,8 @@ _ALL = (
         "MS108",
         Severity.WARNING,
         "slow round",
-        "95 of 100 rounds of the token may take up to 2 s; above that, masters appear off-line to many systems. Said once, "
+        "95 of 100 rounds of the token may take up to 2 s; above that, masters appear off-line to many systems. "
+        "Said once, "
         "with those who have the token longest.",
         "too many stations, too low a baud rate, large Max_Info_Frames, or slow stations",
         "the use time of each station, and how many frames each sends on one token",

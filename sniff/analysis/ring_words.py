@@ -69,6 +69,7 @@ def sentences(ring: Ring) -> list[str]:
         f"{ring.frames} frames in {ring.span / 1e9:.1f} s; bus load {ring.load:.1%}",
         f"unanswered polls for masters take {ring.poll_waste_share:.1%} of the time",
     ]
+    said += _users(ring)
     predicted = ring.predicted_loop
     if predicted is not None:
         least = "" if ring.limits["token use"] else "at least "
@@ -84,6 +85,22 @@ def sentences(ring: Ring) -> list[str]:
         counts[what] = counts.get(what, 0) + happened.count
     said += [f"{count} × {what.value}" for what, count in counts.items() if count]
     return said + list(ring.advice())
+
+
+def _users(ring: Ring) -> list[str]:
+    """Who has the token for how much of the time, and how many broadcasts there are."""
+    held = sorted(((node.held, mac) for mac, node in ring.nodes.items() if node.held), reverse=True)
+    said = []
+    if held and ring.span:
+        shares = ", ".join(
+            f"MAC {mac} {time / ring.span:.0%} (up to {ring.nodes[mac].most_in_a_hold} frames a token)"
+            for time, mac in held[:3]
+        )
+        said.append(f"the token is longest with {shares}")
+    broadcasts = sum(node.broadcasts_sent for node in ring.nodes.values())
+    if broadcasts and ring.span:
+        said.append(f"{broadcasts} broadcasts, {broadcasts / (ring.span / 1e9):.1f} a second")
+    return said
 
 
 def _ms(durations: Histogram, share: float) -> float | None:

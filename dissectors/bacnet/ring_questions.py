@@ -1,0 +1,169 @@
+"""What waits for an answer on a ring, polls, tests and requests: whether it comes, too late, or never."""
+
+from __future__ import annotations
+
+from collections import OrderedDict, deque
+from dataclasses import dataclass
+
+from dissectors.bacnet.frame_types import CARRIES_NPDU, FrameType
+from dissectors.bacnet.held_reads import HeldReads, surely_over
+from dissectors.bacnet.limits import MS, T_NO_TOKEN, T_REPLY_DELAY, T_USAGE_DELAY
+from dissectors.bacnet.message import data_of, more_follows
+from dissectors.bacnet.ring import Event, What
+from dissectors.bacnet.ring_tally import NodeTally, RingTally
+from dissectors.frame import Frame
+
+_POSTPONED_MAX = 64
+_UNANSWERED_MAX = 32
+T_LATE_ANSWER = 2 * T_NO_TOKEN
+"""An answer that comes after its asker gave up is still one within this time."""
+
+T_GO_ON = 100 * MS
+"""The longest time that any text lets a station wait for the answer to a poll (Tusage_timeout)."""
+
+_POLL, _TEST = int(FrameType.POLL_FOR_MASTER), int(FrameType.TEST_REQUEST)
+_NO_ANSWERS = frozenset(
+    (FrameType.TOKEN, FrameType.POLL_FOR_MASTER, FrameType.REPLY_TO_POLL_FOR_MASTER, FrameType.TEST_REQUEST)
+)
+
+
+@dataclass(slots=True)
+class Asked:
+    """The frame that waits for its answer. `missed`: it was counted as one that nobody answered."""
+
+    frame_type: int
+    source: int
+    destination: int
+    frame: Frame
+    no: int
+    missed: bool = False
+
+
+class Questions:
+    """`asked` is what must be answered now; those given up, and those postponed, are remembered, bounded.
+
+    `doubt`: something may have been missed since the last good frame. `holder`: who has the token, as far as known.
+    `alone_since`: the earliest that the frame before may have begun, None where it has no time of its own.
+    """
+
+    def __init__(self, tally: RingTally, reads: HeldReads) -> None:
+        self.asked: Asked | None = None
+        self.doubt = True
+        self.holder: int | None = None
+        self.alone_since: int | None = None
+        self._tally = tally
+        self._reads = reads
+        self._unanswered: OrderedDict[tuple[int, int], Asked] = OrderedDict()  # by server and client
+        self._postponed: deque[tuple[int, int, int]] = deque(maxlen=_POSTPONED_MAX)  # server, client, end of request
+
+    def forget(self) -> None:
+        """Octets were missed: nobody is measured against what was asked before."""
+        self.asked = None
+        self._unanswered.clear()
+        self._postponed.clear()
+
+    def is_answer(self, no: int, frame: Frame, frame_type: int, source: int, destination: int, node: NodeTally) -> bool:
+        """Close what waits for an answer; say whether this frame of `node` is it, now or late."""
+        asked, self.asked = self.asked, None
+        if asked is not None and self._answers(asked, no, frame, frame_type, source, destination, node):
+            return True
+        if not self._unanswered or source == self.holder or frame_type not in CARRIES_NPDU:
+            return False
+        return self._is_late(no, frame, source, destination)
+
+    def give_up(self, no: int, frame: Frame, source: int) -> None:
+        """Nobody answered, and after a long silence `source` begins anew."""
+        asked, self.asked = self.asked, None
+        if asked is None or asked.frame_type == _TEST:
+            return
+        if asked.frame_type == _POLL:
+            self._unanswered_poll(asked, no, frame, source)
+        else:
+            self._unanswered_request(asked)
+
+    def end_postponed(self, frame: Frame, source: int, destination: int, node: NodeTally) -> None:
+        """Data that may be the answer which was postponed."""
+        for waiting in self._postponed:
+            server, client, asked_at = waiting
+            if server == source and client == destination:
+                node.service.add(frame.start - asked_at)
+                self._postponed.remove(waiting)
+                return
+
+    def _answers(
+        self, asked: Asked, no: int, frame: Frame, frame_type: int, source: int, destination: int, node: NodeTally
+    ) -> bool:
+        back = source == asked.destination and destination == asked.source
+        took = frame.start - asked.frame.end
+        if asked.frame_type == _POLL:
+            if not back or frame_type != FrameType.REPLY_TO_POLL_FOR_MASTER:
+                self._unanswered_poll(asked, no, frame, source)
+                return False
+            node.poll_reply.add(took)
+            if surely_over(frame, asked.frame, T_USAGE_DELAY):
+                self._reads.add(Event(What.LATE_POLL_REPLY, frame.start, no, source, destination, took))
+            return True
+        if asked.frame_type == _TEST:
+            answered = back and frame_type == FrameType.TEST_RESPONSE
+            to_itself = answered and asked.frame.ok and source == destination
+            if to_itself and data_of(frame.octets) != data_of(asked.frame.octets):
+                self._tally.note(What.OTHER_ECHO, frame.start, no, source)
+            return answered
+        if not back or frame_type in _NO_ANSWERS:
+            self._unanswered_request(asked)
+            return False
+        node.replies += 1
+        node.reply.add(took)
+        if surely_over(frame, asked.frame, T_REPLY_DELAY):
+            self._reads.add(Event(What.LATE_REPLY, frame.start, no, source, destination, took))
+        if frame_type == FrameType.REPLY_POSTPONED:
+            self._postponed.append((source, destination, asked.frame.end))
+        return True
+
+    def _unanswered_poll(self, asked: Asked, no: int, frame: Frame, source: int) -> None:
+        node = self._tally.node(asked.source)
+        self._tally.poll_waste += max(0, min(frame.start - asked.frame.start, T_NO_TOKEN))
+        node.polls_unanswered += 1
+        if source == asked.source:
+            self._go_on(asked, no, frame, node)
+
+    def _go_on(self, asked: Asked, no: int, frame: Frame, node: NodeTally) -> None:
+        """The station that polled has given the poll up: too soon, in time or late."""
+        took = frame.start - asked.frame.end
+        node.poll_wait.add(took)
+        if surely_over(frame, asked.frame, T_USAGE_DELAY):
+            node.polls_waited += 1
+        if surely_over(frame, asked.frame, T_GO_ON):
+            self._reads.add(Event(What.SLOW_SEARCH, frame.start, no, asked.source, asked.destination, took))
+        since, same = self.alone_since, frame.octets == asked.frame.octets
+        if since is None or took < self._reads.least_gap or self.doubt or same:
+            return
+        # the poll may have come in a late read too, and begun directly after what was before it
+        longest = frame.start - since - (asked.frame.end - asked.frame.start)
+        if longest < T_USAGE_DELAY // 2:
+            self._tally.note(What.TOO_SOON, frame.start, no, asked.source, asked.destination, took)
+
+    def _unanswered_request(self, asked: Asked) -> None:
+        if not asked.frame.ok:  # it may have been damaged for everybody
+            return
+        key = asked.destination, asked.source
+        self._unanswered[key] = asked
+        self._unanswered.move_to_end(key)
+        if len(self._unanswered) > _UNANSWERED_MAX:
+            self._unanswered.popitem(last=False)
+        if not self.doubt and not more_follows(asked.frame):
+            asked.missed = True
+            self._tally.note(What.NO_REPLY, asked.frame.end, asked.no, asked.destination, asked.source)
+
+    def _is_late(self, no: int, frame: Frame, source: int, destination: int) -> bool:
+        """Whether it is for the one that asked and has given up: late, but neither lost nor a second token."""
+        asked = self._unanswered.pop((source, destination), None)
+        if asked is None:
+            return False
+        took = frame.start - asked.frame.end
+        if took > T_LATE_ANSWER:
+            return False
+        if asked.missed:
+            self._tally.take_back(What.NO_REPLY, asked.no, source)
+        self._tally.note(What.LATE_REPLY, frame.start, no, source, destination, took)
+        return True
