@@ -24,9 +24,9 @@ from dataclasses import dataclass, replace
 from dissectors.frame import Event, Frame, Header, Noise, Reason, Role
 from dissectors.line import NS_PER_S, Timing
 from dissectors.n2.commands import parse_command
-from dissectors.n2.envelope import is_good
 from dissectors.n2.forms import fits, may_answer
 from dissectors.n2.header import BROADCAST, meant
+from dissectors.n2.known import KnownStations
 from dissectors.n2.stretch import STRAY
 from dissectors.tracker import Interval, Placement, Tracked, Transaction, Verdict
 
@@ -92,7 +92,8 @@ class N2Tracker:
         self._missed: _Exchange | None = None  # the last command, closed without a good answer
         self._owing: deque[_Exchange] = deque(maxlen=_OWING)  # commands without a good answer, oldest first
         self._done: _Exchange | None = None  # the last command, when it was closed by an answer
-        self._times: dict[int, _Times] = {}  # by station that was named in a good command
+        self._known = KnownStations()
+        self._times: dict[int, _Times] = {}  # by station
 
     def track(self, no: int, event: Event, header: Header | None) -> Tracked:
         """Take the next event; `header` is None exactly for noise."""
@@ -131,7 +132,7 @@ class N2Tracker:
             closed.append(self._close_unanswered(open_))
         station = header.destination if header.ok or frame.repair is not None else self._station_of(octets, header)
         if station is not None and header.ok:
-            self._times.setdefault(station, _Times())
+            self._known.add(station)
         missed = self._missed
         attempt, of = 1, None
         if missed is not None and missed.octets == octets and frame.start - missed.end <= GIVE_UP:
@@ -155,18 +156,9 @@ class N2Tracker:
     def _station_of(self, octets: bytes, header: Header) -> int | None:
         """Whom a damaged command is for (rule 7)."""
         named = header.destination
-        if not self._times or named in self._times:
+        if not len(self._known) or (named is not None and named in self._known):
             return named
-        sent, best, station = octets[1:3], (False, 0), None
-        for known in self._times:
-            name = b"%02X" % known
-            alike = sum(one == other for one, other in zip(name, sent, strict=False))
-            mine = (octets.endswith(b"\r") and len(octets) >= 7 and is_good(b">" + name + octets[3:]), alike)
-            if mine == best:
-                station = None
-            elif mine > best:
-                best, station = mine, known
-        return station
+        return self._known.most_like(octets)
 
     def _close_unanswered(self, exchange: _Exchange) -> Transaction:
         self._open, self._missed, self._done = None, exchange, None
@@ -213,8 +205,8 @@ class N2Tracker:
             verdict = Verdict.DAMAGED_REQUEST
         if header.kind == "negative-acknowledge":
             verdict = Verdict.EXCEPTION
-        if open_.station in self._times:
-            self._times[open_.station].add(latency)
+        if open_.station is not None and open_.station in self._known:
+            self._times.setdefault(open_.station, _Times()).add(latency)
         done = _transaction(open_, verdict, error=header.error)
         closed.append(replace(done, response=no, end=frame.end, latency=latency))
         return Placement(no, open_.id, Role.RESPONSE, open_.station, None)
