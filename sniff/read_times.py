@@ -38,6 +38,7 @@ ON_GRID = 0.85
 USB_FRAME = MS
 LONGEST_INTERVAL = 1000 * MS  # two clocks drift apart over longer ones
 _FAST = 0.97  # senders may be 2 % faster than the nominal rate, and stamps are rounded
+# ms; times of reads that are over a second wrong are no times, and mean no more with a larger bound
 _BOUNDS = (3, 5, 10, 18, 22, 33, 50, 70, 100, 140, 200, 300, 500, 1000)  # ms
 
 
@@ -103,7 +104,7 @@ def held_back(reads: ReadTimes, line: LineSettings, bound: int = 0) -> HeldBack:
     rounded = reads.unit if reads.unit >= MS // 10 else 0
     latency = period + USB_FRAME + 2 * scatter + rounded if period else 0
     if proved > latency:
-        latency = next((b * MS for b in _BOUNDS if 4 * b * MS >= 5 * proved), 2 * proved)
+        latency = next((b * MS for b in _BOUNDS if 4 * b * MS >= 5 * proved), _BOUNDS[-1] * MS)
     return HeldBack(latency, period, proved, len(worst))
 
 

@@ -206,8 +206,9 @@ _ALL = (
         "LN304",
         Severity.WARNING,
         "silent for a while",
-        "Not one octet for 5 s or more and 30 times as long as all but 2 in 100 pauses, in the middle of traffic that "
-        "goes on as before; not where such pauses are regular, and not where octets were lost or the adapter was away.",
+        "Not one octet for 3 s or more (10 s behind a request) and 30 times as long as all but 2 in 100 pauses, in the "
+        "middle of traffic that goes on as before; not where such pauses are regular, and not where octets were lost "
+        "or the adapter was away.",
         "the master stopped: a restart, a busy controller, a changeover, a program that was loaded",
         "the master's log and watchdog at that time",
     ),

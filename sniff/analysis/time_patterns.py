@@ -39,6 +39,7 @@ QUIET = NS_PER_S // 2
 
 BURSTS_LEAST = 6
 BURSTS_KEPT = 500
+STRONG = 3
 MOST_ROUNDS = 300
 STEADY = 0.08
 
@@ -47,7 +48,10 @@ UNREADABLE_ROWS = 6
 UNREADABLE_KEPT = 8
 STRETCH_OCTETS = 800
 
-SILENT_LEAST = 5 * NS_PER_S
+SILENT_LEAST = 3 * NS_PER_S
+SILENT_WAITING = 10 * NS_PER_S
+"""The same behind a request: a master may wait so long for an answer."""
+
 SILENT_TIMES = 30
 SILENT_KEPT = 8
 ROWS_AROUND = 50
@@ -70,6 +74,7 @@ class _Burst:
     senders: set[str]
     rows: list[int]
     good_before: int  # good frames since the burst before
+    struck: int  # octets with line errors, at least 1 a row
 
 
 @dataclass(slots=True)
@@ -124,6 +129,7 @@ class TimePatterns:
         self._gaps = Histogram()
         self._silences: list[tuple[int, int, int]] = []  # begin, end, rows before
         self._hole = False
+        self._asked = False  # the newest row is a request
         self._lost = LostTogether()
 
     # ---- taking in
@@ -131,6 +137,7 @@ class TimePatterns:
     def see(self, no: int, event: Event, sender: str) -> None:
         """Take the next row."""
         self._see_silence(event)
+        self._asked = sender == "master"
         self._rows += 1
         is_good = isinstance(event, Frame) and event.ok
         wrong = next((mark for mark in event.marks if mark.error & _MARKS), None)
@@ -171,7 +178,11 @@ class TimePatterns:
         else:
             gap = max(0, event.start - self._now)
             self._gaps.add(gap)
-            if gap >= SILENT_LEAST and not self._hole and len(self._silences) < 20 * SILENT_KEPT:
+            if (
+                gap >= (SILENT_WAITING if self._asked else SILENT_LEAST)
+                and not self._hole
+                and len(self._silences) < 20 * SILENT_KEPT
+            ):
                 self._silences.append((self._now, event.start, self._rows))
         self._hole = False
         self._now = max(self._now, event.end)
@@ -200,13 +211,15 @@ class TimePatterns:
 
     def _see_trouble(self, no: int, event: Event, sender: str) -> None:
         bursts = self._bursts
+        struck = max(1, sum(bool(mark.error & _MARKS) for mark in event.marks))
         if bursts and event.start - bursts[-1].last < QUIET:
             burst = bursts[-1]
             burst.last = max(burst.last, event.end)
+            burst.struck += struck
             if len(burst.senders) < 8:
                 burst.senders.add(sender)
         elif len(bursts) < BURSTS_KEPT:
-            bursts.append(_Burst(event.start, event.end, {sender}, [no], self._good_since))
+            bursts.append(_Burst(event.start, event.end, {sender}, [no], self._good_since, struck))
             self._good_since = 0
 
     def _see_round(self, event: Event) -> None:
@@ -280,9 +293,19 @@ class TimePatterns:
             return
 
     def _in_bursts(self) -> Iterator[Finding]:
-        bursts = [burst for at, burst in enumerate(self._bursts) if not at or burst.good_before]
-        if len(bursts) < BURSTS_LEAST or len(self._bursts) >= BURSTS_KEPT:
+        """All bursts; where single errors lie between them, those of several."""
+        if len(self._bursts) >= BURSTS_KEPT:
             return
+        for least in (1, STRONG):
+            finding = self._steady([burst for burst in self._bursts if burst.struck >= least])
+            if finding is not None:
+                yield finding
+                return
+
+    def _steady(self, bursts: list[_Burst]) -> Finding | None:
+        """What is told of these bursts; None where they have no interval of their own."""
+        if len(bursts) < BURSTS_LEAST:
+            return None
         intervals = [after.first - before.first for before, after in pairwise(bursts)]
         usual = sorted(intervals)[len(intervals) // 2]
         steady = sum(abs(interval - usual) <= STEADY * usual for interval in intervals)
@@ -291,11 +314,11 @@ class TimePatterns:
         elsewhere = struck[1] if len(struck) > 1 else sum("bus" in burst.senders for burst in bursts)
         between = sorted(burst.good_before for burst in bursts[1:])[len(intervals) // 2]
         if usual < NS_PER_S or steady < 0.75 * len(intervals) or between < 10:
-            return
+            return None
         if self._is_own_rhythm(usual):
-            return
+            return None
         if not struck or (10 * struck[0] >= 9 * len(bursts) and 10 * elsewhere < 3 * len(bursts)):
-            return  # one sender's own rhythm, or somebody who speaks at that interval
+            return None  # one sender's own rhythm, or somebody who speaks at that interval
         tally = Tally()
         for burst in bursts:
             tally.add(burst.first, *burst.rows)
@@ -304,7 +327,7 @@ class TimePatterns:
             f"{counted(len(bursts), 'burst')} of damage or noise, {steady} of {len(intervals)} intervals within "
             f"{STEADY:.0%} of {usual / NS_PER_S:.1f} s, each {milliseconds(longest)} at most; it strikes whoever sends"
         )
-        yield tally.found(RULES["LN302"], "bus", seen)
+        return tally.found(RULES["LN302"], "bus", seen)
 
     def _unreadable(self) -> Iterator[Finding]:
         told: list[tuple[_Stretch, str]] = []

@@ -96,3 +96,13 @@ def test_one_stations_own_rhythm_is_no_hum() -> None:
         frame = Frame("x", octets, start + no % 2 * 3 * MS, start + 5 * MS, check, Found.GAP, damage)
         told.see(no, frame, "station 6" if no % 2 else "master")
     assert list(told.findings()) == []
+
+
+def test_a_contactor_shows_among_single_errors() -> None:
+    faults = (AtTimes(6 * S, 200 * MS, 0.5), BitFlips(0.0004))
+    assert "LN302" in patterns(Case("", partial(FIVE, faults), (), seconds=90))
+
+
+def test_a_master_that_stops_for_some_seconds() -> None:
+    assert patterns(Case("", modbus, (), hear=partial(paused, ((20.0, 4.0),)))) == {"LN304"}
+    assert patterns(Case("", modbus, (), hear=partial(paused, ((20.0, 1.0),)))) == set()

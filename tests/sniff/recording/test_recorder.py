@@ -9,6 +9,7 @@ import sys
 import textwrap
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -324,7 +325,7 @@ def test_parts_without_a_seam(tmp_path: Path, rule: str) -> None:
         part = capture(path)
         here = list(part.items())
         assert part.completeness().whole, part.completeness().text
-        assert part.session == SESSION
+        assert replace(part.session, adapter=part.session.said or part.session.adapter) == SESSION
         assert (part.part, part.first_chunk, part.octets_before) == (number, chunks, octets)
         chunks += sum(isinstance(item, Chunk) for item in here)
         octets += sum(len(item.octets) for item in here if isinstance(item, Chunk))
