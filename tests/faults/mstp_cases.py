@@ -197,7 +197,7 @@ MSTP_CASES: tuple[Case, ...] = (
     Case(
         "MS/TP one sends twenty frames with each token",
         Ring((Member(1, partial(_greedy, 20), settings={"max_info_frames": 20}), _two, _five, _nine)),
-        (Said(("MAC 1",), ("MS108",), _HOG),),
+        (Said(("MAC 1",), ("MS108", "MS601"), _HOG),),
         seconds=40,
         seeds=1,
     ),
