@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from random import Random
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from dissectors.line import LineSettings
 from dissectors.modbus.adu import seal_ascii, seal_rtu, unseal
@@ -107,11 +107,22 @@ class Halts(Wrapped):
         return self.until if due is not None and self.at <= due < self.until else due
 
 
+class Unhurried(PollingMaster):
+    """A master whose pauses are longer by up to `spread` ns, each time another time."""
+
+    def __init__(self, requests: Sequence[Request], line: LineSettings, spread: int, seed: int, **more: Any) -> None:
+        super().__init__(requests, line, **more)
+        self.spread, self.dice = spread, Random(f"unhurried {seed}")
+
+    def _go_on(self, at: int) -> None:
+        super()._go_on(at + self.dice.randrange(self.spread))
+
+
 class ScansOnce(PollingMaster):
     """Asks in turn; from `at` on it looks once for whom else there is, each of `scan` in one round, then goes on."""
 
-    def __init__(self, requests: Sequence[Request], line: LineSettings, scan: Sequence[bytes], at: int, **more: int):
-        super().__init__(requests, line, **more)  # type: ignore[arg-type]
+    def __init__(self, requests: Sequence[Request], line: LineSettings, scan: Sequence[bytes], at: int, **more: Any):
+        super().__init__(requests, line, **more)
         self.usual, self.scan, self.at = self.requests, tuple(scan), at
 
     def _go_on(self, at: int) -> None:

@@ -162,3 +162,40 @@ class PollsOnlyTo(Wrapped):
         if now >= self.at:
             self.node._max_master = self.max_master
         return super().hear(now, octets, quiet)
+
+
+class Dawdles(Wrapped):
+    """A node that takes `by` ns for one token every `every` ns. A token that comes meanwhile it uses as well."""
+
+    def __init__(self, inner: Node, every: int, by: int) -> None:
+        super().__init__(inner)
+        self.node, self.every, self.by = inner, every, by
+        self.next = every
+        self.kept: bytes | None = None
+
+    def hear(self, now: int, octets: bytes, quiet: bool) -> tuple[Send, ...]:
+        is_token = len(octets) == 8 and octets[2] == FrameType.TOKEN and octets[3] == self.node.mac
+        if is_token and now < self.node._busy_until:
+            self.kept = octets
+        slow = is_token and now >= self.next
+        if slow:
+            self.next = now + self.every
+        self.node.faults = Faults(use_delay=self.by if slow else 0)
+        return self.inner.hear(now, octets, quiet)
+
+    def wake(self, now: int) -> tuple[Send, ...]:
+        if self.kept is not None and now >= self.node._busy_until:
+            token, self.kept = self.kept, None
+            self.node.faults = Faults()
+            return self.inner.hear(now, token, True)
+        return self.inner.wake(now)
+
+    def next_wake(self) -> int | None:
+        due = self.inner.next_wake()
+        return due if self.kept is None else min(self.node._busy_until, due or self.node._busy_until)
+
+
+def waiting(node: Node, usage: int) -> Node:
+    """The node waits `usage` ns until somebody uses its token: 20 … 35 ms, up to 100 ms by older texts."""
+    node._usage_timeout = usage
+    return node

@@ -40,8 +40,6 @@ PENDING: tuple[str, ...] = (
     "RTU late answers into the next turn",
     "RTU late answers into the next turn, FTDI",
     "ASCII late answers into the next turn",
-    "RTU two masters ask the same by two clocks",
-    "ASCII two masters ask the same by two clocks",
     "RTU parity errors of one station, one flag a read",
     "RTU breaks after one station",
     "RTU one station's clock six in a hundred too slow",
