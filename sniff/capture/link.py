@@ -49,8 +49,8 @@ MESSAGE_COST = 100
 """Octets of messages kept for a caller that is behind, with what each takes beside its body; reads beyond that are
 dropped and counted."""
 
-GOODBYE = 2.0
-"""Seconds for a process that has said its last words."""
+GOODBYE = 1.0
+"""Seconds for a process that has said its last words, and once more when it was killed: a sync may hold it."""
 
 DERIVED_BACKLOG = 1024 * 1024
 

@@ -50,6 +50,9 @@ CLOSING_PATIENCE = 30.0
 SYNC_PATIENCE = 1.0
 """Seconds for the last sync; the system has the octets by then."""
 
+DRAIN = 0.2
+"""Seconds for what had arrived when it was told to stop; a port gives a few thousand octets a read."""
+
 CLOSING_EVERY = 0.5
 LOOK_EVERY = 0.02
 """Seconds between words to the main process, and between looks at the files, while they are closed."""
@@ -120,9 +123,10 @@ class CaptureLoop:
             self._take(bus)
         while self.reason is None:
             self._step()
+        until = time.monotonic() + DRAIN
         for bus in self._buses:  # what arrived meanwhile
-            if not bus.ended:
-                self._take(bus)
+            while not bus.ended and self._take(bus) and time.monotonic() < until:
+                pass
         self._beat(self.clock.now())
         return self.reason
 
@@ -173,8 +177,8 @@ class CaptureLoop:
         if now >= self._beat_at or self.outlet.size > FLUSH_AT:
             self._beat(now)
 
-    def _take(self, bus: _Bus) -> None:
-        """One read of a source."""
+    def _take(self, bus: _Bus) -> bool:
+        """One read of a source; whether it gave anything."""
         source = bus.source
         index = bus.index
         items = source.read()
@@ -195,6 +199,7 @@ class CaptureLoop:
             self._watch(bus, None)
             if all(other.ended for other in self._buses):
                 self.stop(NOTHING_MORE)
+        return bool(items)
 
     def _set_due(self, bus: _Bus, due: int) -> None:
         if bus.due != due:
@@ -223,7 +228,7 @@ class CaptureLoop:
                 self._selector.unregister(bus.fd)
         bus.fd = fd
         if fd is not None:
-            self._selector.register(fd, selectors.EVENT_READ, lambda: self._take(bus))
+            self._selector.register(fd, selectors.EVENT_READ, lambda: (self._take(bus), None)[1])
 
     # -- beats -------------------------------------------------------------------------------------------------
 
@@ -260,7 +265,9 @@ class CaptureLoop:
         news = False
         for index, (recorder, watch) in enumerate(zip(self.recorders, self._watches, strict=True)):
             told = [recorder.notices.popleft() for _ in range(len(recorder.notices))]
-            slow = watch.see(now, recorder.behind(now), recorder.syncing, recorder.lost_octets)
+            failing = recorder.trouble is not None  # which is said, and explains that nothing is written
+            behind = 0 if failing else recorder.behind(now)
+            slow = watch.see(now, behind, recorder.syncing, recorder.lost_octets)
             for text in told + ([slow] if slow is not None else []):
                 news = True
                 self._keep(index, LineEvent(self._buses[index].source.now(), LineEventKind.NOTE, text))

@@ -53,8 +53,8 @@ DESCRIPTION = """Passive RS-485 fieldbus sniffer and protocol analyzer: Modbus R
 It listens; it never writes to a port."""
 
 EPILOG = """Start with `sniff485 demo`, then `sniff485 ports` and `sniff485 live PORT -s 19200,8E1 -p modbus-rtu`.
-Exit codes: 0 fine, 1 findings, 2 usage, 3 unreadable input or output not written, 4 port trouble, 70 internal error,
-130 interrupted."""
+Exit codes: 0 fine, 1 findings, 2 usage, 3 unreadable input or output not written, 4 port trouble, 70 internal error
+(--traceback says where), 130 interrupted."""
 
 
 class Failure(Exception):

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -79,8 +81,19 @@ class LiveFeed:
         )
 
     def close(self) -> None:
-        """End the capture and close its file."""
-        self.live.stop()
+        """End the capture and close its file; where a slow disk takes its time, say so, and let Ctrl-C end that."""
+        told = False
+
+        def tell() -> None:
+            nonlocal told
+            status = self.live.status
+            if status.closing and status.unwritten and not told:
+                told = True
+                print(f"sniff485: {listening.waiting_words(status)}", file=sys.stderr)
+
+        while self.live.ended is None:
+            with contextlib.suppress(KeyboardInterrupt):  # then it is told to stop once more
+                self.live.stop(tell)
 
 
 class FileFeed:

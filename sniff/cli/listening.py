@@ -219,10 +219,7 @@ class Printer:
             self._say(f"recording: {status.error or 'goes on'}")
         if status.closing and status.unwritten and not self._waited:
             self._waited = True
-            self._say(
-                f"the disk is slow: waiting for the last {status.unwritten} octets to be written; "
-                "end that, and lose them, with Ctrl-C"
-            )
+            self._say(waiting_words(status))
 
     def _say_event(self, event: LineEvent) -> None:
         if event.kind in (LineEventKind.UNPLUGGED, LineEventKind.REPLUGGED):
@@ -259,6 +256,14 @@ class Printer:
 
     def _say(self, text: str) -> None:
         print(f"sniff485: {self.live.session.port}: {plain(text)}", file=sys.stderr)
+
+
+def waiting_words(status: Status) -> str:
+    """What is said while a slow disk gets time for what it did not take yet."""
+    return (
+        f"the disk is slow: waiting for the last {status.unwritten} octets to be written; "
+        "end that, and lose them, with Ctrl-C"
+    )
 
 
 def run(printer: Printer, progress: bool = True) -> int:

@@ -68,7 +68,7 @@ class Run:
         self.folder, self.decode = folder, decode
         self.dice = random.Random(SEED)
         self.disk = Disk()
-        self.recorder = Recorder(folder / "x.mcap", SESSION, Rotation.parse("size:4MB"))
+        self.recorder = Recorder(folder / "x.mcap", SESSION, Rotation.parse("size:500kB"))
         self._wrap()
         self.injected: dict[str, int] = {}
         self.removed = 0
@@ -129,7 +129,8 @@ class Run:
             self._front()
 
     def _begin(self, now: int) -> str:
-        what = self.dice.choice(["unplug", "full disk", "disk hangs", "killed front", "removed file"])
+        kinds = ("unplug", "full disk", "disk hangs", "killed front", "removed file")
+        (what,) = self.dice.choices(kinds, (5, 5, 5, 5, 1))
         self.injected[what] = self.injected.get(what, 0) + 1
         if what == "unplug":
             self.unplugged = True

@@ -60,7 +60,7 @@ def write_batches(path: Path, chunks: list[Chunk]) -> None:
 
 
 def record_live(path: Path, chunks: list[Chunk]) -> None:
-    """As a capture does: flushed each 0.7 s of the bus's time. 1000 s of it."""
+    """As a capture does: flushed each 0.9 s of the bus's time. 1000 s of it."""
     path.unlink(missing_ok=True)
     recorder = Recorder(path, SESSION)
     for chunk in chunks:

@@ -4,10 +4,13 @@ disk that hangs on demand.
 
 from __future__ import annotations
 
+import fcntl
 import os
 import signal
+import struct
 import subprocess
 import sys
+import termios
 import textwrap
 import threading
 import time
@@ -64,6 +67,18 @@ class Feeder:
 
         self._thread = threading.Thread(target=run, daemon=True)
         self._thread.start()
+
+    def until_read(self) -> None:
+        """Until nothing waits in the pseudo-terminal, as far as it can be seen: several times in a row."""
+        quiet = 0
+
+        def is_read() -> bool:
+            nonlocal quiet
+            waiting = struct.unpack("i", fcntl.ioctl(self._slave, termios.FIONREAD, bytes(4)))[0]
+            quiet = 0 if waiting else quiet + 1
+            return quiet > 5
+
+        wait_until(is_read, "nobody reads")
 
     def quiet(self) -> None:
         self._stop.set()

@@ -113,6 +113,14 @@ def run(begin):
     return run
 
 
+def next_line(process: subprocess.Popen[str]) -> str:
+    """The next line on standard error, but for what it says of a disk that others keep busy here."""
+    assert process.stderr is not None
+    while "the disk has caught up" in (line := process.stderr.readline()) or "disk slow" in line:
+        pass
+    return line
+
+
 def octets_of(path: Path) -> bytes:
     return b"".join(item.octets for item in read(path).items() if isinstance(item, Chunk))
 
@@ -191,10 +199,9 @@ def test_a_port_that_goes_and_comes_back(begin, bus, tmp_path) -> None:
     process = begin("record", str(bus.link), *LINE, "-w", "x.mcap")
     wait_for(tmp_path / "x.mcap")
     bus.unplug()
-    assert process.stderr is not None
-    assert process.stderr.readline() == f"sniff485: {bus.link} is gone (hung up)\n"
+    assert next_line(process) == f"sniff485: {bus.link} is gone (hung up)\n"
     bus.plug()
-    assert process.stderr.readline() == f"sniff485: {bus.link} is back\n"
+    assert next_line(process) == f"sniff485: {bus.link} is back\n"
     before = len(octets_of(tmp_path / "x.mcap"))
     until = time.monotonic() + 20
     while len(octets_of(tmp_path / "x.mcap")) <= before + 40:
@@ -204,7 +211,7 @@ def test_a_port_that_goes_and_comes_back(begin, bus, tmp_path) -> None:
     process.communicate(timeout=20)
     assert process.returncode == 0
     kinds = [item.kind.value for item in read(tmp_path / "x.mcap").items() if not isinstance(item, Chunk)]
-    assert kinds == ["unplugged", "replugged"]
+    assert [kind for kind in kinds if kind != "note"] == ["unplugged", "replugged"]
 
 
 def test_a_gateway_that_closes_is_waited_for(begin, tmp_path) -> None:
@@ -216,9 +223,8 @@ def test_a_gateway_that_closes_is_waited_for(begin, tmp_path) -> None:
             with client:
                 client.sendall(POLL)
                 time.sleep(0.2)
-        assert process.stderr is not None
-        assert process.stderr.readline() == f"sniff485: {port} is gone (closed by the gateway)\n"
-        assert process.stderr.readline() == f"sniff485: {port} is back\n"
+        assert next_line(process) == f"sniff485: {port} is gone (closed by the gateway)\n"
+        assert next_line(process) == f"sniff485: {port} is back\n"
         process.send_signal(signal.SIGTERM)
         process.communicate(timeout=20)
     assert process.returncode == 0
@@ -236,8 +242,7 @@ def test_a_full_disk_is_said_at_once_and_ends_in_an_error(begin, tmp_path) -> No
             "record", str(noisy.link), "-s", "115200,8N1", "-w", "x.mcap",
             preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, limit),
         )  # fmt: skip
-        assert process.stderr is not None
-        line = process.stderr.readline()
+        line = next_line(process)
         assert "recording: x.mcap: File too large" in line
         assert process.poll() is None, "it goes on, for there may be room again"
         process.send_signal(signal.SIGINT)
