@@ -25,6 +25,8 @@ from dissectors.modbus.functions import (
     Octets,
     is_open_length,
 )
+from dissectors.modbus.expectation import Expected
+from dissectors.modbus.past import Past
 
 CRC_BITS: Final = 16
 SHORT_FRAME: Final = -4
@@ -42,7 +44,8 @@ WHOLE_STRETCH: Final = 12
 """All octets between two silences with a good CRC, whatever their function: good with both gaps proved, only then."""
 
 ZERO_TAIL: Final = -8
-"""A good frame and zeros after it is good again as a whole (the CRC is 0): the shorter reading wins."""
+"""A good frame and zeros after it is good again as a whole (the CRC is 0): where zeros stray, or are more than a CRC
+has, the shorter reading wins (segmentation.py)."""
 
 
 class Reading(NamedTuple):
@@ -54,7 +57,10 @@ class Reading(NamedTuple):
 
 
 class Candidate(NamedTuple):
-    """A stretch with a good CRC. `start` counts from the first octet ever fed."""
+    """A stretch with a good CRC. `start` counts from the first octet ever fed.
+
+    `zeros`: how many zeros it ends with without which it would be a good frame of a predicted length too.
+    """
 
     start: int
     length: int
@@ -63,6 +69,7 @@ class Candidate(NamedTuple):
     request: bool
     response: bool
     octets: bytes
+    zeros: int = 0
 
     @property
     def end(self) -> int:
@@ -162,24 +169,21 @@ def exception_bits(code: int) -> int:
     return SHORT_FRAME + (VENDOR_CODE if code in VENDOR_EXCEPTIONS else UNKNOWN_CODE)
 
 
-def candidate(octets: Octets, at: int, reading: Reading, start: int) -> Candidate | None:
-    """The candidate at index `at` of `octets` (complete there), numbered `start`; None when its CRC is wrong."""
-    stretch = bytes(octets[at : at + reading.length])
-    if crc16_modbus(stretch):
-        return None
+def candidate(stretch: bytes, reading: Reading, start: int) -> Candidate:
+    """The candidate that a stretch with a good CRC is, read in that way."""
     bits = CRC_BITS + octet_bits(stretch, 0, reading)
-    if not stretch[-1] and zeros_follow_good(stretch):
-        bits += ZERO_TAIL
-    return Candidate(start, reading.length, bits, stretch[0], reading.request, reading.response, stretch)
+    zeros = 0 if stretch[-1] else zeros_follow_good(stretch)
+    return Candidate(start, reading.length, bits, stretch[0], reading.request, reading.response, stretch, zeros)
 
 
-def zeros_follow_good(stretch: bytes) -> bool:
-    """Whether a stretch with a good CRC is a shorter good frame and zeros."""
-    bare = stretch.rstrip(b"\0")
-    for reading in readings(stretch, 0, len(stretch)):
-        if max(len(bare), MIN_FRAME) <= reading.length < len(stretch) and not crc16_modbus(stretch[: reading.length]):
-            return True
-    return False
+def zeros_follow_good(stretch: bytes) -> int:
+    """Of a stretch with a good CRC that is a shorter good frame and zeros: how many zeros; else 0."""
+    count = len(stretch)
+    least = max(len(stretch.rstrip(b"\0")), MIN_FRAME)
+    for length, _, _ in readings(stretch, 0, count):
+        if least <= length < count and not crc16_modbus(stretch[:length]):
+            return count - length
+    return 0
 
 
 def lacks_zeros(stretch: bytes) -> bool:
@@ -191,10 +195,14 @@ def lacks_zeros(stretch: bytes) -> bool:
     return len(stretch) not in lengths and any(n - len(stretch) in (1, 2) for n in lengths)
 
 
-def whole_stretch(octets: Octets, at: int, end: int, start: int) -> Candidate | None:
-    """All of [at, end) as one frame, zeros at its end left off; None when its CRC is wrong or it is no frame.
+def whole_stretch(
+    octets: Octets, at: int, end: int, start: int, past: Past, expected: Expected | None
+) -> Candidate | None:
+    """All of [at, end) as one frame; None when its CRC is wrong or it is no frame.
 
-    Only for stretches with silence at both ends. Text is refused: it is another protocol's.
+    Only for stretches with silence (or a good frame before, silence after) at both ends. Where nothing predicts the
+    length, up to two zeros at the end are the frame's, unless frames of that kind were shorter before or zeros tend
+    to follow frames here; else they are left off. Text is refused: it is another protocol's.
     """
     length = end - at
     if not MIN_FRAME <= length <= MAX_FRAME:
@@ -202,18 +210,34 @@ def whole_stretch(octets: Octets, at: int, end: int, start: int) -> Candidate | 
     stretch = bytes(octets[at:end])
     if crc16_modbus(stretch):
         return None
-    while len(stretch) > MIN_FRAME and not stretch[-1] and not crc16_modbus(stretch[:-1]):
-        stretch = stretch[:-1]
+    if not stretch[-1]:
+        stretch = _without_zeros(stretch, past, expected)
     code = stretch[1]
     if code & ~EXCEPTION_BIT not in FUNCTIONS:
         if code & EXCEPTION_BIT and len(stretch) != EXCEPTION_LENGTH:
             return None
         if not _NOT_TEXT.search(stretch):
             return None
-    open_ended = is_open_length(stretch)
-    return Candidate(start, len(stretch), WHOLE_STRETCH, stretch[0], open_ended, open_ended, stretch)
+    either = is_open_length(stretch)
+    answers = either or bool(code & EXCEPTION_BIT and code ^ EXCEPTION_BIT not in FUNCTIONS)
+    return Candidate(start, len(stretch), WHOLE_STRETCH, stretch[0], either, answers, stretch)
 
 
+def _without_zeros(stretch: bytes, past: Past, expected: Expected | None) -> bytes:
+    """A good frame of unpredicted length, less the zeros at its end that are not its own."""
+    bare = stretch
+    while len(bare) > MIN_FRAME and not bare[-1] and not crc16_modbus(bare[:-1]):
+        bare = bare[:-1]
+    if len(bare) == len(stretch) or not is_open_length(stretch):
+        return bare
+    answer = expected is not None and (expected.unit, expected.function) == (stretch[0], stretch[1])
+    always = past.only_length(stretch[0], stretch[1], answer)
+    if always is not None and len(bare) <= always <= len(stretch):
+        return stretch[:always]
+    return bare if len(stretch) - len(bare) > _CRC_OCTETS or past.zeros_stray else stretch
+
+
+_CRC_OCTETS = 2
 _NOT_TEXT = re.compile(rb"[^\x20-\x7e\r\n]")
 _HEADS = re.compile(
     b"(?=.[%s])" % b"".join(re.escape(bytes((code, code | EXCEPTION_BIT))) for code in FUNCTIONS), re.DOTALL
@@ -240,22 +264,28 @@ class CandidateFinder:
         """Take notice of a window that begins at position `base`, up to index `end`. Neither limit ever falls back."""
         if base > self._base:
             self._drop(base)
+        known = bytes(octets[:end])
+        waiting, self._waiting = self._waiting, []
+        for pending in waiting:
+            self._weigh(known, pending)
         unread, self._unread = self._unread, []
         for start, told in unread:
-            self._read(octets, start, end, told)
+            self._read_on(known, start, told)
         scan = max(self._scanned, base)
         if base + end - 2 > scan:  # a head is read when its third octet is there: then most lengths are told
-            for match in _HEADS.finditer(octets, scan - base, end - 1):
-                self._read(octets, base + match.start(), end, _NOTHING)
+            for match in _HEADS.finditer(known, scan - base, end - 1):
+                at = match.start()
+                found = readings(known, at, end)
+                if found and found[0].length == MORE:
+                    self._read_on(known, base + at, _NOTHING)
+                    continue
+                for reading in found:
+                    length = reading.length
+                    if at + length > end:
+                        self._waiting.append(Pending(base + at, reading))
+                    elif not crc16_modbus(known[at : at + length]):
+                        self.good.append(candidate(known[at : at + length], reading, base + at))
             self._scanned = base + end - 2
-        waiting: list[Pending] = []
-        for pending in self._waiting:
-            start, reading = pending
-            if start - base + reading.length > end:
-                waiting.append(pending)
-            elif (found := candidate(octets, start - base, reading, start)) is not None:
-                self.good.append(found)
-        self._waiting = waiting
 
     def pending(self) -> list[Pending]:
         """What is not complete yet; length MORE where the octets do not tell it yet."""
@@ -267,16 +297,27 @@ class CandidateFinder:
         self._waiting = [p for p in self._waiting if p.start >= base]
         self._unread = [p for p in self._unread if p.start >= base]
 
-    def _read(self, octets: Octets, start: int, end: int, told: Reading) -> None:
+    def _weigh(self, known: bytes, pending: Pending) -> None:
+        """A stretch that is a candidate when it is complete and its CRC is right."""
+        start, reading = pending
+        at = start - self._base
+        stretch = known[at : at + reading.length]
+        if len(stretch) < reading.length:
+            self._waiting.append(pending)
+        elif not crc16_modbus(stretch):
+            self.good.append(candidate(stretch, reading, start))
+
+    def _read_on(self, known: bytes, start: int, told: Reading) -> None:
+        """A head some of whose octets were not there when it was read: only what is new in it counts."""
         more = False
-        for reading in readings(octets, start - self._base, end):
+        for reading in readings(known, start - self._base, len(known)):
             if reading.length == MORE:
                 more = True
             elif reading.length != told.length:
-                self._waiting.append(Pending(start, reading))
+                self._weigh(known, Pending(start, reading))
                 told = reading
             elif reading != told:
                 other = Reading(reading.length, not told.request, not told.response)
-                self._waiting.append(Pending(start, other))
+                self._weigh(known, Pending(start, other))
         if more:
             self._unread.append(Pending(start, told))

@@ -27,7 +27,10 @@ REPEATED = 8
 """Bits for the open request once more, octet for octet: a retry, or an answer that echoes."""
 
 ODD = 2
-"""Bits for the right station and function with another length than was asked for."""
+"""Bits for an answer of the right station and function with another length than was asked for."""
+
+SAME_UNKNOWN = 14
+"""Bits for a station and a function of unknown layout that were named just before: nothing else makes them likely."""
 
 
 class Expected(NamedTuple):
@@ -38,28 +41,33 @@ class Expected(NamedTuple):
     length: int | None
     octets: bytes
 
-    def fit(self, octets: Octets, start: int, length: int) -> int:
-        """Bits that a complete candidate gains from being expected (0: it is not)."""
-        if octets[start] != self.unit:
+    def fit(self, octets: bytes, response: bool) -> int:
+        """Bits that a complete frame gains from being expected (0: it is not); `response`: whether it can be one."""
+        if octets[0] != self.unit:
             return 0
-        code = octets[start + 1]
+        code, length = octets[1], len(octets)
         if code == self.function | EXCEPTION_BIT:
             return EXACT if length == EXCEPTION_LENGTH else 0
         if code != self.function:
             return 0
-        if length == len(self.octets) and octets[start : start + length] == self.octets:
-            return EXACT if self.length == length else REPEATED
+        if octets == self.octets:
+            return EXACT if self.length == length else self._loose(REPEATED)
         if self.length is None:
-            return LOOSE
+            return self._loose(LOOSE)
+        if not response:
+            return 0
         return EXACT if length == self.length else ODD
 
     def hope(self, octets: Octets, start: int, length: int) -> int:
-        """The same for a candidate that is not complete: what it may gain."""
+        """The same for a frame that is not complete: what it may gain."""
         if octets[start] != self.unit or octets[start + 1] != self.function:
             return 0
         if self.length is None:
             return LOOSE
         return EXACT if length in (self.length, len(self.octets)) else ODD
+
+    def _loose(self, bits: int) -> int:
+        return bits if self.function in FUNCTIONS else SAME_UNKNOWN
 
 
 def expectation(open_request: Expected | None, octets: bytes, request: bool, response: bool) -> Expected | None:

@@ -28,7 +28,6 @@ from dissectors.framer import OctetWindow
 from dissectors.line import Timing
 from dissectors.modbus.candidates import (
     CRC_BITS,
-    ZERO_TAIL,
     Candidate,
     CandidateFinder,
     Reading,
@@ -37,18 +36,19 @@ from dissectors.modbus.candidates import (
     octet_hope,
     readings,
     whole_stretch,
-    zeros_follow_good,
 )
 from dissectors.modbus.functions import BROADCAST, EXCEPTION_BIT, FUNCTIONS, MAX_FRAME, MAX_UNIT, MORE
 from dissectors.modbus.remains import Side
 from dissectors.modbus.rtu_window import RtuWindow
-from dissectors.modbus.segmentation import ADJACENT, HEARD, PROVED, SILENCE_INSIDE, segment, worth
+from dissectors.modbus.open_length import OpenLengthFinder
+from dissectors.modbus.past import KNOWN_LENGTH
+from dissectors.modbus.segmentation import ADJACENT, HEARD, PROVED, SILENCE_INSIDE, Paths, worth
 
 WINDOW: Final = 2 * MAX_FRAME
 """Most octets held without silence: then all but the last MAX_FRAME are given out."""
 
 _FIRST = 24  # a first look at a window: on a bus with silences most frames need none
-_STEP = 32  # octets between looks at a window that does not begin with a frame
+_STEP = 32  # fewest octets between looks at a window that does not begin with a frame
 _PATIENT_STEP = 64  # the same while its begin may still become one
 _MOST_CUTS = 3  # silences over which a frame is pieced together
 _HOLD = 20_000_000
@@ -69,6 +69,9 @@ class RtuFramer:
         self._times = OctetWindow(timing)
         self._window = RtuWindow(timing, self._times)
         self._finder = CandidateFinder()
+        self._open = OpenLengthFinder()
+        self._paths = Paths(self._window)
+        self._added = 0  # candidates of the finder that the paths have taken in
         self._next = _FIRST  # window length at which to look again
         self._settled = False  # the silence after the newest octet has been dealt with
 
@@ -168,7 +171,7 @@ class RtuFramer:
             if window.base > base:
                 self._next = max(_FIRST, count - window.base + base)
                 return
-        self._next = min(wait, count + (_STEP if wait > WINDOW else _PATIENT_STEP), WINDOW)
+        self._next = min(wait, count + max(_STEP if wait > WINDOW else _PATIENT_STEP, count // 2), WINDOW)
 
     def _may_go_on(self) -> bool:
         """Whether the window, before a silence, looks like the first part of a frame that a late read cut."""
@@ -226,17 +229,15 @@ class RtuFramer:
                 stretch = bytes(octets[:length])
                 if crc16_modbus(stretch):
                     continue
+                if best is not None:
+                    return False  # two good readings, one with zeros at its end: what follows is weighed too
                 bits = CRC_BITS + octet_bits(stretch, 0, reading) + window.edge(window.base + length)
-                if not stretch[-1] and zeros_follow_good(stretch):
-                    bits += ZERO_TAIL
-                if expected is not None:
-                    bits += expected.fit(stretch, 0, length)
-                own = self._worth(bits, length)
-                if own > best_worth:
-                    best, best_worth = reading, own
+                known = window.past.bits(stretch, reading.request, reading.response)
+                bits += max(known, expected.fit(stretch, reading.response) if expected is not None else 0)
+                best, best_worth = reading, self._worth(bits, length)
             else:
                 hopes = reading  # of two readings only the longer can be the one that is open
-        if best is None:
+        if best is None or best_worth < 0:
             return False
         if hope and hopes is not None and best.length != end and self._hope(hopes, count) > best_worth:
             return False
@@ -248,8 +249,9 @@ class RtuFramer:
         window = self._window
         length = reading.length if reading.length != MORE else count + 1
         bits = CRC_BITS + octet_hope(window.octets, 0, reading)
-        if window.expected is not None:
-            bits += window.expected.hope(window.octets, 0, length)
+        octets, expected = window.octets, window.expected
+        known = KNOWN_LENGTH if reading.response and window.past.knows_length(octets[0], octets[1], length) else 0
+        bits += max(known, expected.hope(octets, 0, length) if expected is not None else 0)
         return self._worth(bits, length)
 
     def _worth(self, bits: int, length: int) -> int:
@@ -266,18 +268,37 @@ class RtuFramer:
         """Best segmentation of the first `count` octets: its frames, and those that nothing to come can undo."""
         window, finder = self._window, self._finder
         finder.look(window.octets, window.base, count)
-        found = finder.good
-        if window.end is not None:
-            found = found + self._whole_stretches(count)
-        if not found:
-            return [], []
-        return segment(window, count, found, finder.pending())
+        unpredicted = self._unpredicted(count)
+        if unpredicted:
+            paths = Paths(window)
+            paths.extend(finder.good + unpredicted)
+        else:
+            paths = self._extended_paths()
+        return paths.winner(), paths.agreed(finder.pending(), count)
 
-    def _whole_stretches(self, count: int) -> list[Candidate]:
-        """All octets between two silences: how functions are found that predict no length."""
-        window = self._window
-        starts = [cut - window.base for cut in window.cuts]
-        if window.start_bits() == PROVED:
-            starts.append(0)
-        found = (whole_stretch(window.octets, start, count, window.base + start) for start in starts)
-        return [candidate for candidate in found if candidate is not None]
+    def _extended_paths(self) -> Paths:
+        """The paths through all candidates found, kept from look to look while nothing is taken."""
+        good = self._finder.good
+        if self._paths.base == self._window.base and self._paths.extend(good[self._added :]):
+            self._added = len(good)
+            return self._paths
+        self._paths, self._added = Paths(self._window), len(good)
+        self._paths.extend(good)
+        return self._paths
+
+    def _unpredicted(self, count: int) -> list[Candidate]:
+        """Frames whose length nothing predicts: all octets between two silences, or several that lie together."""
+        window, silent = self._window, self._window.end is not None
+        octets, base = window.octets, window.base
+        found: dict[tuple[int, int], Candidate] = {}
+        starts = list(window.cuts)
+        if window.start_bits() or window.good_before:
+            starts.append(base)
+        for each in self._open.look(bytes(octets[:count]), base, starts, self._finder.good, silent):
+            found[each.start, each.length] = each
+        if silent:
+            for start in starts:
+                whole = whole_stretch(octets, start - base, count, start, window.past, window.expected)
+                if whole is not None:
+                    found[start, whole.length] = whole
+        return list(found.values())

@@ -84,12 +84,20 @@ def _encapsulated_response(octets: Octets, start: int, end: int) -> int:
         return NEVER
     if start + 7 >= end:
         return MORE
-    at = start + 8
-    for _ in range(octets[start + 7]):
+    objects = octets[start + 7]
+    if 10 + 2 * objects > MAX_FRAME:
+        return NEVER
+    if start + 8 + 2 * objects > end:  # each has two octets at least
+        return MORE
+    at, before = start + 8, -1
+    for _ in range(objects):
         if at + 1 - start > MAX_FRAME:
             return NEVER
         if at + 1 >= end:
             return MORE
+        if octets[at] == before:  # no object twice
+            return NEVER
+        before = octets[at]
         at += 2 + octets[at + 1]
     total = at + 2 - start
     return total if total <= MAX_FRAME else NEVER

@@ -57,6 +57,8 @@ def injury(octets: bytes, before: Side, after: Side, heard: bool | None, expecte
     function = FUNCTIONS.get(code & ~EXCEPTION_BIT)
     if function is None:
         # the function octet itself may be hit: the length of the awaited answer tells
+        if awaited is not None and code & ~EXCEPTION_BIT == awaited.function:
+            return Injury(None, Damage.CHECK)
         return Injury(count, Damage.CHECK) if awaited is not None and count == awaited.length else None
     if not heard and not (1 <= unit <= MAX_UNIT or (unit == BROADCAST and function.writes)):
         return None

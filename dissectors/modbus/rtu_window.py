@@ -12,6 +12,7 @@ from dissectors.line import Timing
 from dissectors.modbus.candidates import Candidate, Reading, readings
 from dissectors.modbus.expectation import Expected, expectation
 from dissectors.modbus.functions import is_open_length
+from dissectors.modbus.past import Past
 from dissectors.modbus.remains import (
     ODD_LENGTH,
     Injury,
@@ -31,11 +32,12 @@ class RtuWindow:
     `octets`: the window. `base`: position of its first octet. `cuts`: positions of proved silences inside it.
     `end`: index at which silence or the end of the capture follows, None while octets may follow at once;
     `end_proved`: that it is silence. `units`: stations that good frames named. `expected`: the open request.
-    `good_before`: a good frame stands directly before the window.
+    `good_before`: a good frame stands directly before the window. `past`: what was said before.
     """
 
     __slots__ = (
         "_before",
+        "_last_good",
         "_latency",
         "_octets",
         "_out",
@@ -51,6 +53,7 @@ class RtuWindow:
         "expected",
         "good_before",
         "octets",
+        "past",
         "units",
     )
 
@@ -65,6 +68,8 @@ class RtuWindow:
         self.units: set[int] = set()
         self.expected: Expected | None = None
         self.good_before = False
+        self.past = Past()
+        self._last_good = b""
         self._out: list[Event] = []
         self._before = Side.SILENCE  # what stands directly before the window
         self._start: int | None = None  # evidence that a frame begins with the window; None until it is asked for
@@ -144,6 +149,8 @@ class RtuWindow:
         self._taken(count, Side.FRAME)
         self.good_before = True
         self.expected = expectation(self.expected, octets, request, response)
+        self.past.note(octets, self.expected is not None or not response)
+        self._last_good = octets
         self.units.add(octets[0])
 
     def take_rest(self, count: int, after: Side) -> None:
@@ -161,6 +168,7 @@ class RtuWindow:
         if self.good_before and before is Side.FRAME:
             zeros = zeros_at_start(stretch)
             if zeros == count or zeros > 1:
+                self._note_stray_zeros(zeros)
                 self._take_noise(zeros, before, after if zeros == count else Side.NOISE, Reason.ZEROS)
                 if zeros == count:
                     return
@@ -174,6 +182,14 @@ class RtuWindow:
             self.take_frame(count, any(r.request for r in fits), any(r.response for r in fits))
         else:
             self._take_damaged(count, hurt)
+
+    def _note_stray_zeros(self, count: int) -> None:
+        """Zeros follow a frame: they teach where they cannot be the end of it."""
+        good = self._last_good
+        lengths = [len(good) + zeros for zeros in range(1, min(count, 2) + 1)]
+        whole = good + bytes(min(count, 2))
+        if not any(length in lengths for length, _, _ in readings(whole, 0, len(whole))) and not is_open_length(good):
+            self.past.note_stray_zero()
 
     def _take_noise(self, count: int, before: Side, after: Side, reason: Reason | None) -> None:
         place = self._place(count, before, after)

@@ -5,7 +5,8 @@ Evidence is counted in bits. A candidate brings those of its octets (candidates.
     +4  silence proved at its start, at its end; or a good frame directly before it
     +2  silence of 1.5 characters proved there
     +4  a station that has been heard before
-    +2 … +10  it answers the open request, or repeats it (expectation.py)
+    +2 … +14  it answers the open request, or repeats it (expectation.py)
+    +6 … +8   this station was asked the same before, or answered at this length (past.py)
     -6  each silence proved inside it
 
 and THRESHOLD is taken off. What remains is its worth. A candidate that stands on its own gains a sixteenth of a bit an
@@ -13,18 +14,28 @@ octet, to decide between readings that contradict each other: a long frame is a 
 one inside. The path of candidates with the greatest sum wins. So a weak request is taken together with the answer
 that fits it, and neither alone.
 
+A good frame and zeros is good again (the CRC is 0), and one frame in 256 ends with a zero: two readings of the same
+octets. The request that is open decides between them; where none speaks, a request is likelier than an answer that
+nobody asked for, and between two silences the reading that uses all octets is likelier than one that leaves a zero over.
+More zeros than a CRC has, or a bus on which zeros tend to follow frames, speak for the shorter reading.
+
+A path is extended by a candidate from the best path before it, the best that ends directly before it, and the best
+that left the request open which it would answer.
+
 A stretch that would be a frame if the octets to come make its CRC good is weighed too, at its best. Frames are
 committed as far as the best path and the best path that ends in such a hope agree.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from bisect import bisect_right
+from collections.abc import Iterable, Sequence
 from typing import Final, NamedTuple, Protocol
 
-from dissectors.modbus.candidates import CRC_BITS, Candidate, Pending, Reading, octet_hope
-from dissectors.modbus.expectation import Expected, expectation
-from dissectors.modbus.functions import MORE
+from dissectors.modbus.candidates import CRC_BITS, ZERO_TAIL, Candidate, Pending, Reading, octet_hope
+from dissectors.modbus.expectation import LOOSE, Expected, expectation
+from dissectors.modbus.functions import EXCEPTION_BIT, MORE
+from dissectors.modbus.past import KNOWN_LENGTH, Past
 
 THRESHOLD: Final = 20
 SCALE: Final = 16
@@ -36,21 +47,24 @@ ADJACENT: Final = 4
 HEARD: Final = 4
 SILENCE_INSIDE: Final = -6
 
-_NEIGHBOURS: Final = 12
-"""How many earlier candidates are tried as the one before; the best path of all is always tried."""
+WHOLE: Final = 4
+"""A frame whose last octets are zeros, and that fills the room between two silences: good without them, too."""
+
+_CRC_OCTETS: Final = 2
 
 
 class Surroundings(Protocol):
     """The window, and what stands round a position of it (positions count from the first octet ever fed).
 
     `base`: position of the window's first octet. `expected`: the open request before it. `good_before`: a good frame
-    ends directly before it.
+    ends directly before it. `past`: what was said before.
     """
 
     octets: bytearray
     base: int
     expected: Expected | None
     good_before: bool
+    past: Past
 
     def edge(self, position: int) -> int:
         """Bits of evidence that one frame ends, another begins there: PROVED, LIKELY or 0."""
@@ -84,81 +98,145 @@ def worth(bits: int, length: int) -> int:
     return excess * SCALE + (length if excess >= 0 else 1)
 
 
-def context_bits(window: Surroundings, unit: int, start: int, end: int, adjacent: bool) -> int:
-    """Bits from what stands round a stretch, without its end and the open request."""
-    bits = ADJACENT if adjacent else window.edge(start)
-    if window.heard(unit):
-        bits += HEARD
+def zero_bits(window: Surroundings, candidate: Candidate, expected: Expected | None, fit: int) -> int:
+    """Bits for a frame that is good without its last zeros too; `fit`: those it has from the open request."""
+    if fit >= LOOSE:
+        return 0
+    if candidate.zeros > _CRC_OCTETS or window.past.zeros_stray:
+        return ZERO_TAIL
+    if candidate.request and window.edge(candidate.start) == PROVED and window.edge(candidate.end) == PROVED:
+        return WHOLE
+    awaited = expected is not None and expected.fit(candidate.octets[: -candidate.zeros], True) >= LOOSE
+    return ZERO_TAIL if awaited else 0
+
+
+class Paths:
+    """The best paths through the candidates of a window, extended as more of them are complete.
+
+    Valid until something is taken out of the window.
+    """
+
+    __slots__ = ("_awaiting", "_best", "_ends", "_touching", "_window", "base")
+
+    def __init__(self, window: Surroundings) -> None:
+        self._window = window
+        self.base = window.base
+        root = _Step(0, None, None, window.base if window.good_before else -1, window.expected)
+        self._ends = [window.base]  # of every path found, ascending
+        self._best = [root]  # the best of those that end there or before
+        self._touching: dict[int, list[_Step]] = {window.base: [root]}  # by the position that they end at
+        self._awaiting: dict[int, tuple[list[int], list[_Step]]] = {}  # as the first two, by request left open
+        self._remember_awaiting(window.base, root)
+
+    def extend(self, candidates: Iterable[Candidate]) -> bool:
+        """Add candidates; False, and nothing done, when one ends before what was added earlier."""
+        fresh = sorted(candidates, key=_by_end)
+        if fresh and fresh[0].end < self._ends[-1]:
+            return False
+        for candidate in fresh:
+            self._add(candidate)
+        return True
+
+    def winner(self) -> list[Candidate]:
+        """The frames of the best path, in order."""
+        return _frames(self._best[-1])
+
+    def agreed(self, pending: Sequence[Pending], count: int) -> list[Candidate]:
+        """Those of them that nothing yet to come can undo. `count`: how many octets of the window are known."""
+        winner = self._best[-1]
+        if winner.candidate is None:
+            return []
+        hope: _Step | None = None
+        most = winner.worth
+        for start, reading in pending:
+            total, step = self._hope(start, reading, count)
+            if total > most:
+                most, hope = total, step
+        path = _frames(winner)
+        if hope is None:
+            return path
+        agreed = []
+        for ours, theirs in zip(path, _frames(hope), strict=False):
+            if ours is not theirs:
+                break
+            agreed.append(ours)
+        return agreed
+
+    def _add(self, candidate: Candidate) -> None:
+        window, start, end = self._window, candidate.start, candidate.end
+        octets = candidate.octets
+        bits = candidate.bits + window.edge(end) + _standing(window, candidate.unit, start, end)
+        known = window.past.bits(octets, candidate.request, candidate.response)
+        edge = window.edge(start)
+        total, before = None, self._best[0]
+        for step in self._options(start, candidate.unit, octets[1]):
+            fit = step.expected.fit(octets, candidate.response) if step.expected is not None else 0
+            own = bits + max(fit, known) + (ADJACENT if step.end == start else edge)
+            if candidate.zeros:
+                own += zero_bits(window, candidate, step.expected, fit)
+            reached = step.worth + worth(own, candidate.length)
+            if total is None or reached > total:
+                total, before = reached, step
+        if total is None:
+            return
+        after = expectation(before.expected, octets, candidate.request, candidate.response)
+        step = _Step(total, candidate, before, end, after)
+        self._ends.append(end)
+        self._best.append(step if total > self._best[-1].worth else self._best[-1])
+        self._touching.setdefault(end, []).append(step)
+        self._remember_awaiting(end, step)
+
+    def _options(self, start: int, unit: int, code: int) -> Sequence[_Step]:
+        """Paths that a frame may follow; the best of them is among these."""
+        if start < self.base:
+            return ()
+        options = [self._best[bisect_right(self._ends, start) - 1]]
+        touching = self._touching.get(start)
+        if touching is not None:
+            options += touching
+        awaiting = self._awaiting.get(unit << 8 | code & ~EXCEPTION_BIT)
+        if awaiting is not None:
+            at = bisect_right(awaiting[0], start) - 1
+            if at >= 0:
+                options.append(awaiting[1][at])
+        return options
+
+    def _hope(self, start: int, reading: Reading, count: int) -> tuple[int, _Step]:
+        """The best path that ends in a frame whose CRC may yet be good, and its worth."""
+        window = self._window
+        octets, at = window.octets, start - window.base
+        length = reading.length if reading.length != MORE else count - at + 1
+        unit, code = octets[at], octets[at + 1]
+        bits = CRC_BITS + octet_hope(octets, at, reading) + _standing(window, unit, start, start + length)
+        known = KNOWN_LENGTH if reading.response and window.past.knows_length(unit, code, length) else 0
+        edge = window.edge(start)
+        most, best = -1, self._best[0]
+        for step in self._options(start, unit, code):
+            own = bits + (ADJACENT if step.end == start else edge)
+            own += max(known, step.expected.hope(octets, at, length) if step.expected is not None else 0)
+            total = step.worth + worth(own, length)
+            if total > most:
+                most, best = total, step
+        return most, best
+
+    def _remember_awaiting(self, end: int, step: _Step) -> None:
+        expected = step.expected
+        if expected is None:
+            return
+        ends, best = self._awaiting.setdefault(expected.unit << 8 | expected.function, ([], []))
+        ends.append(end)
+        best.append(step if not best or step.worth > best[-1].worth else best[-1])
+
+
+def _standing(window: Surroundings, unit: int, start: int, end: int) -> int:
+    """Bits for a known station, less those for silences inside."""
+    bits = HEARD if window.heard(unit) else 0
     silences = window.inside(start, end)
     return bits + SILENCE_INSIDE * silences if silences else bits
 
 
-def segment(
-    window: Surroundings, count: int, candidates: Sequence[Candidate], pending: Sequence[Pending]
-) -> tuple[list[Candidate], list[Candidate]]:
-    """The frames of the best path, and those of them that nothing yet to come can undo, both in order.
-
-    `count`: how many octets of the window are known.
-    """
-    root = _Step(0, None, None, window.base if window.good_before else -1, window.expected)
-    steps = [root]
-    for candidate in sorted(candidates):
-        best: _Step | None = None
-        for step in _before(steps, candidate.start):
-            total = step.worth + _worth(candidate, step, window)
-            if best is None or total > best.worth:
-                after = expectation(step.expected, candidate.octets, candidate.request, candidate.response)
-                best = _Step(total, candidate, step, candidate.end, after)
-        if best is not None:
-            steps.append(best)
-    winner = max(steps, key=_by_worth)
-    path = _frames(winner)
-    hope: _Step | None = None
-    most = winner.worth
-    for start, reading in pending:
-        for step in _before(steps, start):
-            total = step.worth + _hope(start, reading, count, step, window)
-            if total > most:
-                most, hope = total, step
-    if hope is None:
-        return path, path
-    agreed = []
-    for ours, theirs in zip(path, _frames(hope), strict=False):
-        if ours is not theirs:
-            break
-        agreed.append(ours)
-    return path, agreed
-
-
-def _by_worth(step: _Step) -> int:
-    return step.worth
-
-
-def _before(steps: Sequence[_Step], start: int) -> list[_Step]:
-    """Paths that end at or before `start`: the nearest few, and the best."""
-    fitting = [s for s in steps if s.candidate is None or s.candidate.start + s.candidate.length <= start]
-    if len(fitting) <= _NEIGHBOURS:
-        return fitting
-    return [max(fitting, key=_by_worth), *fitting[-_NEIGHBOURS:]]
-
-
-def _worth(candidate: Candidate, step: _Step, window: Surroundings) -> int:
-    start, length = candidate.start, candidate.length
-    bits = candidate.bits + window.edge(start + length)
-    bits += context_bits(window, candidate.unit, start, start + length, step.end == start)
-    if step.expected is not None:
-        bits += step.expected.fit(candidate.octets, 0, length)
-    return worth(bits, length)
-
-
-def _hope(start: int, reading: Reading, count: int, step: _Step, window: Surroundings) -> int:
-    octets, at = window.octets, start - window.base
-    length = reading.length if reading.length != MORE else count - at + 1
-    bits = CRC_BITS + octet_hope(octets, at, reading)
-    bits += context_bits(window, octets[at], start, start + length, step.end == start)
-    if step.expected is not None:
-        bits += step.expected.hope(octets, at, length)
-    return worth(bits, length)
+def _by_end(candidate: Candidate) -> tuple[int, int]:
+    return candidate.start + candidate.length, candidate.start
 
 
 def _frames(step: _Step | None) -> list[Candidate]:

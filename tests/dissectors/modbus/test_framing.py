@@ -27,6 +27,7 @@ def rtu(text: str) -> bytes:
 REQUEST = rtu("01 03 0000 0002")
 RESPONSE = rtu("01 03 04 000A 000B")
 OTHER = rtu("02 04 0010 0001")
+VENDOR = rtu("01 64 0102 0304")
 
 
 def wire(*parts: tuple[float, bytes]) -> Wire:
@@ -189,9 +190,11 @@ def test_a_good_frame_is_never_held() -> None:
 
 
 @pytest.mark.parametrize("zeros", [1, 2, 3, 7])
-@pytest.mark.parametrize("frame", [REQUEST, RESPONSE, rtu("01 01 0400 0001"), rtu("01 64 0102 0304"), rtu("01 83 02")])
+@pytest.mark.parametrize("frame", [REQUEST, RESPONSE, rtu("01 01 0400 0001"), VENDOR, rtu("01 83 02")])
 def test_zeros_after_a_frame_are_noise_though_the_crc_stays_good(frame: bytes, zeros: int) -> None:
     assert crc16_modbus(frame + bytes(zeros)) == 0
+    if frame == VENDOR and zeros <= 2:
+        pytest.skip("nothing tells its length: the CRC of one frame in 256 ends with a zero")
     events = read((0, frame + bytes(zeros)), (50, OTHER))
     assert [e.octets for e in events] == [frame, bytes(zeros), OTHER]
     noise = events[1]

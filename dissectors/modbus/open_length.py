@@ -1,0 +1,155 @@
+"""Frames of functions that predict no length, several to a run of octets: what an adapter glues into one read.
+
+Between two silences a good CRC over all of the octets is enough (candidates.whole_stretch). In a run of several frames
+any stretch from a place where a frame may begin could be one, and one of 260 such places in random octets has a good
+CRC somewhere behind it. So the end of such a frame counts only where something agrees: silence; a good frame of a known
+function that begins there; or a frame of the same station and function (a request and its answer, or its exception).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from typing import Final
+
+from dissectors.checksums import crc16_modbus
+from dissectors.modbus.candidates import (
+    CRC_BITS,
+    WHOLE_STRETCH,
+    Candidate,
+    exception_bits,
+)
+from dissectors.modbus.functions import (
+    BROADCAST,
+    EXCEPTION_BIT,
+    EXCEPTION_LENGTH,
+    FUNCTIONS,
+    MAX_FRAME,
+    MIN_FRAME,
+    is_open_length,
+)
+
+ANY_END: Final = CRC_BITS - 7
+"""Bits of a good CRC that was looked for at every place behind a begin."""
+
+_MOST_BEGINS: Final = 32
+_INITIAL: Final = 0xFFFF
+_NOT_TEXT = re.compile(rb"[^\x20-\x7e\r\n]")
+
+
+def _step(value: int) -> int:
+    for _ in range(8):
+        value = value >> 1 ^ (0xA001 if value & 1 else 0)
+    return value
+
+
+_TABLE: Final = tuple(_step(value) for value in range(256))
+
+
+class _Begin:
+    """A place where such a frame may begin, and how far its CRC was followed."""
+
+    __slots__ = ("crc", "ends", "to")
+
+    def __init__(self, at: int) -> None:
+        self.crc = _INITIAL
+        self.to = at
+        self.ends: list[int] = []  # where the CRC is good
+
+    def follow(self, known: bytes, base: int, least: int, most: int) -> list[int]:
+        """Positions up to `most` with a good CRC; none before `least`."""
+        crc, at, table = self.crc, self.to, _TABLE
+        for octet in known[at - base : most - base]:
+            crc = crc >> 8 ^ table[(crc ^ octet) & 0xFF]
+            at += 1
+            if not crc and at >= least:
+                self.ends.append(at)
+        self.crc, self.to = crc, at
+        return self.ends
+
+
+class OpenLengthFinder:
+    """Finds such frames in a growing window. Positions count from the first octet ever fed."""
+
+    __slots__ = ("_begins",)
+
+    def __init__(self) -> None:
+        self._begins: dict[int, _Begin] = {}
+
+    def look(
+        self, known: bytes, base: int, begins: Iterable[int], good: Iterable[Candidate], silent: bool
+    ) -> list[Candidate]:
+        """Candidates in the known octets of a window at `base`.
+
+        `begins`: where a frame may begin beside the ends of `good`, the candidates of known functions. `silent`:
+        whether silence follows the octets.
+        """
+        for position in [p for p in self._begins if p < base]:
+            del self._begins[position]
+        good = list(good)
+        starts = {candidate.start for candidate in good}
+        ahead = {p for p in (*begins, *(candidate.end for candidate in good)) if self._opens(known, p - base)}
+        if not ahead:
+            return []
+        found: dict[tuple[int, int], Candidate] = {}
+        partner: dict[int, bool] = dict.fromkeys(ahead, False)
+        while ahead:
+            position = min(ahead)
+            ahead.discard(position)
+            for candidate in self._frames(known, base, position, partner[position], starts, silent):
+                found[position, candidate.length] = candidate
+                end = candidate.end
+                answers = _same(known, position - base, end - base)
+                if end not in partner and self._opens(known, end - base):
+                    ahead.add(end)
+                partner[end] = partner.get(end, False) or answers
+        return list(found.values())
+
+    def _opens(self, known: bytes, at: int) -> bool:
+        """Whether the head of such a frame, or of an exception to one, stands there."""
+        if not 0 <= at <= len(known) - MIN_FRAME or known[at] == BROADCAST:
+            return False
+        return is_open_length(known, at) or _is_exception(known, at)
+
+    def _frames(
+        self, known: bytes, base: int, position: int, partner: bool, starts: set[int], silent: bool
+    ) -> list[Candidate]:
+        """Those that begin at a position; `partner`: the frame directly before is of the same station and function."""
+        at, end = position - base, len(known)
+        if _is_exception(known, at):
+            stretch = known[at : at + EXCEPTION_LENGTH]
+            if len(stretch) < EXCEPTION_LENGTH or crc16_modbus(stretch):
+                return []
+            bits = CRC_BITS + exception_bits(stretch[2])
+            return [Candidate(position, EXCEPTION_LENGTH, bits, stretch[0], False, True, stretch)]
+        begin = self._begins.get(position)
+        if begin is None:
+            if len(self._begins) >= _MOST_BEGINS:
+                return []
+            begin = self._begins[position] = _Begin(position)
+        most = min(position + MAX_FRAME, base + end)
+        frames = []
+        for position_after in begin.follow(known, base, position + MIN_FRAME, most):
+            after = position_after - base
+            last = silent and after == end
+            agreed = last or position_after in starts or _same(known, at, after)
+            if not agreed and not (partner and after + 2 <= end and known[after]):
+                continue
+            stretch = known[at:after]
+            if _NOT_TEXT.search(stretch):
+                bits = WHOLE_STRETCH if last else ANY_END
+                frames.append(Candidate(position, after - at, bits, stretch[0], True, True, stretch))
+        return frames
+
+
+def _is_exception(known: bytes, at: int) -> bool:
+    """Whether an exception to a function that the standard does not know may begin there."""
+    code = known[at + 1]
+    return bool(code & EXCEPTION_BIT) and code ^ EXCEPTION_BIT not in FUNCTIONS
+
+
+def _same(known: bytes, at: int, after: int) -> bool:
+    """Whether the octets at `after` name the station and the function that those at `at` do."""
+    if after + 2 > len(known) or known[at] != known[after]:
+        return False
+    return known[at + 1] == known[after + 1] & ~EXCEPTION_BIT

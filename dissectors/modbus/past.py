@@ -1,0 +1,83 @@
+"""What a bus has said so far, as far as it helps to weigh octets: requests, lengths of answers, stray zeros.
+
+A master asks the same again and again, and a station answers it at the same length. Only good frames teach; memory is
+bounded.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from dissectors.modbus.functions import EXCEPTION_BIT, FUNCTIONS
+
+KNOWN_REQUEST: Final = 8
+"""Bits for octets that were a request before, octet for octet."""
+
+KNOWN_LENGTH: Final = 6
+"""Bits for an answer as long as one that this station gave to this function before, where lengths differ at all."""
+
+_MOST_REQUESTS: Final = 512
+_MOST_LENGTHS: Final = 4096
+_FIXED: Final = frozenset({0x05, 0x06, 0x07, 0x08, 0x0B, 0x0F, 0x10, 0x16})
+"""Functions whose answers have one length, or (diagnostics) that of their request: it tells nothing."""
+
+_STRAY: Final = 1024
+_STRAY_BUS: Final = 1500
+"""Each stray zero adds _STRAY to a sum that loses 1/64 with every frame: two within some thirty frames make a habit."""
+
+
+class Past:
+    """Requests and lengths of answers by station and function; whether zeros tend to follow frames on this bus."""
+
+    __slots__ = ("_lengths", "_requests", "_strays")
+
+    def __init__(self) -> None:
+        self._requests: dict[bytes, None] = {}  # the newest last
+        self._lengths: dict[int, int] = {}  # unit, function, direction → a bit for each length
+        self._strays = 0
+
+    def bits(self, octets: bytes, request: bool, response: bool) -> int:
+        """Evidence for a complete frame that may be a request, a response or either."""
+        if request and octets in self._requests:
+            return KNOWN_REQUEST
+        if response and self.knows_length(octets[0], octets[1], len(octets)):
+            return KNOWN_LENGTH
+        return 0
+
+    def knows_length(self, unit: int, code: int, length: int) -> bool:
+        """Whether a frame of this length has answered."""
+        return bool(self._lengths.get(_key(unit, code, True), 0) >> length & 1)
+
+    def only_length(self, unit: int, code: int, answer: bool) -> int | None:
+        """The length that requests or answers of a function of unknown layout always had; None when it varies."""
+        lengths = self._lengths.get(_key(unit, code, answer), 0)
+        return lengths.bit_length() - 1 if lengths and not lengths & lengths - 1 else None
+
+    def note(self, octets: bytes, request: bool) -> None:
+        """A good frame, and what it was taken for."""
+        self._strays -= self._strays >> 6
+        code = octets[1]
+        known = code & ~EXCEPTION_BIT in FUNCTIONS
+        if request:
+            self._requests.pop(octets, None)
+            self._requests[octets] = None
+            if len(self._requests) > _MOST_REQUESTS:
+                del self._requests[next(iter(self._requests))]
+        if (known and request) or code & EXCEPTION_BIT or code in _FIXED:
+            return
+        key = _key(octets[0], code, not request)
+        if key in self._lengths or len(self._lengths) < _MOST_LENGTHS:
+            self._lengths[key] = self._lengths.get(key, 0) | 1 << len(octets)
+
+    def note_stray_zero(self) -> None:
+        """A zero behind a frame that cannot be its last octet."""
+        self._strays = min(self._strays + _STRAY, 8 * _STRAY)
+
+    @property
+    def zeros_stray(self) -> bool:
+        """Whether a zero behind a frame is nothing unusual here."""
+        return self._strays >= _STRAY_BUS
+
+
+def _key(unit: int, code: int, answer: bool) -> int:
+    return unit << 9 | code << 1 | answer
