@@ -30,6 +30,7 @@ class Verdict(Enum):
     DAMAGED_REQUEST = "damaged-request"  # the request itself was damaged: nobody need answer
     BROADCAST = "broadcast"  # no answer expected
     DATA = "data"  # passed without expecting an answer (tokens, unconfirmed data)
+    UNDECIDED = "answered-or-repeated"  # a frame that is its answer or the request again: the bus does not tell
 
     @property
     def words(self) -> str:

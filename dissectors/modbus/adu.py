@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from binascii import Error as HexError
 from binascii import hexlify, unhexlify
+from dataclasses import replace
 
 from dissectors.checksums import crc16_modbus, lrc
 from dissectors.frame import Check, Damage, Frame
@@ -85,6 +86,18 @@ def ascii_check(frame: Frame) -> tuple[int, int] | None:
 def adu(frame: Frame) -> bytes:
     """Unit and PDU of a frame of either kind, without check."""
     return ascii_adu(frame) if frame.protocol == ASCII_NAME else rtu_adu(frame)
+
+
+def readable(frame: Frame) -> Frame:
+    """The frame as it was sent, where it is damaged and its repair is known; else the frame itself."""
+    if frame.repair is None:
+        return frame
+    return replace(frame, octets=frame.repair.octets, check=Check.GOOD, damage=None, expected=None, repair=None)
+
+
+def readable_adu(frame: Frame) -> bytes:
+    """Unit and PDU of a frame of either kind; of a damaged one as repaired, where its repair is known."""
+    return adu(readable(frame))
 
 
 def seal_rtu(octets: bytes) -> bytes:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from dissectors.frame import Frame, Header
-from dissectors.modbus.functions import EXCEPTION_BIT, FUNCTIONS
+from dissectors.frame import Frame, Header, Role
+from dissectors.modbus.functions import BROADCAST, EXCEPTION_BIT, FUNCTIONS
 from dissectors.tracker import Interval, Transaction, Verdict
 
-_WRITES = frozenset(code for code, function in FUNCTIONS.items() if function.writes)
+_READS = frozenset(code for code, function in FUNCTIONS.items() if not function.writes)
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +41,9 @@ class Exchange:
 
     `sure`: its shape is that of a request only. `fault`: why the request itself is damaged. `silent`: nobody answers
     it. `remark`: for the verdict when nothing answers. `disturbed`: something else came since, so the wait teaches
-    nothing. `copied`: response time of a copy taken for the answer, until the next frame confirms it.
+    nothing. `copied`: response time of a copy taken for the answer, until the next frame confirms it. `copies`: frames
+    that are each its answer or a request again, in the order they came. `after_broadcast`: it says the same as the
+    broadcast directly before it. `may_be_answer`: it has the shape of an answer, and a request may have been missed.
     """
 
     tx: int
@@ -57,6 +59,9 @@ class Exchange:
     disturbed: bool = False
     answered: bool = False
     copied: int | None = None
+    copies: list[Seen] = field(default_factory=list)
+    after_broadcast: bool = False
+    may_be_answer: bool = False
     octets: bytes = field(init=False)  # unit and PDU of the request
     unit: int = field(init=False)  # the unit asked, 0 … 255
     end: int = field(init=False)  # of the request, ns
@@ -68,14 +73,24 @@ class Exchange:
 
     @property
     def writes(self) -> bool:
-        """Whether the station has something to store."""
-        return self.request.header.function in _WRITES
+        """Whether the station may have something to store, which takes it longer; also of functions not known."""
+        return self.request.header.function not in _READS
+
+    @property
+    def asks_nobody(self) -> bool:
+        """Whether it reads from address 0: no broadcast, since it asks for an answer; any station may give it."""
+        return self.unit == BROADCAST and self.request.header.role is Role.REQUEST
 
     def is_for(self, octets: bytes) -> bool:
         """Whether unit and function (as an exception or not) of an answer are those asked."""
         if len(octets) < 2 or len(self.octets) < 2:
             return False
-        return octets[0] == self.unit and octets[1] & ~EXCEPTION_BIT == self.octets[1]
+        return (octets[0] == self.unit or self.asks_nobody) and octets[1] & ~EXCEPTION_BIT == self.octets[1]
+
+    @property
+    def last_end(self) -> int:
+        """End of the newest frame that may be this request, ns."""
+        return self.copies[-1].frame.end if self.copies else self.end
 
     def gap(self, start: int) -> int:
         """From the end of the request to `start`, ns, never negative."""
@@ -89,15 +104,18 @@ class Exchange:
     def close(self, verdict: Verdict) -> Transaction:
         """The transaction when no good answer came."""
         garble = self.garble if verdict is Verdict.DAMAGED_ANSWER else None
+        response = garble.no if garble else None
+        if verdict is Verdict.UNDECIDED and self.copies:
+            response = self.copies[-1].no
         return Transaction(
             id=self.tx,
             station=self.unit if self.octets else None,
             kind=self.request.header.kind,
             request=self.request.no,
-            response=garble.no if garble else None,
+            response=response,
             verdict=verdict,
             start=self.request.frame.start,
-            end=max(self.end, garble.end) if garble else self.end,
+            end=max(self.last_end, garble.end) if garble else self.last_end,
             attempt=self.attempt,
             of=self.of,
             error=self.fault or (self.garble.error if self.garble else self.remark),
@@ -106,14 +124,19 @@ class Exchange:
     def close_with(self, answer: Seen, why: str | None) -> Transaction:
         """The transaction with its answer; `why` it does not fit, if so."""
         error = answer.header.error or why
+        if why and not self.fault and not self.is_for(answer.octets):
+            error = why  # what it would mean in answer to something else says nothing here
+        if error is None and self.asks_nobody:
+            error = f"unit {answer.unit} answered a request to address 0"
         if error is None and self.fault:
             error = f"request damaged at this tap: {self.fault}"
         if error is None and self.garble:
             error = f"before the answer: {self.garble.error}"
-        if answer.octets[1] & EXCEPTION_BIT:
+        attempt = self.attempt + sum(copy is not answer for copy in self.copies)
+        if answer.octets[1] & EXCEPTION_BIT and (self.fault or self.is_for(answer.octets)):
             verdict = Verdict.EXCEPTION
         else:
-            verdict = Verdict.RETRY if self.attempt > 1 else Verdict.ANSWERED
+            verdict = Verdict.RETRY if attempt > 1 else Verdict.ANSWERED
         return Transaction(
             id=self.tx,
             station=answer.unit,
@@ -123,8 +146,8 @@ class Exchange:
             verdict=verdict,
             start=self.request.frame.start,
             end=max(self.end, answer.frame.end),
-            latency=self.latency(answer.frame),
-            attempt=self.attempt,
+            latency=None if attempt > self.attempt else self.latency(answer.frame),
+            attempt=attempt,
             of=self.of,
             error=error,
         )
@@ -147,8 +170,13 @@ def answer_apart(tx: int, seen: Seen, verdict: Verdict, other: Exchange | None, 
     )
 
 
-def echo_of(tx: int, seen: Seen, original: Exchange) -> Transaction:
-    """The transaction of an echo."""
+def is_begin_of(octets: bytes, whole: bytes) -> bool:
+    """Whether octets are another frame's first ones, at least four of them, and not all."""
+    return 4 <= len(octets) < len(whole) and whole.startswith(octets)
+
+
+def echo_of(tx: int, seen: Seen, original: Exchange, error: str | None = None) -> Transaction:
+    """The transaction of an echo; `error`: what is wrong with it."""
     return Transaction(
         id=tx,
         station=original.unit,
@@ -159,4 +187,5 @@ def echo_of(tx: int, seen: Seen, original: Exchange) -> Transaction:
         start=seen.frame.start,
         end=seen.frame.end,
         of=original.tx,
+        error=error,
     )

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from dissectors.frame import Check, Frame, Role
-from dissectors.modbus.adu import ASCII_NAME, adu, ascii_check, rtu_check
+from dissectors.modbus.adu import ASCII_NAME, ascii_check, readable, readable_adu, rtu_check
 from dissectors.modbus.functions import EXCEPTION_BIT, FUNCTIONS
 from dissectors.modbus.header import peek_ascii, peek_rtu
 from dissectors.modbus.text import printable
@@ -44,18 +44,20 @@ def fields(frame: Frame, role: Role) -> Fields:
     is_ascii = frame.protocol == ASCII_NAME
     envelope = "mbascii" if is_ascii else "mbrtu"
     found: Fields = {}
-    octets = adu(frame)
+    octets = readable_adu(frame)
     if octets:
         found[f"{envelope}.unit_id"] = octets[0]
     if len(octets) > 1:
         if role in (Role.EITHER, Role.UNKNOWN):
-            role = (peek_ascii if is_ascii else peek_rtu)(frame).role
+            role = (peek_ascii if is_ascii else peek_rtu)(readable(frame)).role
         _pdu(found, octets, role)
     check = ascii_check(frame) if is_ascii else rtu_check(frame)
     if check is not None and frame.check is not Check.ABSENT:
         name = "mbascii.lrc" if is_ascii else "mbrtu.crc16"
         found[name] = check[0]
         found[f"{name}.status"] = int(check[0] == check[1])
+    if frame.repair is not None:
+        found["modbus.repaired"] = frame.repair.flaw.value
     return found
 
 

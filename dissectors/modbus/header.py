@@ -7,8 +7,10 @@ EITHER and the tracker decides. A good check with a length that fits neither is 
 
 from __future__ import annotations
 
-from dissectors.frame import Check, Damage, Frame, Header, Role
-from dissectors.modbus.adu import ASCII_NAME, RTU_NAME, ascii_check, ascii_octets, rtu_check
+from dataclasses import replace
+
+from dissectors.frame import Check, Damage, Frame, Header, Repair, Role
+from dissectors.modbus.adu import ASCII_NAME, RTU_NAME, ascii_check, ascii_octets, readable, rtu_check
 from dissectors.modbus.functions import (
     BROADCAST,
     DIAGNOSTIC_LISTEN_ONLY,
@@ -26,17 +28,24 @@ _DAMAGE = {
     Damage.RESTARTED: "a new start before the end",
     Damage.HEADER: "header check wrong",
 }
+NO_EXCEPTIONS = frozenset((EXCEPTION_BIT, 0xFF))
+"""Function octets with bit 7 set that are no exception: there is no function 00, and FF is all ones rather than 7F."""
+
 _COUNTERS = frozenset((0x02, *range(0x0B, 0x13)))  # diagnostics whose request carries 0000, whose answer a value
 
 
 def peek_rtu(frame: Frame) -> Header:
-    """The header of an RTU frame. Total; of a damaged frame, what its first octets say."""
+    """The header of an RTU frame. Total; of a damaged frame, what its first octets say, or those of its repair."""
+    if frame.repair is not None:
+        return _repaired(peek_rtu(readable(frame)), frame.repair)
     error = None if frame.ok else _damage(frame, "CRC error: 0x{:04X}, computed 0x{:04X}", rtu_check(frame))
     return _peek(RTU_NAME, frame.octets, frame, error, frame.expected)
 
 
 def peek_ascii(frame: Frame) -> Header:
-    """The header of an ASCII frame. Total; of a damaged frame, what its first characters say."""
+    """The header of an ASCII frame. Total; of a damaged frame, what its first characters say, or those of its repair."""
+    if frame.repair is not None:
+        return _repaired(peek_ascii(readable(frame)), frame.repair)
     octets = ascii_octets(frame)
     error = None if frame.ok else _damage(frame, "LRC error: 0x{:02X}, computed 0x{:02X}", ascii_check(frame))
     if frame.check is not Check.ABSENT:
@@ -60,6 +69,11 @@ def kind_of(code: int, mei: int | None = None) -> str:
     return function.name
 
 
+def _repaired(header: Header, repair: Repair) -> Header:
+    """What the frame says, and that it is damaged all the same."""
+    return replace(header, ok=False, error=repair.flaw.value)
+
+
 def _peek(protocol: str, octets: bytes, frame: Frame, error: str | None, expected: int | None) -> Header:
     """`octets` as an RTU frame has them: unit, PDU, two of check where there is one."""
     size = len(octets)
@@ -69,6 +83,10 @@ def _peek(protocol: str, octets: bytes, frame: Frame, error: str | None, expecte
         return Header(protocol, None, unit, Role.UNKNOWN, "unknown", ok=ok, error=error or "too short for a frame")
     unit, code = octets[0], octets[1]
     if code & EXCEPTION_BIT:
+        if code in NO_EXCEPTIONS:
+            kind, code = kind_of(code), code & ~EXCEPTION_BIT
+            error = error or "no exception to any function"
+            return Header(protocol, unit, None, Role.RESPONSE, kind, code, None, None, ok, error)
         code ^= EXCEPTION_BIT
         if ok:
             fits = size == EXCEPTION_LENGTH
@@ -84,12 +102,36 @@ def _peek(protocol: str, octets: bytes, frame: Frame, error: str | None, expecte
             error = f"{size} octets fit neither request nor response"
         elif ok and expected not in (None, size):
             error = f"{size} octets where its own count makes it {expected}"
-    if unit == BROADCAST and role in (Role.REQUEST, Role.EITHER):
+        elif ok and role is Role.REQUEST:
+            error = request_fault(octets)
+    if unit == BROADCAST and (role is Role.EITHER or (role is Role.REQUEST and _is_for_all(function))):
         role = Role.BROADCAST
     address, count = _address_count(code, role, octets, size if frame.check is Check.ABSENT else size - 2)
     if role is Role.RESPONSE:
         return Header(protocol, unit, None, role, kind, code, address, count, ok, error)
     return Header(protocol, None, unit, role, kind, code, address, count, ok, error)
+
+
+def request_fault(octets: bytes) -> str | None:
+    """What a request says that contradicts itself: its byte count against its quantity; None where nothing does.
+
+    Of functions 15, 16 and 23 (Modbus Application Protocol V1.1b3, 6.11, 6.12, 6.17); unit first. Total.
+    """
+    code = octets[1] if len(octets) > 1 else 0
+    at = {0x0F: 4, 0x10: 4, 0x17: 8}.get(code)
+    if at is None or len(octets) < at + 3:
+        return None
+    quantity, there = octets[at] << 8 | octets[at + 1], octets[at + 2]
+    needed = (quantity + 7) // 8 if code == 0x0F else 2 * quantity
+    thing = "coil" if code == 0x0F else "register"
+    if there == needed:
+        return None
+    return f"byte count {there} for {quantity} {thing}{'' if quantity == 1 else 's'}, which take {needed}"
+
+
+def _is_for_all(function: Function | None) -> bool:
+    """Whether a request to address 0 may be a broadcast: what reads asks for an answer, and all would give it."""
+    return function is None or function.writes or function.code == 0x08
 
 
 def _role(function: Function, octets: bytes, size: int, expected: int | None) -> Role:

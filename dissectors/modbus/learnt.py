@@ -13,21 +13,24 @@ from dissectors.line import Timing
 
 _SAMPLES = 16
 _MARGIN = 2_000_000  # of a host clock: no limit is finer than 2 ms
-UNLEARNT_LIMIT = 250_000_000
-"""A copy of a request within 250 ms is its answer while nothing is learnt: few masters give up earlier."""
+UNLEARNT_LIMIT = 100_000_000
+"""A copy of a request within 100 ms is its answer while nothing is learnt: hardly a master gives up so soon. Later
+than that it may be the answer of a slow station as well as the request again."""
 
 
 class Learnt:
     """Response times by unit, the master's timeout, its pauses between an answer and the next request."""
 
-    __slots__ = ("_pauses", "_reads", "_timeout", "_tolerance", "_unanswered", "_writes")
+    __slots__ = ("_cycles", "_margin", "_pauses", "_reads", "_timeout", "_tolerance", "_unanswered", "_writes")
 
     def __init__(self, timing: Timing) -> None:
+        self._margin = _MARGIN + timing.latency
         self._tolerance = _MARGIN + timing.latency + 4 * timing.char
         self._reads: dict[int, deque[int]] = {}
         self._writes: dict[int, deque[int]] = {}
         self._unanswered: deque[int] = deque(maxlen=_SAMPLES)
         self._pauses: deque[int] = deque(maxlen=2 * _SAMPLES)
+        self._cycles: deque[int] = deque(maxlen=2 * _SAMPLES)
         self._timeout: int | None = None
 
     def answered(self, unit: int, write: bool, latency: int) -> None:
@@ -48,9 +51,32 @@ class Learnt:
         self._unanswered.append(elapsed)
         self._timeout = self._agreed()
 
-    def paused(self, gap: int) -> None:
-        """The master sent a sure request `gap` after the answer before it."""
+    def paused(self, gap: int, cycle: int) -> None:
+        """The master sent a sure request `gap` after the answer before it, `cycle` after the request before it."""
         self._pauses.append(gap)
+        self._cycles.append(cycle)
+
+    def pauses_after_answers(self, gap: int, pause: int, cycle: int) -> bool:
+        """Whether a master leaves `pause` after an answer, and would leave more if it had waited `gap` in vain.
+
+        False while too little is known, and of a master that sends by the clock (`cycle` from request to request).
+        """
+        if self._sends_by_the_clock(cycle):
+            return False
+        return self._is_pause(pause) and pause + self._margin < gap + min(self._pauses) * 9 // 10
+
+    def pauses_after_timeouts(self, gap: int, pause: int, cycle: int) -> bool:
+        """Whether `pause` is what a master leaves that waited `gap` in vain once more, and no pause after an answer."""
+        if len(self._pauses) < 4 or self._sends_by_the_clock(cycle):
+            return False
+        return not self._is_pause(pause) and pause >= gap and self._is_pause(pause - gap)
+
+    def _sends_by_the_clock(self, cycle: int) -> bool:
+        return len(self._pauses) < 2 or any(self.is_same(cycle, one) for one in self._cycles)
+
+    def _is_pause(self, pause: int) -> bool:
+        least, most = min(self._pauses), max(self._pauses)
+        return least - least // 10 <= pause + self._margin and pause <= most + most // 10 + self._margin
 
     @property
     def timeout(self) -> int | None:
@@ -60,6 +86,29 @@ class Learnt:
         never shorter.
         """
         return self._timeout
+
+    @property
+    def tolerance(self) -> int:
+        """ns by which two readings of one and the same time may differ."""
+        return self._tolerance
+
+    @property
+    def margin(self) -> int:
+        """ns that adapter and computer may add to a time, or take off."""
+        return self._margin
+
+    def knows(self, unit: int) -> bool:
+        """Whether the unit has answered anything whose direction is sure."""
+        return bool(self._reads.get(unit) or self._writes.get(unit))
+
+    def is_timeout(self, gap: int) -> bool:
+        """Whether that long is how long the master waits before it repeats."""
+        timeout = self._timeout
+        return timeout is not None and self.is_same(gap, timeout)
+
+    def is_same(self, one: int, other: int) -> bool:
+        """Whether two durations are one and the same of the master's, as far as can be told: within 10 %."""
+        return abs(one - other) <= max(one, other) // 10 + self._tolerance
 
     def fastest(self, unit: int) -> int | None:
         """Shortest response time of a unit, of any unit where it has none; None while unlearnt."""
@@ -90,8 +139,10 @@ class Learnt:
     def in_time(self, unit: int, write: bool, gap: int) -> bool:
         """Whether a frame `gap` after a request may be its answer; where nothing is learnt, a fixed limit decides."""
         limit = self.response_limit(unit, write)
-        if limit is None:
-            limit = UNLEARNT_LIMIT if self._timeout is None else self._patience(unit)
+        if limit is None and self._timeout is not None:
+            limit = self._patience(unit)
+        if limit is None:  # a write takes no less than a read
+            limit = max(UNLEARNT_LIMIT, self.response_limit(unit, not write) or 0)
         return gap <= limit
 
     def too_soon(self, silence: int) -> int:

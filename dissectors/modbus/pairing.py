@@ -22,6 +22,12 @@ def mismatch(request: bytes, response: bytes) -> str | None:
     return rule(request, response) if rule else None
 
 
+def another_function(request: bytes, response: bytes) -> str:
+    """In words: the station that was asked answered with another function code."""
+    asked, answered = request[1], response[1]
+    return f"function 0x{answered:02X} instead of 0x{asked:02X} or 0x{asked | EXCEPTION_BIT:02X}"
+
+
 def is_listen_only(request: bytes) -> bool:
     """Whether it is Diagnostics 0004, Force Listen Only Mode, that a server does not answer (clause 6.8.1)."""
     return request[1:4] == b"\x08\x00\x04"

@@ -8,9 +8,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from dissectors.frame import Frame, Header, Role
-from dissectors.modbus.adu import adu
+from dissectors.modbus.adu import readable_adu
 from dissectors.modbus.functions import DEVICE_ID_CODES, DEVICE_ID_OBJECTS, DIAGNOSTICS, EXCEPTION_BIT, FUNCTIONS
-from dissectors.modbus.header import exception_name, kind_of
+from dissectors.modbus.header import NO_EXCEPTIONS, exception_name, kind_of
 
 _MOST_REGISTERS = 10
 _MOST_BITS = 32
@@ -20,7 +20,7 @@ _ARROWS = {Role.RESPONSE: "→", Role.REQUEST: "←", Role.BROADCAST: "←"}
 
 def text(frame: Frame, header: Header, role: Role) -> str:
     """One line about a frame, free of control characters and braces; role as the tracker gave it. Total."""
-    octets = adu(frame)
+    octets = readable_adu(frame)
     damage = f" [{header.error}]" if not header.ok and header.error else ""
     if len(octets) < 2:
         return f"{_hex(octets) or 'nothing'}{damage}"
@@ -31,7 +31,9 @@ def text(frame: Frame, header: Header, role: Role) -> str:
     words = _words(octets, code, role)
     if role is Role.BROADCAST:
         words = f"broadcast: {words}"
-    if header.ok and header.error and not code & EXCEPTION_BIT:
+    if frame.repair is not None and header.error:
+        damage = f" [repaired: {header.error}]"
+    if header.ok and header.error and (not code & EXCEPTION_BIT or code in NO_EXCEPTIONS):
         words += f" [{header.error}]"
     return f"{unit} {arrow} {words}{damage}"
 
@@ -42,6 +44,8 @@ def printable(octets: bytes) -> str:
 
 
 def _words(octets: bytes, code: int, role: Role) -> str:
+    if code in NO_EXCEPTIONS:
+        return _with(f"function 0x{code:02X}", _hex(octets[2:]))
     if code & EXCEPTION_BIT:
         asked = FUNCTIONS.get(code ^ EXCEPTION_BIT)
         name = exception_name(octets[2]) if len(octets) > 2 else "without code"

@@ -6,6 +6,8 @@ Direction is not in the octets of writes and diagnostics, whose good answer repe
 2. A copy of the open request is an echo when it comes sooner than a station can answer, an answer when it comes within
    the station's response time, and a repeat of the request after that.
 3. A request closes the open one: unanswered, or answered by something damaged.
+   Where no time is learnt, a copy that comes late is both at first (Role.EITHER), in one transaction with the request,
+   until more is known (doubts.py).
 4. An answer that does not fit belongs to an earlier request (late), to nobody (unsolicited), or is a second one.
 5. A frame missed by the tap therefore costs its own transaction and no other.
 
@@ -20,11 +22,12 @@ from collections import deque
 
 from dissectors.frame import Event, Header, Noise, Reason, Role
 from dissectors.line import NS_PER_S, Timing
-from dissectors.modbus.adu import adu
-from dissectors.modbus.exchange import Exchange, Garble, Seen, answer_apart, echo_of
-from dissectors.modbus.functions import BROADCAST
+from dissectors.modbus.adu import readable_adu
+from dissectors.modbus.doubts import Doubts, is_full, of_chain, of_next, of_run
+from dissectors.modbus.exchange import Exchange, Garble, Seen, answer_apart, echo_of, is_begin_of
+from dissectors.modbus.functions import BROADCAST, FUNCTIONS
 from dissectors.modbus.learnt import Learnt
-from dissectors.modbus.pairing import is_listen_only, is_restart, mismatch
+from dissectors.modbus.pairing import another_function, is_listen_only, is_restart, mismatch
 from dissectors.tracker import Placement, Tracked, Transaction, Verdict
 
 GIVE_UP = 5 * NS_PER_S
@@ -33,6 +36,14 @@ GIVE_UP = 5 * NS_PER_S
 _IMPATIENT = "the master went on long before its timeout: the answer may have been missed at this tap"
 _PERHAPS_ANSWER = "the master went on long before its timeout: perhaps an answer whose request was missed at this tap"
 _REQUEST_OCTETS = 8  # of the commonest request, RTU
+_FIRST_SEEN = "the first frame of the capture: perhaps an answer whose request came before"
+_AT_ONCE = 50_000_000
+"""ns; no master repeats a request sooner, unless its timeout is known to be that short."""
+
+_TURNAROUND = 90_000_000
+"""Nobody speaks so soon after a broadcast: the master waits 100 … 200 ms (Modbus over Serial Line V1.02, 2.4.1)."""
+
+_CHAIN_MOST = 8  # equal requests in a row whose verdicts wait for each other
 _GARBLE = 3  # so many octets of noise in place of an answer are a damaged answer
 _QUIET_NOISE = frozenset((Reason.ZEROS, Reason.BREAK, Reason.PAD))
 
@@ -58,6 +69,9 @@ class ModbusTracker:
         self._given_up: deque[Exchange] = deque(maxlen=8)
         self._echoing: bool | None = None  # whether this bus repeats requests at once; None while unlearnt
         self._mute: set[int] = set()  # units in listen-only mode
+        self._only: bytes | None = None  # what all frames so far say; empty when they differ
+        self._doubts = Doubts(self.learnt)
+        self._chain: list[Exchange] = []  # equal requests before the open one, whose verdicts wait for it
 
     @property
     def timeout(self) -> int | None:
@@ -72,7 +86,9 @@ class ModbusTracker:
         if isinstance(event, Noise) or header is None:
             self._noise(event)
             return Tracked(None, self._take_closed())
-        seen = Seen(no, event, header, adu(event))
+        seen = Seen(no, event, header, readable_adu(event))
+        if self._only is None or self._only != seen.octets:
+            self._only = b"" if self._last_end is not None else seen.octets
         if not header.ok or len(seen.octets) < 2:
             placement = self._damaged(seen)
         elif header.role is Role.RESPONSE:
@@ -83,19 +99,24 @@ class ModbusTracker:
             placement = self._either(seen)
         self._last_end = event.end
         self._last_was_answer = placement.role is Role.RESPONSE
+        self._decide_doubts(event.end)
         return Tracked(placement, self._take_closed())
 
     def advance(self, now: int) -> tuple[Transaction, ...]:
         """Close the open request when the master has long given up at `now` (ns)."""
         # an answer that began in time may still be under way through the adapter
         self._expire(now - self._timing.latency - self._echo_limit)
+        self._decide_doubts(now)
         return self._take_closed()
 
     def close(self) -> tuple[Transaction, ...]:
         """End of capture."""
+        if self._open is not None and self._open.copies:
+            self._finish_copies(self._open, None)
         if self._open is not None:
             unfinished = not (self._open.fault or self._open.garble or self._open.silent)
             self._close_open(Verdict.OPEN if unfinished else None)
+        self._decide_doubts(None)
         return self._take_closed()
 
     # ---- what the shape decides
@@ -105,7 +126,10 @@ class ModbusTracker:
         if sure and self._is_echo_of_request(seen):
             self._echoing = True
             return self._echo(seen)
+        if self._open is not None and self._open.copies:
+            self._finish_copies(self._open, seen)
         before = self._open
+        copied = None if self._last is None else self._last.copied
         self._learn_from_next(seen, sure)
         request = Exchange(self._take_tx(), seen, sure, fault=fault)
         request.silent = is_listen_only(seen.octets) or (request.unit in self._mute and is_restart(seen.octets))
@@ -113,16 +137,35 @@ class ModbusTracker:
             if before.octets == seen.octets and not (before.fault or before.silent):
                 request.attempt, request.of = before.attempt + 1, before.of or before.tx
             waited = before.gap(seen.frame.start)
-            if before.remark is None and self.timeout is not None and waited < self.timeout // 2:
+            hasty = self.timeout is not None and waited < self.timeout // 2
+            if before.remark is None and hasty:
                 before.remark = _IMPATIENT if before.sure else _PERHAPS_ANSWER
-            self._close_open()
+            if request.attempt > 1 and self._may_be_answered_by(before, seen):
+                self._open, self._last = None, before
+                self._chain.append(before)
+            else:
+                before.may_be_answer |= hasty and not (before.sure or before.attempt > 1 or before.echoed)
+                self._close_open()
+        elif self._last is not None and not sure and not fault:
+            self._note_likeness(request, self._last, copied)
+        if not sure and not fault and self._last is None:
+            request.remark = _FIRST_SEEN
         self._note_mode(request)
-        if request.unit == BROADCAST and not fault:
+        if request.unit == BROADCAST and not fault and not request.asks_nobody:
             self._last = request
             self._closed.append(request.close(Verdict.BROADCAST))
             return Placement(seen.no, request.tx, Role.BROADCAST, destination=BROADCAST)
         self._open = request
         return Placement(seen.no, request.tx, Role.REQUEST, destination=seen.unit)
+
+    def _note_likeness(self, request: Exchange, last: Exchange, copied: int | None) -> None:
+        """Whether what looks like a request may be the answer to the broadcast before it, or to what an echo seemed to
+        answer after `copied` ns."""
+        gap = last.gap(request.request.frame.start)
+        if last.unit == BROADCAST and last.octets[1:] == request.octets[1:]:
+            request.after_broadcast = gap < _TURNAROUND
+        elif last.octets == request.octets and copied is not None:
+            request.may_be_answer = copied <= self._echo_limit + self._timing.latency
 
     def _response(self, seen: Seen) -> Placement:
         """An answer: to the open request, a late, a second or an unsolicited one."""
@@ -133,6 +176,8 @@ class ModbusTracker:
                 why = mismatch(request.octets, seen.octets)
                 if late is None or not (why or self._is_too_soon(request, seen)):
                     return self._answer(request, seen, why)
+            elif request.unit == seen.unit and late is None and not request.fault:
+                return self._answer(request, seen, another_function(request.octets, seen.octets))
             elif request.fault and self._in_time(request, seen):
                 return self._answer(request, seen, None)
             elif late is None:
@@ -152,6 +197,8 @@ class ModbusTracker:
         request = self._open
         if request is None:
             return self._either_unasked(seen)
+        if request.copies:
+            return self._after_copy(request, seen)
         if request.is_for(seen.octets):
             if request.octets == seen.octets and self._is_echo_of_write(request, seen):
                 return self._echo(seen)
@@ -162,9 +209,35 @@ class ModbusTracker:
             near = self._knows(request) and request.octets[:4] == seen.octets[:4]
             if (why is None or near or seen.header.role is Role.UNKNOWN) and self._in_time(request, seen):
                 return self._answer(request, seen, why)
+            if self._is_doubtful(request, seen):
+                return self._join(request, seen)
         elif request.octets[1:] == seen.octets[1:] and self._knows(request) and self._in_time(request, seen):
             return self._from_elsewhere(request, seen)
         return self._request(seen, sure=False)
+
+    def _after_copy(self, request: Exchange, seen: Seen) -> Placement:
+        """A frame that could be anything, after one that is the answer to the open request or a request again."""
+        newest = request.copies[-1]
+        if newest.octets != seen.octets:
+            return self._request(seen, sure=False)
+        pause = max(0, seen.frame.start - request.last_end)
+        gap = request.gap(request.copies[0].frame.start)
+        if pause < self._echo_limit:  # whichever it was, this repeats it at once
+            if self._echoing:
+                return self._echo(seen)
+            return self._answer_apart(seen, Verdict.ANSWERED_TWICE, request)
+        if newest.octets != request.octets:  # the newest was a request, and this answers it
+            return self._request(seen, sure=False)
+        if self.learnt.in_time(request.unit, request.writes, pause) and not self.learnt.is_same(gap, pause):
+            return self._answer(request, seen, None)
+        if self.learnt.is_same(gap, pause) and not is_full(request):
+            return self._join(request, seen)
+        return self._request(seen, sure=False)
+
+    def _join(self, request: Exchange, seen: Seen) -> Placement:
+        """Leave open what the frame is: it belongs to the request in any case."""
+        request.copies.append(seen)
+        return Placement(seen.no, request.tx, Role.EITHER)
 
     def _either_unasked(self, seen: Seen) -> Placement:
         """No request is open: a new one, unless it comes too soon for that."""
@@ -179,6 +252,8 @@ class ModbusTracker:
     def _damaged(self, seen: Seen) -> Placement:
         """A damaged frame: in answer to the open request, a damaged request, or neither."""
         request, role = self._open, seen.header.role
+        if request is not None and self._is_cut_echo(request, seen.frame.octets, seen.frame.start):
+            return self._echo(seen, f"the echo ends after {len(seen.frame.octets)} octets")
         error = seen.header.error or "damaged"
         if request is None:
             if role is Role.RESPONSE:
@@ -194,6 +269,9 @@ class ModbusTracker:
         if request is None or not isinstance(noise, Noise):
             return
         request.disturbed = True
+        if self._is_cut_echo(request, noise.octets, noise.start):
+            request.echoed = True
+            return
         if request.garble or noise.reason in _QUIET_NOISE or len(noise.octets) < _GARBLE:
             return
         if self.learnt.in_time(request.unit, request.writes, request.gap(noise.start)):
@@ -207,6 +285,32 @@ class ModbusTracker:
     def _knows(self, request: Exchange) -> bool:
         return self.learnt.response_limit(request.unit, request.writes) is not None
 
+    def _is_doubtful(self, request: Exchange, seen: Seen) -> bool:
+        """Whether a frame that comes late, for all that is learnt, may be the answer of a slow station."""
+        if self._knows(request) or self.timeout is not None or request.garble or request.fault or request.silent:
+            return False
+        if request.unit == BROADCAST:
+            return False
+        return request.octets == seen.octets or seen.header.function not in FUNCTIONS
+
+    def _may_be_answered_by(self, before: Exchange, seen: Seen) -> bool:
+        """Whether an equal request that comes later than answers are known to come may be a slow answer all the same."""
+        if before.sure or not self._is_plain(before) or before.echoed:
+            return False
+        gap = before.gap(seen.frame.start)
+        return len(self._chain) < _CHAIN_MOST and (self.timeout is None or gap < self.timeout * 9 // 10)
+
+    def _is_plain(self, request: Exchange) -> bool:
+        """Whether nothing at all came to a request that should have been answered."""
+        return not (request.fault or request.silent or request.garble)
+
+    def _is_cut_echo(self, request: Exchange, octets: bytes, start: int) -> bool:
+        """Whether octets are the begin of the request, given back at once and cut short."""
+        if not is_begin_of(octets, request.request.frame.octets):
+            return False
+        gap = request.gap(start)
+        return gap < self._echo_limit or (gap < _AT_ONCE and request.sure)
+
     def _is_too_soon(self, request: Exchange, seen: Seen) -> bool:
         """Whether it began before the station can have seen the end of this repeat: it answers an earlier attempt."""
         soonest = request.latency(seen.frame).high
@@ -218,7 +322,9 @@ class ModbusTracker:
         if newest is None or newest.octets != seen.octets or newest.answered or newest.fault:
             return False
         gap = newest.gap(seen.frame.start)
-        return gap < self._echo_limit or (self.timeout is not None and gap * 8 < self.timeout)
+        if self.timeout is not None:
+            return gap < self._echo_limit or gap * 8 < self.timeout
+        return gap < max(self._echo_limit, _AT_ONCE)
 
     def _is_echo_of_write(self, request: Exchange, seen: Seen) -> bool:
         """Whether a copy that could be an answer comes too soon to be one."""
@@ -270,8 +376,10 @@ class ModbusTracker:
             if last.copied is not None and last.octets != seen.octets:
                 self.learnt.answered(last.unit, last.writes, last.copied)
             last.copied = None
-            if sure and last.answered and self._last_was_answer and self._last_end is not None:
-                self.learnt.paused(max(0, seen.frame.start - self._last_end))
+            asks = sure or seen.unit != last.unit
+            if asks and last.answered and self._last_was_answer and self._last_end is not None:
+                cycle = seen.frame.start - last.request.frame.start
+                self.learnt.paused(max(0, seen.frame.start - self._last_end), cycle)
 
     def _learn_from_answer(self, request: Exchange, seen: Seen, why: str | None) -> None:
         gap = request.gap(seen.frame.start)
@@ -298,6 +406,7 @@ class ModbusTracker:
     def _answer(self, request: Exchange, seen: Seen, why: str | None) -> Placement:
         self._learn_from_answer(request, seen, why)
         request.answered = True
+        self._drop_chain(Verdict.NO_RESPONSE)
         self._open, self._last = None, request
         self._mute.discard(seen.octets[0])
         self._closed.append(request.close_with(seen, why))
@@ -319,18 +428,23 @@ class ModbusTracker:
         self._closed.append(answer_apart(tx, seen, verdict, other, error))
         return Placement(seen.no, tx, Role.RESPONSE, source=seen.unit)
 
-    def _echo(self, seen: Seen) -> Placement:
+    def _echo(self, seen: Seen, error: str | None = None) -> Placement:
         original = self._open or self._last
         assert original is not None  # an echo is of something
         original.echoed = True
         tx = self._take_tx()
-        self._closed.append(echo_of(tx, seen, original))
+        self._closed.append(echo_of(tx, seen, original, error))
         role = Role.BROADCAST if original.unit == BROADCAST else Role.REQUEST
         return Placement(seen.no, tx, role, destination=original.unit)
 
     def _expire(self, now: int) -> None:
         limit = GIVE_UP if self.timeout is None else self.timeout * 3 // 2
-        if self._open is not None and now >= self._open.end + limit:
+        request = self._open
+        if request is None or now < request.last_end + limit:
+            return
+        if request.copies:
+            self._finish_copies(request, None)
+        else:
             self._close_open()
 
     def _close_open(self, verdict: Verdict | None = None) -> None:
@@ -346,10 +460,59 @@ class ModbusTracker:
                 verdict = Verdict.DATA
             elif request.garble:
                 verdict = Verdict.DAMAGED_ANSWER
+            elif request.after_broadcast:
+                error = f"unit {request.unit} answered a broadcast"
+                self._closed.append(answer_apart(request.tx, request.request, Verdict.UNSOLICITED, None, error))
+                return
+            elif request.may_be_answer or (request.echoed and not request.sure and not self._echoing):
+                verdict = Verdict.UNDECIDED
+            elif request.remark is _FIRST_SEEN and request.tx == 1:
+                verdict = Verdict.OPEN
             else:
-                verdict = Verdict.NO_RESPONSE
-                self._given_up.append(request)
+                verdict = of_chain([*self._chain, request], self.learnt) if self._chain else Verdict.NO_RESPONSE
+        self._drop_chain(Verdict.UNDECIDED if verdict is Verdict.UNDECIDED else Verdict.NO_RESPONSE)
+        if verdict is Verdict.NO_RESPONSE:
+            self._given_up.append(request)
         self._closed.append(request.close(verdict))
+
+    def _drop_chain(self, verdict: Verdict) -> None:
+        """Close the requests that waited for the open one, in the order they came."""
+        for request in self._chain:
+            if verdict is Verdict.NO_RESPONSE:
+                self._given_up.append(request)
+            self._closed.append(request.close(verdict))
+        self._chain.clear()
+
+    def _finish_copies(self, request: Exchange, following: Seen | None) -> None:
+        """Close a request with frames that are its answer or its repeats, or leave it to what will be learnt."""
+        self._open, self._last = None, request
+        verdict = None
+        if following is not None:
+            resembles = following.octets[:2] == request.octets[:2] and len(following.octets) == len(request.octets)
+            verdict = of_next(request, following.frame.start, resembles, self.learnt)
+        elif len(request.copies) > 1:
+            verdict = of_run(request)
+        if verdict is Verdict.ANSWERED and self._only == request.octets:
+            verdict = Verdict.UNDECIDED  # where nothing else is said, an answer may have been the first frame
+        if verdict is None:
+            self._doubts.add(request)
+        else:
+            self._close_doubt(request, verdict)
+
+    def _close_doubt(self, request: Exchange, verdict: Verdict) -> None:
+        if verdict is Verdict.ANSWERED:
+            answer = request.copies[0]
+            request.answered = True
+            self.learnt.answered(request.unit, request.writes, request.gap(answer.frame.start))
+            self._closed.append(request.close_with(answer, None))
+            return
+        if verdict is Verdict.NO_RESPONSE:
+            self._given_up.append(request)
+        self._closed.append(request.close(verdict))
+
+    def _decide_doubts(self, now: int | None) -> None:
+        for request, verdict in self._doubts.decide(now):
+            self._close_doubt(request, verdict)
 
     def _take_closed(self) -> tuple[Transaction, ...]:
         closed, self._closed = tuple(self._closed), []

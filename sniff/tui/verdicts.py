@@ -10,6 +10,7 @@ SHORT: dict[Verdict, str] = {
     Verdict.ANSWERED_TWICE: "twice",
     Verdict.DAMAGED_ANSWER: "bad answ.",
     Verdict.DAMAGED_REQUEST: "bad requ.",
+    Verdict.UNDECIDED: "undecided",
 }
 """At most 9 characters; the other verdicts fit as they are."""
 
@@ -27,6 +28,7 @@ STYLE: dict[Verdict, str] = {
     Verdict.DAMAGED_REQUEST: "bad",
     Verdict.BROADCAST: "dim",
     Verdict.DATA: "dim",
+    Verdict.UNDECIDED: "dim",
 }
 """Component style of the lists."""
 
