@@ -79,10 +79,13 @@ class Flaw(Enum):
 
     FIRST_MISSING = "first octet missing"
     FIRST_SPOILT = "first octet spoilt"
+    FIRST_TWO_MISSING = "first two octets missing"
     LAST_MISSING = "last octet missing"
     LAST_TWO_MISSING = "last two octets missing"
     LAST_SPOILT = "last octet spoilt"
     CHECK_SWAPPED = "check octets swapped"
+    ONE_SPOILT = "one octet spoilt"
+    ONE_MISSING = "one octet missing"
 
 
 @dataclass(frozen=True, slots=True)

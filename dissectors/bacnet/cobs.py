@@ -68,7 +68,12 @@ def decode_body(body: bytes) -> bytes | None:
     return unstuff(body[:-CRC_SIZE]) if len(body) >= CRC_SIZE else None
 
 
+def stuffed_crc(encoded: bytes) -> bytes:
+    """The five octets of CRC-32K that follow these encoded data."""
+    return stuff(struct.pack("<I", crc32k(encoded)))
+
+
 def encode_body(data: bytes) -> bytes:
     """The octets after the header; the length field is two less than their number."""
     encoded = stuff(data)
-    return encoded + stuff(struct.pack("<I", crc32k(encoded)))
+    return encoded + stuffed_crc(encoded)

@@ -7,9 +7,13 @@ from typing import NamedTuple
 
 from dissectors.bacnet import message as messages
 from dissectors.bacnet.apdu import PduType
+from dissectors.bacnet.frame_types import FrameType
 from dissectors.bacnet.message import Message
 from dissectors.frame import Frame
 from dissectors.tracker import Interval, Transaction, Verdict
+
+
+_TOKEN, _POLL, _TEST = (bytes((kind,)) for kind in (FrameType.TOKEN, FrameType.POLL_FOR_MASTER, FrameType.TEST_REQUEST))
 
 
 class Party(NamedTuple):
@@ -45,9 +49,20 @@ class Exchange:
     attempt: int = 1
     of: int | None = None
     postponed: bool = False
+    damaged: bool = False  # the request came damaged; its header is whole
     response: int | None = None  # its first frame, while more segments follow
     latency: Interval | None = None
     last: int = 0  # end of the newest frame that belongs to it
+
+    @property
+    def is_token(self) -> bool:
+        """Whether it only passes the token."""
+        return self.octets[2:3] == _TOKEN and not self.damaged
+
+    @property
+    def may_be_silent(self) -> bool:
+        """Whether no answer is no fault: the polled or tested address is free."""
+        return self.octets[2:3] == _POLL or (self.octets[2:3] == _TEST and self.source == self.destination)
 
     def interval(self, answer: Frame) -> Interval:
         """From the end of the request to the begin of the answer, with what the adapter allows."""

@@ -11,15 +11,17 @@ The rules:
 4. A preamble with a bad header is kept as a damaged frame, up to the next good header or the length it claims, when
    that many octets make sense: a node would have to drop it, we can often still say who sent it. Of a doubled
    preamble the second one counts.
-5. One FF directly after a good frame belongs to it (the tail octet that some drivers send): flag "trailing-pad".
-6. All else is noise, cut at silence of 60 bit times and at NOISE_MAX octets.
+5. A good header whose preamble lacks an octet or has a wrong one, directly after a frame or after silence, begins a
+   damaged frame where no data are announced or the data CRC is good.
+6. One FF directly after a good frame belongs to it (the tail octet that some drivers send): flag "trailing-pad".
+7. All else is noise, cut at silence of 60 bit times and at NOISE_MAX octets.
 """
 
 from __future__ import annotations
 
 import struct
+from typing import NamedTuple
 
-from dissectors.bacnet import cobs
 from dissectors.bacnet.frame_types import HEADER, PREAMBLE, is_encoded, total
 from dissectors.bacnet.limits import (
     FRAME_ABORT_BITS,
@@ -29,10 +31,13 @@ from dissectors.bacnet.limits import (
     T_FRAME_ABORT_MAX,
     T_NO_TOKEN,
 )
-from dissectors.checksums import crc8_mstp, crc16_x25
-from dissectors.frame import Check, Chunk, Damage, Event, Found, Frame, LineError, Noise, Place, Reason
-from dissectors.framer import OctetWindow, Taken
+from dissectors.bacnet.mending import after_spoilt_preamble, body_is_good, header_is_good, mended
+from dissectors.checksums import crc8_mstp
+from dissectors.frame import Check, Chunk, Damage, Event, Found, Frame, LineError, Noise, Place, Reason, Repair
+from dissectors.framer import UNKNOWN_SILENCE, OctetWindow, Taken
 from dissectors.line import Timing
+
+__all__ = ["NOISE_MAX", "MstpFramer", "body_is_good", "header_is_good", "parse_header"]
 
 NOISE_MAX = 1024
 """Most octets in one Noise event."""
@@ -42,20 +47,11 @@ _NAMED = 5  # preamble, type, destination, source: from here on a fragment says 
 _WAIT = -1
 
 
-def header_is_good(header: bytes | bytearray) -> bool:
-    """Whether eight octets are a preamble and a header with a good CRC."""
-    return len(header) >= HEADER and header[:2] == PREAMBLE and crc8_mstp(bytes(header[2:7])) == header[7]
+class _Mended(NamedTuple):
+    """A frame whose preamble is not as it should be: how many octets, and what it was."""
 
-
-def body_is_good(frame_type: int, length: int, body: bytes) -> bool:
-    """Whether the octets after the header (data and CRC) fit the length and the CRC of the frame type."""
-    if not length:
-        return not body
-    if len(body) != length + 2:
-        return False
-    if is_encoded(frame_type):
-        return cobs.crc_is_good(body)
-    return crc16_x25(body[:-2]) == body[-2] | body[-1] << 8
+    size: int
+    repair: Repair
 
 
 class MstpFramer:
@@ -129,6 +125,15 @@ class MstpFramer:
             if size and len(octets) == size and not final and quiet < self._pause:
                 self._needs_pause = self._pause
                 return None
+            if not size and octets[:2] != PREAMBLE[: len(octets)]:
+                mended_frame = self._spoilt_preamble(quiet, final)
+                if mended_frame == _WAIT:
+                    self._needs_pause = self._pause
+                    return None
+                if isinstance(mended_frame, _Mended):
+                    return self._take_frame(
+                        mended_frame.size, Check.BAD, Damage.HEADER, self._found(0), mended_frame.repair
+                    )
         while True:
             at = self._noise
             if at:
@@ -162,6 +167,31 @@ class MstpFramer:
             return 0
         self._plain = size
         return size
+
+    def _spoilt_preamble(self, quiet: int, final: bool) -> _Mended | int | None:
+        """Rule 5 at the front of the window, where a frame may begin: the frame, _WAIT, or None where there is none."""
+        octets = self._window.octets
+        if self._skipped and not self._window.silence(0)[0] >= self._pause:
+            return None  # in the middle of noise
+        if self._window.gap(0) == UNKNOWN_SILENCE:
+            return None  # the capture may have begun in the middle of a frame
+        stop = self._silence_in(1, len(octets), self._pause)
+        ended = stop is not None or final or quiet >= self._pause
+        stop = len(octets) if stop is None else stop
+        spoilt = after_spoilt_preamble(octets[: min(HEADER, stop)])
+        if spoilt is None:
+            return None if ended or stop >= HEADER or PREAMBLE in octets else _WAIT
+        at, length, flaw = spoilt
+        begin = at + HEADER - 2
+        size = begin + (length + 2 if length else 0)
+        if length and self._good_header(1, min(size, stop), stop) is not None:
+            return None
+        if size > stop:
+            return None if ended else _WAIT
+        whole = PREAMBLE + bytes(octets[at:size])
+        if not body_is_good(whole[2], length, whole[HEADER:]):
+            return None
+        return _Mended(size, Repair(flaw, whole))
 
     def _frame_at(self, at: int, quiet: int, final: bool) -> int | tuple[int, Check, Damage | None, Found]:
         """The frame at a 55: (octets, check, damage, found), or how many octets here are noise, or _WAIT."""
@@ -315,7 +345,9 @@ class MstpFramer:
 
     # Giving out
 
-    def _take_frame(self, size: int, check: Check, damage: Damage | None, found: Found) -> Frame:
+    def _take_frame(
+        self, size: int, check: Check, damage: Damage | None, found: Found, repair: Repair | None = None
+    ) -> Frame:
         octets = self._window.octets
         expected = None
         if size >= HEADER and (damage is not Damage.HEADER):
@@ -327,6 +359,8 @@ class MstpFramer:
         skipped, self._skipped = self._skipped, 0
         self._plain = 0
         self._after_frame = True
+        if repair is None and check is not Check.GOOD:
+            repair = mended(taken.octets, damage)
         return Frame(
             "mstp",
             taken.octets,
@@ -340,6 +374,7 @@ class MstpFramer:
             taken.slack,
             taken.marks,
             flags,
+            repair,
         )
 
     def _take_plain(self, size: int) -> Frame:

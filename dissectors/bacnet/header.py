@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 
 from dissectors.bacnet import names
@@ -10,7 +11,7 @@ from dissectors.bacnet import tags as tagging
 from dissectors.bacnet.frame_types import CARRIES_NPDU, EXPECTING, HEADER, PROPRIETARY, FrameType, name
 from dissectors.bacnet.limits import BROADCAST
 from dissectors.bacnet.message import data_of
-from dissectors.frame import Check, Damage, Frame, Header, Role
+from dissectors.frame import Check, Damage, Frame, Header, Repair, Role
 
 DAMAGE_WORDS: dict[Damage, str] = {
     Damage.CHECK: "data CRC",
@@ -46,6 +47,8 @@ def peek(frame: Frame) -> Header:
     `kind` is the frame type's name, for data the service's or network message's name. Total.
     """
     octets = frame.octets
+    if frame.repair is not None:
+        return _of_mended(frame, frame.repair)
     if len(octets) < 4:
         return Header("mstp", None, None, Role.UNKNOWN, "fragment", ok=False, error=_why(frame))
     frame_type, destination = octets[2], octets[3]
@@ -58,6 +61,12 @@ def peek(frame: Frame) -> Header:
     ok = frame.ok
     role = _role(frame_type, destination)
     return Header("mstp", source, destination, role, kind, frame_type, None, None, ok, None if ok else _why(frame))
+
+
+def _of_mended(frame: Frame, repair: Repair) -> Header:
+    """What a damaged frame said, and what is wrong with it."""
+    said = peek(replace(frame, octets=repair.octets, check=Check.GOOD, damage=None, repair=None))
+    return replace(said, ok=False, error=repair.flaw.value)
 
 
 @lru_cache(maxsize=4096)
@@ -198,5 +207,5 @@ def error_text(data: bytes, at: int) -> str:
 
 
 def is_whole_header(frame: Frame) -> bool:
-    """Whether the eight octets of a header are there and its CRC is good."""
-    return len(frame.octets) >= HEADER and frame.damage is not Damage.HEADER
+    """Whether it is certain what its header says: its CRC is good, or it could be put right."""
+    return frame.repair is not None or (len(frame.octets) >= HEADER and frame.damage is not Damage.HEADER)

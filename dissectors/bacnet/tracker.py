@@ -11,12 +11,16 @@ The rules:
 4. A token is an exchange of its own: DATA when the new holder then sends, with the time it took; NO_RESPONSE when the
    token is sent again or the bus falls silent.
 5. Segments and their acknowledgements belong to the exchange of the request, which ends with the last segment.
-6. A damaged frame closes what waits for it as DAMAGED_ANSWER; one that nobody waits for is a DAMAGED_REQUEST.
+6. Who sent a frame with a damaged header, the frames before it tell (turn.py). A damaged frame of the one who was asked
+   closes what waits for it as DAMAGED_ANSWER; any other is a DAMAGED_REQUEST, unless its header is whole and an answer
+   follows: then only the listener got it damaged.
+7. A Test Request to the own address asks whether that address is taken (zero configuration); silence is no fault.
 """
 
 from __future__ import annotations
 
 from collections import OrderedDict
+from dataclasses import replace
 
 from dissectors.bacnet.apdu import PduType
 from dissectors.bacnet.exchange import Exchange, Key, read
@@ -24,6 +28,7 @@ from dissectors.bacnet.frame_types import EXPECTING, FrameType, total
 from dissectors.bacnet.header import is_whole_header
 from dissectors.bacnet.limits import BROADCAST, MAX_ENCODED, MS, T_NO_TOKEN, T_USAGE_DELAY, TURNAROUND_BITS
 from dissectors.bacnet.message import Message
+from dissectors.bacnet.turn import Turn
 from dissectors.frame import Event, Frame, Header, Noise, Role
 from dissectors.line import Timing
 from dissectors.tracker import Placement, Tracked, Transaction, Verdict
@@ -55,11 +60,14 @@ class MstpTracker:
         self._postponed: OrderedDict[Key, Exchange] = OrderedDict()
         self._past: OrderedDict[Key, tuple[Exchange, Verdict, int]] = OrderedDict()
         self._previous: tuple[Frame, int] | None = None  # the frame before, and its transaction
+        self._turn = Turn(timing)
         self._clock: int | None = None
 
     def track(self, no: int, event: Event, header: Header | None) -> Tracked:
         """Take the next event."""
         if isinstance(event, Noise) or header is None:
+            if isinstance(event, Noise):
+                self._turn.see_noise(event)
             return Tracked(None, ())
         closed = self._expire(event.start)
         self._clock = event.end if self._clock is None else max(self._clock, event.end)
@@ -97,8 +105,9 @@ class MstpTracker:
     def _give_up(self, waiting: Exchange) -> Transaction:
         """Nobody answered what held the bus."""
         self._waiting = None
-        unused_poll = waiting.octets[2:3] == bytes((FrameType.POLL_FOR_MASTER,))
-        return self._end(waiting, Verdict.DATA if unused_poll else Verdict.NO_RESPONSE)
+        if waiting.damaged:
+            return self._end(waiting, Verdict.DAMAGED_REQUEST)
+        return self._end(waiting, Verdict.DATA if waiting.may_be_silent else Verdict.NO_RESPONSE)
 
     def _end(self, exchange: Exchange, verdict: Verdict) -> Transaction:
         self._remember(exchange, verdict)
@@ -119,6 +128,7 @@ class MstpTracker:
         if not frame.ok:
             return self._damaged(no, frame, header, closed)
         frame_type = frame.octets[2]
+        self._turn.see(frame, frame_type, frame.octets[4], frame.octets[3])
         waiting = self._waiting
         if waiting is not None:
             answered = self._answer_now(waiting, no, frame, header, closed)
@@ -169,7 +179,8 @@ class MstpTracker:
             return self._at(no, waiting.id, header, Role.RESPONSE)
         if back and frame_type not in (FrameType.TOKEN, FrameType.POLL_FOR_MASTER):
             message, key = read(frame)
-            if key == waiting.key and (message is None or message.apdu is None or message.apdu.type != 0):
+            fits = waiting.damaged or key == waiting.key
+            if fits and (message is None or message.apdu is None or message.apdu.type != 0):
                 return self._answered(waiting, no, frame, header, message, closed)
             if waiting.key is not None:  # another answer went first: this one can only come later
                 self._waiting = None
@@ -312,29 +323,52 @@ class MstpTracker:
     # Damage, echoes, single frames
 
     def _damaged(self, no: int, frame: Frame, header: Header, closed: list[Transaction]) -> Placement:
-        waiting = self._waiting
-        if waiting is not None and waiting.octets[2] != FrameType.TOKEN:
-            known = is_whole_header(frame)
-            if not known or (header.source, header.destination) == (waiting.destination, waiting.source):
-                self._waiting = None
-                self._remember(waiting, Verdict.DAMAGED_ANSWER)
-                closed.append(
-                    waiting.close(
-                        Verdict.DAMAGED_ANSWER,
-                        response=no,
-                        end=frame.end,
-                        latency=waiting.interval(frame),
-                        error=header.error,
-                    )
-                )
-                return self._at(no, waiting.id, header, Role.RESPONSE)
-        if waiting is not None and waiting.octets[2] == FrameType.TOKEN:
+        header = self._named(frame, header)
+        source, waiting = header.source, self._waiting
+        if waiting is not None and waiting.is_token:
             self._waiting = None
-            used = not is_whole_header(frame) or header.source == waiting.destination
-            closed.append(waiting.close(Verdict.DATA if used else Verdict.NO_RESPONSE))
+            used = source == waiting.destination
+            latency = waiting.interval(frame) if used else None
+            closed.append(waiting.close(Verdict.DATA if used else Verdict.NO_RESPONSE, latency=latency))
         elif waiting is not None:
+            if source == waiting.destination and header.destination in (None, waiting.source):
+                return self._damaged_answer(waiting, no, frame, header, closed)
             closed.append(self._give_up(waiting))
+        if is_whole_header(frame) and header.role is Role.REQUEST:
+            self._waiting = exchange = self._open(no, frame, header)
+            exchange.damaged = True
+            return self._at(no, exchange.id, header)
         return self._single(no, frame, header, Verdict.DAMAGED_REQUEST, closed)
+
+    def _named(self, frame: Frame, header: Header) -> Header:
+        """The header of a damaged frame with the source and destination that it most likely had."""
+        if is_whole_header(frame):
+            if header.source is not None and header.destination is not None and header.function is not None:
+                self._turn.see(frame, header.function, header.source, header.destination)
+            return header
+        speaker = self._turn.speaker(frame)
+        if speaker is None:
+            return header
+        destination = header.destination if speaker.destination is None else speaker.destination
+        if speaker.frame_type is not None and destination is not None:
+            self._turn.see_likely(frame, speaker.frame_type, speaker.source, destination)
+        return replace(header, source=speaker.source, destination=destination)
+
+    def _damaged_answer(
+        self, waiting: Exchange, no: int, frame: Frame, header: Header, closed: list[Transaction]
+    ) -> Placement:
+        self._waiting = None
+        self._remember(waiting, Verdict.DAMAGED_ANSWER)
+        closed.append(
+            waiting.close(
+                Verdict.DAMAGED_ANSWER,
+                response=no,
+                end=frame.end,
+                latency=waiting.interval(frame),
+                error=header.error,
+            )
+        )
+        return self._at(no, waiting.id, header, Role.RESPONSE)
 
     def _is_echo(self, frame: Frame) -> bool:
         """An exact copy sooner than any node may send; not to be told where the adapter hides such times."""

@@ -1,0 +1,190 @@
+"""Whose turn it is to speak, as far as the frames before tell: by that, a frame with a damaged header has a sender.
+
+A token says who speaks next, a poll or a request who answers, silence that the one before has given up. A damaged frame
+is compared with what each of those could have sent; octets may be wrong, missing or too many.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from dissectors.bacnet.frame_types import EXPECTING, HEADER, PREAMBLE, FrameType
+from dissectors.bacnet.limits import (
+    BROADCAST,
+    MS,
+    T_NO_TOKEN,
+    T_REPLY_DELAY,
+    T_USAGE_DELAY,
+    T_USAGE_TIMEOUT_MAX,
+)
+from dissectors.checksums import crc8_mstp
+from dissectors.frame import Frame, Noise
+from dissectors.line import Timing
+
+_TOKEN, _POLL, _POLL_REPLY = map(int, (FrameType.TOKEN, FrameType.POLL_FOR_MASTER, FrameType.REPLY_TO_POLL_FOR_MASTER))
+_ASKING = frozenset((*EXPECTING, int(FrameType.TEST_REQUEST)))
+_ANSWERING = (6, 7, 33, 4)
+_OF_HOLDER = (5, 6, 32, 33)
+_USE_MOST = 100 * MS  # older texts let a station wait so long for the next one
+
+_ANY = -1  # an octet of which nothing is known
+_ANY_COST, _SPOILT, _A_BIT, _LOST, _TOO_MANY = 2, 4, 3, 4, 5
+"""What it costs to take an octet for one of which nothing is known, for one with several bits or with one bit wrong,
+to miss one, to have one too many."""
+
+_UNLIKELY, _STRANGE = 3, 6
+
+
+class Speaker(NamedTuple):
+    """Who sent a damaged frame, to whom, and of what type, as far as can be told."""
+
+    source: int
+    destination: int | None
+    frame_type: int | None
+
+
+class _Guess(NamedTuple):
+    """A frame that somebody could send now; `cost` 0 where it is what should come."""
+
+    cost: int
+    frame_type: int
+    destination: int  # or _ANY
+    source: int
+
+
+class Turn:
+    """Fed the frames of a bus in order; total, and bounded by the 256 addresses.
+
+    `holder`: who has the token, or was sent it. `passed_by`: who sent it, while the holder has not used it. `asked`: type,
+    source and destination of the frame that waits for its answer. `end`: ns, of the newest frame. None: not known.
+    """
+
+    __slots__ = ("_heard", "_latency", "_next", "asked", "end", "holder", "passed_by", "slack")
+
+    def __init__(self, timing: Timing) -> None:
+        self.holder: int | None = None
+        self.passed_by: int | None = None
+        self.asked: tuple[int, int, int] | None = None
+        self.end: int | None = None
+        self.slack = 0
+        self._latency = timing.latency
+        self._next: dict[int, int] = {}  # whom each station passed its token to last
+        self._heard: set[int] = set()
+
+    def see(self, frame: Frame, frame_type: int, source: int, destination: int) -> None:
+        """A frame of which it is known who sent it."""
+        self._heard.add(source)
+        self._take(frame_type, source, destination)
+        self.end, self.slack = frame.end, frame.slack
+
+    def see_likely(self, frame: Frame, frame_type: int, source: int, destination: int) -> None:
+        """A damaged frame, taken for what `speaker` said."""
+        self._take(frame_type, source, destination)
+        self.end, self.slack = frame.end, frame.slack
+
+    def see_noise(self, noise: Noise) -> None:
+        """Octets that are no frame: as many as a frame has were one of whom it was to speak."""
+        if len(noise.octets) < HEADER - 3:
+            return
+        holder = self.holder
+        if holder is not None and self.asked is None and len(noise.octets) <= HEADER + 2 and holder in self._next:
+            self._take(_TOKEN, holder, self._next[holder])
+        else:
+            self.asked = self.passed_by = None
+        self.end, self.slack = noise.end, self._latency
+
+    def knows(self, address: int) -> bool:
+        """Whether a frame of that address was ever heard."""
+        return address in self._heard
+
+    def speaker(self, frame: Frame) -> Speaker | None:
+        """Who most likely sent a frame whose header is damaged; None where nothing is known of the bus."""
+        guesses = self._guesses(frame)
+        octets = frame.octets[: HEADER + 2]
+        best: tuple[int, _Guess] | None = None
+        for guess in guesses:
+            cost = guess.cost + _distance(octets, _expected(guess))
+            if best is None or cost < best[0]:
+                best = cost, guess
+        if best is None:
+            return None
+        _, guess = best
+        return Speaker(guess.source, None if guess.destination == _ANY else guess.destination, guess.frame_type)
+
+    def _take(self, frame_type: int, source: int, destination: int) -> None:
+        if frame_type == _TOKEN:
+            self.holder, self.passed_by, self.asked = destination, source, None
+            self._next[source] = destination
+            return
+        asked, self.passed_by = self.asked, None
+        if frame_type == _POLL or (frame_type in _ASKING and destination != BROADCAST):
+            self.holder, self.asked = source, (frame_type, source, destination)
+        elif asked is not None and (source, destination) == (asked[2], asked[1]):
+            self.holder, self.asked = asked[1], None
+            if frame_type == _POLL_REPLY:
+                self._next[asked[1]] = source
+        elif frame_type != _POLL_REPLY:
+            self.holder, self.asked = source, None
+
+    def _guesses(self, frame: Frame) -> list[_Guess]:
+        """All that may be said now, what should come first."""
+        gap = 0 if self.end is None else max(0, frame.start - self.end)
+        most, least = gap + self.slack, max(0, gap - frame.slack)
+        made: list[_Guess] = []
+        holder, asked = self.holder, self.asked
+        if holder is None or least >= T_NO_TOKEN:
+            pass
+        elif asked is not None:
+            kind, source, destination = asked
+            waits = T_USAGE_TIMEOUT_MAX if kind == _POLL else T_REPLY_DELAY + T_USAGE_TIMEOUT_MAX
+            soonest = T_USAGE_DELAY if kind == _POLL else T_REPLY_DELAY
+            absent = _UNLIKELY if kind == _POLL and destination not in self._heard else 0
+            late = _UNLIKELY if least > waits else 0
+            types = (_POLL_REPLY,) if kind == _POLL else _ANSWERING
+            made += [_Guess(absent + late, reply, source, destination) for reply in types]
+            made += self._of_holder(source, 0 if most >= soonest else _UNLIKELY)
+        else:
+            by = self.passed_by
+            late = _UNLIKELY if by is not None and least > _USE_MOST else 0
+            made += self._of_holder(holder, late)
+            if by is not None:
+                again = 0 if most >= T_USAGE_DELAY else _UNLIKELY
+                made.append(_Guess(again, _TOKEN, holder, by))
+                made += self._of_holder(by, again + 1)
+        read = frame.octets[4] if len(frame.octets) > 4 else None
+        if read is not None and (read in self._heard or not made):
+            made += self._of_holder(read, _STRANGE if made else 0)
+            made.append(_Guess(_STRANGE if made else 0, 6, _ANY, read))
+        return made
+
+    def _of_holder(self, mac: int, cost: int) -> list[_Guess]:
+        following = self._next.get(mac, _ANY)
+        made = [_Guess(cost, _TOKEN, following, mac)] if following != mac else []
+        made.append(_Guess(cost, _POLL, _ANY, mac))
+        return made + [_Guess(cost, kind, _ANY, mac) for kind in _OF_HOLDER]
+
+
+def _expected(guess: _Guess) -> tuple[int, ...]:
+    """The header of a guessed frame, octet by octet."""
+    if guess.frame_type <= _POLL_REPLY or guess.frame_type == FrameType.REPLY_POSTPONED:
+        crc = _ANY
+        if guess.destination != _ANY:
+            crc = crc8_mstp(bytes((guess.frame_type, guess.destination, guess.source, 0, 0)))
+        return (*PREAMBLE, guess.frame_type, guess.destination, guess.source, 0, 0, crc)
+    return (*PREAMBLE, guess.frame_type, guess.destination, guess.source, _ANY, _ANY, _ANY)
+
+
+def _distance(octets: bytes, header: tuple[int, ...]) -> int:
+    """What it costs to take the begin of `octets` for that header; octets after it cost nothing."""
+    row = [at * _TOO_MANY for at in range(len(octets) + 1)]
+    for wanted in header:
+        before, row = row, [row[0] + _LOST]
+        for at, octet in enumerate(octets):
+            if wanted == octet:
+                same = 0
+            elif wanted == _ANY:
+                same = _ANY_COST
+            else:
+                same = _A_BIT if (wanted ^ octet).bit_count() == 1 else _SPOILT
+            row.append(min(before[at] + same, before[at + 1] + _LOST, row[at] + _TOO_MANY))
+    return min(row)
