@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dissectors.frame import Check, Frame, Role
 from dissectors.n2.commands import Command, error_name, fields_of, parse_command
-from dissectors.n2.header import error_code
+from dissectors.n2.header import error_code, meant
 from dissectors.n2.interpretation import guessed_time, printable
 from dissectors.n2.objects import Encoding, attribute_name, guessed_bits, region_name
 from dissectors.n2.text import sent_and_due
@@ -21,8 +21,9 @@ CHECKSUM_STATUS = {Check.BAD: 0, Check.GOOD: 1, Check.ABSENT: 3}
 
 
 def fields(frame: Frame, role: Role) -> Fields:
-    """Field names to values, in frame order; total. An answer gives its raw characters only."""
-    octets = frame.octets
+    """Field names to values, in frame order; total. An answer gives its raw characters only, a repaired frame what it
+    was."""
+    octets = meant(frame)
     if octets[:1] == b">":
         found = _command(parse_command(octets))
     elif octets[:1] == b"N":
@@ -34,7 +35,7 @@ def fields(frame: Frame, role: Role) -> Fields:
         found = {"n2.acknowledge": "A"}
         if data := fields_of(octets):
             found["n2.data"] = printable(data)
-    sums = sent_and_due(octets)
+    sums = sent_and_due(frame.octets)
     if sums is not None:
         found["n2.checksum"] = sums[0]
     found["n2.checksum.status"] = CHECKSUM_STATUS[frame.check]

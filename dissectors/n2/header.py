@@ -28,13 +28,18 @@ DAMAGES: dict[Damage, str] = {
 
 def peek(frame: Frame) -> Header:
     """What a frame is, to whom, and about which object; total."""
-    error = damage_of(frame)
-    if frame.octets[:1] == b">":
-        return _peek_command(parse_command(frame.octets), error)
-    if frame.octets[:1] == b"N":
-        code = error_code(frame.octets)
+    error, octets = damage_of(frame), meant(frame)
+    if octets[:1] == b">":
+        return _peek_command(parse_command(octets), error)
+    if octets[:1] == b"N":
+        code = error_code(octets)
         return _answer("negative-acknowledge", error, error_text(code) if error is None else error)
-    return _answer("answer" if fields_of(frame.octets) else "acknowledge", error, error)
+    return _answer("answer" if fields_of(octets) else "acknowledge", error, error)
+
+
+def meant(frame: Frame) -> bytes:
+    """The octets of a frame; of a damaged one what they were, where one thing put right shows it."""
+    return frame.octets if frame.repair is None else frame.repair.octets
 
 
 def error_code(octets: bytes) -> str:
@@ -44,6 +49,8 @@ def error_code(octets: bytes) -> str:
 
 def damage_of(frame: Frame) -> str | None:
     """What is wrong with the frame itself, in words; None when nothing is."""
+    if frame.repair is not None:
+        return frame.repair.flaw.value
     if frame.damage is not None:
         return DAMAGES[frame.damage]
     return "bad checksum" if frame.check is Check.BAD else None

@@ -73,7 +73,12 @@ class Interpretation:
 
 
 def interpret(request: Frame, response: Frame) -> Interpretation:
-    """Read an answer with the command it answers; total, whatever the two frames are."""
+    """Read an answer with the command it answers; total, whatever the two frames are.
+
+    Of a damaged one that can be repaired what it was, marked as tentative.
+    """
+    if response.repair is not None or request.repair is not None:
+        return _repaired(request, response)
     command = parse_command(request.octets)
     raw = printable(fields_of(response.octets)) if response.octets[:1] == b"A" else ""
     base = Interpretation(
@@ -100,6 +105,17 @@ def interpret(request: Frame, response: Frame) -> Interpretation:
         records, doubt = change_records(raw)
         return replace(base, records=records, tentative=doubt)
     return base
+
+
+def _repaired(request: Frame, response: Frame) -> Interpretation:
+    """The same two frames as they were meant."""
+    flaws = tuple(f"{frame.repair.flaw.value}, repaired" for frame in (request, response) if frame.repair is not None)
+    whole = [
+        frame if frame.repair is None else replace(frame, octets=frame.repair.octets, damage=None, repair=None)
+        for frame in (request, response)
+    ]
+    told = interpret(whole[0], whole[1])
+    return replace(told, tentative=(*told.tentative, *flaws))
 
 
 def printable(text: str) -> str:

@@ -1,18 +1,21 @@
-"""One line for the frame list: `5 ← read AI 3 attribute 3 (current value)`, `A → 0042910000`, `N11 undefined …`."""
+"""One line for the frame list: `5 ← read AI 3 attribute 3 (current value)`, `A → 0042910000`, `N11 undefined …`.
+
+A damaged frame that can be repaired shows what it was, and says so.
+"""
 
 from __future__ import annotations
 
 from dissectors.checksums import sum8
 from dissectors.frame import Check, Frame, Header, Role
 from dissectors.n2.commands import NATIVE, UNKNOWN, Command, error_text, fields_of, parse_command
-from dissectors.n2.header import damage_of, error_code
+from dissectors.n2.header import damage_of, error_code, meant
 from dissectors.n2.interpretation import guessed_time, printable
 from dissectors.n2.objects import Encoding, attribute_name, guessed_bits, number, object_name
 
 
 def text(frame: Frame, header: Header, role: Role) -> str:
     """One line without control characters. An answer shows its raw characters: alone it means no more."""
-    octets = frame.octets
+    octets = meant(frame)
     if octets[:1] == b">":
         line = _command(parse_command(octets))
     elif octets[:1] == b"N":
@@ -34,6 +37,8 @@ def _damage(frame: Frame) -> str:
     words = damage_of(frame)
     if words is None:
         return ""
+    if frame.repair is not None:
+        return f" [{words}; repaired]"
     sums = sent_and_due(frame.octets)
     if frame.check is Check.BAD and sums is not None:
         return f" [{words}: {sums[0]}, {sums[1]} expected]"

@@ -1,13 +1,19 @@
-"""Pairing N2 commands and answers. An answer carries no address, so only order and time tell whose it is.
+"""Pairing N2 commands and answers. An answer carries no address, so only order, form and time tell whose it is.
 
-1. One master, one open command. An answer belongs to the open one, unless its form cannot answer that one and does
-   answer the one before it, which had none: then it is late.
-2. A command closes the one before it: no response, or a damaged answer where octets came that are no frame.
-3. The same octets again, at once, are an echo; within GIVE_UP of the unanswered try, with no other command between,
+1. One master, one open command. A good answer belongs to the open one, unless it rather answers one before it that had
+   none: it has a form that the open one does not ask for and the one before does, or comes sooner than the station of
+   the open one ever answered. Then it is late, and the open command stays open.
+2. A damaged answer leaves the command open: it may have been junk, and a good one come yet. So damage alone is never a
+   second answer.
+3. A command closes the one before it: no response, or a damaged answer where one came, or octets that may be one.
+4. The same octets again, at once, are an echo; within GIVE_UP of the unanswered try, with no other command between,
    a retry.
-4. A second answer without a command between: late where that station still owes one within GIVE_UP (a retry makes
-   two commands, and both may be answered), else answered twice (two stations with one address).
-5. How long a master waits is its own setting (NAE 250 ms to 3 s), so silence alone closes a command after GIVE_UP.
+5. A second good answer without a command between: late where a command within GIVE_UP is owed one of that form (of
+   the two answers either may be the late one), else answered twice. Whether that means two stations is for the rules
+   to say: the same octets again may be a repeater's.
+6. How long a master waits is its own setting (NAE 250 ms to 3 s), so silence alone closes a command after GIVE_UP.
+7. A damaged command is for the station that it names where that one is known; and for the one known station whose
+   address makes its checksum right.
 """
 
 from __future__ import annotations
@@ -17,9 +23,11 @@ from dataclasses import dataclass, replace
 
 from dissectors.frame import Event, Frame, Header, Noise, Reason, Role
 from dissectors.line import NS_PER_S, Timing
-from dissectors.n2.commands import Command, fields_of, parse_command
-from dissectors.n2.header import BROADCAST
-from dissectors.n2.objects import holds_current_value
+from dissectors.n2.commands import parse_command
+from dissectors.n2.envelope import is_good
+from dissectors.n2.forms import fits, may_answer
+from dissectors.n2.header import BROADCAST, meant
+from dissectors.n2.stretch import STRAY
 from dissectors.tracker import Interval, Placement, Tracked, Transaction, Verdict
 
 GIVE_UP = 3 * NS_PER_S
@@ -27,7 +35,7 @@ GIVE_UP = 3 * NS_PER_S
 
 _LONGEST = 256  # characters of an answer that may have begun in time and not be read yet
 _OWING = 16  # commands remembered that a late answer may still answer
-_SPOILT = 2  # octets of noise in answer to a command that count as a damaged answer
+_FEW = 3  # answers of a station after which its shortest time says something
 
 
 @dataclass(slots=True)
@@ -45,13 +53,26 @@ class _Exchange:
     attempt: int
     of: int | None
     damaged: bool
-    spoilt: int = 0  # octets of noise since the command
+    spoilt: bool = False  # octets came that may have been an answer
+    bad: Transaction | None = None  # how it ends if the damaged answer that came was all
     answer: bytes = b""
     answer_end: int = 0
 
     @property
     def first_try(self) -> int:
         return self.id if self.of is None else self.of
+
+
+@dataclass(slots=True)
+class _Times:
+    """How soon a station answers: how often that was seen, and the shortest that it may have been, ns."""
+
+    count: int = 0
+    least: int = 0
+
+    def add(self, latency: Interval) -> None:
+        self.least = min(self.least, latency.low) if self.count else latency.low
+        self.count += 1
 
 
 class N2Tracker:
@@ -66,6 +87,7 @@ class N2Tracker:
         self._missed: _Exchange | None = None  # the last command, closed without a good answer
         self._owing: deque[_Exchange] = deque(maxlen=_OWING)  # commands without any answer, oldest first
         self._done: _Exchange | None = None  # the last command, when it was closed by an answer
+        self._times: dict[int, _Times] = {}  # by station that was named in a good command
 
     def track(self, no: int, event: Event, header: Header | None) -> Tracked:
         """Take the next event; `header` is None exactly for noise."""
@@ -75,7 +97,7 @@ class N2Tracker:
         closed: list[Transaction] = []
         if self._open is not None and event.start - self._open.end > GIVE_UP:
             closed.append(self._close_unanswered(self._open))
-        if event.octets[:1] == b">":
+        if meant(event)[:1] == b">":
             placement = self._command(no, event, header, closed)
         else:
             placement = self._answer(no, event, header, closed)
@@ -92,25 +114,28 @@ class N2Tracker:
         if self._open is None:
             return ()
         left, self._open = self._open, None
-        return (_transaction(left, Verdict.OPEN),)
+        return (left.bad or _transaction(left, Verdict.OPEN),)
 
     # --- commands ---
 
     def _command(self, no: int, frame: Frame, header: Header, closed: list[Transaction]) -> Placement:
-        open_ = self._open
-        if open_ is not None and frame.octets == open_.octets and frame.start - open_.end <= self._at_once:
-            return self._echo(no, frame, header, header.role, open_, closed)
+        open_, octets = self._open, meant(frame)
+        if open_ is not None and octets == open_.octets and frame.start - open_.end <= self._at_once:
+            return self._echo(no, frame, header.role, open_, closed)
         if open_ is not None:
             closed.append(self._close_unanswered(open_))
+        station = header.destination if header.ok or frame.repair is not None else self._station_of(octets, header)
+        if station is not None and header.ok:
+            self._times.setdefault(station, _Times())
         missed = self._missed
         attempt, of = 1, None
-        if missed is not None and missed.octets == frame.octets and frame.start - missed.end <= GIVE_UP:
+        if missed is not None and missed.octets == octets and frame.start - missed.end <= GIVE_UP:
             attempt, of = missed.attempt + 1, missed.first_try
         self._open = _Exchange(
             id=self._take_id(),
             no=no,
-            octets=frame.octets,
-            station=header.destination,
+            octets=octets,
+            station=station,
             kind=header.kind,
             start=frame.start,
             end=frame.end,
@@ -120,11 +145,23 @@ class N2Tracker:
             damaged=not header.ok,
         )
         self._done = None
-        return Placement(no, self._open.id, header.role, None, header.destination)
+        return Placement(no, self._open.id, header.role, None, station)
+
+    def _station_of(self, octets: bytes, header: Header) -> int | None:
+        """Whom a damaged command is for (rule 7)."""
+        if not self._times:
+            return header.destination
+        if len(octets) >= 7 and octets.endswith(b"\r"):
+            fitting = [known for known in self._times if is_good(b">%02X" % known + octets[3:])]
+            if len(fitting) == 1:
+                return fitting[0]
+        return header.destination if header.destination in self._times else None
 
     def _close_unanswered(self, exchange: _Exchange) -> Transaction:
         self._open, self._missed, self._done = None, exchange, None
-        if exchange.spoilt >= _SPOILT:
+        if exchange.bad is not None:
+            return exchange.bad
+        if exchange.spoilt:
             return _transaction(exchange, Verdict.DAMAGED_ANSWER, error="octets that are no frame")
         if exchange.damaged:
             return _transaction(exchange, Verdict.DAMAGED_REQUEST)
@@ -133,64 +170,98 @@ class N2Tracker:
         self._owing.append(exchange)
         return _transaction(exchange, Verdict.NO_RESPONSE)
 
-    def _owing_answer(self, station: int | None, now: int) -> _Exchange | None:
-        """Take the oldest command to a station that had no answer within GIVE_UP."""
-        for exchange in self._owing:
-            if exchange.station == station and now - exchange.end <= GIVE_UP:
-                self._owing.remove(exchange)
-                return exchange
-        return None
-
     def _hear_noise(self, event: Event) -> None:
-        if self._open is not None and not (isinstance(event, Noise) and event.reason is Reason.PAD):
-            self._open.spoilt += len(event.octets)
+        """A few stray octets are nobody's answer; more, or what ends like one, may be."""
+        if self._open is None or not isinstance(event, Noise) or event.reason is Reason.PAD:
+            return
+        octets = event.octets
+        self._open.spoilt |= len(octets) > STRAY or (len(octets) > 1 and octets.endswith(b"\r"))
 
     # --- answers ---
 
     def _answer(self, no: int, frame: Frame, header: Header, closed: list[Transaction]) -> Placement:
-        open_, missed = self._open, self._missed
+        open_ = self._open
         if open_ is None:
             return self._orphan(no, frame, header, closed)
-        if missed is not None and frame.start - missed.end <= 2 * GIVE_UP and _answers_rather(missed, open_, frame):
-            self._missed = None
-            self._owing = deque((e for e in self._owing if e is not missed), _OWING)
-            return self._separate(no, frame, header, Verdict.LATE, missed, closed)
+        if not header.ok:
+            bad = _transaction(open_, Verdict.DAMAGED_ANSWER, error=header.error)
+            open_.bad = replace(bad, response=no, end=frame.end, latency=self._since(open_, frame))
+            return Placement(no, open_.id, Role.RESPONSE, open_.station, None)
+        owing = self._owed_rather(open_, frame)
+        if owing is not None:
+            self._forget(owing)
+            return self._separate(no, frame, header, Verdict.LATE, owing, closed)
         self._open, self._missed, self._done = None, None, open_
         open_.answer, open_.answer_end = frame.octets, frame.end
+        latency = self._since(open_, frame)
         verdict = Verdict.ANSWERED if open_.attempt == 1 else Verdict.RETRY
         if open_.damaged:
             verdict = Verdict.DAMAGED_REQUEST
         if header.kind == "negative-acknowledge":
             verdict = Verdict.EXCEPTION
-        if not header.ok:
-            verdict = Verdict.DAMAGED_ANSWER
-            self._missed = open_
+        if open_.station in self._times:
+            self._times[open_.station].add(latency)
         done = _transaction(open_, verdict, error=header.error)
-        latency = self._interval(frame.start - open_.end, open_.slack)
         closed.append(replace(done, response=no, end=frame.end, latency=latency))
         return Placement(no, open_.id, Role.RESPONSE, open_.station, None)
+
+    def _owed_rather(self, open_: _Exchange, frame: Frame) -> _Exchange | None:
+        """An earlier command, to another station or of another form, that a good answer rather answers (rule 1)."""
+        asked = parse_command(open_.octets)
+        formless = not open_.damaged and not may_answer(asked, frame.octets)
+        times = self._times.get(open_.station) if open_.station is not None else None
+        latest = self._since(open_, frame).high
+        soon = times is not None and times.count >= _FEW and 2 * latest < times.least
+        if not (formless or soon):
+            return None
+        candidates = [e for e in self._within(frame.start) if e.octets != open_.octets or not formless]
+        if self._missed is not None and self._missed not in candidates and self._missed.bad is None:
+            candidates.append(self._missed)
+        return _best_owed(candidates, frame)
+
+    def _within(self, now: int) -> list[_Exchange]:
+        """Commands that had no answer and may still get one."""
+        return [exchange for exchange in self._owing if now - exchange.end <= 2 * GIVE_UP]
+
+    def _forget(self, exchange: _Exchange) -> None:
+        if self._missed is exchange:
+            self._missed = None
+        self._owing = deque((other for other in self._owing if other is not exchange), _OWING)
 
     def _orphan(self, no: int, frame: Frame, header: Header, closed: list[Transaction]) -> Placement:
         """An answer that no open command asked for."""
         done, missed = self._done, self._missed
+        if not header.ok:
+            station = done.station if done is not None else missed.station if missed is not None else None
+            return self._separate(no, frame, header, Verdict.UNSOLICITED, None, closed, station)
         if done is not None:
-            if (owing := self._owing_answer(done.station, frame.start)) is not None:
+            owed = [exchange for exchange in self._within(frame.start) if frame.start - exchange.end <= GIVE_UP]
+            same = [exchange for exchange in owed if exchange.station == done.station]
+            owing = _best_owed(same, frame) or _best_owed(owed, frame)
+            if owing is not None:
+                self._forget(owing)
                 return self._separate(no, frame, header, Verdict.LATE, owing, closed)
             if frame.octets == done.answer and frame.start - done.answer_end <= self._at_once:
-                return self._echo(no, frame, header, Role.RESPONSE, done, closed)
+                return self._echo(no, frame, Role.RESPONSE, done, closed)
             if frame.start - done.end <= GIVE_UP:
                 return self._separate(no, frame, header, Verdict.ANSWERED_TWICE, done, closed)
         elif missed is not None and frame.start - missed.end <= 2 * GIVE_UP:
-            self._missed = None
-            self._owing = deque((e for e in self._owing if e is not missed), _OWING)
+            self._forget(missed)
             return self._separate(no, frame, header, Verdict.LATE, missed, closed)
         return self._separate(no, frame, header, Verdict.UNSOLICITED, None, closed)
 
     def _separate(
-        self, no: int, frame: Frame, header: Header, verdict: Verdict, to: _Exchange | None, closed: list[Transaction]
+        self,
+        no: int,
+        frame: Frame,
+        header: Header,
+        verdict: Verdict,
+        to: _Exchange | None,
+        closed: list[Transaction],
+        station: int | None = None,
     ) -> Placement:
         """A transaction of its own for an answer that came too late, twice or unasked."""
-        station = to.station if to else None
+        station = to.station if to else station
         transaction = Transaction(
             id=self._take_id(),
             station=station,
@@ -200,16 +271,14 @@ class N2Tracker:
             verdict=verdict,
             start=frame.start,
             end=frame.end,
-            latency=self._interval(frame.start - to.end, to.slack) if to and verdict is Verdict.LATE else None,
-            of=to.first_try if to else None,
+            latency=self._since(to, frame) if to and verdict is Verdict.LATE else None,
+            of=to.id if to else None,
             error=header.error,
         )
         closed.append(transaction)
         return Placement(no, transaction.id, Role.RESPONSE, station, None)
 
-    def _echo(
-        self, no: int, frame: Frame, header: Header, role: Role, of: _Exchange, closed: list[Transaction]
-    ) -> Placement:
+    def _echo(self, no: int, frame: Frame, role: Role, of: _Exchange, closed: list[Transaction]) -> Placement:
         request, response = (None, no) if role is Role.RESPONSE else (no, None)
         source, destination = (of.station, None) if role is Role.RESPONSE else (None, of.station)
         echo = Transaction(
@@ -226,12 +295,21 @@ class N2Tracker:
         closed.append(echo)
         return Placement(no, echo.id, role, source, destination)
 
-    def _interval(self, nominal: int, slack: int) -> Interval:
-        return Interval(nominal, max(0, nominal - self._latency), max(0, nominal + slack))
+    def _since(self, exchange: _Exchange, frame: Frame) -> Interval:
+        """Time from the end of a command to the begin of an answer."""
+        nominal = frame.start - exchange.end
+        return Interval(nominal, max(0, nominal - self._latency), max(0, nominal + exchange.slack))
 
     def _take_id(self) -> int:
         self._next += 1
         return self._next - 1
+
+
+def _best_owed(exchanges: list[_Exchange], frame: Frame) -> _Exchange | None:
+    """The command that an answer belongs to: the oldest whose form it surely has, else the oldest that it may answer."""
+    able = [e for e in exchanges if not e.damaged and may_answer(parse_command(e.octets), frame.octets)]
+    sure = [e for e in able if fits(parse_command(e.octets), frame.octets)]
+    return next(iter(sure or able), None)
 
 
 def _transaction(exchange: _Exchange, verdict: Verdict, error: str | None = None) -> Transaction:
@@ -247,36 +325,4 @@ def _transaction(exchange: _Exchange, verdict: Verdict, error: str | None = None
         attempt=exchange.attempt,
         of=exchange.of,
         error=error,
-    )
-
-
-_ACKNOWLEDGED = frozenset(
-    ("synchronise-time", "warm-reset", "write-attribute", "write-value", "override", "release-override")
-)
-
-
-def fits(command: Command, answer: bytes) -> bool | None:
-    """Whether an answer has the form that a command asks for; None where any form may be right."""
-    if answer[:1] != b"A":
-        return None
-    length = len(fields_of(answer))
-    kind = command.type.kind
-    if kind in _ACKNOWLEDGED:
-        return length == 0
-    if kind == "identify":
-        return length == 2
-    if kind == "read-attribute" and command.encoding is not None:
-        width = command.encoding.width
-        current = holds_current_value(command.region or 0, command.attribute or 0)
-        return length == width or (current and length == width + 2)
-    return None
-
-
-def _answers_rather(missed: _Exchange, open_: _Exchange, frame: Frame) -> bool:
-    """Whether a good answer has the wrong form for the open command and the right one for the one before."""
-    if frame.damage is not None or missed.damaged:
-        return False
-    return (
-        fits(parse_command(open_.octets), frame.octets) is False
-        and fits(parse_command(missed.octets), frame.octets) is True
     )

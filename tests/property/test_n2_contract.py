@@ -182,7 +182,10 @@ def test_joined_in_the_middle_no_answer_is_made_of_a_command(commands, cut, late
 def test_one_damaged_octet_is_never_a_good_frame(frame, data):
     at = data.draw(st.integers(1, len(frame) - 1))
     other = data.draw(
-        st.integers(0, 255).filter(lambda o: o != frame[at] and bytes([o]).upper() != frame[at : at + 1].upper())
+        # (a CR makes a whole acknowledgement of the begin of an answer, which nothing can tell)
+        st.integers(0, 255).filter(
+            lambda o: o not in (frame[at], 0x0D) and bytes([o]).upper() != frame[at : at + 1].upper()
+        )
     )
     octets = frame[:at] + bytes([other]) + frame[at + 1 :]
     timing = Timing()

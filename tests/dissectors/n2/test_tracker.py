@@ -10,8 +10,9 @@ from dissectors.frame import Check, Chunk, Damage, Found, Frame, Noise, Place, R
 from dissectors.line import Timing
 from dissectors.n2 import N2Framer, N2Tracker, peek
 from dissectors.n2.commands import parse_command
+from dissectors.n2.forms import fits
 from dissectors.n2.framing import judge
-from dissectors.n2.tracker import GIVE_UP, fits
+from dissectors.n2.tracker import GIVE_UP
 from dissectors.tracker import Tracked, Transaction, Verdict
 
 relaxed = settings(deadline=None)
