@@ -15,13 +15,11 @@ from enum import IntEnum
 from typing import Protocol, runtime_checkable
 
 from dissectors.frame import Event, Header
+from dissectors.subject import Subject, as_subject
 from dissectors.tracker import Placement, Transaction
 
 EVIDENCE_MAX = 16
 """Most frame numbers that a finding carries."""
-
-WHOLE_BUS = frozenset(("bus", "master"))
-"""Subjects that are no single station."""
 
 
 class Severity(IntEnum):
@@ -60,10 +58,11 @@ class Rule:
 class Finding:
     """What a rule found.
 
-    `subject`: what it is about ("MAC 12", "12 → 27", "bus"). `first`, `last`: ns, when it was seen first and last.
-    `count`: how often. `evidence`: frame numbers, at most EVIDENCE_MAX. `seen`: what was seen; `means`: what it is
-    consistent with; `next`: what to check next. Plain sentences, no control characters. `cause`: code and subject of
-    the finding that most likely explains this one; a face shows this one under it.
+    `subject`: what it is about in words ("MAC 12", "12 → 27", "bus"); `about`: the same as a value. `first`, `last`:
+    ns, when it was seen first and last. `count`: how often. `evidence`: frame numbers, at most EVIDENCE_MAX. `seen`:
+    what was seen; `means`: what it is consistent with; `next`: what to check next. Plain sentences, no control
+    characters. `cause`: code and subject of the finding that most likely explains this one; a face shows this one
+    under it. `stated`: the value behind the words, where whoever found it had one.
     """
 
     code: str
@@ -77,6 +76,17 @@ class Finding:
     means: str
     next: str
     cause: tuple[str, str] | None = None
+    stated: Subject | None = None
+
+    @property
+    def about(self) -> Subject:
+        """What it is about."""
+        return self.stated if self.stated is not None else as_subject(self.subject)
+
+    @property
+    def key(self) -> tuple[str, str]:
+        """What another finding's `cause` calls it by."""
+        return self.code, self.subject
 
     def merge(self, other: Finding) -> Finding:
         """What one rule found about one subject in two captures of a bus: counts add up, times span both.
@@ -151,7 +161,7 @@ class Tally:
         if len(self.evidence) < EVIDENCE_MAX:
             self.evidence.extend(no for no in frames if no is not None and no not in self.evidence)
 
-    def found(self, rule: Rule, subject: str, seen: str, severity: Severity | None = None) -> Finding:
+    def found(self, rule: Rule, subject: str | Subject, seen: str, severity: Severity | None = None) -> Finding:
         """The finding that this adds up to."""
         return found(
             rule,
@@ -169,7 +179,8 @@ def with_consequences(findings: Iterable[Finding], rules: Mapping[str, Rule]) ->
     """The same findings; those that a graver or as grave one explains (`Rule.explains`) are notes that name it.
 
     Only a warning or an error explains, and never what is itself a consequence. What is found about a station explains
-    what is said of that station, of the bus and of the master; what is found about the bus explains it of everybody.
+    what is said of that station and of things in it, of the bus and of the master; what is found about the bus
+    explains it of everybody.
     """
     made = list(findings)
     order = sorted(range(len(made)), key=lambda at: -made[at].severity)
@@ -187,8 +198,8 @@ def with_consequences(findings: Iterable[Finding], rules: Mapping[str, Rule]) ->
 def _is_explained(finding: Finding, cause: Finding, codes: tuple[str, ...]) -> bool:
     if not finding.code.startswith(codes) or finding.severity > cause.severity:
         return False
-    everybody = cause.subject in WHOLE_BUS or finding.subject in WHOLE_BUS
-    return everybody or finding.subject == cause.subject
+    about, of_cause = finding.about, cause.about
+    return about.is_whole_bus or of_cause.is_whole_bus or about.is_of(of_cause)
 
 
 def _as_consequence(finding: Finding, cause: Finding, rules: Mapping[str, Rule]) -> Finding:
@@ -199,6 +210,25 @@ def _as_consequence(finding: Finding, cause: Finding, rules: Mapping[str, Rule])
         next=f"settle {cause.code} first, then see whether this is still there",
         cause=(cause.code, cause.subject),
     )
+
+
+def under_causes(findings: Iterable[Finding]) -> tuple[tuple[Finding, bool], ...]:
+    """The findings in their order, each with whether it stands under the one before it that explains it.
+
+    Consequences follow their cause; one whose cause is not among them stands for itself.
+    """
+    made = list(findings)
+    standing = {one.key for one in made if one.cause is None}
+    told: dict[tuple[str, str], list[Finding]] = {}
+    for one in made:
+        if one.cause is not None and one.cause in standing:
+            told.setdefault(one.cause, []).append(one)
+    ordered: list[tuple[Finding, bool]] = []
+    for one in made:
+        if one.cause not in standing:
+            ordered.append((one, False))
+            ordered += [(under, True) for under in told.pop(one.key, ())]
+    return tuple(ordered)
 
 
 def times(count: int) -> str:
@@ -213,7 +243,7 @@ def counted(count: int, thing: str, several: str | None = None) -> str:
 
 def found(
     rule: Rule,
-    subject: str,
+    subject: str | Subject,
     seen: str,
     *,
     first: int = 0,
@@ -222,11 +252,14 @@ def found(
     evidence: tuple[int, ...] = (),
     severity: Severity | None = None,
 ) -> Finding:
-    """A finding of a rule, with the rule's own words for cause and next step; evidence is cut to EVIDENCE_MAX."""
+    """A finding of a rule, with the rule's own words for cause and next step; evidence is cut to EVIDENCE_MAX.
+
+    `subject`: a `Subject`, or the words that are its `str()`.
+    """
     return Finding(
         code=rule.code,
         severity=rule.severity if severity is None else severity,
-        subject=subject,
+        subject=str(subject),
         first=first,
         last=max(first, last),
         count=count,
@@ -234,4 +267,5 @@ def found(
         seen=seen,
         means=rule.means,
         next=rule.next,
+        stated=subject if isinstance(subject, Subject) else None,
     )

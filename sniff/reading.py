@@ -14,7 +14,7 @@ from dissectors.tracker import Transaction
 from sniff.analysis.points import PointReader
 from sniff.engine import Output, Row
 from sniff.formats import CaptureError
-from sniff.session import Item, LineEvent, Session
+from sniff.session import ASSUMED, LINE_NOTE, Item, LineEvent, Session
 from sniff.session_engine import SessionEngine
 
 HELD = 20_000
@@ -75,14 +75,9 @@ class Settling:
             del self._closed[self._in_order.popleft().id]
 
 
-LINE_NOTE = "line"
-ASSUMED = "assumed: the file does not say"
-"""Note of a session whose format keeps no line settings: `line` is what such a bus normally runs."""
-
-
 def line_is_assumed(session: Session) -> bool:
     """Whether neither the file nor the user says the line settings."""
-    return session.notes.get(LINE_NOTE) == ASSUMED
+    return session.line_is_assumed
 
 
 def with_settings(session: Session, protocol: str | None = None, line: LineSettings | None = None) -> Session:
@@ -103,7 +98,7 @@ def with_settings(session: Session, protocol: str | None = None, line: LineSetti
         line=line or session.line,
         unknown=unknown,
         given=session.given or (bool(session.unknown) and not unknown),
-    )
+    ).with_latency_of_reads()
 
 
 def outputs(items: Iterable[Item], session: Session, pairing: bool = True) -> Iterator[Output | LineEvent]:

@@ -11,6 +11,7 @@ from enum import Enum
 
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings, Timing
+from sniff.read_times import MS, ReadTimes, held_back
 
 DEVICES_NOTE = "devices"
 """Note of a session: which station is which device, as on the command line: "1=teco-e510,*=teco-f510"."""
@@ -42,6 +43,16 @@ class Adapter:
 LINELESS = frozenset(("pty", "TCP gateway"))
 """Drivers and adapters that set no line."""
 
+LINE_NOTE = "line"
+ASSUMED = "assumed: the file does not say"
+"""Note of a session whose format keeps no line settings: `line` is what such a bus normally runs."""
+
+INFERRED = "inferred from the reads"
+"""Where a latency is from that nobody said."""
+
+UNNAMED = ("assumed", "unknown", "")
+"""What `latency_from` is when nobody knows the adapter."""
+
 UNKNOWABLE = ("line", "protocol")
 """What of a session may be searched for."""
 
@@ -58,6 +69,8 @@ class Session:
     `unknown`: which of UNKNOWABLE nobody knows (yet): `line` is then only where the search for it began, `protocol`
     a stand-in. `given`: somebody named them after a search in vain, so that octets count wherever the search heard
     them with `line`. `profiles`: device profiles in force, name → TOML document, as far as the format keeps them.
+    `reads`: when the first reads came, of a saved capture; `said`: the adapter as the file says it, where `adapter`
+    differs from it by what the reads say (`with_latency_of_reads`).
     """
 
     port: str
@@ -71,6 +84,33 @@ class Session:
     unknown: tuple[str, ...] = ()
     given: bool = False
     profiles: Mapping[str, str] = field(default_factory=dict)
+    reads: ReadTimes | None = field(default=None, compare=False, repr=False)
+    said: Adapter | None = field(default=None, compare=False, repr=False)
+
+    def with_latency_of_reads(self) -> Session:
+        """The session with the latency that its reads speak for: times that cannot be exact are not taken as exact.
+
+        An adapter that nobody named is as slow as its reads say. One whose latency is known is contradicted only by
+        several reads that hold more octets than can have come: a single one is a computer that was busy.
+        """
+        said = self.said or self.adapter
+        if self.reads is None or "line" in self.unknown or self.line_is_assumed:
+            return self
+        told = held_back(self.reads, self.line, said.latency)
+        is_named = said.latency or said.latency_from not in UNNAMED
+        if is_named and (told.impossible < 3 or 500 * told.impossible < len(self.reads.octets)):
+            return replace(self, adapter=said, said=None)
+        if told.latency <= said.latency:
+            return replace(self, adapter=said, said=None)
+        why = INFERRED
+        if is_named:
+            why += f", which hold more octets than {said.latency / MS:.3g} ms ({said.latency_from}) allow"
+        return replace(self, adapter=replace(said, latency=told.latency, latency_from=why), said=said)
+
+    @property
+    def line_is_assumed(self) -> bool:
+        """Whether neither the file nor the user says the line settings."""
+        return self.notes.get(LINE_NOTE) == ASSUMED
 
     @property
     def timing(self) -> Timing:

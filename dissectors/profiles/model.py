@@ -55,22 +55,27 @@ class Role(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Bit:
-    """One bit of a register. `on`, `off`: what 1 and 0 say in words; empty: nothing worth saying."""
+    """One bit of a register. `on`, `off`: what 1 and 0 say in words; empty: nothing worth saying. `role`: of a 1."""
 
     number: int
     name: str
     on: str
     off: str = ""
+    role: Role = Role.VALUE
 
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """Several bits of a register that are one number: bits `low` … `high`, `states` its values in words."""
+    """Several bits of a register that are one number: bits `low` … `high`, `states` its values in words.
+
+    `roles`: those of its values that say that the device has a fault, or warns.
+    """
 
     low: int
     high: int
     name: str
     states: Mapping[int, str]
+    roles: Mapping[int, Role] = field(default_factory=dict)
 
     def of(self, raw: int) -> int:
         """The number that these bits make."""

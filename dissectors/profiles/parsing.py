@@ -173,13 +173,26 @@ def _entry(table: Table, space: str, address: int, number: str, modbus: Table | 
         reserved=reserved,
         states=states,
         codes=len(states) + len(empty),
-        bits=tuple(_bit(table, number, value) for number, value in sorted(table.numbered("bits").items())),
+        bits=_bits(table),
         parts=tuple(_part(part) for part in table.tables("part")),
         states_from=table.text("states-from", ""),
         doubt=table.text("doubt", ""),
     )
     table.finish()
     return entry
+
+
+def _bits(table: Table) -> tuple[Bit, ...]:
+    roles = _roles(table, "bits")
+    bits = tuple(_bit(table, number, value) for number, value in sorted(table.numbered("bits").items()))
+    if unnamed := set(roles) - {bit.number for bit in bits}:
+        raise table.error(f"{roles[min(unnamed)].value}-bits", f"bit {min(unnamed)} has no name in bits")
+    return tuple(replace(bit, role=roles.get(bit.number, Role.VALUE)) for bit in bits)
+
+
+def _roles(table: Table, what: str) -> dict[int, Role]:
+    """Bits or states that say that the device has a fault, or warns: `fault-bits`, `alarm-states` …"""
+    return {number: role for role in (Role.FAULT, Role.ALARM) for number in table.numbers(f"{role.value}-{what}")}
 
 
 def _bit(table: Table, number: int, value: Any) -> Bit:
@@ -189,7 +202,8 @@ def _bit(table: Table, number: int, value: Any) -> Bit:
     if isinstance(value, str):
         return Bit(number, _slug(value), table.spoken(f"bits.{number}", value))
     if isinstance(value, list) and len(value) in (2, 3) and all(isinstance(item, str) for item in value):
-        return Bit(number, *(table.spoken(f"bits.{number}", word) for word in value))
+        name, on, *off = (table.spoken(f"bits.{number}", word) for word in value)
+        return Bit(number, name, on, "".join(off))
     raise table.error(f"bits.{number}", f'expected "name" or ["name", "on", "off"], not {value!r}')
 
 
@@ -198,7 +212,7 @@ def _part(table: Table) -> Part:
     if low is None or high is None or not 0 <= low <= high <= 31:
         raise table.error("bits", "expected [lowest, highest] within 0 … 31")
     states = table.words("states")
-    part = Part(int(low), int(high), _name(table, "name"), states)
+    part = Part(int(low), int(high), _name(table, "name"), states, _roles(table, "states"))
     table.finish()
     return part
 

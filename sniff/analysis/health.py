@@ -22,17 +22,16 @@ So half of the requests lost, or every fifth frame damaged, is a station at 0 or
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
-from dissectors.findings import WHOLE_BUS, Finding, Severity
+from dissectors.findings import Finding, Severity
+from dissectors.subject import About
 from dissectors.tracker import Verdict
 from sniff.analysis.nodes import Node
 from sniff.analysis.summary import Summary
 
 ERROR_POINTS, WARNING_POINTS, FINDINGS_MOST = 30, 10, 60
-_STATION = re.compile(r"(?:^station |^MAC |→ )(\d+)")
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,19 +66,19 @@ def health_of(summary: Summary, findings: Iterable[Finding] = ()) -> HealthRepor
         for node in summary.nodes.present()
         if (health := station_health(node, about.get(node.address, ()))) is not None
     }
-    bus = _bus_health(summary, [finding for finding in grave if finding.subject in WHOLE_BUS])
+    bus = _bus_health(summary, [finding for finding in grave if finding.about.is_whole_bus])
     worst = min((address for address in about if address in stations), key=lambda a: stations[a].score, default=None)
     if worst is not None and (limit := (100 + stations[worst].score) // 2) < bus.score:
-        word = "station" if about[worst][0].subject.startswith("station") else "MAC"
-        reason = f"{word} {worst} is at {stations[worst].score}, so the bus is at {limit} at best"
+        first = about[worst][0].about
+        noun = "MAC" if first.kind is About.PAIR else first.noun  # only a token ring has pairs
+        reason = f"{noun} {worst} is at {stations[worst].score}, so the bus is at {limit} at best"
         bus = Health(limit, (*bus.reasons, reason))
     return HealthReport(bus, stations)
 
 
 def station_of(finding: Finding) -> int | None:
-    """The station that a finding is about, by its subject: "station 3", "MAC 5", "station 1, AI 200", "0 → 27"."""
-    match = _STATION.search(finding.subject)
-    return int(match[1]) if match else None
+    """The station that a finding is about: of "0 → 27" it is 27."""
+    return finding.about.station
 
 
 def station_health(node: Node, findings: Iterable[Finding] = ()) -> Health | None:

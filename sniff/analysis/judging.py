@@ -112,6 +112,7 @@ def _harmless(finding: Finding) -> Finding:
         seen=plain(finding.seen),
         means=plain(finding.means),
         next=plain(finding.next),
+        cause=None if finding.cause is None else (finding.cause[0], plain(finding.cause[1])),
     )
 
 

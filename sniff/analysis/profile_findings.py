@@ -1,6 +1,7 @@
 """What is wrong with a device by its own profile: the rules PR…, and the class that finds them row by row. Pure.
 
-Only what is certain is judged: no value whose layout is a guess, no response time beyond what the adapter allows.
+Only what is certain is judged: no value whose layout is a guess (a fault told that way is a note), no response time
+beyond what the adapter allows.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from dissectors.profiles import Role as EntryRole
 from dissectors.profiles.decoding import Value, bit_words, decode, in_range, number, plain_name, state_words
 from dissectors.readings import How, Reading, Readings
 from dissectors.registry import Dissector
+from dissectors.subject import About, Subject, station
 from dissectors.tracker import Placement, Transaction
 from sniff.analysis.points import ALL, PointReader, Sample
 from sniff.analysis.wording import milliseconds
@@ -57,7 +59,8 @@ PROFILE_RULES: dict[str, Rule] = {
             "PR004",
             Severity.ERROR,
             "device reports a fault",
-            "A station answered a fault code or a trip bit other than none, worded as in its manual.",
+            "A station answered a fault code or a trip bit other than none, worded as in its manual, or the bit or "
+            "state of a status word that stands for any fault.",
             "the device has stopped, or will not start, because of it",
             "look the fault up in the device's manual; reset it when its cause is gone",
         ),
@@ -65,7 +68,8 @@ PROFILE_RULES: dict[str, Rule] = {
             "PR005",
             Severity.WARNING,
             "device reports an alarm",
-            "A station answered an alarm code or warning bit other than none, worded as in its manual.",
+            "A station answered an alarm code or warning bit other than none, worded as in its manual, or the bit or "
+            "state of a status word that stands for any warning.",
             "the device runs on, but not as it should",
             "look the alarm up in the device's manual",
         ),
@@ -90,17 +94,23 @@ PROFILE_RULES: dict[str, Rule] = {
     )
 }
 
-Key = tuple[str, str, str]
+CODES = {EntryRole.FAULT: "PR004", EntryRole.ALARM: "PR005"}
+
+OF_STATUS = "status word"
+"""Which of several things about a device: what its status word says, without saying why."""
+
+Key = tuple[str, Subject, str]
 """Code, subject, and which of several things about it."""
 
 
 @dataclass(slots=True)
 class _Told:
-    """One finding in the making. `worst`: ns, of the slowest answer."""
+    """One finding in the making. `worst`: ns, of the slowest answer. `sure`: whether no layout behind it is a guess."""
 
     seen: str
     tally: Tally = field(default_factory=Tally)
     worst: int = 0
+    sure: bool = True
 
 
 class ProfileFindings:
@@ -112,7 +122,7 @@ class ProfileFindings:
         self._reader = PointReader(dissector, devices)
         self._readings = cast("Readings | None", dissector.extras.get("readings"))
         self._told: dict[Key, _Told] = {}
-        self._answers: dict[str, int] = {}
+        self._answers: dict[Subject, int] = {}
 
     def see(self, no: int, event: Event, header: Header | None, placement: Placement | None) -> None:
         """Take the next row."""
@@ -134,8 +144,16 @@ class ProfileFindings:
         self._judge_time(transaction)
 
     def findings(self) -> tuple[Finding, ...]:
-        """All findings so far, in the order of first sight."""
-        return tuple(self._found(key, told) for key, told in self._told.items())
+        """All findings so far, in the order of first sight.
+
+        A bit of a status word that says no more than a code or trip bit of the same device is left out.
+        """
+        worded = {(code, subject) for code, subject, which in self._told if which != OF_STATUS}
+        return tuple(
+            self._found(key, told)
+            for key, told in self._told.items()
+            if key[2] != OF_STATUS or (key[0], key[1]) not in worded
+        )
 
     def _found(self, key: Key, told: _Told) -> Finding:
         code, subject, _ = key
@@ -145,7 +163,10 @@ class ProfileFindings:
             seen += milliseconds(told.worst)
         elif count > 1:
             seen = f"{seen}, {count} times"
-        return told.tally.found(PROFILE_RULES[code], subject, seen)
+        if told.sure:
+            return told.tally.found(PROFILE_RULES[code], subject, seen)
+        seen += ", as far as this is where the state stands in the answer, which no public source confirms"
+        return told.tally.found(PROFILE_RULES[code], subject, seen, Severity.NOTE)
 
     # --- the rules ---
 
@@ -177,18 +198,26 @@ class ProfileFindings:
     def _judge_value(self, sample: Sample) -> None:
         profile = self._devices.at(sample.device)
         value = sample.value
-        if profile is None or not value.reading.sure:
+        if profile is None:
             return
         who = _subject(profile, sample.device)
         self._judge_range(value, who, sample.time, sample.frame)
         entry = value.entry
-        if entry is None or value.bit or value.raw is None or entry.role not in (EntryRole.FAULT, EntryRole.ALARM):
+        if entry is None or value.bit or value.raw is None:
             return
-        code = "PR004" if entry.role is EntryRole.FAULT else "PR005"
-        for words in _troubles(entry, value):
-            self._add(code, who, f"{entry.name} {words}", f"{entry.title}: {words}", sample.time, sample.frame)
+        if entry.role in CODES:
+            for words in _troubles(entry, value):
+                self._add_trouble(CODES[entry.role], who, f"{entry.name} {words}", f"{entry.title}: {words}", sample)
+        else:
+            for code, words in _told_by_bits(entry, value.raw):
+                self._add_trouble(code, who, OF_STATUS, f"{entry.title}: {words}", sample)
 
-    def _judge_range(self, value: Value, who: str, time: int, no: int) -> None:
+    def _add_trouble(self, code: str, who: Subject, which: str, seen: str, sample: Sample) -> None:
+        told = self._add(code, who, which, seen, sample.time, sample.frame)
+        if told is not None:
+            told.sure = told.sure or sample.value.reading.sure
+
+    def _judge_range(self, value: Value, who: Subject, time: int, no: int) -> None:
         entry = value.entry
         if entry is None or value.bit or entry.doubt or not value.reading.sure or in_range(entry, value.value):
             return
@@ -212,13 +241,13 @@ class ProfileFindings:
             if told is not None:
                 told.worst = max(told.worst, latency.low)
 
-    def _add(self, code: str, subject: str, which: str, seen: str, time: int, no: int) -> _Told | None:
+    def _add(self, code: str, subject: Subject, which: str, seen: str, time: int, no: int) -> _Told | None:
         key = code, subject, which
         told = self._told.get(key)
         if told is None:
             if len(self._told) >= MOST_TOLD:
                 return None
-            told = self._told[key] = _Told(seen)
+            told = self._told[key] = _Told(seen, sure=code not in CODES.values())
         told.tally.add(time, no)
         return told
 
@@ -234,5 +263,19 @@ def _troubles(entry: Entry, value: Value) -> Iterator[str]:
         yield words if entry.high == 1 else f"code {code}, {words}" if words else f"code {code}, not in the manual"
 
 
-def _subject(profile: Profile, station: int | None) -> str:
-    return f"{ALL} {profile.noun}s" if station is None else f"{profile.noun} {station}"
+def _told_by_bits(entry: Entry, raw: int) -> Iterator[tuple[str, str]]:
+    """Rule and words of each bit, and of each number in several bits, that stands for a fault or a warning."""
+    for bit in entry.bits:
+        if bit.role in CODES and raw >> bit.number & 1:
+            yield CODES[bit.role], bit.on
+    for part in entry.parts:
+        held = part.of(raw)
+        role = part.roles.get(held, EntryRole.VALUE)
+        if role in CODES:
+            yield CODES[role], f"{part.name} {part.states.get(held, held)}"
+
+
+def _subject(profile: Profile, address: int | None) -> Subject:
+    if address is None:
+        return Subject(About.OTHER, name=f"{ALL} {profile.noun}s")
+    return station(address, profile.noun)

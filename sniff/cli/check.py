@@ -63,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
         "json": lambda: check_output.write_json(checked),
         "junit": lambda: check_output.write_junit(checked, Severity.WARNING if fail_on is None else fail_on),
     }[args.format]()
-    failing = fail_on is not None and any(f.severity >= fail_on for one in checked for f in one.findings)
+    failing = fail_on is not None and any(check_output.failures(one.findings, fail_on) for one in checked)
     return int(failing)
 
 

@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from xml.sax.saxutils import escape, quoteattr
 
-from dissectors.findings import Finding, Rule, Severity, merged, times
+from dissectors.findings import Finding, Rule, Severity, merged, times, under_causes
 from dissectors.line import NS_PER_S
 from sniff.analysis.health import Health
 from sniff.analysis.judging import rules_over
@@ -52,6 +52,16 @@ class Checked:
         return self.starts[no - 1] if 0 < no <= len(self.starts) else None
 
 
+def failures(findings: Sequence[Finding], fail_on: Severity, code: str = "") -> list[Finding]:
+    """Those at or above a severity, with `code` only that rule's. A consequence counts by its cause, where that is
+    among them."""
+    return [
+        finding
+        for finding, under in under_causes(findings)
+        if not under and finding.severity >= fail_on and code in ("", finding.code)
+    ]
+
+
 # ---- text
 
 
@@ -62,7 +72,10 @@ def write_text(checked: Sequence[Checked], colour: bool) -> None:
         if number:
             print()
         _write_head(one, width)
-        for finding in one.findings:
+        for finding, under in under_causes(one.findings):
+            if under:
+                _write_consequence(one, finding, width)
+                continue
             print()
             _write_finding(one, finding, width, colour)
         print()
@@ -118,6 +131,12 @@ def _write_finding(one: Checked, finding: Finding, width: int, colour: bool) -> 
         _paragraph(_evidence(one, finding), width, _INDENT, _INDENT + " " * 7)
 
 
+def _write_consequence(one: Checked, finding: Finding, width: int) -> None:
+    """What a finding above most likely explains: one paragraph under it; what to do stands there."""
+    words = f"└ {finding.subject}: {_title(one, finding)}  [{finding.code}]  {_sentence(finding.seen)}"
+    _paragraph(words, width, _INDENT, _INDENT + "  ")
+
+
 def _evidence(one: Checked, finding: Finding) -> str:
     shown = []
     for no in finding.evidence[:EVIDENCE_SHOWN]:
@@ -154,7 +173,9 @@ def _count_words(findings: Sequence[Finding]) -> str:
         f"{counts[severity]} {plural[severity][: -1 if counts[severity] == 1 else None]}"
         for severity in sorted(counts, reverse=True)
     ]
-    return ", ".join(parts) + "; `sniff485 rule CODE` explains one"
+    under = sum(is_under for _, is_under in under_causes(findings))
+    hanging = f" ({under} of them under {'its cause' if under == 1 else 'their causes'})" if under else ""
+    return ", ".join(parts) + hanging + "; `sniff485 rule CODE` explains one"
 
 
 def _span(seconds: float) -> str:
@@ -169,9 +190,9 @@ def _span(seconds: float) -> str:
 
 
 def write_json(checked: Sequence[Checked]) -> None:
-    """Print one object a finding; keys and their order are a promise."""
+    """Print one object a finding, consequences behind their cause; keys and their order are a promise."""
     for one in checked:
-        for finding in one.findings:
+        for finding, _ in under_causes(one.findings):
             print(json.dumps(to_json(one, finding), ensure_ascii=False))
 
 
@@ -196,6 +217,7 @@ def to_json(one: Checked, finding: Finding) -> dict[str, object]:
         "seen": finding.seen,
         "means": finding.means,
         "next": finding.next,
+        "cause": None if finding.cause is None else {"code": finding.cause[0], "subject": finding.cause[1]},
     }
 
 
@@ -203,7 +225,8 @@ def to_json(one: Checked, finding: Finding) -> dict[str, object]:
 
 
 def write_junit(checked: Sequence[Checked], fail_on: Severity) -> None:
-    """Print one test suite a source, one test case a rule: it fails when a finding of it is at or above `fail_on`."""
+    """Print one test suite a source, one test case a rule: it fails when a finding of it is at or above `fail_on`, but
+    for the consequences of another finding, which stand in the text of their cause too."""
     lines = ['<?xml version="1.0" encoding="UTF-8"?>', '<testsuites name="sniff485 check">']
     for one in checked:
         lines += _suite(one, fail_on)
@@ -213,7 +236,7 @@ def write_junit(checked: Sequence[Checked], fail_on: Severity) -> None:
 
 def _suite(one: Checked, fail_on: Severity) -> list[str]:
     rules: dict[str, Rule] = rules_over(dissector_for(one.session))
-    failing = {finding.code for finding in one.findings if finding.severity >= fail_on}
+    failing = {finding.code for finding in failures(one.findings, fail_on)}
     head = (
         f"  <testsuite name={_attribute(one.source)} tests={_attribute(str(len(rules)))} "
         f'failures={_attribute(str(len(failing)))} errors="0" time={_attribute(f"{one.seconds:.3f}")}>'
@@ -226,7 +249,7 @@ def _suite(one: Checked, fail_on: Severity) -> list[str]:
             lines.append(case + "/>")
             continue
         lines.append(case + ">")
-        bad = [finding for finding in found if finding.severity >= fail_on]
+        bad = failures(one.findings, fail_on, code)
         if bad:
             text = "\n".join(_junit_text(one, finding) for finding in bad)
             lines.append(
@@ -243,7 +266,12 @@ def _suite(one: Checked, fail_on: Severity) -> list[str]:
 def _junit_text(one: Checked, finding: Finding) -> str:
     evidence = f"\n{_evidence(one, finding)}" if finding.evidence else ""
     head = f"{finding.severity.label}: {finding.subject}: {_sentence(finding.seen)}"
-    return f"{head}\nmeans: {finding.means}\nnext: {finding.next}{evidence}"
+    explained = "".join(
+        f"\nexplains {other.code} {other.subject}: {_sentence(other.seen)}"
+        for other in one.findings
+        if other.cause == finding.key
+    )
+    return f"{head}\nmeans: {finding.means}\nnext: {finding.next}{evidence}{explained}"
 
 
 def _attribute(text: str) -> str:

@@ -23,8 +23,18 @@ from dissectors.frame import Chunk, Frame, Noise
 from dissectors.profiles.packaged import names
 from sniff.engine import Output
 from sniff.profile_files import EVERY, address, noted
-from sniff.reading import ASSUMED, LINE_NOTE, engine_for, line_is_assumed
-from sniff.session import DEVICES_NOTE, Adapter, Item, LineEvent, LineEventKind, Session, settings_change
+from sniff.reading import engine_for, line_is_assumed
+from sniff.session import (
+    ASSUMED,
+    DEVICES_NOTE,
+    LINE_NOTE,
+    Adapter,
+    Item,
+    LineEvent,
+    LineEventKind,
+    Session,
+    settings_change,
+)
 
 BLANK = ord("x")
 CHARACTER_STRING, OBJECT_IDENTIFIER = 7, 12

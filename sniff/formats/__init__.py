@@ -6,11 +6,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any, Protocol
 
-from sniff.session import Completeness, Item, Session
+from dissectors.frame import Chunk
+from sniff.read_times import LOOKED_AT, ReadTimes
+from sniff.session import Completeness, Item, LineEventKind, Session
 
 
 class CaptureError(Exception):
@@ -71,11 +74,38 @@ def read(path: str | Path) -> Capture:
     if str(path) == "-":
         from sniff.formats import standard_input
 
-        return standard_input.read()
+        return _with_reads(standard_input.read())
     if Path(path).is_dir():
         raise CaptureError(f"{path}: a directory, not a capture; name a file in it")
     found: Capture = _find(READERS, Path(path))(Path(path))
-    return found
+    return _with_reads(found)
+
+
+def _with_reads(capture: Capture) -> Capture:
+    """The capture; its session knows when its first reads came, and takes no times as exact that cannot be."""
+    session = capture.session
+    if session.unknown or session.reads is not None:
+        return capture
+    capture.session = replace(session, reads=ReadTimes.of(_first_reads(capture))).with_latency_of_reads()
+    return capture
+
+
+def _first_reads(capture: Capture) -> list[tuple[int, int]]:
+    """Time and octets of the first reads, none after a change of settings; (time, 0) for a hole."""
+    reads: list[tuple[int, int]] = []
+    try:
+        for item in capture.items():
+            if isinstance(item, Chunk):
+                reads.append((item.time, len(item.octets)))
+            elif item.kind is LineEventKind.SETTINGS:
+                break
+            elif item.kind.is_hole:
+                reads.append((item.time, 0))
+            if len(reads) >= LOOKED_AT:
+                break
+    except CaptureError:
+        pass  # whoever reads on is told
+    return reads
 
 
 def create(path: str | Path, session: Session, options: Mapping[str, str] | None = None) -> CaptureWriter:

@@ -17,8 +17,8 @@ from dissectors.line import LineSettings
 from sniff.analysis.wording import describe, duration
 from sniff.engine import Output
 from sniff.formats.linktypes import LINK_TYPES, RTAC, RTAC_ERRORS, USER1, link_type_for, rtac_record
-from sniff.reading import ASSUMED, LINE_NOTE, Settled, Settling, engine_for
-from sniff.session import Adapter, Item, LineEvent, LineEventKind, Session, SettingsChange
+from sniff.reading import Settled, Settling, engine_for
+from sniff.session import ASSUMED, LINE_NOTE, Adapter, Item, LineEvent, LineEventKind, Session, SettingsChange
 
 FOREIGN_LATENCY = 20_000_000
 """ns; a usual USB adapter's latency timer and some scheduling."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 
-from dissectors.findings import Finding, Severity
+from dissectors.findings import Finding, Severity, under_causes
 from dissectors.profiles import Devices
 from dissectors.registry import Dissector
 from dissectors.tracker import Transaction, Verdict
@@ -237,8 +237,9 @@ def _found(
             means=finding.means,
             next=finding.next,
             evidence=tuple(Evidence(no, *words.get(no, (None, ""))) for no in _shown(finding)),
+            under=under,
         )
-        for finding in findings
+        for finding, under in under_causes(findings)
     )
 
 

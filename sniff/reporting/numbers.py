@@ -35,7 +35,7 @@ class Evidence:
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """One finding."""
+    """One finding. `under`: whether the one before it that stands for itself explains it."""
 
     code: str
     severity: str
@@ -48,6 +48,7 @@ class Found:
     means: str
     next: str
     evidence: tuple[Evidence, ...]
+    under: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ from textual.binding import Binding, BindingType
 from textual.containers import VerticalScroll
 from textual.widgets import DataTable, Static
 
-from dissectors.findings import Finding, Severity
+from dissectors.findings import Finding, Severity, under_causes
 from sniff.analysis.judging import rules_over
 from sniff.tui.analyzer import analyzer
 from sniff.tui.judged import Judged
@@ -48,6 +48,7 @@ class FindingsScreen(ViewScreen):
         self._by_subject = False
         self._all = True
         self._found: dict[str, Finding] = {}
+        self._under: set[str] = set()  # keys of those that one above explains
         self._evidence: dict[str, int] = {}  # place in the evidence of each finding that was shown last
         self._titles: dict[str, str] = {}
 
@@ -93,12 +94,14 @@ class FindingsScreen(ViewScreen):
         self._titles = {code: rule.title for code, rule in rules_over(self.store.dissector).items()}
         if self.viewing.last_row >= self.store.last_no:
             judged.step(0, self.viewing.last_row)  # what closed since
-        found = [f for f in judged.findings() if self._all or f.severity >= Severity.WARNING]
+        found = [f for f in judged.findings() if self._all or f.severity >= Severity.WARNING or f.cause is not None]
         if self._by_subject:
             found.sort(key=lambda f: (f.subject, -f.severity, f.code))
-        self._found = _keyed(found)
+        ordered = under_causes(found)
+        self._found = _keyed(one for one, _ in ordered)
+        self._under = {key for key, (_, under) in zip(self._found, ordered, strict=True) if under}
         table = self.query_one(StationTable)
-        table.fill((key, self._cells(f)) for key, f in self._found.items())
+        table.fill((key, self._cells(f, key in self._under)) for key, f in self._found.items())
         if self._first_look:  # the cursor stays on the gravest one until all was read once
             table.move_cursor(row=0, animate=False)
             self._first_look = self.work_left()
@@ -106,10 +109,11 @@ class FindingsScreen(ViewScreen):
 
     # -- showing -----------------------------------------------------------------------------------------------
 
-    def _cells(self, finding: Finding) -> list[Text]:
+    def _cells(self, finding: Finding, under: bool) -> list[Text]:
         style = _STYLES[finding.severity]
         title = self._titles.get(finding.code, "")
-        cells = (_SIGNS[finding.severity], finding.code, finding.subject, str(finding.count), title)
+        subject = f"└ {finding.subject}" if under else finding.subject
+        cells = (_SIGNS[finding.severity], finding.code, subject, str(finding.count), title)
         return [Text(plain(cell), style=style if at in (0, 1) else "") for at, cell in enumerate(cells)]
 
     def _describe(self) -> None:

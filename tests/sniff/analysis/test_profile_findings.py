@@ -12,8 +12,13 @@ import pytest
 
 from dissectors.findings import Finding, Severity
 from dissectors.profiles import Devices, packaged
+from dissectors.profiles.decoding import decode
+from dissectors.readings import How, Reading
+from sniff.analysis.health import health_of
 from sniff.analysis.judging import Judging
+from sniff.analysis.points import Sample
 from sniff.analysis.profile_findings import PROFILE_RULES, ProfileFindings
+from sniff.analysis.summary import Summary
 from sniff.engine import Output
 from sniff.reading import dissector_for, outputs
 from sniff.simulation.scenarios import scenario, simulate
@@ -171,3 +176,60 @@ def test_the_makers_words_for_an_exception_stand_before_the_standard(
     assert finding.seen.startswith(words)
     assert finding.severity is severity
     assert ("later" in finding.means) == ("acknowledge" in words)
+
+
+@pytest.mark.parametrize(
+    ("devices", "exchange", "expected"),
+    [
+        (E510, ("010325200001", "0103020009"), [("PR004", "drive 1", "status: fault")]),
+        (E510, ("010325200001", "0103020011"), [("PR005", "drive 1", "status: warning")]),
+        (E510, ("010325200001", "0103020001"), []),
+        (ACN, ("010303040001", "0103028000"), [("PR004", "drive 1", "operation state: condition fault")]),
+        (ACN, ("010303040001", "0103024001"), [("PR005", "drive 1", "operation state: condition warning")]),
+        (ACN, ("010303040001", "0103020031"), []),
+    ],
+)
+def test_a_status_word_tells_of_faults_and_warnings(
+    devices: Devices, exchange: tuple[str, str], expected: list[tuple[str, str, str]]
+) -> None:
+    assert brief(judged(exchange, devices=devices)) == expected
+
+
+def test_the_status_word_adds_nothing_to_the_code() -> None:
+    found = judged(("010325200001", "0103020008"), ("010325210001", "0103020011"))
+    assert brief(found) == [("PR004", "drive 1", "fault: code 17, external fault 01")]
+
+
+F510 = packaged("teco-f510")
+
+
+@pytest.mark.parametrize(
+    ("space", "address", "code"),
+    [("BI", 3, "PR004"), ("BI", 4, "PR005"), ("binary-input", 2, "PR004")],
+)
+@pytest.mark.parametrize("sure", [True, False])
+def test_objects_tell_of_faults_and_warnings(space: str, address: int, code: str, sure: bool) -> None:
+    session = bus.SESSION
+    judge = ProfileFindings(session.timing, dissector_for(session), Devices(default=F510))
+    for state in (0, 1):
+        reading = Reading(space, address, state, state, How.READ, sure=sure)
+        (value,) = decode(F510, (reading,))
+        judge._judge_value(Sample(10, 1, value, 1))
+    (found,) = judge.findings()
+    assert (found.code, found.subject, found.severity) == (
+        code,
+        "drive 1",
+        PROFILE_RULES[code].severity if sure else Severity.NOTE,
+    )
+
+
+def test_health_counts_what_devices_tell() -> None:
+    session = bus.SESSION
+    dissector = dissector_for(session)
+    summary, judging = Summary(session.line), Judging(session, dissector, E510)
+    for output in bus.run(bus.chunks(*[("010325210001", "0103020011")] * 3), session):
+        summary.add(output)
+        judging.add(output)
+    health = health_of(summary, judging.findings())
+    assert health.stations[1].reasons[-1] == "finding PR004 (−30)"
+    assert health.bus.score == (100 + health.stations[1].score) // 2

@@ -67,6 +67,34 @@ def test_junit_fails_the_rules_that_found_something(absent, capsys):
     assert int(suite.get("tests")) == len(suite)
 
 
+@pytest.fixture
+def two_masters(tmp_path: Path) -> str:
+    return recorded(modbus(second_master=True, seed=1), tmp_path / "two.cap.txt", 3)
+
+
+def test_consequences_stand_under_their_cause(two_masters, capsys):
+    assert main(["check", two_masters]) == 1
+    lines = capsys.readouterr().out.splitlines()
+    cause = next(number for number, line in enumerate(lines) if "[MB203]" in line)
+    assert any(line.startswith("         └ station") for line in lines[cause : cause + 12])
+    main(["check", two_masters, "--json"])
+    found = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    cause = next(number for number, one in enumerate(found) if one["code"] == "MB203")
+    assert found[cause]["cause"] is None
+    assert found[cause + 1]["cause"] == {"code": "MB203", "subject": "bus"}
+    main(["check", two_masters, "--format", "junit", "--fail-on", "note"])
+    suite = ElementTree.fromstring(capsys.readouterr().out).find("testsuite")
+    failed = {case.get("name")[:5]: case.find("failure").text for case in suite if case.find("failure") is not None}
+    assert "explains " in failed["MB203"]
+    assert not {one["code"] for one in found if one["cause"]} & set(failed)
+
+
+def test_the_exit_code_goes_by_causes(two_masters):
+    assert main(["check", two_masters, "--fail-on", "note", "--ignore", "MB4"]) == 1
+    assert main(["check", two_masters, "--only", "MB203,MB002", "--fail-on", "error"]) == 1
+    assert main(["check", two_masters, "--only", "MB002", "--fail-on", "warning"]) == 0
+
+
 def test_every_rule_is_explained(capsys):
     assert main(["rule", "LN", "MB", "N2", "MS"]) == 0
     said = capsys.readouterr().out

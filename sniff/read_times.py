@@ -1,0 +1,180 @@
+"""How long octets were held back before they were read, told by when reads came and how many octets each held. Pure.
+
+A capture that names no adapter may have exact times (a logic analyser's, a simulation's) or be the work of a USB
+adapter with a latency timer. Two things tell, neither of them by what the octets mean:
+
+* *Impossible reads.* A read that holds more octets than can have come on the wire since the read before: some of them
+  were there before, and were held back. Summed up over a run of reads this gives a lower bound.
+* *A grid.* Reads at multiples of one period, at any phase of what is sent: an adapter that hands over what it has when
+  its timer runs out. Then each read holds at most what comes in one period, and wherever a period ends inside a frame
+  two reads stand exactly one period apart. A capture in which a read is a whole frame has neither, whatever rhythm its
+  master keeps.
+
+The bound that is given has a margin: a frame of the USB (1 ms) and the scatter of the reads. Looked at is the begin of
+a capture (`LOOKED_AT` reads), so that a file is opened at once however long it is.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from dissectors.line import LineSettings
+
+MS = 1_000_000
+LOOKED_AT = 4096
+"""Reads of a capture that are looked at."""
+
+PERIODS = (64, 50, 40, 32, 25, 20, 16, 12, 10, 8, 6, 5, 4, 3, 2, 1)
+"""Periods of latency timers that are tried, ms, the longest first."""
+
+FULL_PACKETS = (62, 64)
+"""Octets of a USB packet that is full and does not wait for the timer."""
+
+LEAST_INTERVALS = 12
+LEAST_SPLITS = 3.0
+ON_GRID = 0.85
+USB_FRAME = MS
+LONGEST_INTERVAL = 1000 * MS  # two clocks drift apart over longer ones
+_FAST = 0.97  # senders may be 2 % faster than the nominal rate, and stamps are rounded
+_BOUNDS = (3, 5, 10, 18, 22, 33, 50, 70, 100, 140, 200, 300, 500, 1000)  # ms
+
+
+@dataclass(frozen=True, slots=True)
+class ReadTimes:
+    """The first reads of a capture: for each the ns since the read before (−1: not known) and how many octets it held.
+
+    Made by `ReadTimes.of`; the same for any line settings.
+    """
+
+    intervals: tuple[int, ...] = ()
+    octets: tuple[int, ...] = ()
+
+    @classmethod
+    def of(cls, reads: Sequence[tuple[int, int]]) -> ReadTimes:
+        """`reads`: (time in ns, octets) in their order; no octets: a hole, after which the time before says nothing."""
+        intervals: list[int] = []
+        octets: list[int] = []
+        before: int | None = None
+        for time, count in reads:
+            if not count:
+                before = None
+                continue
+            intervals.append(-1 if before is None or time < before else time - before)
+            octets.append(count)
+            before = time
+        return cls(tuple(intervals), tuple(octets))
+
+    @property
+    def unit(self) -> int:
+        """What all intervals are multiples of, ns: 1, 10, 100 … 1 ms; what is finer was rounded away."""
+        unit = MS
+        for interval in self.intervals:
+            while unit > 1 and interval > 0 and interval % unit:
+                unit //= 10
+        return unit
+
+
+@dataclass(frozen=True, slots=True)
+class HeldBack:
+    """What reads say. `latency`: ns by which an octet may have been held back, 0 when nothing speaks against exactness.
+
+    `period`: of the grid, ns, 0 without one. `proved`: ns by which an octet certainly was. `impossible`: how many
+    stretches of reads hold more than can have come.
+    """
+
+    latency: int = 0
+    period: int = 0
+    proved: int = 0
+    impossible: int = 0
+
+
+EXACT = HeldBack()
+
+
+def held_back(reads: ReadTimes, line: LineSettings, bound: int = 0) -> HeldBack:
+    """What the reads say on a line with these settings. `bound`: ns that are known to be held back anyhow."""
+    worst = _backlogs(reads, line.char, bound + line.char + reads.unit)
+    proved = max(worst, default=0)
+    period, scatter = _grid(reads, line.char)
+    if not period and not worst:
+        return EXACT
+    rounded = reads.unit if reads.unit >= MS // 10 else 0
+    latency = period + USB_FRAME + 2 * scatter + rounded if period else 0
+    if proved > latency:
+        latency = next((b * MS for b in _BOUNDS if 4 * b * MS >= 5 * proved), 2 * proved)
+    return HeldBack(latency, period, proved, len(worst))
+
+
+def _backlogs(reads: ReadTimes, char: int, allowed: int) -> list[int]:
+    """Of each stretch that holds more octets than can have come: ns of line time too much, where over `allowed`."""
+    found: list[int] = []
+    backlog = worst = 0.0
+    for interval, count in zip(reads.intervals, reads.octets, strict=True):
+        if interval < 0:
+            backlog = worst = 0.0
+            continue
+        backlog = max(0.0, backlog + _FAST * count * char - interval)
+        if backlog > max(allowed, worst):
+            if worst:
+                found.pop()
+            worst = backlog
+            found.append(int(worst))
+        elif not backlog:
+            worst = 0.0
+    return found
+
+
+def _grid(reads: ReadTimes, char: int) -> tuple[int, int]:
+    """Period of the grid that reads lie on and how far they scatter about it, ns; (0, 0) for none."""
+    pairs = [
+        (interval, count)
+        for interval, count in zip(reads.intervals, reads.octets, strict=True)
+        if 0 < interval <= LONGEST_INTERVAL and count not in FULL_PACKETS
+    ]
+    if len(pairs) < LEAST_INTERVALS:
+        return 0, 0
+    in_whole_ms = reads.unit == MS  # as people write: multiples of 5 and 10 ms prove nothing
+    for ms in PERIODS:
+        if in_whole_ms and ms % 5 == 0:
+            continue
+        scatter = _fits(pairs, ms * MS, char)
+        if scatter is not None:
+            return ms * MS, scatter
+    return 0, 0
+
+
+def _fits(pairs: Sequence[tuple[int, int]], period: int, char: int) -> int | None:
+    """How far reads scatter about multiples of `period`; None where that is no latency timer's."""
+    tolerance = min(period // 8, 600_000)
+    few = pairs[:64]
+    if sum(_off(interval, period) <= tolerance for interval, _ in few) < (ON_GRID - 0.15) * len(few):
+        return None
+    errors = [_off(interval, period) for interval, _ in pairs]
+    on_grid = sorted(error for error in errors if error <= tolerance)
+    if len(on_grid) < ON_GRID * len(pairs):
+        return None
+    longest = period + tolerance + USB_FRAME
+    if sum(_FAST * count * char > longest for _, count in pairs) > 0.03 * len(pairs):
+        return None  # whole frames: a timer would have cut them
+    # Where a period ends inside a frame, two reads stand one period apart.
+    expected = sum(count for _, count in pairs) * char / period
+    apart = [(interval, count) for interval, count in pairs if abs(interval - period) <= tolerance]
+    if expected < LEAST_SPLITS or len(apart) < 0.4 * expected:
+        return None
+    # It ends anywhere in a frame, so that these reads hold now this many octets, now that.
+    counts = Counter(count for _, count in apart)
+    if len(counts) < (3 if period > 3 * char else 2) or max(counts.values()) > 0.6 * len(apart):
+        return None
+    # Octets read one by one as they come stand apart by what they take on the line, not by a timer.
+    as_sent = sum(abs(interval - count * char) <= max(tolerance, char // 4) for interval, count in apart)
+    if 2 * as_sent > len(apart):
+        return None
+    return on_grid[int(0.95 * (len(on_grid) - 1))]
+
+
+def _off(interval: int, period: int) -> int:
+    """Distance to the nearest multiple of the period, from one on."""
+    times = max(1, (interval + period // 2) // period)
+    return abs(interval - times * period)
