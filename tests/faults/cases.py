@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
-from random import Random
 
-from dissectors.frame import Chunk, LineError, Mark, Place
-from dissectors.line import LineSettings
+from dissectors.frame import Place
 from dissectors.modbus.simulated_master import read_holding, write_register
-from sniff.session import Item, LineEvent, LineEventKind
 from sniff.simulation.faults import (
     BitFlips,
     Break,
@@ -22,12 +18,24 @@ from sniff.simulation.faults import (
     MarkParity,
     NoiseInGaps,
 )
-from sniff.simulation.line_mix import low_times, receive
-from sniff.simulation.scenarios import Scenario, simulate
-from sniff.simulation.tap import CH340, EXACT, FTDI, FTDI_LOW_LATENCY, OCTETS, UART, TapModel
-from tests.faults.buses import modbus, mstp, n2
-from tests.faults.case import Case, Heard
+from sniff.simulation.tap import EXACT, FTDI
+from tests.faults.buses import modbus, n2
+from tests.faults.case import Case
 from tests.faults.drive_cases import DRIVE_CASES
+from tests.faults.hearing import (
+    counting,
+    echoing,
+    losing,
+    other_settings,
+    overrunning,
+    silent,
+    stepping,
+    swapped,
+)
+from tests.faults.line_cases import LINE_CASES
+from tests.faults.modbus_cases import MODBUS_CASES
+from tests.faults.mstp_cases import MSTP_CASES
+from tests.faults.n2_cases import N2_CASES
 from tests.faults.ring_cases import RING_CASES
 from tests.faults.stations import (
     AnswersAs,
@@ -43,149 +51,6 @@ from tests.faults.uneven_stations import TakesTurns, Waits
 
 MS = 1_000_000
 S = 1_000_000_000
-
-
-def clean_cases(seconds: float) -> Iterator[Case]:
-    """Nothing is wrong: nothing may be found at warning or above. `seconds` with exact times and with an FTDI adapter,
-    a tenth of it with the others."""
-    buses = {"RTU": modbus, "ASCII": partial(modbus, is_ascii=True), "N2": n2, "MS/TP": mstp}
-    for protocol, make in buses.items():
-        for tap in (EXACT, FTDI, OCTETS, FTDI_LOW_LATENCY, UART, CH340):
-            yield Case(
-                f"{protocol} clean, {tap.name}", make, (), tap, seconds if tap in (EXACT, FTDI) else seconds / 10
-            )
-
-
-def unsteady_cases() -> Iterator[Case]:
-    """Stations whose times vary, yet nothing is wrong, or the adapter does not let anybody know."""
-    uneven = partial(modbus, change={2: partial(Waits, spread=30 * MS), 3: partial(Waits, spread=8 * MS)})
-    groups = partial(modbus, change={2: partial(Waits, spread=12 * MS, groups=True)})
-    rare = partial(modbus, change={2: partial(Waits, spread=25 * MS, groups=True, share=0.03)})
-    yield Case("RTU clean, uneven times", uneven, (), never=("MB102", "MB208"))
-    yield Case("RTU clean, uneven times, FTDI 16 ms", uneven, (), FTDI, never=("MB102", "MB208"))
-    yield Case("RTU clean, uneven times, octet by octet", uneven, (), OCTETS, never=("MB102", "MB208"))
-    yield Case("RTU clean, two times that an FTDI hides", groups, (), FTDI, never=("MB102", "MB208"))
-    yield Case("RTU clean, busy now and then", rare, (), never=("MB102", "MB208"))
-
-
-# ---- what goes wrong in the sniffer
-
-
-def _other_settings(settings: str, plan: Scenario, seconds: float, tap: TapModel) -> Heard:
-    """The same line heard by a UART with other settings, bit by bit."""
-    session, _ = simulate(plan, seconds, tap)
-    other = LineSettings.parse(settings)
-
-    def items() -> Iterator[Item]:
-        for burst in plan.wire().run(int(seconds * S)):
-            if burst.octets:
-                received = receive(other, low_times(plan.line, burst.start, burst.octets, {}))
-                if received.octets:
-                    yield Chunk(max(received.ends), received.octets, received.marks)
-
-    return replace(session, line=other), items()
-
-
-def _swapped(plan: Scenario, seconds: float, tap: TapModel) -> Heard:
-    """A and B swapped: what was low is high; the silence between frames reads as a break."""
-    session, _ = simulate(plan, seconds, tap)
-
-    def items() -> Iterator[Item]:
-        silent_since = 0
-        for burst in plan.wire().run(int(seconds * S)):
-            if not burst.octets:
-                continue
-            lows = sorted(low_times(plan.line, burst.start, burst.octets, {}))
-            inverted, at = [], silent_since
-            for begin, end in lows:
-                if begin > at:
-                    inverted.append((at, begin))
-                at = max(at, end)
-            silent_since = at
-            received = receive(plan.line, inverted)
-            if received.octets:
-                yield Chunk(max(received.ends), received.octets, received.marks)
-
-    return session, items()
-
-
-def _losing(plan: Scenario, seconds: float, tap: TapModel) -> Heard:
-    """A computer that loses a read now and then, and says so."""
-    session, items = simulate(plan, seconds, tap)
-    dice = Random(plan.seed)
-
-    def some() -> Iterator[Item]:
-        for item in items:
-            if isinstance(item, Chunk) and dice.random() < 0.01:
-                yield LineEvent(item.time, LineEventKind.DROPPED, "", len(item.octets))
-            else:
-                yield item
-
-    return session, some()
-
-
-def _overrunning(plan: Scenario, seconds: float, tap: TapModel) -> Heard:
-    """An adapter that loses octets inside a read, and marks the place."""
-    session, items = simulate(plan, seconds, tap)
-    dice = Random(plan.seed)
-
-    def some() -> Iterator[Item]:
-        for item in items:
-            if isinstance(item, Chunk) and len(item.octets) > 4 and dice.random() < 0.02:
-                yield Chunk(item.time, item.octets[:2] + item.octets[4:], (Mark(2, LineError.OVERRUN),))
-            else:
-                yield item
-
-    return session, some()
-
-
-def _echoing(plan: Scenario, seconds: float, tap: TapModel) -> Heard:
-    """A tap behind a converter that gives back what the master sends."""
-    session, _ = simulate(plan, seconds, tap)
-
-    def items() -> Iterator[Item]:
-        for burst in plan.wire().run(int(seconds * S)):
-            if burst.octets:
-                yield Chunk(burst.end, burst.octets, burst.marks)
-            if burst.octets and burst.sent[0].party == "master":
-                yield Chunk(burst.end + len(burst.octets) * plan.line.char + 200_000, burst.octets)
-
-    return session, items()
-
-
-def _stepping(plan: Scenario, seconds: float, tap: TapModel) -> Heard:
-    """A computer whose wall clock is put right by two minutes after a while."""
-    session, items = simulate(plan, seconds, tap)
-
-    def stepped() -> Iterator[Item]:
-        waiting = True
-        for item in items:
-            if waiting and item.time > S // 2:
-                yield LineEvent(item.time, LineEventKind.CLOCK, "", 120 * S)
-                waiting = False
-            yield item
-
-    return session, stepped()
-
-
-def _counting(plan: Scenario, seconds: float, tap: TapModel) -> Heard:
-    """A driver that counts line errors and does not say where they were."""
-    session, items = simulate(plan, seconds, tap)
-
-    def counted() -> Iterator[Item]:
-        for item in items:
-            if isinstance(item, Chunk) and item.marks:
-                yield Chunk(item.time, item.octets)
-                yield LineEvent(item.time, LineEventKind.ERRORS, "parity", len(item.marks))
-            else:
-                yield item
-
-    return session, counted()
-
-
-def _silent(plan: Scenario, seconds: float, tap: TapModel) -> Heard:
-    session, _ = simulate(plan, seconds, tap)
-    return session, ()
 
 
 # ---- the table
@@ -286,18 +151,18 @@ CASES: tuple[Case, ...] = (
     ),
     Case("RTU address 250", partial(modbus, units=(1, 2, 250), delays={250: 9 * MS}), (("MB205", "station 250"),)),
     Case("RTU answers as another", partial(modbus, change=_wrong_place), (("MB206", "station 2"),)),
-    Case("RTU echo", modbus, (("LN205", "bus"),), hear=_echoing),
+    Case("RTU echo", modbus, (("LN205", "bus"),), hear=partial(echoing, 0)),
     # the sniffer and its settings
-    Case("wrong baud rate", modbus, (("LN003", "bus"),), hear=partial(_other_settings, "9600,8E1")),
-    Case("wrong baud rate, too high", modbus, (("LN003", "bus"),), hear=partial(_other_settings, "38400,8E1")),
-    Case("wrong parity", modbus, (("LN004", "bus"),), hear=partial(_other_settings, "19200,8O1")),
-    Case("A and B swapped", modbus, (("LN003", "bus"),), hear=_swapped),
-    Case("octets lost by the computer", modbus, (("LN005", "adapter"),), hear=_losing),
-    Case("octets lost in the adapter", modbus, (("LN104", "adapter"),), hear=_overrunning),
+    Case("wrong baud rate", modbus, (("LN003", "bus"),), hear=partial(other_settings, "9600,8E1")),
+    Case("wrong baud rate, too high", modbus, (("LN003", "bus"),), hear=partial(other_settings, "38400,8E1")),
+    Case("wrong parity", modbus, (("LN004", "bus"),), hear=partial(other_settings, "19200,8O1")),
+    Case("A and B swapped", modbus, (("LN003", "bus"),), hear=swapped),
+    Case("octets lost by the computer", modbus, (("LN005", "adapter"),), hear=losing),
+    Case("octets lost in the adapter", modbus, (("LN104", "adapter"),), hear=overrunning),
     Case("adapter unplugged", modbus, (("LN006", "adapter"),), replace(EXACT, unplugged=((20 * S, 22 * S),))),
-    Case("silent bus", modbus, (("LN002", "bus"),), hear=_silent),
-    Case("clock stepped", modbus, (("LN007", "adapter"),), hear=_stepping),
-    Case("line errors counted", partial(modbus, (MarkParity(0.01),)), (("LN102", "bus"),), hear=_counting),
+    Case("silent bus", modbus, (("LN002", "bus"),), hear=silent),
+    Case("clock stepped", modbus, (("LN007", "adapter"),), hear=stepping),
+    Case("line errors counted", partial(modbus, (MarkParity(0.01),)), (("LN102", "bus"),), hear=counting),
     # through a USB adapter that holds octets back for 16 ms
     Case("FTDI station absent", partial(modbus, absent=(4,)), (("MB001", "station 4"),), FTDI),
     Case("FTDI answers lost", partial(modbus, (LostResponse(0.08, ("unit 2",)),)), (("MB002", "station 2"),), FTDI),
@@ -344,4 +209,9 @@ CASES: tuple[Case, ...] = (
     # device profiles, BACnet MS/TP
     *DRIVE_CASES,
     *RING_CASES,
+    # what is the same each time, time patterns, tokens
+    *MODBUS_CASES,
+    *N2_CASES,
+    *LINE_CASES,
+    *MSTP_CASES,
 )

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 from dissectors.bacnet.application import Outgoing, Poller
+from dissectors.bacnet.frame_making import frame
 from dissectors.bacnet.frame_types import FrameType
 from dissectors.bacnet.simulated import Faults, Node
 from dissectors.line import LineSettings
@@ -79,3 +80,83 @@ class AlsoSends(Wrapped):
                     continue
             sent.append(send)
         return tuple(sent)
+
+
+class TestsItself(Wrapped):
+    """Asks with a Test_Request whether somebody else has its number: with its first token, or every `every` ns.
+
+    It waits `wait` ns for the answer before it goes on.
+    """
+
+    __test__ = False  # no test of pytest's
+
+    def __init__(self, inner: Node, line: LineSettings, every: int = 0, wait: int = 30_000_000) -> None:
+        super().__init__(inner)
+        self.mac, self.char, self.every, self.wait = inner.mac, line.char, every, wait
+        self.next: int | None = 0
+
+    def wake(self, now: int) -> tuple[Send, ...]:
+        return self.change(now, b"", self.inner.wake(now))
+
+    def change(self, now: int, octets: bytes, sends: tuple[Send, ...]) -> tuple[Send, ...]:
+        sent: list[Send] = []
+        for send in sends:
+            if send.octets[2] == FrameType.TOKEN and self.next is not None and now >= self.next:
+                self.next = now + self.every if self.every else None
+                asking = frame(FrameType.TEST_REQUEST, self.mac, self.mac, b"is it me?")
+                later = (len(asking) + 6) * self.char + self.wait
+                sent += (Send(send.at, asking), replace(send, at=send.at + later))
+            else:
+                sent.append(send)
+        return tuple(sent)
+
+
+class AnswersTests:
+    """A second device with a number, too simple for a token: it answers a Test_Request, with other octets."""
+
+    def __init__(self, mac: int, octets: bytes, after: int = 3_000_000) -> None:
+        self.mac, self.octets, self.after = mac, octets, after
+
+    def hear(self, now: int, octets: bytes, quiet: bool) -> tuple[Send, ...]:
+        if len(octets) < 8 or octets[2] != FrameType.TEST_REQUEST or octets[3] != self.mac:
+            return ()
+        return (Send(now + self.after, frame(FrameType.TEST_RESPONSE, octets[4], self.mac, self.octets)),)
+
+    def wake(self, now: int) -> tuple[Send, ...]:
+        return ()
+
+    def next_wake(self) -> int | None:
+        return None
+
+
+class SpeaksUnasked:
+    """A slave that sends a value by itself, every `every` ns, as soon as the line is free for `free` ns."""
+
+    def __init__(self, octets: bytes, every: int, free: int = 1_500_000) -> None:
+        self.octets, self.every, self.free = octets, every, free
+        self.due = every
+
+    def hear(self, now: int, octets: bytes, quiet: bool) -> tuple[Send, ...]:
+        if now < self.due:
+            return ()
+        self.due = now + self.every
+        return (Send(now + self.free, self.octets),)
+
+    def wake(self, now: int) -> tuple[Send, ...]:
+        return ()
+
+    def next_wake(self) -> int | None:
+        return None
+
+
+class PollsOnlyTo(Wrapped):
+    """A node whose Max_Master is set to `max_master` at `at`: whoever is above it is never polled again."""
+
+    def __init__(self, inner: Node, at: int, max_master: int) -> None:
+        super().__init__(inner)
+        self.node, self.at, self.max_master = inner, at, max_master
+
+    def hear(self, now: int, octets: bytes, quiet: bool) -> tuple[Send, ...]:
+        if now >= self.at:
+            self.node._max_master = self.max_master
+        return super().hear(now, octets, quiet)

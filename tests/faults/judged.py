@@ -1,0 +1,78 @@
+"""One run of one case: simulate, listen, judge, and compare what was said with what is true."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from dissectors.findings import Finding, Severity
+from sniff.analysis.judging import Judging, rules_over
+from sniff.engine import Output
+from sniff.profile_files import noted_devices
+from sniff.reading import dissector_for, outputs
+from sniff.session import Item, Session
+from tests.faults.case import Case, subject_of
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """One run of one case.
+
+    `missed`: what should have been said. `accused`: findings at warning or above about somebody innocent.
+    `mistaken`: errors about whoever may be named that are not what is wrong, and codes that must never come.
+    `graves`: number of findings at warning or above that are nobody's consequence. `frames`: good ones.
+    """
+
+    name: str
+    seed: int
+    findings: tuple[Finding, ...]
+    missed: tuple[str, ...]
+    accused: tuple[str, ...]
+    mistaken: tuple[str, ...]
+
+    @property
+    def false(self) -> tuple[str, ...]:
+        """Everything that should not have been said."""
+        return self.accused + self.mistaken
+
+    @property
+    def right(self) -> bool:
+        return not self.missed and not self.false
+
+    @property
+    def graves(self) -> tuple[str, ...]:
+        """What was said at warning or above."""
+        return tuple(f"{f.code} {f.subject}" for f in self.findings if f.severity >= Severity.WARNING)
+
+
+def findings_of(session: Session, items: Iterable[Item]) -> tuple[Finding, ...]:
+    """What all rules together say of a capture."""
+    judging = Judging(session, dissector_for(session), noted_devices(session))
+    for item in outputs(items, session):
+        if isinstance(item, Output):
+            judging.add(item)
+        else:
+            judging.add_line_event(item)
+    return judging.findings()
+
+
+def run(case: Case, seed: int = 1) -> Outcome:
+    """Simulate, listen, judge."""
+    session, items = case.hear(case.make(seed=seed), case.seconds, case.tap)
+    findings = findings_of(session, items)
+    rules = rules_over(dissector_for(session))
+    missed = tuple(
+        str(said) for said in case.wanted if not any(said.fits(one, rules.get(one.code)) for one in findings)
+    )
+    meant = {id(one) for one in findings for said in case.wanted if said.fits(one, rules.get(one.code))}
+    allowed = case.about if case.expect else frozenset(("adapter",))
+    accused, mistaken = [], []
+    for one in findings:
+        named = f"{one.code} {one.subject}"
+        if one.severity >= Severity.WARNING and subject_of(one) not in allowed:
+            accused.append(named)
+        elif one.code in case.never or (
+            one.severity is Severity.ERROR and id(one) not in meant and one.code not in case.also
+        ):  # what is called an error must be what is wrong
+            mistaken.append(named)
+    return Outcome(case.name, seed, findings, missed, tuple(accused), tuple(mistaken))

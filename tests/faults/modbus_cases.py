@@ -1,0 +1,354 @@
+"""Modbus stations and masters that do one thing wrong, and what a technician should be told. Data."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from dissectors.frame import Place
+from dissectors.line import LineSettings
+from dissectors.modbus.simulated_master import PollingMaster, read_holding, write_register, write_registers
+from dissectors.simulated import Station
+from sniff.simulation.faults import BitFlips, Break, CutShort, LateResponse, LostResponse, MarkParity, NoiseInGaps
+from sniff.simulation.tap import CH340, FTDI, UART
+from tests.faults.buses import RTU_LINE, modbus
+from tests.faults.case import Case, Said
+from tests.faults.hearing import echoing, hidden_latency, of_party, sent_otherwise
+from tests.faults.misbehaving import (
+    Rewrites,
+    SpoiltFirst,
+    Trimmed,
+    copied_before,
+    other_function,
+    other_quantity,
+    other_value,
+    swapped_check,
+)
+from tests.faults.stations import AnswersBroadcasts, Ignores, Of
+from tests.faults.workbench import Modbus, server, usual_requests, usual_stations
+
+MS = 1_000_000
+S = 1_000_000_000
+
+_ascii = partial(modbus, is_ascii=True)
+_FOUR = (1, 2, 3, 4)
+_master = ("master", "bus")
+_second = ("station 2",)
+
+_no_unit = read_holding(0, 0, 2)
+_wrong_count = b"\x01\x10\0\5\0\2\2\0\7"  # two registers, but the count says two octets
+_vendor = b"\x02\x41\x10\x01"
+
+_FIRST = r"\bfirst\b|too late|begin"
+_LAST = r"\blast\b|too early|too soon|\bends?\b.*missing|lets go|cut (off|short)"
+_SWAP = r"swap|other order|wrong order|order of|revers|exchang|high (octet|byte)"
+_COPY = r"\becho|\bcop(y|ies|ied)|gives? back|repeats? the request"
+_LATE = r"\blate|after (the|its|another|it was) |next (turn|request)|gave up"
+_TWO = r"two (stations|devices|servers|drives)|second (station|device)|same (address|number)|both"
+
+
+def _twin(delay: int, *, is_ascii: bool = False, seed: int) -> Station:
+    """A second device with number 2, which has other values."""
+    made = server(2, delay=delay, is_ascii=is_ascii)
+    for address in range(64):
+        made.holding.write(address, 40_000 + address)
+    return made
+
+
+def _two_masters(unit_masters: tuple[int, ...], every: int, is_ascii: bool, *, seed: int) -> Station:
+    """A second one that asks the same as the first, by its own clock."""
+    line = LineSettings.parse("19200,7E1") if is_ascii else RTU_LINE
+    asked = [read_holding(unit, 0, 6) for unit in unit_masters]
+    return PollingMaster(
+        asked, line, is_ascii=is_ascii, start=(13 + seed) * MS, pause=every, interval=0, timeout=200 * MS, retries=0
+    )
+
+
+_turns = Modbus(usual_requests(_FOUR), usual_stations(_FOUR, unit_2=60 * MS, unit_3=60 * MS), retries=0)
+
+MODBUS_CASES: tuple[Case, ...] = (
+    # damage that is the same each time
+    Case(
+        "RTU CRC octets swapped by one station",
+        partial(modbus, change={2: partial(Rewrites, rewrite=swapped_check)}),
+        (Said(_second, words=_SWAP),),
+    ),
+    Case(
+        "RTU CRC octets swapped, FTDI",
+        partial(modbus, change={2: partial(Rewrites, rewrite=swapped_check)}),
+        (Said(_second, words=_SWAP),),
+        FTDI,
+    ),
+    Case(
+        "RTU first octet of one station lost",
+        partial(modbus, (Trimmed("unit 2", first=1, rate=0.5),)),
+        (Said(_second, words=_FIRST),),
+    ),
+    Case(
+        "RTU first octet of one station always lost, FTDI",
+        partial(modbus, (Trimmed("unit 3", first=1),)),
+        (Said(("station 3",), words=_FIRST),),
+        FTDI,
+    ),
+    Case(
+        "RTU first octet of one station spoilt",
+        partial(modbus, (SpoiltFirst("unit 3", rate=0.6),)),
+        (Said(("station 3",), words=_FIRST),),
+    ),
+    Case(
+        "RTU last octet of one station lost",
+        partial(modbus, (Trimmed("unit 2", last=1, rate=0.5),)),
+        (Said(_second, ("MB006",), _LAST),),
+    ),
+    Case(
+        "RTU last two octets of one station always lost",
+        partial(modbus, (Trimmed("unit 1", last=2),)),
+        (Said(("station 1",), ("MB006",), _LAST),),
+    ),
+    Case(
+        "RTU last octet of one station lost, CH340",
+        partial(modbus, (Trimmed("unit 2", last=1, rate=0.5),)),
+        (Said(_second, ("MB006",), _LAST),),
+        CH340,
+    ),
+    Case(
+        "ASCII first character of one station lost",
+        partial(_ascii, (Trimmed("unit 2", first=1, rate=0.5),)),
+        (Said(_second, ("MB005",), _FIRST),),
+    ),
+    Case(
+        "ASCII last characters of one station lost",
+        partial(_ascii, (Trimmed("unit 2", last=2, rate=0.5),)),
+        (Said(_second, ("MB005", "MB006"), _LAST),),
+    ),
+    Case(
+        "RTU echo cut short",
+        modbus,
+        (Said(("bus", "master", "adapter"), ("LN205",), _COPY),),
+        hear=partial(echoing, 2),
+        never=("MB203", "MB201", "MB202"),
+        seeds=1,
+    ),
+    Case(
+        "RTU station copies the request before its answer",
+        partial(modbus, change={2: partial(Rewrites, rewrite=copied_before)}),
+        (Said(("station 2", "bus"), ("LN205",), _COPY),),
+        seeds=1,
+    ),
+    # answers that do not fit, requests that are wrong
+    Case(
+        "RTU answers with another function",
+        partial(modbus, change={2: partial(Rewrites, rewrite=other_function)}),
+        (("MB010", "station 2"),),
+        seeds=1,
+    ),
+    Case(
+        "ASCII answers with another function",
+        partial(_ascii, change={2: partial(Rewrites, rewrite=partial(other_function, is_ascii=True))}),
+        (("MB010", "station 2"),),
+        seeds=1,
+    ),
+    Case(
+        "RTU write confirmed with another value",
+        partial(modbus, change={2: partial(Rewrites, rewrite=other_value)}),
+        (Said(_second, ("MB010",), r"confirm|other value|another value|differ|not fit"),),
+        seeds=1,
+    ),
+    Case(
+        "ASCII write confirmed with another value",
+        partial(_ascii, change={2: partial(Rewrites, rewrite=partial(other_value, is_ascii=True))}),
+        (Said(_second, ("MB010",), r"confirm|other value|another value|differ|not fit"),),
+        seeds=1,
+    ),
+    Case(
+        "RTU registers confirmed with another quantity",
+        partial(
+            modbus, extra=(write_registers(2, 4, [1, 2, 3]),), change={2: partial(Rewrites, rewrite=other_quantity)}
+        ),
+        (Said(_second, ("MB010",), r"confirm|quantity|differ|not fit"),),
+        seeds=1,
+    ),
+    Case(
+        "RTU byte count of requests wrong",
+        partial(modbus, extra=(_wrong_count,)),
+        (
+            Said(
+                ("master", "bus", "station 1"), (), r"byte count|count of (octets|bytes)|quantity|(octets|bytes) .*fit"
+            ),
+        ),
+        struck=("station 1",),
+        seeds=1,
+    ),
+    Case(
+        "RTU master reads from address 0",
+        partial(modbus, extra=(_no_unit,)),
+        (Said(("master", "bus", "station 0"), (), r"address 0\b|broadcast|unit number|to all"),),
+        never=("MB001", "MB004", "MB203"),
+        seeds=1,
+    ),
+    Case(
+        "ASCII master reads from address 0",
+        partial(_ascii, extra=(_no_unit,)),
+        (Said(("master", "bus", "station 0"), (), r"address 0\b|broadcast|unit number|to all"),),
+        never=("MB001", "MB004", "MB203"),
+        seeds=1,
+    ),
+    Case(
+        "RTU answer to a broadcast, from a new address",
+        partial(modbus, extra=(write_register(0, 3, 7),), change={2: partial(AnswersBroadcasts, unit=9)}),
+        (Said(("bus", "station 9"), ("MB204",), "broadcast"),),
+        seeds=1,
+    ),
+    Case(
+        "RTU vendor function without answer",
+        Modbus(
+            (*usual_requests(_FOUR), _vendor),
+            usual_stations(_FOUR),
+            change={2: partial(Ignores, function=0x41)},
+        ),
+        (Said(_second, ("MB004", "MB002")),),
+        seeds=1,
+    ),
+    # late
+    Case(
+        "RTU late answers into the next turn",
+        Modbus(_turns.asked, _turns.stations, (LateResponse(0.15, 201 * MS, ("unit 1",)),), retries=0),
+        (Said(("station 1",), ("MB103", "MB207"), _LATE),),
+        never=("MB201", "MB202", "MB206", "MB001"),
+    ),
+    Case(
+        "RTU late answers into the next turn, FTDI",
+        Modbus(_turns.asked, _turns.stations, (LateResponse(0.15, 201 * MS, ("unit 1",)),), retries=0),
+        (Said(("station 1",), ("MB103", "MB207"), _LATE),),
+        FTDI,
+        never=("MB201", "MB202", "MB206", "MB001"),
+    ),
+    Case(
+        "ASCII late answers into the next turn",
+        Modbus(
+            usual_requests(_FOUR, 2),
+            usual_stations(_FOUR, is_ascii=True, unit_2=70 * MS, unit_3=70 * MS),
+            (LateResponse(0.15, 201 * MS, ("unit 1",)),),
+            is_ascii=True,
+            retries=0,
+        ),
+        (Said(("station 1",), ("MB103", "MB207"), _LATE),),
+        never=("MB201", "MB202", "MB206", "MB001"),
+    ),
+    # who has an address
+    Case(
+        "RTU two devices with one address, other values",
+        Modbus(usual_requests(_FOUR), usual_stations(_FOUR), others={"twin": partial(_twin, 32 * MS)}, pause=60 * MS),
+        (Said(_second, ("MB201", "MB202"), _TWO),),
+        also=("MB201", "MB202"),
+        seeds=1,
+    ),
+    Case(
+        "RTU two devices with one address, other values, FTDI",
+        Modbus(usual_requests(_FOUR), usual_stations(_FOUR), others={"twin": partial(_twin, 50 * MS)}, pause=90 * MS),
+        (Said(_second, ("MB201", "MB202"), _TWO),),
+        FTDI,
+        also=("MB201", "MB202"),
+    ),
+    Case(
+        "ASCII two devices with one address, other values",
+        Modbus(
+            usual_requests(_FOUR),
+            usual_stations(_FOUR, is_ascii=True),
+            others={"twin": partial(_twin, 45 * MS, is_ascii=True)},
+            is_ascii=True,
+            pause=90 * MS,
+        ),
+        (Said(_second, ("MB201", "MB202"), _TWO),),
+        also=("MB201", "MB202"),
+        seeds=1,
+    ),
+    Case(
+        "RTU two masters ask the same by two clocks",
+        Modbus(
+            usual_requests(_FOUR),
+            usual_stations(_FOUR),
+            others={"second master": partial(_two_masters, _FOUR, 470 * MS, False)},
+        ),
+        (("MB203", "bus"),),
+        struck=("master",),
+    ),
+    Case(
+        "ASCII two masters ask the same by two clocks",
+        Modbus(
+            usual_requests(_FOUR),
+            usual_stations(_FOUR, is_ascii=True),
+            others={"second master": partial(_two_masters, _FOUR, 470 * MS, True)},
+            is_ascii=True,
+        ),
+        (("MB203", "bus"),),
+        struck=("master",),
+    ),
+    # line errors of one
+    Case(
+        "RTU parity errors of one station, one flag a read",
+        partial(modbus, (MarkParity(0.03, ("unit 2",)),)),
+        (("LN101", "station 2"),),
+        FTDI,
+    ),
+    Case(
+        "RTU parity errors of one station, 16550",
+        partial(modbus, (MarkParity(0.01, ("unit 2",)),)),
+        (("LN101", "station 2"),),
+        UART,
+    ),
+    Case(
+        "ASCII parity errors of one station",
+        partial(_ascii, (MarkParity(0.01, ("unit 2",)),)),
+        (("LN101", "station 2"),),
+    ),
+    Case(
+        "RTU parity errors of the master",
+        partial(modbus, (MarkParity(0.01, ("master",)),)),
+        (("LN101", "master"),),
+    ),
+    Case(
+        "RTU breaks after one station",
+        partial(modbus, (Of("unit 2", Break(0.15)),)),
+        (("LN103", "station 2"),),
+    ),
+    Case(
+        "ASCII answers cut short",
+        partial(_ascii, (CutShort(0.1, ("unit 3",)),)),
+        (("MB005", "station 3"),),
+    ),
+    Case(
+        "RTU noise before a station, FTDI",
+        partial(modbus, (Of("unit 2", NoiseInGaps(0.2, places=(Place.BEFORE,))),)),
+        (Said(_second, ("LN201",), r"stray|noise|before"),),
+        FTDI,
+    ),
+    Case(
+        "RTU one station sends six in a hundred too slowly",
+        modbus,
+        (Said(_second, ("MB005", "MB006", "LN101"), r"damag|framing|baud|parity"),),
+        hear=partial(sent_otherwise, partial(of_party, "unit 2", LineSettings(18_048, 8, "E", 1))),
+        seeds=1,
+    ),
+    # a recording that hides how late it was
+    Case(
+        "hidden latency, station absent",
+        partial(modbus, absent=(4,)),
+        (("MB001", "station 4"),),
+        FTDI,
+        hear=hidden_latency,
+    ),
+    Case(
+        "hidden latency, answers lost",
+        partial(modbus, (LostResponse(0.08, ("unit 2",)),)),
+        (("MB002", "station 2"),),
+        FTDI,
+        hear=hidden_latency,
+    ),
+    Case(
+        "hidden latency, bit errors of one station",
+        partial(modbus, (BitFlips(6e-3, ("unit 2",)),)),
+        (("MB005", "station 2"),),
+        FTDI,
+        hear=hidden_latency,
+    ),
+)
