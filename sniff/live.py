@@ -1,14 +1,23 @@
-"""A bus being captured: what the capture process sends, through the engine, for whoever shows it."""
+"""A bus being captured: what the capture process sends, through the engine, for whoever shows it.
+
+The engine may be behind what comes, without harm to the recording. It is never let run for long at a time, so that
+whoever shows it can draw, and once the capture is over what is left gets a second: its octets are counted as `unseen`.
+"""
 
 from __future__ import annotations
 
+import time
+from collections import deque
+from collections.abc import Callable
+
+from dissectors.frame import Chunk, Mark
 from dissectors.profiles import Devices
 from dissectors.registry import Dissector
 from sniff.analysis.channels import BusChannels, DerivedMessage
 from sniff.analysis.detecting import Detecting
 from sniff.analysis.points import PointReader, Sample
 from sniff.capture.link import CaptureLink
-from sniff.capture.wire import Ended, Received, Status, Tick
+from sniff.capture.wire import Ended, Message, Received, Status, Tick
 from sniff.detection import Progress, Search
 from sniff.engine import Output
 from sniff.reading import engine_for
@@ -16,6 +25,15 @@ from sniff.recording.frames import METADATA, SCHEMA, FrameLog
 from sniff.recording.topics import FRAMES
 from sniff.session import LineEvent, Session
 from sniff.value_channels import ValueChannels
+
+AT_ONCE = 0.2
+"""Seconds that one `poll` may spend with the engine."""
+
+TO_THE_END = 1.0
+"""Seconds that the engine gets for what had come when the capture ended."""
+
+PIECE = 2048
+"""Octets given to the engine at a time."""
 
 LiveItem = Output | LineEvent | Status | Ended
 
@@ -26,7 +44,8 @@ class LiveBus:
     `session`: of the bus; `status`: the newest report; `ended`: why it is over, None while it runs. `points`: takes
     values out of what was heard; they go back into the recording. `search`: finds what `session.unknown` names, None
     when everything is given; its octets are recorded like all others. When it ends, `session`, `dissector` and
-    `points` become others, before the event and the outputs that this gives are handed out.
+    `points` become others, before the event and the outputs that this gives are handed out. `unseen`: octets that came
+    here, or were on their way, and were never looked at.
     """
 
     def __init__(
@@ -41,6 +60,9 @@ class LiveBus:
         self.status = Status(bus, path=link.paths[bus] if bus < len(link.paths) else "", priority=link.priority)
         self.ended: Ended | None = None
         self.devices = devices or Devices()
+        self._pending: deque[Message] = deque()
+        self._leave_at: float | None = None  # when what is pending is not looked at any more
+        self._skipped = 0
         self._channels = ValueChannels(self.session.bus, self.devices) if link.paths else None
         self._frames = FrameLog()
         self._settle()
@@ -60,18 +82,60 @@ class LiveBus:
         """What a search is at; None when there is none (any more)."""
         return self.search.progress if self.search is not None and self.engine.searching else None
 
+    @property
+    def unseen(self) -> int:
+        """Octets of the line that were not looked at, because this side did not keep up."""
+        return self.status.dropped + self.link.dropped.get(self.bus, 0) + self._skipped
+
     def poll(self, timeout: float = 0.0) -> list[LiveItem]:
-        """What has come, in order; waits up to `timeout` seconds. The end closes the engine and comes last."""
+        """What has come, in order; waits up to `timeout` seconds. The end closes the engine and comes last.
+
+        What takes longer than some tenths of a second waits for the next call.
+        """
         items: list[LiveItem] = []
-        for message in self.link.receive(timeout):
-            items += self._take(message)
+        if self._pending:
+            self.link.look()
+        else:
+            self._pending.extend(self.link.receive(timeout))
+        if (killed := self.link.insist()) is not None:
+            self._pending.append(killed)
+        until = time.monotonic() + AT_ONCE
+        while self._pending:
+            if self.link.closing and self._leave_at is None:
+                self._leave_at = time.monotonic() + TO_THE_END
+            if self._leave_at is None and time.monotonic() >= until:
+                break
+            items += self._next()
+            if not self._pending and self._leave_at is not None:  # the end is near: go there
+                self._pending.extend(self.link.receive())
         return items
 
-    def stop(self) -> list[LiveItem]:
-        """End the capture; what was still to come, and the end."""
+    def _next(self) -> list[LiveItem]:
+        """Take the next message, of a long read a piece; once the time is over, reads are only counted."""
+        message = self._pending.popleft()
+        if not isinstance(message, Received) or not isinstance(message.item, Chunk):
+            return self._take(message)
+        if self._leave_at is not None and time.monotonic() >= self._leave_at:
+            self._skipped += len(message.item.octets) if message.bus == self.bus else 0
+            return []
+        if len(message.item.octets) > PIECE:
+            piece, rest = cut(message.item, PIECE, self.session.line.char)
+            self._pending.appendleft(Received(message.bus, rest))
+            return self._take(Received(message.bus, piece))
+        return self._take(message)
+
+    def end(self) -> None:
+        """Have the capture end; `poll` gives the rest, and Ended last. Again: without waiting for a slow disk."""
+        self.link.ask_to_stop()
+
+    def stop(self, more: Callable[[], None] = lambda: None) -> list[LiveItem]:
+        """End the capture; what was still to come, and the end. `more` is called a few times a second meanwhile."""
         items: list[LiveItem] = []
-        for message in self.link.stop():
-            items += self._take(message)
+        if self.ended is None:
+            self.end()
+        while self.ended is None:
+            items += self.poll(0.1)
+            more()
         return items
 
     def _settle(self) -> None:
@@ -85,6 +149,7 @@ class LiveBus:
             self.search.take(message)
         if isinstance(message, Ended):
             self.ended = message
+            self.link.let_go()
             return [*self._some(self.engine.close()), message]
         if message.bus != self.bus:
             return []
@@ -139,3 +204,11 @@ class LiveBus:
         batch = self._frames.take()
         if batch is not None and not self.status.dropped:
             self.link.derived(self.bus, FRAMES, SCHEMA.name, *batch, METADATA)
+
+
+def cut(chunk: Chunk, at: int, char: int) -> tuple[Chunk, Chunk]:
+    """A read as two, of octets that followed each other at the speed of the line (`char`: ns an octet)."""
+    marks = tuple(mark for mark in chunk.marks if mark.offset < at)
+    rest = tuple(Mark(mark.offset - at, mark.error) for mark in chunk.marks if mark.offset >= at)
+    late = len(chunk.octets) - at
+    return Chunk(chunk.time - late * char, chunk.octets[:at], marks), Chunk(chunk.time, chunk.octets[at:], rest)

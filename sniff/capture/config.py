@@ -53,11 +53,12 @@ class RecordSpec:
 
 @dataclass(frozen=True, slots=True)
 class CaptureConfig:
-    """Everything the capture process is told. `duration`: ns, None for no end."""
+    """Everything the capture process is told. Its limits: `duration`, ns, and `count`, frames; None for no end."""
 
     sources: tuple[SourceSpec, ...]
     record: RecordSpec | None = None
     duration: int | None = None
+    count: int | None = None
 
     def to_json(self) -> dict[str, Any]:
         """Plain values."""
@@ -82,4 +83,4 @@ class CaptureConfig:
             for source in value["sources"]
         )
         record = value["record"]
-        return cls(sources, None if record is None else RecordSpec(**record), value["duration"])
+        return cls(sources, None if record is None else RecordSpec(**record), value["duration"], value["count"])

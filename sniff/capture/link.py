@@ -14,6 +14,7 @@ from dissectors.line import LineSettings
 from sniff.capture.config import CaptureConfig, RecordSpec, SourceSpec
 from sniff.capture.spawn import Spawned, spawn
 from sniff.capture.wire import (
+    LOSSY,
     Derived,
     Ended,
     Kind,
@@ -24,7 +25,10 @@ from sniff.capture.wire import (
     decode_message,
     encode,
     encode_derived,
+    encode_item,
     encode_json,
+    gap_event,
+    octets_of_chunk,
 )
 from sniff.formats import CaptureError
 from sniff.session import Session, SettingsChange
@@ -34,8 +38,19 @@ from sniff.sources.clock import Clock
 START_PATIENCE = 30.0
 STOP_PATIENCE = 10.0
 READ_SIZE = 64 * 1024
-READ_AT_ONCE = 128 * 1024
-"""Octets of messages taken by one `receive`, so that a caller that is behind still gets to draw."""
+GIVEN_AT_ONCE = 128 * 1024
+"""Octets of messages given by one `receive`, so that a caller that is behind still gets to draw."""
+
+READ_AT_ONCE = 4 * 1024 * 1024
+"""Octets read before that: all there is in good times, so that the end of the capture is seen when it comes."""
+
+MOST_WAITING = 8 * 1024 * 1024
+MESSAGE_COST = 100
+"""Octets of messages kept for a caller that is behind, with what each takes beside its body; reads beyond that are
+dropped and counted."""
+
+GOODBYE = 2.0
+"""Seconds for a process that has said its last words."""
 
 DERIVED_BACKLOG = 1024 * 1024
 
@@ -45,6 +60,8 @@ class CaptureLink:
 
     One thread at a time may use it. `pid`: of the capture process. `priority`: what it was granted. `clock`: its
     clock. `paths`: the files that it records to at first. `derived_dropped`: results that did not go back in time.
+    `dropped`: octets of each bus that came here and were not given out, because the caller did not keep up. `closing`:
+    whether the end of the capture has come here, although other things may wait before it.
     """
 
     def __init__(self, spawned: Spawned) -> None:
@@ -55,6 +72,13 @@ class CaptureLink:
         self._sending = True
         self._splitter = MessageSplitter()
         self._waiting: deque[tuple[int, int, bytes]] = deque()
+        self._waiting_size = 0
+        self._gap: dict[int, int] = {}  # bus → octets dropped since the last read that was kept
+        self._heard_at = time.monotonic()
+        self._stops = 0
+        self._told_to_end = 0  # how hard
+        self._malformed: WireError | None = None
+        self.closing = False
         self._unsent = bytearray()
         self._sessions: list[Session] = []
         self.pid = process.pid
@@ -62,19 +86,25 @@ class CaptureLink:
         self.paths: list[str] = []
         self.clock = Clock(0, 0)
         self.derived_dropped = 0
+        self.dropped: dict[int, int] = {}
         self.ended: Ended | None = None
 
     # -- starting ----------------------------------------------------------------------------------------------
 
     @classmethod
     def start(
-        cls, sources: Sequence[SourceSpec], record: RecordSpec | None = None, duration: float | None = None
+        cls,
+        sources: Sequence[SourceSpec],
+        record: RecordSpec | None = None,
+        duration: float | None = None,
+        count: int | None = None,
     ) -> CaptureLink:
         """Start listening; returns when all ports are open and all files begun.
 
-        `duration`: seconds, None for no end. Raises PortError or CaptureError with the reason.
+        `duration`: seconds, `count`: frames after which it ends, whatever becomes of this process; None for no end.
+        Raises PortError or CaptureError with the reason.
         """
-        config = CaptureConfig(tuple(sources), record, None if duration is None else int(duration * 1e9))
+        config = CaptureConfig(tuple(sources), record, None if duration is None else int(duration * 1e9), count)
         words = [source.spec for source in config.sources] + ([config.record.path] if config.record else [])
         link = cls(spawn(words))
         try:
@@ -96,7 +126,7 @@ class CaptureLink:
             alive = self._fill(until - time.monotonic())
             if not self._waiting and (not alive or time.monotonic() > until):  # it may say why, and end at once
                 raise PortError(self._why_dead())
-        kind, _, body = self._waiting.popleft()
+        kind, _, body = self._pop()
         value = decode_json(body)
         if kind == Kind.FAILED:
             raise (PortError if value.get("kind") == "port" else CaptureError)(str(value.get("text")))
@@ -121,24 +151,38 @@ class CaptureLink:
         """What has come, in order; waits up to `timeout` seconds for something. After Ended always empty."""
         if self.ended is not None:
             return []
-        self._send()
         messages: list[Message] = []
-        alive = True
+        alive = self.look(0.0 if self._waiting else timeout)
         try:
-            if not self._waiting:
-                alive = self._fill(timeout)
-            while self._waiting:
-                message = decode_message(*self._waiting.popleft())
+            given = 0
+            while self._waiting and given < GIVEN_AT_ONCE:
+                given += len(self._waiting[0][2])
+                message = decode_message(*self._pop())
                 if message is not None:
                     messages.append(message)
                 if isinstance(message, Ended):
                     return self._finish(messages, message)
-        except WireError as error:
-            self._kill()
-            return self._finish(messages, Ended(f"capture process: {error}", clean=False))
-        if not alive:
-            return self._finish(messages, Ended(self._why_dead(), clean=False))
+        except WireError as malformed:
+            return self._finish(messages, self._broken(malformed))
+        if not alive and not self._waiting:
+            error = self._malformed
+            return self._finish(messages, self._how_it_ended() if error is None else self._broken(error))
         return messages
+
+    def look(self, timeout: float = 0.0) -> bool:
+        """Read on, without giving anything out; whether the other end is open."""
+        self._send()
+        try:
+            alive = self._malformed is None and self._fill(timeout)
+        except WireError as error:
+            self._malformed = error
+            alive = False
+        self.closing = self.closing or not alive
+        return alive
+
+    def _broken(self, error: WireError) -> Ended:
+        self._kill()
+        return Ended(f"capture process: {error}", clean=False)
 
     def _finish(self, messages: list[Message], ended: Ended) -> list[Message]:
         self.ended = ended
@@ -152,6 +196,7 @@ class CaptureLink:
             selector.register(self._connection, selectors.EVENT_READ)
             if not selector.select(max(0, timeout)):
                 return True
+        self._heard_at = time.monotonic()
         taken = 0
         while taken < READ_AT_ONCE:
             try:
@@ -163,8 +208,36 @@ class CaptureLink:
             if not data:
                 return False
             taken += len(data)
-            self._waiting.extend(self._splitter.feed(data))
+            for kind, bus, body in self._splitter.feed(data):
+                self._keep(kind, bus, body)
         return True
+
+    def _keep(self, kind: int, bus: int, body: bytes) -> None:
+        """Have a message wait for the caller; reads are dropped when too much waits already."""
+        if kind == Kind.CHUNK:
+            gap = self._gap.get(bus, 0)
+            if self._waiting_size > (MOST_WAITING // 2 if gap else MOST_WAITING):
+                octets = octets_of_chunk(body)[1]
+                self._gap[bus] = gap + octets
+                self.dropped[bus] = self.dropped.get(bus, 0) + octets
+                return
+            if gap:
+                self._gap[bus] = 0
+                event = gap_event(octets_of_chunk(body)[0], gap)
+                for message in MessageSplitter().feed(encode_item(bus, event)):
+                    self._add(*message)
+        elif kind == Kind.ENDED:
+            self.closing = True
+        self._add(kind, bus, body)
+
+    def _add(self, kind: int, bus: int, body: bytes) -> None:
+        self._waiting.append((kind, bus, body))
+        self._waiting_size += len(body) + MESSAGE_COST
+
+    def _pop(self) -> tuple[int, int, bytes]:
+        message = self._waiting.popleft()
+        self._waiting_size -= len(message[2]) + MESSAGE_COST
+        return message
 
     # -- sending -----------------------------------------------------------------------------------------------
 
@@ -208,28 +281,52 @@ class CaptureLink:
 
     # -- ending ------------------------------------------------------------------------------------------------
 
+    def ask_to_stop(self) -> None:
+        """Have the capture end; Ended comes when its files are closed. Asked again, it no longer waits for the disk."""
+        if self.ended is None:
+            self._stops += 1
+            self._told_to_end = 0
+            self._heard_at = time.monotonic()
+            self._unsent += encode(Kind.STOP)
+            self._send()
+
+    def insist(self, patience: float = STOP_PATIENCE) -> Ended | None:
+        """After `ask_to_stop`, between calls of `receive`: end by force what has said nothing for `patience` seconds.
+
+        How it ended, then; None as long as there is hope. What it had not written is lost.
+        """
+        silent = time.monotonic() - self._heard_at
+        if self.ended is not None or not self._stops or silent < patience:
+            return None
+        if not self._told_to_end:
+            self._told_to_end = 1
+            self._heard_at = time.monotonic()
+            self._process.terminate()
+            return None
+        self._kill()
+        self.ended = Ended("capture process did not end and was killed", clean=False)
+        return self.ended
+
     def stop(self, patience: float = STOP_PATIENCE) -> list[Message]:
         """End the capture and wait until its files are closed; what had not been received, Ended last.
 
-        `patience`: seconds until it is ended by force.
+        `patience`: seconds of silence until it is ended by force.
         """
         messages: list[Message] = []
         if self.ended is None:
-            self._unsent += encode(Kind.STOP)
-            until = time.monotonic() + patience
-            while self.ended is None and time.monotonic() < until:
-                messages += self.receive(0.1)
-            if self.ended is None:
-                self._process.terminate()
-                until = time.monotonic() + patience
-                while self.ended is None and time.monotonic() < until:
-                    messages += self.receive(0.1)
-        with contextlib.suppress(subprocess.TimeoutExpired):
-            self._process.wait(patience)
-        self._kill()
-        if self.ended is None:
-            self._finish(messages, Ended("capture process did not end and was killed", clean=False))
+            self.ask_to_stop()
+        while self.ended is None:
+            messages += self.receive(0.1)
+            if (killed := self.insist(patience)) is not None:
+                messages.append(killed)
+        self.let_go()
         return messages
+
+    def let_go(self) -> None:
+        """After the end: wait for the process, which has nothing left to do, a little."""
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._process.wait(GOODBYE)
+        self._kill()
 
     def __enter__(self) -> CaptureLink:
         return self
@@ -241,10 +338,22 @@ class CaptureLink:
         """End the process by its id, if it still runs, and let go of everything."""
         if self._process.poll() is None:
             self._process.kill()
-        self._process.wait()
+        with contextlib.suppress(subprocess.TimeoutExpired):  # a disk that hangs may hold it still
+            self._process.wait(GOODBYE)
         self._sending = False
         self._connection.close()
         self._errors.close()
+
+    def _how_it_ended(self) -> Ended:
+        """Why nothing comes any more. One that ended as asked may find this side too slow for its last words."""
+        try:
+            code: int | None = self._process.wait(2)
+        except subprocess.TimeoutExpired:
+            code = None
+        if code in (0, LOSSY):
+            lost = "; not everything was recorded" if code else ""
+            return Ended(f"ended, but its last words did not arrive{lost}", lossy=bool(code))
+        return Ended(self._why_dead(), clean=False)
 
     def _why_dead(self) -> str:
         try:

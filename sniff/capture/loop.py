@@ -10,13 +10,17 @@ from __future__ import annotations
 import contextlib
 import selectors
 import socket
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 from dissectors.frame import Chunk
-from dissectors.line import LineSettings
+from dissectors.line import NS_PER_S, LineSettings
+from sniff.capture.disk_watch import DiskWatch
+from sniff.capture.frame_counter import FrameCounter
 from sniff.capture.outlet import Outlet
 from sniff.capture.wire import (
+    LOSSY,
     NOTHING_MORE,
     Kind,
     MessageSplitter,
@@ -40,6 +44,16 @@ STATUS_EVERY = 1000 * NS_PER_MS
 FLUSH_AT = 32 * 1024
 """Octets gathered that are sent before the beat."""
 
+CLOSING_PATIENCE = 30.0
+"""Seconds that a disk gets for what it did not take yet, once nothing more is heard. Whoever stops again ends it."""
+
+SYNC_PATIENCE = 1.0
+"""Seconds for the last sync; the system has the octets by then."""
+
+CLOSING_EVERY = 0.5
+LOOK_EVERY = 0.02
+"""Seconds between words to the main process, and between looks at the files, while they are closed."""
+
 _COMMAND_SIZE = 64 * 1024
 _FAR = 1 << 62
 
@@ -61,6 +75,7 @@ class CaptureLoop:
     """Runs until somebody says `stop`. `commands`: the connection that the main process sends on, None for none.
 
     `sessions`: of the sources, in their order; where settings are searched for, the first item of a bus says so.
+    `end_at`, `count`: its limits, ns on the clock and frames of all buses.
     """
 
     clock: Clock
@@ -71,8 +86,11 @@ class CaptureLoop:
     waker: socket.socket | None = None  # readable when a signal came
     priority: str = ""
     end_at: int | None = None
+    count: int | None = None
     sessions: list[Session] = field(default_factory=list)
     reason: str | None = None
+    closing: bool = False
+    _hurried: bool = False
     _offset: int = 0
     _due: int = _FAR
     _buses: list[_Bus] = field(default_factory=list)
@@ -82,7 +100,10 @@ class CaptureLoop:
         self._selector = selectors.DefaultSelector()
         self._buses = [_Bus(index, source) for index, source in enumerate(self.sources)]
         self._splitter = MessageSplitter()
+        self._counters = [FrameCounter(session) for session in self.sessions] if self.count is not None else []
+        self._watches = [DiskWatch() for _ in self.recorders]
         self._seeking = {index for index, session in enumerate(self.sessions) if "line" in session.unknown}
+        self._unknown = {index for index, session in enumerate(self.sessions) if session.unknown}
         now = self.clock.now()
         self._beat_at = self._status_at = now
         self._busy_until = now
@@ -103,12 +124,38 @@ class CaptureLoop:
             if not bus.ended:
                 self._take(bus)
         self._beat(self.clock.now())
-        for bus in self._buses:
-            self.outlet.post(encode_status(self.status(bus.index)))
         return self.reason
 
+    def finish(self) -> int:
+        """Close the files; a slow disk is waited for, and said. The exit code: LOSSY when not everything is in them."""
+        self.closing = True
+        for recorder in self.recorders:
+            recorder.finish()
+        until = time.monotonic() + CLOSING_PATIENCE
+        said = time.monotonic() + CLOSING_EVERY
+        while not all(recorder.finished for recorder in self.recorders) and not self._hurried:
+            now = time.monotonic()
+            if now >= until:
+                break
+            if now >= said:
+                said = now + CLOSING_EVERY
+                self._send_status()
+                self.outlet.flush()
+            for key, _ in self._selector.select(LOOK_EVERY):
+                if key.fd not in [bus.fd for bus in self._buses]:
+                    key.data()
+        until = time.monotonic() + SYNC_PATIENCE
+        for recorder in self.recorders:
+            recorder.give_up()
+            if recorder.finished:
+                recorder.synced(max(0.0, until - time.monotonic()))
+        for bus in self._buses:
+            self.outlet.post(encode_status(self.status(bus.index)))
+        return LOSSY if any(recorder.trouble or recorder.lost_octets for recorder in self.recorders) else 0
+
     def stop(self, reason: str) -> None:
-        """End soon; the first reason counts."""
+        """End soon; the first reason counts. Said again while files are closed, they are not waited for any longer."""
+        self._hurried = self.closing
         self.reason = self.reason or reason
 
     # -- one turn ----------------------------------------------------------------------------------------------
@@ -160,6 +207,8 @@ class CaptureLoop:
                 self.recorders[index].chunk(item)
             else:
                 self.recorders[index].line(item)
+        if self._counters:
+            self._counters[index].item(item)
         self.outlet.item(index, item)
 
     def _hurry(self) -> None:
@@ -181,9 +230,10 @@ class CaptureLoop:
     def _beat(self, now: int) -> None:
         for recorder in self.recorders:
             recorder.tick(now)
+        news = self._watch_disk(now)
         for bus in self._buses:
             self.outlet.droppable(encode_tick(bus.index, bus.source.now()))
-        if now >= self._status_at:
+        if news or now >= self._status_at:
             self._status_at = now + STATUS_EVERY
             self._check_clock(now)
             self._send_status()
@@ -194,8 +244,24 @@ class CaptureLoop:
             self._beat_at = min(self._beat_at, self.end_at)
             if now >= self.end_at:
                 self.stop("the time asked for is over")
+        if self.count is not None:
+            for counter, bus in zip(self._counters, self._buses, strict=True):
+                counter.advance(bus.source.now())
+            if sum(counter.frames for counter in self._counters) >= self.count:
+                self.stop("the number of frames asked for is reached")
         if not self.recorders and not self.outlet.open:
             self.stop("nobody listens")
+
+    def _watch_disk(self, now: int) -> bool:
+        """Say, in the recording too, what is new about the files and the disk; whether anything is."""
+        news = False
+        for index, (recorder, watch) in enumerate(zip(self.recorders, self._watches, strict=True)):
+            told = [recorder.notices.popleft() for _ in range(len(recorder.notices))]
+            slow = watch.see(now, recorder.behind(now), recorder.syncing, recorder.lost_octets)
+            for text in told + ([slow] if slow is not None else []):
+                news = True
+                self._keep(index, LineEvent(self._buses[index].source.now(), LineEventKind.NOTE, text))
+        return news
 
     def _check_clock(self, now: int) -> None:
         offset = self.clock.drift()
@@ -218,13 +284,16 @@ class CaptureLoop:
         recorder = self.recorders[index]
         return Status(
             index,
-            str(recorder.path),
+            "" if recorder.gone else str(recorder.path),
             recorder.size,
             octets,
             dropped,
             recorder.lost_octets,
             self.priority,
             recorder.trouble or "",
+            self._watches[index].behind / NS_PER_S,
+            recorder.unwritten,
+            self.closing,
         )
 
     # -- what the main process says ----------------------------------------------------------------------------
@@ -245,10 +314,14 @@ class CaptureLoop:
         if not data:
             self._selector.unregister(self.commands)
             self.commands = None
+            if self.closing:
+                return
             if not self.recorders:
                 self.stop("the main process is gone")
             elif self._seeking:
                 self.stop("the main process is gone, which searched for the line settings")
+            elif self.count is not None and self._unknown:
+                self.stop("the main process is gone, which searched for the protocol whose frames are counted")
 
     def _command(self, kind: int, bus: int, body: bytes) -> None:
         if kind == Kind.STOP:
@@ -256,6 +329,7 @@ class CaptureLoop:
         elif kind == Kind.FOUND and bus < len(self._buses):
             change = SettingsChange.parse(body.decode("utf-8", "replace"))
             self._seeking.discard(bus)
+            self._unknown.discard(bus)
             self._take(self._buses[bus])
             self._settings(self._buses[bus], replace(change, searching=False, found=True))
         elif kind == Kind.DERIVED and bus < len(self.recorders):

@@ -7,8 +7,8 @@ import socket
 import time
 from collections import deque
 
-from sniff.capture.wire import encode_item
-from sniff.session import Item, LineEvent, LineEventKind
+from sniff.capture.wire import encode_item, gap_event
+from sniff.session import Item
 
 BACKLOG = 2 * 1024 * 1024
 """Octets of messages held for a reader that is behind (9 s of ten buses at 115200 Bd); more are dropped."""
@@ -50,8 +50,7 @@ class Outlet:
             self.dropped[bus] += len(octets)
             return
         if self._gap[bus]:
-            text = "not shown: this side did not keep up; the recording has them"
-            self.post(encode_item(bus, LineEvent(item.time, LineEventKind.DROPPED, text, self._gap[bus])))
+            self.post(encode_item(bus, gap_event(item.time, self._gap[bus])))
             self._gap[bus] = 0
         self.post(encode_item(bus, item))
 

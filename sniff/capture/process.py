@@ -19,7 +19,7 @@ from sniff.capture.config import CaptureConfig, SourceSpec
 from sniff.capture.loop import CaptureLoop
 from sniff.capture.outlet import Outlet
 from sniff.capture.priority import raise_priority
-from sniff.capture.wire import Kind, MessageSplitter, WireError, decode_json, encode, encode_json, encode_status
+from sniff.capture.wire import Kind, MessageSplitter, WireError, decode_json, encode, encode_json
 from sniff.formats import CaptureError
 from sniff.recording.rotation import Rotation
 from sniff.recording.writer import Recorder
@@ -31,12 +31,15 @@ from sniff.sources.clock import Clock
 FAREWELL = 2.0
 """Seconds that the last message may wait for its reader."""
 
+CRASH_PATIENCE = 5.0
+"""Seconds for each file after a defect of the loop."""
+
 SWITCH = 0.0002
 """Seconds after which a recorder's thread must give way to the reader."""
 
 
 def main() -> int:
-    """Run one capture; 0 when it ended as asked."""
+    """Run one capture; 0 when it ended as asked, LOSSY when that left octets unrecorded."""
     connection = connect()
     config = _read_config(connection)
     sys.setswitchinterval(SWITCH)
@@ -110,22 +113,25 @@ def _capture(
         "paths": paths,
     }
     outlet.post(encode_json(Kind.HELLO, hello))
-    loop = CaptureLoop(clock, sources, recorders, outlet, connection, priority=priority, sessions=sessions)
+    loop = CaptureLoop(
+        clock, sources, recorders, outlet, connection, priority=priority, count=config.count, sessions=sessions
+    )
     if config.duration is not None:
         loop.end_at = clock.now() + config.duration
     waker = _end_on_signals(loop)
     try:
         reason = loop.run()
+    except BaseException:
+        for recorder in recorders:
+            recorder.close(CRASH_PATIENCE)
+        raise
     finally:
         for source in sources:
             source.close()
-        for recorder in recorders:
-            recorder.close()
-    for bus in range(len(recorders)):  # what could not be written to the end
-        outlet.post(encode_status(loop.status(bus)))
+    code = loop.finish()
     waker.close()
     outlet.finish(encode(Kind.ENDED, 0, reason.encode()), FAREWELL)
-    return 0
+    return code
 
 
 def _end_on_signals(loop: CaptureLoop) -> socket.socket:

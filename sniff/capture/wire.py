@@ -64,7 +64,9 @@ class Status:
     `path`: the file being written, "" for none; `size`: its octets. `octets`: all that came from the line. `dropped`:
     octets that were recorded but not sent here, because this side did not keep up. `lost`: octets that are missing
     from the file, because the disk did not keep up. `priority`: what the system granted. `error`: why nothing is
-    written any more, "" while all is well.
+    written any more, "" while all is well. `behind`: seconds by which the disk is late, 0 while it keeps up.
+    `unwritten`: octets that are not in the file yet. `closing`: whether nothing is heard any more, and the rest is
+    being written.
     """
 
     bus: int
@@ -75,7 +77,13 @@ class Status:
     lost: int = 0
     priority: str = ""
     error: str = ""
+    behind: float = 0.0
+    unwritten: int = 0
+    closing: bool = False
 
+
+LOSSY = 3
+"""Exit code of a capture process that could not record everything."""
 
 NOTHING_MORE = "nothing more to read"
 """Why a capture ended whose ports are gone for good, or whose file is at its end."""
@@ -83,10 +91,14 @@ NOTHING_MORE = "nothing more to read"
 
 @dataclass(frozen=True, slots=True)
 class Ended:
-    """The capture is over and its files are closed, unless `clean` is False."""
+    """The capture is over and its files are closed, unless `clean` is False.
+
+    `lossy`: it recorded less than it heard; without this its last `Status` says whether it did.
+    """
 
     reason: str
     clean: bool = True
+    lossy: bool = False
 
 
 Message = Received | Tick | Status | Ended
@@ -132,6 +144,22 @@ def encode_item(bus: int, item: Item) -> bytes:
         return encode(Kind.CHUNK, bus, body + item.octets)
     text = item.text.encode("utf-8", "replace")
     return encode(Kind.LINE, bus, _LINE.pack(item.time, item.count, _LINE_CODES[item.kind]) + text)
+
+
+def gap_event(time: int, octets: int) -> LineEvent:
+    """What stands where the main process misses octets that it was too slow for."""
+    return LineEvent(
+        time, LineEventKind.DROPPED, "not shown: this side did not keep up; the recording has them", octets
+    )
+
+
+def octets_of_chunk(body: bytes) -> tuple[int, int]:
+    """Time (ns) and number of the octets in the body of a CHUNK. Raises WireError."""
+    try:
+        time, marks = _CHUNK.unpack_from(body)
+    except struct.error as error:
+        raise WireError(f"message {Kind.CHUNK}: {error}") from error
+    return time, max(0, len(body) - _CHUNK.size - marks * _MARK.size)
 
 
 def encode_tick(bus: int, now: int) -> bytes:

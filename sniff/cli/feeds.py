@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from dissectors.profiles import Devices
+from sniff.cli import listening
 from sniff.engine import Output
 from sniff.formats import Capture, CaptureError
 from sniff.live import LiveBus
@@ -66,12 +67,13 @@ class LiveFeed:
             port=self.live.session.port,
             line=self.live.session.line_words,
             protocol=self.live.session.protocol_words,
-            recording=status.path or None,
+            recording=None if ended is not None and listening.not_there(self.live) else status.path or None,
             file_size=status.size,
-            dropped=status.dropped + status.lost,
+            dropped=self.live.unseen + status.lost,
             live=True,
             ended=ended.reason if ended is not None else "",
             trouble=status.error,
+            behind=status.behind,
             priority=status.priority,
             searching="" if searching is None else f"{searching.line}",
         )

@@ -121,12 +121,14 @@ def start(
     duration: float | None = None,
     devices: Devices | None = None,
     search: Unknowns | None = None,
+    count: int | None = None,
 ) -> LiveBus:
     """Start the capture process. Ends with exit code 4 for the port, 3 for the file.
 
     Recording and `duration` begin at once, also with something to `search` for; `LiveBus.searching` says how far it is.
+    `duration` (seconds) and `count` (frames) are limits of the capture process, whatever becomes of this one.
     """
-    link = start_link(source, record, duration)
+    link = start_link(source, record, duration, count)
     try:
         adapter = link.session(0).adapter
         detecting = search.detecting(adapter.latency, adapter.reports) if search is not None else None
@@ -136,10 +138,12 @@ def start(
         raise
 
 
-def start_link(source: SourceSpec, record: RecordSpec | None, duration: float | None = None) -> CaptureLink:
+def start_link(
+    source: SourceSpec, record: RecordSpec | None, duration: float | None = None, count: int | None = None
+) -> CaptureLink:
     """Start the capture process without an engine. Ends with exit code 4 for the port, 3 for the file."""
     try:
-        return CaptureLink.start([source], record, duration)
+        return CaptureLink.start([source], record, duration, count)
     except PortError as error:
         raise Failure(str(error), PORT_TROUBLE) from None
     except CaptureError as error:
@@ -189,6 +193,7 @@ class Printer:
         self.summary = Summary(live.session.line, kept_seconds=60)
         self._session = live.session
         self._trouble = ""
+        self._waited = False
         self._settling = Settling(live.points)
 
     def take(self, items: list[Output | LineEvent | Status | Ended]) -> None:
@@ -201,17 +206,29 @@ class Printer:
             elif isinstance(item, LineEvent):
                 self.summary.add_line_event(item)
                 self._say_event(item)
-            elif isinstance(item, Status) and item.error != self._trouble:
-                self._trouble = item.error
-                self._say(f"recording: {item.error or 'goes on'}")
+            elif isinstance(item, Status):
+                self._say_status(item)
             elif isinstance(item, Ended) and not item.clean:
                 self._say(item.reason)
         if not self.quiet:
             sys.stdout.flush()
 
+    def _say_status(self, status: Status) -> None:
+        if status.error != self._trouble:
+            self._trouble = status.error
+            self._say(f"recording: {status.error or 'goes on'}")
+        if status.closing and status.unwritten and not self._waited:
+            self._waited = True
+            self._say(
+                f"the disk is slow: waiting for the last {status.unwritten} octets to be written; "
+                "end that, and lose them, with Ctrl-C"
+            )
+
     def _say_event(self, event: LineEvent) -> None:
         if event.kind in (LineEventKind.UNPLUGGED, LineEventKind.REPLUGGED):
             print(f"sniff485: {plain(event.text)}", file=sys.stderr)  # names the port
+        elif event.kind is LineEventKind.NOTE:
+            self._say(event.text)
         elif event.kind is not LineEventKind.SETTINGS:  # those of a search are said where it is shown
             self._say(f"{event.kind.value} {event.text}".strip())
 
@@ -244,15 +261,16 @@ class Printer:
         print(f"sniff485: {self.live.session.port}: {plain(text)}", file=sys.stderr)
 
 
-def run(printer: Printer, count: int | None = None, duration: float | None = None, progress: bool = True) -> int:
-    """Listen until something ends it: a signal, `count` frames, `duration` seconds, the port. Gives the exit code.
+def run(printer: Printer, progress: bool = True) -> int:
+    """Listen until something ends it: a signal, the capture's limits, the port. Gives the exit code.
 
-    `progress`: say on standard error how a search for settings goes, and how it ended.
+    A signal more ends the waiting for a slow disk, too. `progress`: say on standard error how a search for settings
+    goes, and how it ended.
     """
     live = printer.live
-    until = None if duration is None else time.monotonic() + duration
     meter = _Meter(printer) if progress and printer.quiet and sys.stderr.isatty() else None
     search_meter = searching.Meter() if progress and live.searching is not None else None
+    heeded = 0
     with until_interrupted() as caught, _stopped_by_its_reader(live):
         while live.ended is None:
             items = live.poll(0.1)
@@ -262,19 +280,17 @@ def run(printer: Printer, count: int | None = None, duration: float | None = Non
             elif meter is not None:
                 meter.show()
             printer.take(items)
-            full = count is not None and printer.summary.frames >= count
-            over = until is not None and time.monotonic() >= until
-            if caught or full or over:
-                printer.take(live.stop())
-                break
+            if len(caught) > heeded:
+                heeded = len(caught)
+                live.end()
         printer.finish()
     for shown in (meter, search_meter):
         if shown is not None:
             shown.clear()
+    if lost_something(live):
+        return UNREADABLE  # what was asked for is not all in the file
     if live.ended is not None and not live.ended.clean:
         return PORT_TROUBLE
-    if live.status.error or live.status.lost:
-        return UNREADABLE  # what was asked for is not all in the file
     if _gone_for_good(live):
         print(f"sniff485: {plain(live.session.port)}: gone for good; nothing more can be heard", file=sys.stderr)
         return PORT_TROUBLE
@@ -282,6 +298,20 @@ def run(printer: Printer, count: int | None = None, duration: float | None = Non
         say_not_found(live, "interrupted" if caught else "ended")
         return INTERRUPTED if caught else PORT_TROUBLE
     return 0
+
+
+def lost_something(live: LiveBus) -> bool:
+    """Whether octets that were heard are not in the recording, or nobody knows."""
+    status, ended = live.status, live.ended
+    if not live.link.paths:
+        return False
+    killed = ended is not None and not ended.clean and status.unwritten > 0
+    return bool(status.error or status.lost or killed or (ended is not None and ended.lossy) or not_there(live))
+
+
+def not_there(live: LiveBus) -> bool:
+    """Whether there is no file where the recording ought to be."""
+    return bool(live.link.paths) and (not live.status.path or not os.path.exists(live.status.path))
 
 
 def _gone_for_good(live: LiveBus) -> bool:
@@ -312,7 +342,7 @@ def say_not_found(live: LiveBus, how: str) -> None:
 
 def say_end(printer: Printer) -> None:
     """The closing lines on standard error: what was heard, what was lost, where it is."""
-    summary, status = printer.summary, printer.live.status
+    summary = printer.summary
     noise = f", {summary.noise} octets of noise" if summary.noise else ""
     searched = f", {summary.searched} octets heard while searching" if summary.searched else ""
     print(
@@ -329,13 +359,27 @@ def say_end(printer: Printer) -> None:
             f"sniff485: response time p50 {milliseconds(middle)}, max {milliseconds(most)} (each ±{bound})",
             file=sys.stderr,
         )
-    if status.dropped:
-        print(f"sniff485: {status.dropped} octets not shown here: this host did not keep up", file=sys.stderr)
-    if status.lost:
+    say_recorded(printer.live)
+
+
+def say_recorded(live: LiveBus, where: bool = True) -> None:
+    """The last lines on standard error: what was not looked at, what was lost, where the recording is (unless said)."""
+    status, ended = live.status, live.ended
+    if live.unseen:
+        kept = "; the recording has them" if live.link.paths else ""
+        print(f"sniff485: {live.unseen} octets not looked at: this host did not keep up{kept}", file=sys.stderr)
+    lost = status.lost
+    if ended is not None and not ended.clean and status.unwritten:
+        lost += status.unwritten
+        print(f"sniff485: about {lost} octets NOT RECORDED: the capture process was ended", file=sys.stderr)
+    elif lost:
         why = "" if status.error else ": the disk did not keep up"
-        print(f"sniff485: {status.lost} octets NOT RECORDED{why}", file=sys.stderr)
-    if status.path:
-        print(f"sniff485: recorded to {status.path}", file=sys.stderr)
+        print(f"sniff485: {lost} octets NOT RECORDED{why}", file=sys.stderr)
+    if not_there(live):
+        print(f"sniff485: {plain(status.path or live.link.paths[0])} is not there any more", file=sys.stderr)
+    elif status.path and where:
+        cut = "" if ended is None or ended.clean else ", cut where the capture was ended"
+        print(f"sniff485: recorded to {plain(status.path)}{cut}", file=sys.stderr)
 
 
 class _Meter:
@@ -353,6 +397,7 @@ class _Meter:
         self.next = now + 0.5
         summary, status = self.printer.summary, self.printer.live.status
         text = f"{now - self.began:.0f} s  {summary.frames} frames  {summary.damaged} damaged  {status.size} octets"
+        text += f"  disk slow: {status.behind:.0f} s behind" if status.behind else ""
         print(f"\r\x1b[K{text}", end="", file=sys.stderr, flush=True)
 
     def clear(self) -> None:

@@ -7,6 +7,7 @@ from __future__ import annotations
 import argparse
 import sys
 
+from sniff.analysis.plain import plain
 from sniff.capture.config import RecordSpec
 from sniff.cli import UNREADABLE, USAGE, Failure, arguments, listening
 from sniff.live import LiveBus
@@ -56,11 +57,10 @@ def show(live: LiveBus, as_json: bool, as_lines: bool) -> int:
         )
         if live.engine.searching:
             listening.say_not_found(live, "ended")
-        if live.status.error or live.status.lost:
-            said = live.status.error or "the disk did not keep up"
-            print(f"sniff485: recording: {said}; {live.status.lost} octets NOT RECORDED", file=sys.stderr)
-            return UNREADABLE
-        return 0
+        if live.status.error:
+            print(f"sniff485: recording: {plain(live.status.error)}", file=sys.stderr)
+        listening.say_recorded(live, where=False)
+        return UNREADABLE if listening.lost_something(live) else 0
     printer = listening.Printer(live, as_json=as_json, colour=arguments.colour())
     code = listening.run(printer)
     listening.say_end(printer)

@@ -37,11 +37,10 @@ def run(args: argparse.Namespace) -> int:
     listening.refuse_recording(path)
     if args.keep and not args.rotate:
         raise Failure("--keep: of which rotation? say when a new file begins with --rotate size:64MB or time:1h", USAGE)
-    live = listening.start(
-        target.source, RecordSpec(path, args.rotate, args.keep), devices=target.devices, search=target.search
-    )
+    record = RecordSpec(path, args.rotate, args.keep)
+    live = listening.start(target.source, record, args.duration, target.devices, target.search, args.count)
     printer = listening.Printer(live, quiet=True)
-    code = listening.run(printer, args.count, args.duration, not args.quiet)
+    code = listening.run(printer, not args.quiet)
     if not args.quiet:
         listening.say_end(printer)
     return code

@@ -31,6 +31,7 @@ MOST_OCTETS = 1 << 20
 MOST_CHUNK = 16 << 20  # octets
 LONGEST = 65535  # octets of one entry
 CONTINUED = "continued"
+READS = "reads"
 
 _HEAD = struct.Struct("<Iq")
 _STEP = 4096  # entries unpacked at a time: a batch of millions from a hostile file costs no more
@@ -91,14 +92,7 @@ class Batcher:
 
     def add_event(self, event: LineEvent) -> None:
         """Take an event of the line; it goes out with the batch."""
-        record: dict[str, object] = {"kind": event.kind.value, "chunk": self.next}
-        if event.text:
-            record["text"] = event.text
-        if event.count:
-            record["count"] = event.count
-        if stamp(event.time) != event.time:
-            record["time_ns"] = event.time
-        self._line(event.time, record)
+        self._line(event.time, _event_record(event, self.next))
 
     def close(self) -> list[Message]:
         """The messages of what was collected, marks and events first."""
@@ -253,6 +247,23 @@ class Batch:
             )
 
 
+def loss_message(event: LineEvent, number: int, reads: int) -> Message:
+    """An event by itself, before the entry with that number: so many entries before it were never written."""
+    data = json.dumps(_event_record(event, number) | {READS: reads}, separators=(",", ":")).encode()
+    return Message(LINE, stamp(event.time), stamp(event.time), 0, data)
+
+
+def _event_record(event: LineEvent, number: int) -> dict[str, object]:
+    record: dict[str, object] = {"kind": event.kind.value, "chunk": number}
+    if event.text:
+        record["text"] = event.text
+    if event.count:
+        record["count"] = event.count
+    if stamp(event.time) != event.time:
+        record["time_ns"] = event.time
+    return record
+
+
 class Joiner:
     """Puts /raw and /line messages together again, in the order of the file.
 
@@ -267,6 +278,7 @@ class Joiner:
         self.strange = 0
         self._marks: dict[int, list[Mark]] = {}
         self._continued: set[int] = set()
+        self._told: dict[int, int] = {}  # entry → how many before it the recorder itself says are missing
         self._events: deque[tuple[int, LineEvent]] = deque()
         self._order: deque[int] = deque()  # numbers of entries that marks and continuations wait for
 
@@ -278,6 +290,8 @@ class Joiner:
             return
         kind, number, record = parsed
         if kind in _EVENT_KINDS:
+            if (reads := _integer(record.get(READS), 0)) > 0 and len(self._told) < _MOST_PENDING:
+                self._told[number] = reads
             self._events.append((number, _event(kind, record, log_time)))
         elif kind == CONTINUED:
             self._continued.add(number)
@@ -296,6 +310,8 @@ class Joiner:
         many = self._hole(sequence, batch)
         if many:
             yield from self._before(number - many)
+        many -= min(many, self._told.pop(number, 0))
+        if many:
             text = f"{many} read{'s' if many != 1 else ''} missing from the recording"
             yield LineEvent(batch.start, LineEventKind.DROPPED, text, -1)
         if self._order or self._events:
@@ -365,6 +381,7 @@ class Joiner:
 
     def _forget(self, number: int) -> None:
         """Drop what belongs to entries that have passed, in the order in which it came."""
+        self._told.clear()
         while self._order and self._order[0] < number:
             late = self._order.popleft()
             self._continued.discard(late)

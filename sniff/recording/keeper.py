@@ -1,13 +1,15 @@
-"""The writing thread of a recorder: owns the files, writes, syncs, rotates, and remembers what went wrong.
+"""The writing thread of a recorder: owns the files, writes, rotates, and remembers what went wrong.
 
 Everything comes to it through one queue. Its numbers (`taken`, `lost_octets`, `size`, `trouble`, `paths`) are read by
-the capture's thread and written only here.
+the capture's thread and written only here. A write may hang as long as the disk likes: what comes meanwhile waits in
+the queue. Syncs, which hang more often, have a thread of their own (`syncing.py`).
 """
 
 from __future__ import annotations
 
 import contextlib
 import os
+from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -20,11 +22,18 @@ from sniff.formats.files import explain
 from sniff.recording.batch import Message
 from sniff.recording.part import PartFile
 from sniff.recording.rotation import NewestParts, Rotation, part_name, parts
+from sniff.recording.syncing import Syncer
 from sniff.recording.topics import RAW
 from sniff.session import Session
 
 MOST_WAITING = 32 << 20
 """Octets kept in memory for a disk that is slow or full: 45 min at 115200 Bd."""
+
+MOVED, REMOVED = "moved away", "removed"
+"""What somebody can do to a file that is being written."""
+
+MOST_DERIVED = MOST_WAITING // 4
+"""The same for results of the engine, which can be computed again: they give way first."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +49,7 @@ class Parcel:
     @property
     def weight(self) -> int:
         """Octets of memory, roughly."""
-        return sum(len(message.data) + 64 for message in self.messages)
+        return sum(len(message.data) + 300 for message in self.messages)
 
 
 class Order:
@@ -50,20 +59,39 @@ class Order:
         self.name = name
 
 
-FLUSH, SYNC, CLOSE = Order("flush"), Order("sync"), Order("close")
+class Flush(Order):
+    """Write everything out; flushes are numbered from 1."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__("flush")
+        self.number = number
+
+
+SYNC, CHECK, CLOSE = Order("sync"), Order("check"), Order("close")
 
 
 class Keeper:
-    """Opens the first file at once (raises CaptureError); `run` is the thread, until it is told to CLOSE."""
+    """Opens the first file at once (raises CaptureError); `run` is the thread, until it is told to CLOSE.
+
+    `taken`: weight of the parcels that came through `orders`. `flushed`: number of the newest flush after which nothing
+    waited. `confirmed`, `lost_octets`: octets of the bus that are in a file, and that never will be. `notices`: what
+    became of files, in words, for whoever takes them from there. `gone`: whether the last file is not where it was
+    begun, and nothing followed it.
+    """
 
     def __init__(self, path: Path, session: Session, rotation: Rotation | None, keep: int | None) -> None:
         self.orders: SimpleQueue[Parcel | Order | Session] = SimpleQueue()
         self.paths: list[Path] = []
-        self.trouble: str | None = None
+        self.notices: deque[str] = deque()
         self.taken = 0
+        self.flushed = 0
+        self.confirmed = 0
         self.lost_octets = 0
+        self.gone = False
         self._troubles: dict[str, str] = {}
+        self._trouble: str | None = None
         self._path = path
+        self._start = _current_folder()  # it may be removed, and made again by somebody
         self._session = session
         self._rotation = rotation
         self._newest = NewestParts(keep)
@@ -71,11 +99,15 @@ class Keeper:
         self._octets = 0  # of the bus, in all parts
         self._finished_size = 0
         self._unwritten = 0  # octets of the bus that were taken since everything was in the file
+        self._count = self._number = 0  # of parts begun; of the newest, as its name has it
         self._first = 0  # of the part
+        self._part_octets = 0  # of the bus, in the part
         self._began: int | None = None  # time of the part's first batch
+        self._syncer = Syncer()
         try:
             self._open()
         except OSError as error:
+            self._syncer.end()
             raise _refused(path, error) from None
 
     @property
@@ -83,9 +115,28 @@ class Keeper:
         """Octets of all files, as far as they are written."""
         return self._finished_size + self._part.size - self._part.waiting
 
+    @property
+    def waiting(self) -> int:
+        """Octets that are packed and that the file did not take yet."""
+        return self._part.waiting
+
+    @property
+    def trouble(self) -> str | None:
+        """What is wrong with the disk, in words; None while all is well."""
+        return self._trouble or self._syncer.trouble
+
+    @property
+    def syncing(self) -> int:
+        """For how long the system has been busy with a sync, ns."""
+        return self._syncer.busy
+
+    def synced(self, seconds: float) -> bool:
+        """After the end: wait until the disk has everything, at most so long; whether it has."""
+        return self._syncer.wait(seconds)
+
     def run(self) -> None:
         """Do what comes through `orders`. Never raises."""
-        steps = {FLUSH: self._flush, SYNC: self._sync, CLOSE: self._finish}
+        steps = {SYNC: self._sync, CHECK: self._check, CLOSE: self._finish}
         order: Parcel | Order | Session | None = None
         while order is not CLOSE:
             order = self.orders.get()
@@ -93,8 +144,11 @@ class Keeper:
                 self._try("take", partial(self._take, order), order.octets)
             elif isinstance(order, Session):
                 self._session = order  # of the parts to come
+            elif isinstance(order, Flush):
+                self._try("flush", partial(self._flush, order.number))
             else:
                 self._try(order.name, steps[order])
+        self._syncer.end()
 
     def _try(self, name: str, step: Callable[[], None], octets: int = 0) -> None:
         """Do one thing; when it fails say so, until it succeeds again. `octets`: of the bus that are lost then."""
@@ -108,18 +162,16 @@ class Keeper:
             self.lost_octets += octets
         else:
             self._troubles.pop(name, None)
-        self.trouble = next(iter(self._troubles.values()), None)
+        self._trouble = next(iter(self._troubles.values()), None)
 
     def _take(self, batch: Parcel) -> None:
         self.taken += batch.weight
-        if self._part.waiting > MOST_WAITING:
-            self.lost_octets += batch.octets
-            return
         if batch.messages[-1].topic == RAW and self._part_is_full(batch):
             self._try("rotate", self._rotate)  # the old part goes on when it fails; the next batch tries again
         for message in batch.messages:
             self._part.add(message, batch.schema, batch.metadata)
         self._octets += batch.octets
+        self._part_octets += batch.octets
         self._unwritten += batch.octets
         self._next = batch.next
         if self._began is None and batch.messages[-1].topic == RAW:
@@ -131,68 +183,122 @@ class Keeper:
         age = batch.messages[-1].publish_time - self._began
         return self._rotation.due(self._part.size, age, self._next - self._first)
 
-    def _flush(self) -> None:
+    def _flush(self, number: int) -> None:
         self._part.flush()
+        self._written()
+        self.flushed = number
+
+    def _written(self) -> None:
+        """All that was taken is in the file."""
+        self.confirmed += self._unwritten
         self._unwritten = 0
 
     def _sync(self) -> None:
-        self._part.sync()
+        self._syncer.sync(self.paths[-1], self._part.stream)
 
     def _rotate(self) -> None:
         """Go on in a new part. Raises OSError before anything changed, or when the old part cannot be finished."""
-        old = self._part
+        old, path = self._part, self.paths[-1]
         self._open()
         try:
             old.finish()
-            self._unwritten = 0
-            old.sync()
+            self._written()
         finally:
-            self.lost_octets += self._unwritten
-            self._unwritten = 0
             self._finished_size += old.size - old.waiting
-            old.stream.close()
-            self._newest.remove_old()
+            self._leave(old, path)
+
+    def _leave(self, old: PartFile, path: Path) -> None:
+        """Let go of a part that something has followed."""
+        self.lost_octets += self._unwritten
+        self._unwritten = 0
+        self._syncer.sync(path, old.stream, last=True)
+        self._newest.remove_old()
+
+    def _check(self) -> None:
+        """Go on in a new part if the file is no longer where it was begun. Raises OSError while none can be begun."""
+        fate = self._fate()
+        if fate is None:
+            return
+        old, path, octets = self._part, self.paths[-1], self._part_octets
+        with contextlib.suppress(OSError):
+            (self._start / path.parent).mkdir(parents=True, exist_ok=True)
+        try:
+            self._open()
+        except OSError as error:
+            raise OSError(error.errno, f"{fate} while it was recorded, and no other can be begun", str(path)) from None
+        if fate == MOVED:
+            with contextlib.suppress(OSError):
+                old.finish()
+                self._written()
+            said = ""
+        else:
+            self._forget(octets)
+            said = f", with {octets} octets of the bus in it"
+        self.paths.remove(path)
+        self._leave(old, path)
+        self.notices.append(f"{path} was {fate} while it was recorded{said}; goes on in {self.paths[-1]}")
+
+    def _fate(self) -> str | None:
+        """What somebody did to the file that is being written; None where it is as it should be, or nobody knows."""
+        try:
+            ours = os.fstat(self._part.stream.fileno())
+            if os.path.samestat(os.stat(self._start / self.paths[-1]), ours):
+                return None
+        except (FileNotFoundError, NotADirectoryError):
+            pass
+        except (OSError, ValueError):
+            return None
+        return MOVED if ours.st_nlink else REMOVED
+
+    def _forget(self, octets: int) -> None:
+        """Octets of the part that are in no file any more."""
+        self.confirmed -= octets - self._unwritten
+        self.lost_octets += octets - self._unwritten
 
     def _finish(self) -> None:
+        self._try("check", self._check)
         try:
             self._part.finish()
-            self._unwritten = 0
-            self._part.sync()
+            self._written()
         finally:
+            self.gone = self._fate() is not None
+            if self._fate() == REMOVED:
+                self._forget(self._part_octets)
             self.lost_octets += self._unwritten  # at most: some of them may be in the file
-            with contextlib.suppress(OSError):
-                self._part.stream.close()
+            self._unwritten = 0
+            self._syncer.sync(self._path, self._part.stream, last=True)
 
     def _open(self) -> None:
         path, number = self._path, 1
-        if self._rotation is not None:
-            number = max((number for number, _ in parts(path)), default=0) + 1
+        if self._rotation is not None or self.paths:
+            there = max((number for number, _ in parts(path)), default=0)
+            number = max(there, self._number) + 1
             path = part_name(path, number)
-        stream: BinaryIO = open(path, "xb", buffering=0)  # noqa: SIM115
+        stream: BinaryIO = open(self._start / path, "xb", buffering=0)  # noqa: SIM115
         try:
             before = {"first_chunk": self._next, "octets_before": self._octets}
-            part = PartFile(stream, self._session, len(self.paths) + 1, before)
+            part = PartFile(stream, self._session, self._count + 1, before)
             part.flush()
-            self._newest.add(path, stream)
+            self._newest.add(self._start / path, stream)
         except OSError:
             stream.close()
-            path.unlink(missing_ok=True)
+            (self._start / path).unlink(missing_ok=True)
             raise
-        with contextlib.suppress(OSError):
-            _sync_folder(path.parent)
+        self._syncer.sync_folder(self._start / path.parent)
         self._part = part
+        self._number, self._count = number, self._count + 1
         self._first = self._next
+        self._part_octets = 0
         self._began = None
         self.paths.append(path)
 
 
-def _sync_folder(folder: Path) -> None:
-    """Have the system write down that a file is there. Raises OSError, always on Windows."""
-    descriptor = os.open(folder, os.O_RDONLY)
+def _current_folder() -> Path:
+    """Where relative names begin; as they are where it is gone already."""
     try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
+        return Path.cwd()
+    except OSError:
+        return Path()
 
 
 def _refused(path: Path, error: OSError) -> CaptureError:

@@ -6,7 +6,6 @@ without a seam when there is room again.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from typing import BinaryIO
 
@@ -95,11 +94,6 @@ class PartFile:
         """Write everything out. Raises OSError; what was not taken waits for the next call."""
         self._writer.flush()  # type: ignore[no-untyped-call]
         self._drain()
-
-    def sync(self) -> None:
-        """Have the system write the file to the disk. Raises OSError."""
-        self.stream.flush()
-        os.fsync(self.stream.fileno())
 
     def finish(self) -> None:
         """Write summary and footer. Raises OSError. The stream stays open."""

@@ -75,6 +75,7 @@ LINE_SCHEMA = _flat(
         "offset": ("integer", "octet within the entry, from 0; absent for events"),
         "text": ("string", "an event in words"),
         "count": ("integer", "what an event counts"),
+        "reads": ("integer", "of dropped: entries before this one that were never written"),
         "time_ns": ("integer", "the event's time where log_time cannot hold it"),
     },
     ("kind", "chunk"),

@@ -1,15 +1,16 @@
 """Writing MCAP: `create` for a conversion, `Recorder` for a live bus.
 
-A recorder never waits for the disk: the capture's thread only collects octets; another thread packs, writes, syncs
-and rotates. Loss is bounded in time by the caller's `tick`: a chunk is in the file within 1 s and on the disk within
-10 s. When the disk does not take it, `trouble` says so in words, up to `keeper.MOST_WAITING` octets wait in memory for
-room, and what comes after that is counted in `lost_octets`; the numbering in the file shows the hole. Nothing is
-raised into the capture but a file that cannot be created at the start.
+A recorder never waits for the disk: the capture's thread only collects octets; another thread packs, writes and
+rotates, and one more syncs. Loss is bounded in time by the caller's `tick`: a chunk is in the file within 1 s and on
+the disk within 10 s. When the disk does not take it, `trouble` says so in words, `behind` for how long, up to
+`keeper.MOST_WAITING` octets wait in memory, and what comes after that is counted in `lost_octets` and, where it is
+missing, in the file. Nothing is raised into the capture but a file that cannot be created at the start.
 """
 
 from __future__ import annotations
 
 import threading
+from collections import deque
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -17,18 +18,35 @@ from pathlib import Path
 from dissectors.frame import Chunk
 from sniff.formats.files import NewFile, explain
 from sniff.recording import keeper
-from sniff.recording.batch import Batcher, Message, stamp
-from sniff.recording.keeper import CLOSE, FLUSH, SYNC, Keeper, Parcel
+from sniff.recording.batch import Batcher, Message, loss_message, stamp
+from sniff.recording.keeper import CHECK, CLOSE, SYNC, Flush, Keeper, Parcel
 from sniff.recording.part import PartFile
 from sniff.recording.rotation import Rotation
 from sniff.recording.topics import LINE, RAW
-from sniff.session import UNKNOWABLE, Item, LineEvent, Session, SettingsChange, settings_change
+from sniff.session import (
+    UNKNOWABLE,
+    Item,
+    LineEvent,
+    LineEventKind,
+    Session,
+    SettingsChange,
+    settings_change,
+)
 
 FLUSH_AFTER = 700_000_000
 """ns that something may wait before it is written: with a tick each 0.25 s, all is in the file within 1 s."""
 
 SYNC_AFTER = 8_000_000_000
-"""ns between syncs: with a slow disk, all is on it within 10 s."""
+"""ns between syncs: all is on the disk within 10 s, unless it takes more than 2 s for a sync."""
+
+CHECK_EVERY = 1_000_000_000
+"""ns between looks whether the file is still where it was begun."""
+
+MOST_FLUSHES = 4096
+"""Flushes remembered while they wait for the disk; of a longer jam the beginning is known."""
+
+SYNC_PATIENCE = 1.0
+"""Seconds that closing waits for the last sync: the system has the octets by then."""
 
 
 # -- converting ------------------------------------------------------------------------------------------------
@@ -109,7 +127,7 @@ class Recorder:
     """Records one bus. All methods are for one thread; none of them waits for the disk but `close`.
 
     `chunks`, `octets`: what was given to it. `lost_octets`: how many of those are not in the file. `trouble`: what is
-    wrong with the disk, in words, None while all is well.
+    wrong with the disk, in words, None while all is well. `notices`: what became of files, in words, to be taken.
     """
 
     def __init__(
@@ -125,13 +143,20 @@ class Recorder:
         self._batcher = Batcher()
         self._open_octets = 0
         self._now: int | None = None
-        self._oldest: int | None = None  # time of the oldest thing that is not in the file
+        self._ticked: int | None = None
+        self._oldest: int | None = None  # time of the oldest thing that was not sent to be written
+        self._oldest_came = 0  # the same on the clock of `tick`, which is not that of a replayed capture
         self._unsynced: int | None = None
         self._sequences: dict[str, int] = {}
         self._sent = 0
         self._dropped_octets = 0
+        self._gap_octets = self._gap_reads = 0  # dropped since the last batch that was not
+        self._following = 0  # number of the entry after the last batch
+        self._flushes: deque[tuple[int, int]] = deque()  # number and oldest time of flushes that wait
+        self._flush_number = 0
+        self._checked: int | None = None
         self._closed = False
-        self._stuck: str | None = None
+        self._given_up = False
         self._session = session
         self._keeper = Keeper(Path(path), session, rotation, keep)
         self._thread = threading.Thread(target=self._keeper.run, name="recorder", daemon=True)
@@ -176,7 +201,7 @@ class Recorder:
     ) -> None:
         """Record a result of the engine, best effort. `schema_name`: one of `topics.SCHEMAS`; `metadata`: of the
         channel, taken when the topic is new in a file. /raw and /line are not for results."""
-        if self._closed or topic in (RAW, LINE):
+        if self._closed or topic in (RAW, LINE) or self._full(keeper.MOST_DERIVED):
             return
         sequence = self._sequences.get(topic, 0)
         self._sequences[topic] = (sequence + 1) % (1 << 32)
@@ -186,19 +211,39 @@ class Recorder:
 
     def tick(self, now_ns: int) -> None:
         """Say what time it is on the capture's clock, at least every 0.25 s: closes, flushes and syncs what is due."""
+        self._ticked = now_ns
         if not self._closed:
             self._step(now_ns)
 
-    def close(self) -> None:
-        """Write everything, finish the file, wait for the disk (at most a minute). Never raises."""
-        if self._closed:
-            return
-        self._close_batch()
-        self._closed = True
-        self._keeper.orders.put(CLOSE)
-        self._thread.join(60)
-        if self._thread.is_alive():
-            self._stuck = f"{self.path}: the disk does not answer; the last seconds may be missing"
+    def finish(self) -> None:
+        """Take nothing more; write everything and finish the file, in the background. `finished` says when."""
+        if not self._closed:
+            self._close_batch()
+            self._closed = True
+            if self._gap_octets:  # nothing came after it
+                self._send(Parcel([self._gap(self._now or 0)], 0, self._following))
+            self._keeper.orders.put(CLOSE)
+
+    @property
+    def finished(self) -> bool:
+        """Whether everything is written, or failed to be."""
+        return not self._thread.is_alive()
+
+    def give_up(self) -> None:
+        """After `finish`: wait no longer; what is not in the file is lost, and counted."""
+        self._given_up = not self.finished
+
+    def synced(self, seconds: float) -> bool:
+        """Once `finished`: wait until the disk has everything, at most so long; whether it has. The system has it."""
+        return self._keeper.synced(seconds)
+
+    def close(self, patience: float = 60.0) -> None:
+        """Finish the file; wait so many seconds for the disk. Never raises."""
+        self.finish()
+        self._thread.join(patience)
+        self.give_up()
+        if self.finished:
+            self.synced(SYNC_PATIENCE)
 
     # what it tells
 
@@ -206,6 +251,11 @@ class Recorder:
     def path(self) -> Path:
         """The file that is being written."""
         return self._keeper.paths[-1]
+
+    @property
+    def gone(self) -> bool:
+        """Whether that file is not there any more, now that all is over."""
+        return self._keeper.gone
 
     @property
     def paths(self) -> tuple[Path, ...]:
@@ -218,32 +268,64 @@ class Recorder:
         return self._keeper.size
 
     @property
+    def notices(self) -> deque[str]:
+        """What became of files, in words; whoever takes one removes it."""
+        return self._keeper.notices
+
+    @property
     def trouble(self) -> str | None:
         """What is wrong, in words; None while all is well."""
-        return self._stuck or self._keeper.trouble
+        if self._given_up:
+            return f"{self.path}: the disk does not answer; what it did not take is lost"
+        return self._keeper.trouble
 
     @property
     def lost_octets(self) -> int:
         """Octets of the bus that are not in a file and never will be."""
-        return self._dropped_octets + self._keeper.lost_octets
+        return self._dropped_octets + self._keeper.lost_octets + (self.unwritten if self._given_up else 0)
+
+    @property
+    def unwritten(self) -> int:
+        """Octets of the bus that are not in a file yet."""
+        return max(0, self.octets - self._dropped_octets - self._keeper.lost_octets - self._keeper.confirmed)
+
+    def behind(self, now: int) -> int:
+        """Age of the oldest thing that is not in the file yet (ns at `now`, the capture's clock), 0 for nothing."""
+        while self._flushes and self._flushes[0][0] <= self._keeper.flushed:
+            self._flushes.popleft()
+        if self.finished or not (self._flushes or self._oldest is not None):
+            return 0
+        return max(0, now - (self._flushes[0][1] if self._flushes else self._oldest_came))
+
+    @property
+    def syncing(self) -> int:
+        """For how long the system has been busy with a sync, ns; 0 while it is not."""
+        return self._keeper.syncing
 
     # inside
 
     def _note(self, time: int) -> None:
         if self._oldest is None:
             self._oldest = time
+            self._oldest_came = time if self._ticked is None else self._ticked
 
     def _step(self, now: int) -> None:
         self._now = now
         if self._oldest is not None and _due(self._oldest, now, FLUSH_AFTER):
-            self._oldest = None
             self._close_batch()
-            self._keeper.orders.put(FLUSH)
+            self._flush_number += 1
+            if len(self._flushes) < MOST_FLUSHES:
+                self._flushes.append((self._flush_number, self._oldest_came))
+            self._keeper.orders.put(Flush(self._flush_number))
+            self._oldest = None
             if self._unsynced is None:
                 self._unsynced = now
         if self._unsynced is not None and _due(self._unsynced, now, SYNC_AFTER):
             self._unsynced = None
             self._keeper.orders.put(SYNC)
+        if self._checked is None or _due(self._checked, now, CHECK_EVERY):
+            self._checked = now
+            self._keeper.orders.put(CHECK)
 
     def _close_batch(self) -> None:
         messages = self._batcher.close()
@@ -251,13 +333,30 @@ class Recorder:
             self._send_raw(messages, self._batcher.first)
 
     def _send_raw(self, messages: list[Message], following: int) -> None:
-        self._send(Parcel(messages, self._open_octets, following))
-        self._open_octets = 0
+        octets, self._open_octets = self._open_octets, 0
+        if self._full(keeper.MOST_WAITING):
+            self._dropped_octets += octets
+            self._gap_octets += octets
+            self._gap_reads += following - self._following
+            self._following = following
+            return
+        if self._gap_octets and messages[-1].topic == RAW:
+            messages = [self._gap(messages[-1].publish_time), *messages]
+        self._following = following
+        self._send(Parcel(messages, octets, following))
+
+    def _gap(self, time: int) -> Message:
+        """What says in the file how much is missing before a batch."""
+        octets, reads = self._gap_octets, self._gap_reads
+        self._gap_octets = self._gap_reads = 0
+        text = f"{octets} octets lost: the disk did not keep up"
+        event = LineEvent(time, LineEventKind.DROPPED, text, octets)
+        return loss_message(event, self._following, reads)
+
+    def _full(self, limit: int) -> bool:
+        return self._sent - self._keeper.taken + self._keeper.waiting > limit
 
     def _send(self, parcel: Parcel) -> None:
-        if self._sent - self._keeper.taken > keeper.MOST_WAITING:
-            self._dropped_octets += parcel.octets
-            return
         self._sent += parcel.weight
         self._keeper.orders.put(parcel)
 

@@ -18,8 +18,9 @@ def run(feed: Feed, start_screen: str = "frames") -> None:
         feed.close()
     if status.ended:
         sys.stdout.write(f"{_plain(status.port)}: {_plain(status.ended)}\n")
-    if status.live and status.recording:
-        sys.stdout.write(f"recorded to {_plain(status.recording)}\n")
+    recording = feed.status().recording  # as it is now that its files are closed
+    if status.live and recording:
+        sys.stdout.write(f"recorded to {_plain(recording)}\n")
 
 
 def _plain(text: str) -> str:

@@ -18,6 +18,7 @@ class FeedStatus:
     `ended`: why nothing more comes ("unplugged", "file ends inside a record"), empty while all is well.
     `priority`: what the system allowed the capture process, in words ("real-time", "normal"), empty when unknown.
     `trouble`: why nothing is written any more although the capture goes on ("no space left on the disk …").
+    `behind`: seconds by which the disk is late with the recording, 0 while it keeps up.
     `searching`: with which settings a search listens at the moment, empty when there is none.
     """
 
@@ -32,6 +33,7 @@ class FeedStatus:
     priority: str = ""
     searching: str = ""
     trouble: str = ""
+    behind: float = 0.0
 
     @property
     def in_file(self) -> bool:

@@ -33,6 +33,8 @@ def record_state(status: FeedStatus) -> str:
         return "FILE"
     if status.trouble:
         return "REC FAILS"
+    if status.recording and status.behind:
+        return f"REC {status.behind:.0f} s BEHIND"
     return "REC" if status.recording else "NOT REC"
 
 
@@ -55,13 +57,17 @@ def status_line(status: FeedStatus, store: Store, viewing: Viewing, width: int) 
     """Pieces of text with a style name each, together at most `width` cells: the port gives way first."""
     state = record_state(status)
     reason = plain(why_ended(status, store)[0])
+    style = "REC" if state.startswith("REC ") else state
     shown_state = f"{state}: {fit(reason, min(cell_len(reason), REASON))}" if reason else state
     pieces = [
         *([(f"searching {plain(status.searching)} …", "doubt")] if status.searching else []),
         *([] if status.searching else [(plain(status.line), ""), (plain(status.protocol), "")]),
         (f"load {store.load.share():.0%}", ""),
         (f"err {store.error_total}", "bad" if store.error_total else ""),
-        (shown_state, {"REC": "bad", "REC FAILS": "bad", "NOT REC": "doubt", "ENDED": "doubt"}.get(state, "")),
+        (
+            shown_state,
+            {"REC": "bad", "NOT REC": "doubt", "ENDED": "doubt"}.get(style, ""),
+        ),
         *([(size(status.file_size), "")] if status.recording or not status.live else []),
     ]
     if status.dropped:
