@@ -22,7 +22,7 @@ from dataclasses import replace
 from dissectors import registry
 from dissectors.frame import Chunk, Noise, Place, Reason
 from dissectors.line import LineSettings, Timing
-from dissectors.registry import Dissector
+from dissectors.manifest import Dissector
 from sniff.engine import NOTHING, Engine, Output, Row
 from sniff.session import Item, Session, SettingsChange, settings_change
 

@@ -12,7 +12,6 @@ from dissectors.bacnet.message import Message
 from dissectors.frame import Frame
 from dissectors.tracker import Interval, Transaction, Verdict
 
-
 _TOKEN, _POLL, _TEST = (bytes((kind,)) for kind in (FrameType.TOKEN, FrameType.POLL_FOR_MASTER, FrameType.TEST_REQUEST))
 
 

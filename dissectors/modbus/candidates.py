@@ -11,6 +11,7 @@ import re
 from typing import Final, NamedTuple
 
 from dissectors.checksums import crc16_modbus
+from dissectors.modbus.expectation import Expected
 from dissectors.modbus.functions import (
     BROADCAST,
     EXCEPTION_BIT,
@@ -25,7 +26,6 @@ from dissectors.modbus.functions import (
     Octets,
     is_open_length,
 )
-from dissectors.modbus.expectation import Expected
 from dissectors.modbus.past import Past
 
 CRC_BITS: Final = 16

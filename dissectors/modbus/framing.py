@@ -38,10 +38,10 @@ from dissectors.modbus.candidates import (
     whole_stretch,
 )
 from dissectors.modbus.functions import BROADCAST, EXCEPTION_BIT, FUNCTIONS, MAX_FRAME, MAX_UNIT, MORE
-from dissectors.modbus.remains import Side
-from dissectors.modbus.rtu_window import RtuWindow
 from dissectors.modbus.open_length import OpenLengthFinder
 from dissectors.modbus.past import KNOWN_LENGTH
+from dissectors.modbus.remains import Side
+from dissectors.modbus.rtu_window import RtuWindow
 from dissectors.modbus.segmentation import ADJACENT, HEARD, PROVED, SILENCE_INSIDE, Paths, worth
 
 WINDOW: Final = 2 * MAX_FRAME

@@ -18,8 +18,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from dissectors import registry
 from dissectors.frame import Damage, Found, Frame, Role
-from dissectors.registry import Dissector
+from dissectors.manifest import Dissector
 from dissectors.tracker import Transaction, Verdict
 from sniff.analysis.wording import describe
 from sniff.engine import Row
@@ -37,7 +38,9 @@ class FilterError(ValueError):
         self.column = column
 
 
-PREFIXES = ("mbrtu.", "mbascii.", "modbus.", "n2.", "mstp.", "bacnet.", "bacapp.", "profibus.")
+def is_field(name: str, dissector: Dissector) -> bool:
+    """Whether a name can be a field: of this protocol, or of another one (a filter may be for several captures)."""
+    return name.startswith(dissector.prefixes) or any(name.startswith(other.prefixes) for other in registry.usable())
 
 
 def _source(row: Row, _: Transaction | None) -> tuple[Value, ...]:
@@ -278,7 +281,7 @@ class _Parser:
             return lambda row, _: (describe(dissector, row),)
         if name in COLUMNS:
             return COLUMNS[name]
-        if not name.startswith(PREFIXES):
+        if not is_field(name, dissector):
             close = difflib.get_close_matches(name, FIELDS, 1, 0.5)
             hint = f"did you mean {close[0]!r}?" if close else f"columns: {' '.join((*COLUMNS, 'text'))}"
             raise FilterError(f"unknown name {name!r} ({hint} fields: modbus.func_code …)", column)

@@ -11,7 +11,7 @@ from dissectors.frame import Damage, Event, Frame, LineError, Mark, Noise, Place
 from dissectors.line import NS_PER_S
 from dissectors.tracker import Transaction, Verdict
 from sniff.analysis.line_rules import LINE_RULES as RULES
-from sniff.analysis.wording import milliseconds
+from sniff.analysis.wording import milliseconds, station_word
 from sniff.engine import Row
 from sniff.session import LineEvent, LineEventKind, Session
 
@@ -319,7 +319,7 @@ def _sender(row: Row) -> str:
     placement, header = row.placement, row.header
     source = placement.source if placement is not None else header.source if header is not None else None
     if source is not None:
-        return f"MAC {source}" if header is not None and header.protocol == "mstp" else f"station {source}"
+        return f"{station_word(header.protocol) if header is not None else 'station'} {source}"
     role = placement.role if placement is not None else header.role if header is not None else Role.UNKNOWN
     return "master" if role in (Role.REQUEST, Role.BROADCAST) else "bus"
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from dissectors.frame import Frame, Role
-from dissectors.registry import Dissector
+from dissectors.manifest import Dissector
 from sniff.analysis.plain import plain
 
 DEEPEST = 20

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from dissectors.frame import Frame
-from dissectors.registry import Dissector
+from dissectors.manifest import Dissector
 from dissectors.tracker import Transaction
 from sniff.analysis.packet_tree import Field, fields_of
 from sniff.analysis.plain import plain

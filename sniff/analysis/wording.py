@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from dissectors import registry
 from dissectors.frame import Event, Frame, LineError, Noise, Place, Role
-from dissectors.registry import Dissector
+from dissectors.manifest import Dissector
 from dissectors.tracker import Interval
 from sniff.engine import Row
 
@@ -32,8 +33,8 @@ def _octets(event: Event) -> str:
 
 
 def station_word(protocol: str) -> str:
-    """What the people of that protocol call a place on the bus."""
-    return "MAC" if protocol == "mstp" else "station"
+    """What the people of that protocol call a place on the bus; "station" where it is not known here."""
+    return registry.get(protocol).noun if protocol in registry.names() else "station"
 
 
 def mark_names(error: LineError) -> str:

@@ -61,7 +61,7 @@ def target_of(args: argparse.Namespace) -> Target:
     said: LineSettings | str | None = args.line or (bus.line if bus is not None else None)
     auto = AUTO in (said, configured)
     line = said if isinstance(said, LineSettings) else None
-    protocol = configured or (AUTO if auto else "modbus-rtu")
+    protocol = configured or (AUTO if auto else registry.DEFAULT)
     search = None
     if auto:
         search = Unknowns(line, None if protocol == AUTO else protocol)

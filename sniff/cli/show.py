@@ -10,8 +10,9 @@ import csv
 import sys
 from collections.abc import Iterable, Iterator
 
-from dissectors.registry import Dissector
-from sniff.analysis.filtering import PREFIXES, FilterError, Predicate, compile_filter
+from dissectors import registry
+from dissectors.manifest import Dissector
+from sniff.analysis.filtering import FilterError, Predicate, compile_filter
 from sniff.analysis.packet_tree import Field
 from sniff.analysis.row_tree import tree_of
 from sniff.cli import USAGE, Failure, arguments, rows, writing
@@ -40,8 +41,9 @@ def run(args: argparse.Namespace) -> int:
     """Show every capture in turn, the parts of one recording as one."""
     if args.table and not args.names:
         raise Failure("-T fields: say which with -e NAME (repeatable), for instance -e modbus.func_code", USAGE)
+    of_protocols = tuple(prefix for dissector in registry.usable() for prefix in dissector.prefixes)
     for name in args.names:
-        if name not in rows.JSON_KEYS and not name.startswith((*PREFIXES, "frame.", "tx.", "line.")):
+        if name not in rows.JSON_KEYS and not name.startswith((*of_protocols, "frame.", "tx.", "line.")):
             raise Failure(f"-e {name}: unknown field{nearest(name, rows.JSON_KEYS)}; --fields lists a capture's", USAGE)
     left = args.count
     for path, capture in arguments.open_captures(args.files):

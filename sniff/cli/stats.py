@@ -9,6 +9,7 @@ import argparse
 from collections import Counter
 from pathlib import Path
 
+from dissectors import registry
 from dissectors.histogram import Histogram
 from dissectors.line import NS_PER_S
 from dissectors.tracker import Transaction
@@ -56,8 +57,9 @@ def run(args: argparse.Namespace) -> int:
     session = arguments.settings_of(args, merged_session(captures, names), names[0])
     items = merged(captures) if len(captures) > 1 else captures[0].items()
     if table == "ring":
-        if "ring" not in dissector_for(session).extras:
-            raise Failure(f"ring: {session.protocol} passes no token; this table is for mstp", USAGE)
+        if dissector_for(session).ring is None:
+            passing = ", ".join(one.name for one in registry.usable() if one.ring is not None)
+            raise Failure(f"ring: {session.protocol} passes no token; this table is for {passing}", USAGE)
         from sniff.cli import ring
 
         return ring.show(items, session, args.style)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections import Counter
+from typing import Any
 
 from dissectors.findings import Finding, Severity, under_causes
+from dissectors.manifest import Dissector
 from dissectors.profiles import Devices
-from dissectors.registry import Dissector
 from dissectors.tracker import Transaction, Verdict
 from sniff.analysis.health import Health, health_of
 from sniff.analysis.judging import Judging, rules_over
@@ -44,7 +45,7 @@ def collect(source: str, capture: Capture, session: Session, devices: Devices) -
     dissector = dissector_for(session)
     summary = Summary(session.line)
     judging = Judging(session, dissector, devices)
-    ring = _Ring(session) if "ring" in dissector.extras else None
+    ring = _Ring(dissector.ring(session.timing)) if dissector.ring is not None else None
     timeline: Timeline | None = None
     happenings: list[Happening] = []
     trouble: dict[int, Counter[str]] = {}
@@ -291,10 +292,8 @@ def _measurement(session: Session, dissector: Dissector) -> Measurement:
 class _Ring:
     """The token ring of one capture."""
 
-    def __init__(self, session: Session) -> None:
-        from dissectors.bacnet import RingObserver
-
-        self._observer = RingObserver(session.timing)
+    def __init__(self, observer: Any) -> None:
+        self._observer = observer
 
     def add(self, row: Row) -> None:
         """Take the next row."""

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from dissectors import registry
+
 if TYPE_CHECKING:
     from sniff.simulation.bus import VirtualBus
     from sniff.testing.capture_reading import CaptureReading
@@ -131,7 +133,7 @@ def virtual_bus() -> Iterator[Callable[..., VirtualBus]]:
 
     with ExitStack() as stack:
 
-        def make(name: str = "modbus-rtu", **options: Any) -> VirtualBus:
+        def make(name: str = registry.DEFAULT, **options: Any) -> VirtualBus:
             from sniff.simulation.bus import VirtualBus
             from sniff.simulation.scenarios import scenario
 

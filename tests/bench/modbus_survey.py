@@ -296,8 +296,10 @@ def score(total: Score, bus: Bus, events: list[Event], tracker: ModbusTracker) -
     ends = sorted(sent)
     reached = {begin: one for begin, one in sent.items() if not one.hurt}
     hurt = [one for one in sent.values() if one.hurt]
-    spans = {begin: (following if following is not None else len(bus.wire)) for begin, following in zip(
-        ends, [*ends[1:], None], strict=True)}
+    spans = {
+        begin: (following if following is not None else len(bus.wire))
+        for begin, following in zip(ends, [*ends[1:], None], strict=True)
+    }
     total.whole += len(reached)
     total.damaged += len(hurt)
     at, covered = 0, set()

@@ -119,7 +119,7 @@ def exchanges_with_zeros(code: int, dice: random.Random, count: int) -> Iterator
         asked, answered = exchange(code, dice)
         if tried % 8 == 0 and len(answered) > 6 and asked != answered:
             answered = _with_both(unit, answered)
-        elif tried % 8 == 1 and code in (6, 8, 0x16) or tried % 8 == 1 and code not in CODES and len(asked) > 4:
+        elif (tried % 8 == 1 and code in (6, 8, 0x16)) or (tried % 8 == 1 and code not in CODES and len(asked) > 4):
             body = _with_both(unit, asked)
             asked, answered = body, body if asked == answered else answered
         elif tried % 8 == 2:

@@ -15,7 +15,7 @@ from typing import Any
 from dissectors.frame import Check, Chunk, Damage, Event, Found, Frame, Header, Noise, Place, Reason, Role
 from dissectors.framer import OctetWindow
 from dissectors.line import Timing
-from dissectors.registry import Dissector
+from dissectors.manifest import Dissector
 from dissectors.tracker import Placement, Tracked, Transaction, Verdict
 
 LONGEST = 82
