@@ -51,7 +51,7 @@ def get(name: str) -> Dissector:
             if point.name == name:
                 return _plugged(point)
         else:
-            raise UnknownProtocol(f"protocol {name!r}: expected one of {', '.join(names())}")
+            raise UnknownProtocol(f"protocol {name!r} is not installed: expected one of {', '.join(names())}")
     return found
 
 

@@ -14,7 +14,7 @@ import sys
 from importlib import import_module
 from types import ModuleType
 
-from dissectors.registry import BrokenPlugin
+from dissectors import registry
 from sniff import __version__
 from sniff.formats import CaptureError
 
@@ -47,10 +47,9 @@ COMMANDS: dict[str, str] = {
 }
 """Name → what it does, in the order of the help. Each is `sniff/cli/<name>.py`: `configure(parser)`, `run(args)`."""
 
-DESCRIPTION = """Passive RS-485 fieldbus sniffer and protocol analyzer: Modbus RTU and ASCII, Metasys N2, BACnet MS/TP.
-It listens; it never writes to a port."""
+DESCRIPTION = """Passive RS-485 fieldbus sniffer and protocol analyzer. It listens; it never writes to a port."""
 
-EPILOG = """Start with `sniff485 demo`, then `sniff485 ports` and `sniff485 live PORT -s 19200,8E1 -p modbus-rtu`.
+EPILOG = """Start with `sniff485 demo`, then `sniff485 ports` and `sniff485 live PORT -s 19200,8E1 -p PROTOCOL`.
 Exit codes: 0 fine, 1 findings, 2 usage, 3 unreadable input, 4 port trouble, 130 interrupted."""
 
 
@@ -80,7 +79,7 @@ def main(argv: list[str] | None = None) -> int:
         sys.stdout.flush()
         print(f"sniff485: {_plain(error)}", file=sys.stderr)
         return UNREADABLE
-    except BrokenPlugin as error:
+    except registry.UnknownProtocol as error:  # of a capture, or a plug-in that is broken
         print(f"sniff485: {_plain(error)}", file=sys.stderr)
         return USAGE
     except KeyboardInterrupt:
@@ -95,7 +94,7 @@ def _run(arguments: list[str]) -> int:
     parser = argparse.ArgumentParser(
         prog="sniff485",
         description=DESCRIPTION,
-        epilog=EPILOG,
+        epilog=EPILOG if name is not None else f"{_protocols()}\n\n{EPILOG}",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"sniff485 {__version__}")
@@ -120,6 +119,13 @@ def _run(arguments: list[str]) -> int:
         args = parser.parse_args(arguments)
     assert chosen is not None  # argparse has refused anything else
     return int(chosen.run(args))
+
+
+def _protocols() -> str:
+    """The protocols that there are, plug-ins too: what `-p` takes, and what it is."""
+    known = registry.usable()
+    width = max(len(one.name) for one in known)
+    return "\n".join(("protocols:", *(f"  {one.name:<{width}}  {one.title}" for one in known)))
 
 
 def _no_such_command(word: str) -> str:

@@ -2,8 +2,8 @@
 
 Every octet stays an octet at its time, so framing, gaps, pairs, damage and findings stay what they were; only who it
 was and what it is called is gone. Renamed are: addresses in all frames, identification and texts in good
-ones (how, each protocol's manifest says); what events of the line say in words (ports that went and came back, notes) is
-left out. Values of points are kept: they are what a reader needs.
+ones (how, each protocol's manifest says); what events of the line say in words (ports that went and came back, notes)
+is left out. Values of points are kept: they are what a reader needs.
 
 A damaged frame keeps its damage: only its address is renumbered, where its place is known.
 """
