@@ -20,7 +20,8 @@ lint: $(VENV)/.test
 bench: $(VENV)/.test
 	$(BIN)/python -m pytest tests/bench -o norecursedirs=.venv -o testpaths=tests/bench --benchmark-only --benchmark-group-by=group $(ARGS)
 
-# Every injected fault with five seeds, and an hour of clean traffic; takes a while. ARGS chooses cases by name.
+# Every injected fault with three seeds, and an hour of every clean bus, on all cores; takes a while. ARGS: words of
+# names of cases; --clean-minutes N; --jobs N; --seeds N; --tell.
 faults: $(VENV)/.test
 	$(BIN)/python -m tests.faults.matrix $(ARGS)
 

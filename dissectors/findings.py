@@ -62,7 +62,8 @@ class Finding:
     ns, when it was seen first and last. `count`: how often. `evidence`: frame numbers, at most EVIDENCE_MAX. `seen`:
     what was seen; `means`: what it is consistent with; `next`: what to check next. Plain sentences, no control
     characters. `cause`: code and subject of the finding that most likely explains this one; a face shows this one
-    under it. `stated`: the value behind the words, where whoever found it had one.
+    under it. `stated`: the value behind the words, where whoever found it had one. `stations`: of what is found about
+    the bus, the stations that it concerns; empty: everybody.
     """
 
     code: str
@@ -77,6 +78,7 @@ class Finding:
     next: str
     cause: tuple[str, str] | None = None
     stated: Subject | None = None
+    stations: tuple[int, ...] = ()
 
     @property
     def about(self) -> Subject:
@@ -191,7 +193,7 @@ def with_consequences(findings: Iterable[Finding], rules: Mapping[str, Rule]) ->
         codes = rules[cause.code].explains
         for other, finding in enumerate(made):
             if other != at and finding.cause is None and codes and _is_explained(finding, cause, codes):
-                made[other] = _as_consequence(finding, cause, rules)
+                made[other] = as_consequence(finding, cause, rules)
     return tuple(made)
 
 
@@ -199,10 +201,13 @@ def _is_explained(finding: Finding, cause: Finding, codes: tuple[str, ...]) -> b
     if not finding.code.startswith(codes) or finding.severity > cause.severity:
         return False
     about, of_cause = finding.about, cause.about
-    return about.is_whole_bus or of_cause.is_whole_bus or about.is_of(of_cause)
+    if cause.stations and about.station is not None:
+        return about.station in cause.stations
+    return about.is_whole_bus or of_cause.reaches_all or about.is_of(of_cause)
 
 
-def _as_consequence(finding: Finding, cause: Finding, rules: Mapping[str, Rule]) -> Finding:
+def as_consequence(finding: Finding, cause: Finding, rules: Mapping[str, Rule]) -> Finding:
+    """The same finding as a note that names what most likely explains it."""
     return replace(
         finding,
         severity=min(finding.severity, Severity.NOTE),

@@ -101,15 +101,36 @@ class Repair:
 
 
 @dataclass(frozen=True, slots=True)
+class Assembly:
+    """A message that came in several frames, of which this frame brought the last part.
+
+    `octets`: the whole message as if it had come in one piece, in the form of its protocol; b"" while parts are
+    missing. `frames`: numbers of the frames that brought its parts, in the order of the parts. `missing`: places, from
+    0, of parts that were not seen (the first of them, where there are many).
+    """
+
+    octets: bytes
+    frames: tuple[int, ...] = ()
+    missing: tuple[int, ...] = ()
+
+    @property
+    def complete(self) -> bool:
+        """Whether every part was seen."""
+        return not self.missing
+
+
+@dataclass(frozen=True, slots=True)
 class Frame:
     """One frame as it was on the wire, good or damaged; `octets` include delimiters and check.
 
     `start`, `end`: ns, latest possible begin of its first octet and end of its last octet.
-    `slack`: ns by which `end` may in truth be earlier (0 … `Timing.latency`).
+    `slack`: ns by which `end` may in truth be earlier (0 … `Timing.latency`, more where the computer read late).
     `expected`: total octets predicted from its first octets, None where nothing predicts it.
     `skipped`: octets of noise directly before it since the frame before.
     `flags`: protocol-specific oddities in words ("lower-case", "trailing-pad"), ascending.
     `repair`: of a damaged frame, what it was if one thing at one of its ends went wrong.
+    `assembly`: of the frame that brings the last part of a longer message, that message: what the tracker knows of the
+    frames before it (`Tracked.assembly`); no framer sets it.
     """
 
     protocol: str
@@ -125,6 +146,7 @@ class Frame:
     marks: tuple[Mark, ...] = ()
     flags: tuple[str, ...] = ()
     repair: Repair | None = None
+    assembly: Assembly | None = None
 
     @property
     def ok(self) -> bool:

@@ -51,6 +51,11 @@ class Subject:
         """Whether it is no single station: what is said of it is said of all that share the line."""
         return self.kind in (About.BUS, About.MASTER)
 
+    @property
+    def reaches_all(self) -> bool:
+        """Whether what is wrong with it may be seen at everybody: also what the adapter loses is lost to all."""
+        return self.is_whole_bus or self.kind is About.ADAPTER
+
     def is_of(self, other: Subject) -> bool:
         """Whether what is wrong with `other` may be seen at this: the same thing, or one inside that station."""
         if self == other:

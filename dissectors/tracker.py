@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Protocol
 
-from dissectors.frame import Event, Header, Role
+from dissectors.frame import Assembly, Event, Header, Role
 from dissectors.line import Timing
 
 
@@ -69,7 +69,8 @@ class Placement:
 class Transaction:
     """One exchange, closed: it does not change any more.
 
-    `request`, `response`: numbers of the frames (None where not seen). `start`, `end`: ns, of the first and last
+    `request`, `response`: numbers of the frames (None where not seen); of a message in several frames, of the last one,
+    which holds the whole (`Frame.assembly`). `start`, `end`: ns, of the first and last
     octet that belong to it. `latency`: end of request to start of response. `attempt`: 1 for a first try, 2 and more
     for repeats. `of`: the transaction that this repeats, echoes or answers late.
     """
@@ -95,10 +96,14 @@ class Transaction:
 
 @dataclass(frozen=True, slots=True)
 class Tracked:
-    """What one event did: its own placement (None for noise), and the transactions that it closed, in order."""
+    """What one event did: its own placement (None for noise), and the transactions that it closed, in order.
+
+    `assembly`: the message in several frames that this one ends; whoever feeds the tracker keeps it with the frame.
+    """
 
     placement: Placement | None = None
     closed: tuple[Transaction, ...] = ()
+    assembly: Assembly | None = None
 
 
 NOTHING_TRACKED = Tracked()

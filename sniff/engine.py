@@ -12,6 +12,7 @@ from dissectors.frame import Chunk, Event, Frame, Header
 from dissectors.line import LineSettings, Timing
 from dissectors.manifest import Dissector
 from dissectors.tracker import Placement, Tracker, Transaction, Unpaired
+from sniff.late_reads import LateReads
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,11 +61,13 @@ class Engine:
         self.next = first
         self.last_tx = before_tx
         self._before_tx = before_tx
+        self._late = LateReads(timing)
         self.framer = dissector.framer(timing)
         self.tracker: Tracker = dissector.tracker(timing) if pairing else Unpaired()
 
     def feed(self, chunk: Chunk) -> Output:
         """Take one read."""
+        self._late.see(chunk)
         return self._track(self.framer.feed(chunk))
 
     def advance(self, now: int) -> Output:
@@ -89,13 +92,17 @@ class Engine:
             return NOTHING
         rows: list[Row] = []
         closed: list[Transaction] = []
-        peek, track = self.dissector.peek, self.tracker.track
+        peek, track, late = self.dissector.peek, self.tracker.track, self._late
         for event in events:
+            if isinstance(event, Frame):
+                event = late.with_slack(event)
             no = self.next
             self.next += 1
             header = peek(event) if isinstance(event, Frame) else None
             tracked = track(no, event, header)
             placement = tracked.placement
+            if tracked.assembly is not None and isinstance(event, Frame):
+                event = replace(event, assembly=tracked.assembly)
             if placement is not None:
                 if self._before_tx:
                     placement = replace(placement, tx=placement.tx + self._before_tx)

@@ -21,9 +21,8 @@ from sniff.capture.wire import Ended, Message, Received, Status, Tick
 from sniff.detection import Progress, Search
 from sniff.engine import Output
 from sniff.reading import engine_for
-from sniff.recording.frames import METADATA, SCHEMA, FrameLog
-from sniff.recording.topics import FRAMES
 from sniff.session import LineEvent, Session
+from sniff.thinning import Budget
 from sniff.value_channels import ValueChannels
 
 AT_ONCE = 0.2
@@ -34,6 +33,12 @@ TO_THE_END = 1.0
 
 PIECE = 2048
 """Octets given to the engine at a time."""
+
+VALUES_A_SECOND, VALUES_AT_ONCE = 1.0, 4000
+NODES_A_SECOND, NODES_AT_ONCE = 0.5, 600
+"""What goes back into the recording of the values of points and of the numbers of stations: `sniff/thinning.py`."""
+
+NODES = "/nodes/"
 
 LiveItem = Output | LineEvent | Status | Ended
 
@@ -64,7 +69,8 @@ class LiveBus:
         self._leave_at: float | None = None  # when what is pending is not looked at any more
         self._skipped = 0
         self._channels = ValueChannels(self.session.bus, self.devices) if link.paths else None
-        self._frames = FrameLog()
+        self._values_budget = Budget(VALUES_A_SECOND, VALUES_AT_ONCE)
+        self._nodes_budget = Budget(NODES_A_SECOND, NODES_AT_ONCE)
         self._settle()
 
     @property
@@ -159,9 +165,6 @@ class LiveBus:
         if isinstance(message, Tick):
             if self._bus_channels is not None and (messages := self._bus_channels.due(message.now)):
                 self._send(messages)
-                self._send_frames()
-            elif self.engine.searching:
-                self._send_frames()
             deadline = self.engine.deadline()
             due = deadline is not None and message.now >= deadline
             return self._some(self.engine.advance(message.now)) if due or deadline is None else []
@@ -180,8 +183,6 @@ class LiveBus:
             return []
         if self._bus_channels is not None:
             self._bus_channels.add(output)
-        if self.link.paths:
-            self._frames.add(output)
         for sample in self.points.add(output):
             self._record(sample)
         return [output]
@@ -189,7 +190,7 @@ class LiveBus:
     def _record(self, sample: Sample) -> None:
         """Send a value back into the file, best effort."""
         message = self._channels.message(sample) if self._channels is not None else None
-        if message is not None:
+        if message is not None and self._values_budget.take(message.topic, message.time):
             self.link.derived(
                 self.bus, message.topic, message.schema, message.time, message.time, message.data, message.metadata
             )
@@ -197,13 +198,9 @@ class LiveBus:
     def _send(self, messages: list[DerivedMessage]) -> None:
         """Send statistics and findings back into the file, best effort."""
         for one in messages:
+            if one.topic.startswith(NODES) and not self._nodes_budget.take(one.topic, one.log_time):
+                continue
             self.link.derived(self.bus, one.topic, one.schema, one.log_time, one.publish_time, one.data, one.metadata)
-
-    def _send_frames(self) -> None:
-        """Send what was made of the octets; not once octets were missed here, since places of octets are counted."""
-        batch = self._frames.take()
-        if batch is not None and not self.status.dropped:
-            self.link.derived(self.bus, FRAMES, SCHEMA.name, *batch, METADATA)
 
 
 def cut(chunk: Chunk, at: int, char: int) -> tuple[Chunk, Chunk]:

@@ -23,7 +23,7 @@ from dataclasses import dataclass
 from dissectors.line import LineSettings
 
 MS = 1_000_000
-LOOKED_AT = 4096
+LOOKED_AT = 2048
 """Reads of a capture that are looked at."""
 
 PERIODS = (64, 50, 40, 32, 25, 20, 16, 12, 10, 8, 6, 5, 4, 3, 2, 1)
@@ -110,20 +110,43 @@ def held_back(reads: ReadTimes, line: LineSettings, bound: int = 0) -> HeldBack:
 def _backlogs(reads: ReadTimes, char: int, allowed: int) -> list[int]:
     """Of each stretch that holds more octets than can have come: ns of line time too much, where over `allowed`."""
     found: list[int] = []
-    backlog = worst = 0.0
+    backlog = Backlog(char, allowed)
     for interval, count in zip(reads.intervals, reads.octets, strict=True):
-        if interval < 0:
-            backlog = worst = 0.0
-            continue
-        backlog = max(0.0, backlog + _FAST * count * char - interval)
-        if backlog > max(allowed, worst):
-            if worst:
-                found.pop()
-            worst = backlog
-            found.append(int(worst))
-        elif not backlog:
-            worst = 0.0
+        if backlog.add(interval, count):
+            del found[backlog.stretches - 1 :]
+            found.append(int(backlog.now))
     return found
+
+
+class Backlog:
+    """Line time of octets beyond what can have come, ns; summed up over reads until they have caught up.
+
+    `now`: of the present stretch of reads; `worst`: of all; `stretches`: how many went over what is `allowed` (ns).
+    """
+
+    __slots__ = ("_allowed", "_char", "_most", "now", "stretches", "worst")
+
+    def __init__(self, char: int, allowed: int) -> None:
+        self._char = char
+        self._allowed = allowed
+        self._most = 0.0
+        self.now = self.worst = 0.0
+        self.stretches = 0
+
+    def add(self, interval: int, octets: int) -> bool:
+        """Take a read so many ns after the one before (negative: not known); whether it is worse than before."""
+        if interval < 0:
+            self.now = self._most = 0.0
+            return False
+        self.now = max(0.0, self.now + _FAST * octets * self._char - interval)
+        if not self.now:
+            self._most = 0.0
+        if self.now <= max(self._allowed, self._most):
+            return False
+        self.stretches += not self._most
+        self._most = self.now
+        self.worst = max(self.worst, self.now)
+        return True
 
 
 def _grid(reads: ReadTimes, char: int) -> tuple[int, int]:

@@ -57,6 +57,8 @@ class SessionEngine:
         """Take a read or what happened to the line."""
         if isinstance(item, Chunk):
             return self.feed(item)
+        if item.kind.is_hole:  # what was asked before it and what is answered after it belong to nothing
+            return NOTHING if self.searching and not self._counts_anyhow else self._restart(self._engine.timing)
         change = settings_change(item)
         return NOTHING if change is None else self._change(change, item.time)
 

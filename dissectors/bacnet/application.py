@@ -8,14 +8,16 @@ from typing import Any, Protocol
 
 from dissectors.bacnet import apdu as apdus
 from dissectors.bacnet import codec, names, npdu, services
-from dissectors.bacnet.apdu import Apdu, PduType
+from dissectors.bacnet.apdu import SEGMENTED_ACCEPTED, Apdu, PduType
 from dissectors.bacnet.limits import BROADCAST
+from dissectors.bacnet.segmenting import Receiver, Sender
 from dissectors.bacnet.values import BitString, Enumerated, ObjectId, Record
 
 READ_PROPERTY, READ_MULTIPLE, WRITE_PROPERTY = 12, 14, 15
 I_AM, WHO_IS = 0, 8
 _REASON_UNRECOGNIZED, _REASON_MISSING = 9, 5
 _ABORT_SEGMENTATION = 4
+_RECEIVING_MAX = 16
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,6 +82,7 @@ class Poller(Quiet):
         self._every = every
         self._next = 0
         self._turn = 0
+        self._receiving: dict[tuple[int, int], Receiver] = {}  # by server and invoke id, the newest last
         self.answers: list[bytes] = []
 
     def on_token(self, now: int) -> Iterable[Outgoing]:
@@ -92,9 +95,20 @@ class Poller(Quiet):
         return (Outgoing(destination, read_property(self._turn & 0xFF, target, name), True),)
 
     def hear(self, source: int, octets: bytes) -> Iterable[Outgoing]:
-        """Keep the newest answers."""
+        """Keep the newest answers; acknowledge those that come in segments."""
         self.answers = [*self.answers[-99:], octets]
-        return ()
+        header, apdu, _ = _open(octets)
+        if header is None or apdu is None or apdu.type != PduType.COMPLEX_ACK or not apdu.segmented:
+            return ()
+        about = source, apdu.invoke_id or 0
+        receiver = self._receiving.pop(about, None)
+        if receiver is None or (apdu.sequence == 0 and receiver.is_whole):
+            receiver = Receiver()
+        self._receiving[about] = receiver
+        if len(self._receiving) > _RECEIVING_MAX:
+            del self._receiving[next(iter(self._receiving))]
+        acknowledgement = receiver.take(apdu)
+        return () if acknowledgement is None else (Outgoing(source, npdu.encode(acknowledgement)),)
 
 
 @dataclass(slots=True)
@@ -127,29 +141,39 @@ class Device:
     vendor: int = 0
     max_apdu: int = 480
     announce: bool = True  # says I-Am when it gets its first token
+    segments: bool = False  # answers that are too long go in segments where the client takes them
     written: list[tuple[ObjectId, Any]] = field(default_factory=list)
+    _sending: dict[tuple[int, int], Sender] = field(default_factory=dict)  # by client and invoke id
 
     def on_token(self, now: int) -> Iterable[Outgoing]:
-        """I-Am, once."""
+        """I-Am, once; segments that nobody acknowledged."""
+        again = [
+            Outgoing(client, npdu.encode(segment, expects_reply=True))
+            for (client, _), sender in self._sending.items()
+            for segment in sender.wake(now)
+        ]
+        self._sending = {key: sender for key, sender in self._sending.items() if not sender.is_over}
         if not self.announce:
-            return ()
+            return again
         self.announce = False
-        return (self.i_am(),)
+        return (self.i_am(), *again)
 
     def i_am(self) -> Outgoing:
         """The broadcast that says who is here."""
         values = {
             "i-am-device-identifier": ObjectId(8, self.instance),
             "max-apdu-length-accepted": self.max_apdu,
-            "segmentation-supported": "no-segmentation",
+            "segmentation-supported": "segmented-transmit" if self.segments else "no-segmentation",
             "vendor-id": self.vendor,
         }
         body = codec.encode(services.UNCONFIRMED[I_AM], values)
         return Outgoing(BROADCAST, npdu.encode(apdus.encode(PduType.UNCONFIRMED_REQUEST, body, service=I_AM)))
 
     def hear(self, source: int, octets: bytes) -> Iterable[Outgoing]:
-        """I-Am to a Who-Is that means this device."""
+        """I-Am to a Who-Is that means this device; the next segments to an acknowledgement."""
         header, apdu, body = _open(octets)
+        if apdu is not None and apdu.type == PduType.SEGMENT_ACK:
+            return self._next_segments(source, apdu)
         if header is None or apdu is None or (apdu.type, apdu.service) != (PduType.UNCONFIRMED_REQUEST, WHO_IS):
             return ()
         asked = codec.decode(services.UNCONFIRMED[WHO_IS], body).record
@@ -157,17 +181,27 @@ class Device:
         high = asked.get("device-instance-range-high-limit", 4194303)
         return (self.i_am(),) if low <= self.instance <= high else ()
 
+    def _next_segments(self, client: int, acknowledgement: Apdu) -> Iterable[Outgoing]:
+        key = client, acknowledgement.invoke_id or 0
+        sender = self._sending.get(key)
+        if sender is None:
+            return ()
+        following = sender.take(acknowledgement)
+        if sender.is_over:
+            del self._sending[key]
+        return tuple(Outgoing(client, npdu.encode(segment, expects_reply=True)) for segment in following)
+
     def answer(self, source: int, octets: bytes) -> bytes | None:
         """The answer to a confirmed request."""
         header, apdu, body = _open(octets)
         if header is None or apdu is None or not apdu.is_request or apdu.invoke_id is None or apdu.error is not None:
             return None
-        reply = self._reply(apdu, body)
+        reply = self._reply(source, apdu, body)
         if header.snet is not None:
             return npdu.encode(reply, dnet=header.snet, dadr=header.sadr or b"")
         return npdu.encode(reply)
 
-    def _reply(self, apdu: Apdu, body: bytes) -> bytes:
+    def _reply(self, source: int, apdu: Apdu, body: bytes) -> bytes:
         invoke_id, service = apdu.invoke_id or 0, apdu.service or 0
         if apdu.segmented:
             return apdus.encode(PduType.ABORT, invoke_id=invoke_id, reason=_ABORT_SEGMENTATION, flags=1)
@@ -185,6 +219,9 @@ class Device:
         except _Refused as refused:
             error = codec.encode(services.parameters(PduType.ERROR, service) or "", refused.error)
             return apdus.encode(PduType.ERROR, error, invoke_id=invoke_id, service=service)
+        if len(made) + 3 > self.max_apdu and self.segments and apdu.flags & SEGMENTED_ACCEPTED:
+            sender = self._sending[source, invoke_id] = Sender.of(invoke_id, service, made, self.max_apdu)
+            return sender.window_of_segments()[0]
         if len(made) + 3 > self.max_apdu:
             return apdus.encode(PduType.ABORT, invoke_id=invoke_id, reason=_ABORT_SEGMENTATION, flags=1)
         return apdus.encode(PduType.COMPLEX_ACK, made, invoke_id=invoke_id, service=service)

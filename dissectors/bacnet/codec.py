@@ -25,19 +25,41 @@ from dissectors.bacnet.values import (
     pack,
     primitive,
     show,
+    show_part,
     type_of,
 )
+
+KNOWN_OBJECTS = 63
+"""Object types from here on are later than the tables of property types, or a vendor's."""
 
 _DEPTH_MAX = 40  # nested types; the tags themselves are bounded by tags.DEPTH_MAX
 
 
 @dataclass(frozen=True, slots=True)
+class WrongType:
+    """The value of a standard property of a standard object that is of another primitive type than the standard's."""
+
+    object: ObjectId
+    property: int
+    expected: str
+    found: str
+
+    def __str__(self) -> str:
+        which = Enumerated(self.property, "PropertyIdentifier")
+        return f"{self.object} {which} is {self.found}, not {self.expected}"
+
+
+@dataclass(frozen=True, slots=True)
 class Decoded:
-    """What a layout made of octets: the values, the tags left over, and why decoding stopped (None: all fitted)."""
+    """What a layout made of octets: the values, the tags left over, and why decoding stopped (None: all fitted).
+
+    `wrong`: values of properties that are of another type than they should.
+    """
 
     record: Record
     rest: tuple[Tag, ...] = ()
     error: str | None = None
+    wrong: tuple[WrongType, ...] = ()
 
 
 class _Misfit(Exception):
@@ -53,13 +75,18 @@ class _Misfit(Exception):
 class _Scope:
     """Which property is spoken of: the type of its value follows from it."""
 
-    object_type: int | None = None
+    wrong: list[WrongType]
+    object: ObjectId | None = None
     property: int | None = None
     index: int | None = None
     names: dict[int, str] | None = None  # by the place of each tag, for those who ask
 
     def inner(self) -> _Scope:
-        return _Scope(self.object_type, self.property, self.index, self.names)
+        return _Scope(self.wrong, self.object, self.property, self.index, self.names)
+
+    def of_value(self) -> _Scope:
+        """Inside a value other properties are spoken of."""
+        return _Scope(self.wrong, names=self.names)
 
     def name(self, tag: Tag, text: str) -> None:
         if self.names is not None:
@@ -67,7 +94,7 @@ class _Scope:
 
     def note(self, field: Field, value: Any) -> None:
         if isinstance(value, ObjectId) and field.name != "initiating-device-identifier":
-            self.object_type = value.type
+            self.object = value
         elif isinstance(value, Enumerated) and field.type == "PropertyIdentifier":
             self.property, self.index = value.value, None
         elif field.name.endswith("array-index") and isinstance(value, int):
@@ -77,8 +104,8 @@ class _Scope:
         if self.property is None:
             return None
         found = PROPERTY_TYPES.get(self.property)
-        if self.object_type is not None:
-            found = BY_OBJECT.get((self.object_type, self.property), found)
+        if self.object is not None:
+            found = BY_OBJECT.get((self.object.type, self.property), found)
         if found is not None and found.startswith("{") and self.index is not None:
             return "Unsigned" if self.index == 0 else found[1:-1]
         return found
@@ -94,15 +121,16 @@ def decode(layout: str | None, octets: bytes, names: dict[int, str] | None = Non
         return Decoded(Record(None, ()), tree.tags, tree.error)
     entries: tuple[tuple[str, Any], ...] = ()
     error, at = None, 0
+    wrong: list[WrongType] = []
     try:
-        found, at = _sequence(notation.parse(layout), tree.tags, 0, _Scope(names=names), 0)
+        found, at = _sequence(notation.parse(layout), tree.tags, 0, _Scope(wrong, names=names), 0)
         entries = tuple(found)
     except _Misfit as misfit:
         entries, at, error = misfit.entries, misfit.at, str(misfit)
     rest = tree.tags[at:]
     if error is None and rest:
         error = f"{len(rest)} tags more than the service has"
-    return Decoded(Record(None, entries), rest, tree.error or error)
+    return Decoded(Record(None, entries), rest, tree.error or error, tuple(wrong))
 
 
 def _sequence(
@@ -153,14 +181,14 @@ def _field(field: Field, tags: Sequence[Tag], at: int, scope: _Scope, depth: int
     if field.tag is None:
         value, after = _in_place(field.type, tags, at, scope, depth)
         if base(field.type) is not None:
-            scope.name(tags[at], f"{field.name}: {show(value)}")
+            scope.name(tags[at], f"{field.name}: {show_part(field.name, value)}")
         return value, after
     tag = tags[at]
     if base(field.type) is not None:
         if tag.children is not None:
             raise _Misfit(f"{field.name} is no primitive value")
         value = _primitive(field.type, tag)
-        scope.name(tag, f"{field.name}: {show(value)}")
+        scope.name(tag, f"{field.name}: {show_part(field.name, value)}")
         return value, at + 1
     if tag.children is None:
         raise _Misfit(f"{field.name} has no opening tag")
@@ -230,15 +258,33 @@ def _any(tags: Sequence[Tag], scope: _Scope, depth: int) -> Any:
     expected = scope.value_type()
     if expected is not None:
         try:
-            value, used = _in_place(expected, tags, 0, _Scope(names=scope.names), depth + 1)
+            value, used = _in_place(expected, tags, 0, scope.of_value(), depth + 1)
             if len(tags) == 1 and base(expected) is not None:
                 scope.name(tags[0], show(value))
             if used == len(tags) and (used or expected.startswith("{")):
                 return value
         except _Misfit:
-            pass
+            _note_type(expected, tags, scope)
     values = tuple(plain(tag) for tag in tags)
     return values[0] if len(values) == 1 else values
+
+
+def _note_type(expected: str, tags: Sequence[Tag], scope: _Scope) -> None:
+    """Keep that a value is of another type, where that is sure: one primitive value in place of another kind of one.
+
+    Null is no value: written, it gives a commanded property up.
+    """
+    kind, about = base(expected), scope.object
+    if kind is None or about is None or about.type >= KNOWN_OBJECTS or scope.property is None or len(tags) != 1:
+        return
+    (tag,) = tags
+    if tag.context or tag.number == NUMBER_OF["Null"] or not tag.number < len(APPLICATION):
+        return
+    found = APPLICATION[tag.number]
+    if found == kind:  # the right type, but no such value
+        found = f"{found} of {len(tag.octets)} octets"
+    scope.wrong.append(WrongType(about, scope.property, kind, found))
+    scope.name(tag, f"{found} {show(plain(tag))} (the property is {kind})")
 
 
 def plain(tag: Tag) -> Any:

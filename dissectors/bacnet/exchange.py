@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from dissectors.bacnet import message as messages
-from dissectors.bacnet.apdu import PduType
+from dissectors.bacnet.apdu import NEGATIVE_ACK, Apdu, PduType
 from dissectors.bacnet.frame_types import FrameType
 from dissectors.bacnet.message import Message
 from dissectors.frame import Frame
@@ -49,9 +49,14 @@ class Exchange:
     of: int | None = None
     postponed: bool = False
     damaged: bool = False  # the request came damaged; its header is whole
-    response: int | None = None  # its first frame, while more segments follow
+    response: int | None = None  # its newest frame, while more segments follow
     latency: Interval | None = None
     last: int = 0  # end of the newest frame that belongs to it
+    unconfirmed: bool = False  # nobody answers it, whatever its frame type says
+    segmented: bool = False  # request or answer came in segments
+    more_follows: bool = False  # of a request: its newest segment is not the last
+    ends_with: int | None = None  # sequence number of the answer's last segment, once that was seen
+    becomes: Verdict | None = None  # of segments that answer what is closed, or nothing: the verdict at their end
 
     @property
     def is_token(self) -> bool:
@@ -68,6 +73,39 @@ class Exchange:
         gap = max(0, answer.start - self.end)
         return Interval(gap, max(0, gap - answer.slack), gap + self.slack)
 
+    def goes_on(self, no: int, frame: Frame, apdu: Apdu | None, incomplete: bool) -> bool:
+        """Take an answer, or an acknowledgement of either side; whether more must come before it is over.
+
+        `incomplete`: segments before this one were not seen. They come again, or the last acknowledgement says that the
+        other side has them.
+        """
+        if apdu is not None and apdu.type == PduType.SEGMENT_ACK:
+            self.segmented = True
+            refuses = bool(apdu.flags & NEGATIVE_ACK)
+            return refuses or self.ends_with is None or self.ends_with != apdu.sequence
+        if apdu is not None and not apdu.is_answer:
+            return False
+        if self.response is None:
+            self.latency = self.interval(frame)
+        self.response = no
+        if apdu is None or not apdu.segmented:
+            return False
+        self.segmented = True
+        if not apdu.more_follows:
+            self.ends_with = apdu.sequence
+        return apdu.more_follows or incomplete
+
+    def stopped(self) -> Transaction:
+        """What it became when nobody went on: without an answer, or, after the first segments of one, undecided.
+
+        The station that answers is there; whose fault the end is cannot be told.
+        """
+        if self.becomes is not None:
+            return self.close(self.becomes)
+        if self.response is None:
+            return self.close(Verdict.NO_RESPONSE)
+        return self.close(Verdict.OPEN, error="its segments stopped before the last one")
+
     def close(
         self,
         verdict: Verdict,
@@ -82,7 +120,7 @@ class Exchange:
             id=self.id,
             station=self.destination,
             kind=self.kind,
-            request=self.no,
+            request=None if self.becomes is not None else self.no,
             response=self.response if response is None else response,
             verdict=verdict,
             start=self.start,
@@ -92,6 +130,21 @@ class Exchange:
             of=self.of,
             error=error,
         )
+
+
+def mirrored(key: Key) -> Key:
+    """The key as it would be had the sender set the server flag of a SegmentACK or Abort the other way round."""
+    return Key(key.server, key.client, key.invoke_id)
+
+
+def trails(apdu: Apdu | None) -> bool:
+    """Whether it can follow the last segment of an exchange and still belong to it: an acknowledgement, a segment
+    sent again (but the first one with more to follow, which begins anew), an Abort."""
+    if apdu is None:
+        return False
+    if apdu.type in (PduType.SEGMENT_ACK, PduType.ABORT):
+        return True
+    return apdu.segmented and (bool(apdu.sequence) or not apdu.more_follows)
 
 
 def read(frame: Frame) -> tuple[Message | None, Key | None]:

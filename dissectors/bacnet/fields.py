@@ -42,7 +42,16 @@ def fields(frame: Frame, role: Role) -> dict[str, Value]:
     if message.npdu is not None:
         _network(message.npdu, message, found)
     if message.apdu is not None:
-        _application(message.apdu, message.parameters, found)
+        _application(message.apdu, found)
+    assembly = frame.assembly
+    if assembly is not None and message.whole is not None:
+        for no in assembly.frames:
+            _add(found, "bacapp.fragment", no)
+        _add(found, "bacapp.fragment.count", len(assembly.frames))
+        _add(found, "bacapp.reassembled.length", len(message.whole[1]))
+    spoken = message.spoken()
+    if spoken is not None:
+        _said(*spoken, found)
     return {name: values[0] if len(values) == 1 else ",".join(map(str, values)) for name, values in found.items()}
 
 
@@ -115,7 +124,8 @@ def _address(end: str, net: int | None, address: bytes | None, found: dict[str, 
         _add(found, f"bacnet.{end}adr_tmp", address.hex())
 
 
-def _application(apdu: Apdu, parameters: bytes, found: dict[str, list[Value]]) -> None:
+def _application(apdu: Apdu, found: dict[str, list[Value]]) -> None:
+    """The header of an APDU."""
     _add(found, "bacapp.type", apdu.type)
     if apdu.error is not None:
         return
@@ -139,8 +149,10 @@ def _application(apdu: Apdu, parameters: bytes, found: dict[str, list[Value]]) -
         _add(found, "bacapp.reject_reason", apdu.reason)
     if apdu.type == PduType.ABORT:
         _add(found, "bacapp.abort_reason", apdu.reason)
-    if apdu.segmented:
-        return
+
+
+def _said(apdu: Apdu, parameters: bytes, found: dict[str, list[Value]]) -> None:
+    """What the parameters of an APDU say."""
     decoded = messages.decode_parameters(apdu, parameters)
     if decoded is None:
         return
@@ -243,7 +255,7 @@ def _kind(value: Any) -> tuple[str, Value] | None:
     if isinstance(value, Enumerated):
         return "enum_index", value.value
     if isinstance(value, (Date, Time)):
-        return type(value).__name__.lower(), str(value)
+        return type(value).__name__.lower(), value.plain
     return ("object_id", str(value)) if isinstance(value, ObjectId) else None
 
 

@@ -69,6 +69,7 @@ class MstpFramer:
         self._skipped = 0  # octets of noise given out since the last frame
         self._after_frame = False  # the event before was a frame
         self._needs_pause = 0  # the silence that decides what is held; 0 while nothing is held
+        self._clear = (0, 0)  # between these places of the window no good header begins
         self._plain = 0  # octets of the good frame without silence inside at the front of the window, 0 unknown
 
     def feed(self, chunk: Chunk) -> list[Event]:
@@ -323,11 +324,16 @@ class MstpFramer:
     def _good_header(self, begin: int, end: int, stop: int) -> int | None:
         """The first place in [begin, end) where a good header begins that is whole before `stop`."""
         octets = self._window.octets
-        at = octets.find(PREAMBLE, begin, min(end + 1, stop))
+        clear_from, clear_to = self._clear
+        known = clear_from <= begin <= clear_to
+        at = octets.find(PREAMBLE, clear_to if known else begin, min(end + 1, stop))
         while at != -1 and at < end and at + HEADER <= stop:
             if header_is_good(octets[at : at + HEADER]):
                 return at
             at = octets.find(PREAMBLE, at + 1, min(end + 1, stop))
+        looked = min(end, stop - HEADER + 1)
+        if looked > begin and (not known or looked > clear_to):
+            self._clear = (clear_from if known else begin), looked
         return None
 
     def _undecided_header(self, begin: int, end: int, stop: int) -> bool:
@@ -390,6 +396,8 @@ class MstpFramer:
     def _take(self, count: int) -> Taken:
         if self._silences:
             self._silences = [(index - count, silence) for index, silence in self._silences if index >= count]
+        if self._clear[1]:
+            self._clear = max(0, self._clear[0] - count), max(0, self._clear[1] - count)
         return self._window.take(count)
 
     def _take_noise(self, before_frame: bool) -> Noise:

@@ -8,7 +8,7 @@ from functools import lru_cache
 from dissectors.bacnet import names
 from dissectors.bacnet import npdu as npdus
 from dissectors.bacnet import tags as tagging
-from dissectors.bacnet.frame_types import CARRIES_NPDU, EXPECTING, HEADER, PROPRIETARY, FrameType, name
+from dissectors.bacnet.frame_types import CARRIES_NPDU, HEADER, PROPRIETARY, FrameType, name
 from dissectors.bacnet.limits import BROADCAST
 from dissectors.bacnet.message import data_of
 from dissectors.frame import Check, Damage, Frame, Header, Repair, Role
@@ -145,7 +145,7 @@ def _apdu(data: bytes, at: int, frame_type: int, role: Role, kind: str) -> tuple
     if role is not Role.BROADCAST:
         if pdu in _ANSWERS:
             role = Role.RESPONSE
-        elif pdu == 1 and frame_type not in EXPECTING:
+        elif pdu == 1:  # nobody answers it, whatever the frame type says
             role = Role.DATA
         elif pdu == 0:
             role = Role.REQUEST

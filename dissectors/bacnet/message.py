@@ -10,7 +10,7 @@ from dissectors.bacnet import npdu as npdus
 from dissectors.bacnet.apdu import Apdu
 from dissectors.bacnet.frame_types import CARRIES_NPDU, HEADER, is_encoded
 from dissectors.bacnet.npdu import Npdu
-from dissectors.frame import Check, Damage, Frame
+from dissectors.frame import Assembly, Check, Damage, Frame
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,6 +18,7 @@ class Message:
     """What a frame says. `data`: the octets it carries, decoded where the type is encoded; b"" when none.
 
     `npdu`, `apdu`: None where the frame has none or ended before. `parameters`: octets after the APDU header.
+    `whole`: the message in segments that the frame ends, header and parameters; None for every other frame.
     """
 
     frame_type: int
@@ -28,6 +29,14 @@ class Message:
     npdu: Npdu | None = None
     apdu: Apdu | None = None
     parameters: bytes = b""
+    whole: tuple[Apdu, bytes] | None = None
+
+    def spoken(self) -> tuple[Apdu, bytes] | None:
+        """The APDU whose parameters can be read from this frame on, and they: its own, or that of the segments that
+        it ends. None for other segments, and where there is none."""
+        if self.whole is not None:
+            return self.whole
+        return None if self.apdu is None or self.apdu.segmented else (self.apdu, self.parameters)
 
 
 def data_of(octets: bytes) -> bytes | None:
@@ -63,7 +72,19 @@ def read(frame: Frame, *, trusting: bool = False) -> Message | None:
     body = data[npdu.body :]
     apdu = apdus.decode(body)
     rest = body[apdu.body :] if apdu is not None else b""
-    return Message(frame_type, octets[3], source, length, data, npdu, apdu, rest)
+    whole = _whole(frame.assembly) if frame.assembly is not None else None
+    return Message(frame_type, octets[3], source, length, data, npdu, apdu, rest, whole)
+
+
+def more_follows(frame: Frame) -> bool:
+    """Whether it is a segment that is not the last one: within a window nobody need acknowledge it."""
+    message = read(frame)
+    return message is not None and message.apdu is not None and message.apdu.more_follows
+
+
+def _whole(assembly: Assembly) -> tuple[Apdu, bytes] | None:
+    header = apdus.decode(assembly.octets)
+    return None if header is None else (header, assembly.octets[header.body :])
 
 
 def decode_parameters(apdu: Apdu, parameters: bytes) -> codec.Decoded | None:

@@ -1,4 +1,5 @@
-"""What BACnet exchanges tell: properties with their values. Reads, writes and changes of value; unsegmented ones."""
+"""What BACnet exchanges tell: properties with their values. Reads, writes and changes of value. A message in
+segments tells it with its last one."""
 
 from __future__ import annotations
 
@@ -7,10 +8,11 @@ from collections.abc import Iterator
 from typing import Any
 
 from dissectors.bacnet import message as messages
+from dissectors.bacnet import names
 from dissectors.bacnet.apdu import PduType
 from dissectors.bacnet.frame_types import HEADER
 from dissectors.bacnet.message import Message
-from dissectors.bacnet.values import BitString, Double, Enumerated, ObjectId, Record, show
+from dissectors.bacnet.values import BitString, Date, Double, Enumerated, ObjectId, Record, Time, show
 from dissectors.frame import Frame
 from dissectors.readings import How, Reading
 
@@ -40,21 +42,23 @@ def readings(request: Frame | None, response: Frame | None) -> tuple[Reading, ..
 
 def _told(message: Message) -> Iterator[Reading]:
     """What one frame tells by itself; total: a parameter that is not there ends it."""
-    apdu = message.apdu
-    if apdu is None or apdu.segmented:
+    spoken = message.spoken()
+    if spoken is None:
         return
+    apdu, parameters = spoken
     tell = _TELLERS.get((apdu.type, apdu.service or 0))
     if tell is None:
         return
-    decoded = messages.decode_parameters(apdu, message.parameters)
+    decoded = messages.decode_parameters(apdu, parameters)
     if decoded is None or decoded.error is not None:
         return
     whose = message.destination if apdu.service in (_WRITE, _WRITE_MULTIPLE) else message.source
     try:
         for thing, record, value, how in tell(decoded.record):
-            reading = _reading(thing, record, value, how, whose)
-            if reading is not None:
-                yield reading
+            for index, part in _parts(record, value):
+                reading = _reading(thing, record, index, part, how, whose)
+                if reading is not None:
+                    yield reading
     except (KeyError, TypeError, ValueError, AttributeError):
         return
 
@@ -98,10 +102,29 @@ _TELLERS: dict[tuple[int, int], Any] = {
 }
 
 
-def _reading(thing: ObjectId, record: Record, value: Any, how: How, station: int | None) -> Reading | None:
+_ARRAYS = frozenset(
+    names.number("PropertyIdentifier", name)
+    for name in ("event-message-texts", "object-list", "priority-array", "property-list", "state-text")
+)
+"""Arrays whose elements are values by themselves: read at once they tell the same as read one by one."""
+
+
+def _parts(record: Record, value: Any) -> Iterator[tuple[int | None, Any]]:
+    """The value with its array index; each element of an array that came as a whole."""
+    index = record.get("property-array-index")
+    if index is None and isinstance(value, tuple) and record["property-identifier"].value in _ARRAYS:
+        for place, element in enumerate(value, 1):
+            chosen = element.entries[0][1] if isinstance(element, Record) and len(element.entries) == 1 else element
+            yield place, chosen
+    else:
+        yield index, value
+
+
+def _reading(
+    thing: ObjectId, record: Record, index: int | None, value: Any, how: How, station: int | None
+) -> Reading | None:
     space, _, number = str(thing).partition(",")
     which = record["property-identifier"]
-    index = record.get("property-array-index")
     part = "" if which.value == _PRESENT_VALUE else str(which) + (f".{index}" if index is not None else "")
     raw, shown = _shown(value)
     if shown is None:
@@ -121,7 +144,7 @@ def _shown(value: Any) -> tuple[int | None, int | float | str | None]:
         return int.from_bytes(struct.pack(">f", value), "big"), _shortest(value)
     if isinstance(value, str):
         return None, value
-    if isinstance(value, BitString | ObjectId):
+    if isinstance(value, BitString | ObjectId | Date | Time):
         return None, show(value)
     return None, None
 

@@ -30,10 +30,17 @@ class What(Enum):
     TWO_TOKENS = "sent without having the token"
     REJOINED = "answered a poll though already in the ring"
     LEFT = "gave no sign when given the token"
-    SECOND_DEVICE = "another device instance under the same address"
-    COLLIDED_REPLY = "damaged octets in place of an answer"
+    OTHER_DEVICE = "another device instance under the same address"
+    SECOND_DEVICE = "two device instances in turns under the same address"
+    OTHER_ECHO = "a test of the own address answered with other octets"
+    DAMAGED_REPLY = "damaged octets in place of an answer"
     TOO_SOON = "sent again before its own poll could be answered"
+    UNASKED = "sent without being asked, and never has the token"
     LATE_USE = "late to use the token"
+    GIVEN_UP = "used the token after it was given up"
+    SLOW_SEARCH = "late to go on after a poll that nobody answered"
+    STOPPED = "searched for a successor for over a second"
+    STORM = "one of many broadcasts in a short time"
     LATE_REPLY = "late to answer"
     NO_REPLY = "no answer"
     LATE_POLL_REPLY = "late to answer a poll"
@@ -86,9 +93,13 @@ class Node:
     """One address. Counts of frames that it sent (`…_sent`) or was sent.
 
     `use`: end of a token to it … its first frame. `loop`: from token to token. `reply`: request to its answer.
-    `service`: request to the answer after it had postponed. `poll_reply`: poll to its answer. `holds`: data frames a
-    token → how often. `highest_polled`: highest address that it ever polled. `polls_of_search`: polls of
-    searches for a successor, its first one or one that was lost: they are as they should be.
+    `service`: request to the answer after it had postponed. `poll_reply`: poll to its answer. `poll_wait`: from a poll
+    of its own that nobody answered to its next frame. `holds`: data frames a token → how often. `held`: ns for which it
+    had the token. `highest_polled`: highest address that it ever polled. `polls_of_search`: polls of searches for a
+    successor, its first one or one that was lost, and shortly after: they are as they should be. `polls_waited`:
+    unanswered polls after which it waited as long as it must. `damaged`: damaged frames that it sent, by their header
+    or by whose turn it was; `damaged_octets` of them; `cut_last`: those where the last octet, or two, alone is missing
+    or wrong. `last_token`, `last_polled`: ns, when it was sent a token or a poll last.
     """
 
     tokens_received: int = 0
@@ -96,24 +107,31 @@ class Node:
     polls_sent: int = 0
     polls_of_search: int = 0
     polls_unanswered: int = 0
+    polls_waited: int = 0
     polls_received: int = 0
     poll_replies_sent: int = 0
     requests_sent: int = 0
     requests_received: int = 0
     data_sent: int = 0
+    broadcasts_sent: int = 0
     postponed: int = 0
     replies: int = 0
     damaged: int = 0
+    damaged_octets: int = 0
+    cut_last: int = 0
     octets: int = 0
+    held: int = 0
     highest_polled: int = -1
     first: int = 0
     last: int = 0
     last_token: int = 0
+    last_polled: int = 0
     use: Histogram = field(default_factory=Histogram)
     loop: Histogram = field(default_factory=Histogram)
     reply: Histogram = field(default_factory=Histogram)
     service: Histogram = field(default_factory=Histogram)
     poll_reply: Histogram = field(default_factory=Histogram)
+    poll_wait: Histogram = field(default_factory=Histogram)
     holds: Mapping[int, int] = field(default_factory=lambda: MappingProxyType({}))
     devices: tuple[int, ...] = ()
 
@@ -140,6 +158,7 @@ class Node:
             first=min(self.first, other.first),
             last=max(self.last, other.last),
             last_token=max(self.last_token, other.last_token),
+            last_polled=max(self.last_polled, other.last_polled),
             holds=MappingProxyType(holds),
             devices=tuple(dict.fromkeys(self.devices + other.devices))[:EVENTS_MAX],
         )
@@ -151,30 +170,47 @@ SUMS = (
     "polls_sent",
     "polls_of_search",
     "polls_unanswered",
+    "polls_waited",
     "polls_received",
     "poll_replies_sent",
     "requests_sent",
     "requests_received",
     "data_sent",
+    "broadcasts_sent",
     "postponed",
     "replies",
     "damaged",
+    "damaged_octets",
+    "cut_last",
     "octets",
+    "held",
 )
-_DISTRIBUTIONS = ("use", "loop", "reply", "service", "poll_reply")
+_DISTRIBUTIONS = ("use", "loop", "reply", "service", "poll_reply", "poll_wait")
 
 
 @dataclass(frozen=True, slots=True)
 class Edge:
-    """Tokens from one station to another, and how many of them were repeats."""
+    """Tokens from one station to another, and how many of them were repeats.
+
+    `streak`: how many of the newest ones since the sender passed to anybody else; `since`: ns, the first of these.
+    """
 
     tokens: int = 0
     retries: int = 0
     last: int = 0
+    since: int = 0
+    streak: int = 0
 
     def merge(self, other: Edge) -> Edge:
         """Both together."""
-        return Edge(self.tokens + other.tokens, self.retries + other.retries, max(self.last, other.last))
+        newer = other if other.last >= self.last else self
+        return Edge(
+            self.tokens + other.tokens,
+            self.retries + other.retries,
+            max(self.last, other.last),
+            newer.since,
+            newer.streak,
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,7 +219,8 @@ class Ring:
 
     `frames`, `octets`, `noise` (octets), `header_errors`, `data_errors`, `cut`: counts.
     `poll_waste`: time spent on polls that nobody answered, waiting included. `impossible`: frames that followed the one
-    before sooner than any driver can (Tturnaround). `happened`: events by kind and station.
+    before sooner than any driver can (Tturnaround). `hole`: ns, when octets may have been missed last. `polled`: when
+    one station polled another last, ns. `happened`: events by kind and station.
     """
 
     timing: Timing = field(default_factory=Timing)
@@ -197,9 +234,16 @@ class Ring:
     cut: int = 0
     poll_waste: int = 0
     impossible: int = 0
+    hole: int = 0
     nodes: Mapping[int, Node] = field(default_factory=lambda: MappingProxyType({}))
     edges: Mapping[tuple[int, int], Edge] = field(default_factory=lambda: MappingProxyType({}))
     happened: Mapping[tuple[What, int | None], Happened] = field(default_factory=lambda: MappingProxyType({}))
+    polled: Mapping[tuple[int, int], int] = field(default_factory=lambda: MappingProxyType({}))
+
+    @property
+    def shows_tokens(self) -> bool:
+        """Whether tokens are in the capture at all: some programs save it without them."""
+        return bool(self.edges)
 
     @property
     def span(self) -> int:
@@ -321,7 +365,14 @@ class Ring:
             self.cut + other.cut,
             self.poll_waste + other.poll_waste,
             self.impossible + other.impossible,
+            max(self.hole, other.hole, *firsts, 0) if self.frames and other.frames else max(self.hole, other.hole),
             MappingProxyType(nodes),
             MappingProxyType(edges),
             MappingProxyType(happened),
+            MappingProxyType(
+                {
+                    pair: max(self.polled.get(pair, 0), other.polled.get(pair, 0))
+                    for pair in self.polled.keys() | other.polled.keys()
+                }
+            ),
         )

@@ -2,21 +2,26 @@
 
 The token is held by one station, or on its way to one that has not used it yet. A station may send when it holds it,
 when the token is on its way to it, when it passed the token on and nobody used it, or when it was asked. Whoever sends
-otherwise has a second token, unless the bus was silent for 500 ms before: then the token was lost and made anew.
-After damage, noise or the begin of a capture nothing is concluded: a token may have passed unseen.
+otherwise has a second token, is a slave that speaks unasked, or uses a token that was given up; the one who holds the
+token is innocent of it and keeps it. When the bus was silent for 500 ms before, the token was lost and made anew.
+After damage, noise or the begin of a capture nothing is concluded: a token may have passed unseen. Times over a limit
+are judged by their smallest reading, and only where the read was not held back (`held_reads.py`).
 """
 
 from __future__ import annotations
 
-from collections import deque
+from collections import OrderedDict, deque
 from dataclasses import dataclass
 
 from dissectors.bacnet import message as messages
 from dissectors.bacnet.frame_types import CARRIES_NPDU, EXPECTING, HEADER, PROPRIETARY, FrameType, is_encoded
+from dissectors.bacnet.header import is_whole_header
+from dissectors.bacnet.held_reads import HeldReads
 from dissectors.bacnet.limits import (
     BROADCAST,
     MAX_DATA,
     MAX_MASTER,
+    MS,
     N_MIN_OCTETS,
     T_NO_TOKEN,
     T_REPLY_DELAY,
@@ -24,17 +29,32 @@ from dissectors.bacnet.limits import (
     T_USAGE_TIMEOUT,
     TURNAROUND_BITS,
 )
-from dissectors.bacnet.ring import EVENTS_MAX, Ring, What
+from dissectors.bacnet.message import data_of
+from dissectors.bacnet.ring import EVENTS_MAX, Event, Ring, What
+from dissectors.bacnet.ring_damage import count_damage, speaker_of
 from dissectors.bacnet.ring_tally import NodeTally, RingTally
+from dissectors.bacnet.storms import Storms
+from dissectors.bacnet.turn import Turn
 from dissectors.bacnet.values import ObjectId
-from dissectors.frame import Damage, Frame, Header, Noise
+from dissectors.frame import Damage, Frame, Header, Noise, Role
 from dissectors.frame import Event as FramerEvent
 from dissectors.line import Timing
 
 _HOLD_MAX = 64  # longest run of data frames that is counted by itself
 _POSTPONED_MAX = 64
+_UNANSWERED_MAX = 32
+_AFTER_SEARCH = 10  # tokens after a search in which a poll still looks for the one that was lost
 T_LATE_ANSWER = 2 * T_NO_TOKEN
 """An answer that comes after its asker gave up is still one within this time."""
+
+T_LATE_USE = 2 * T_NO_TOKEN
+"""So long a token that was given up may still be used, and the two that are there then last."""
+
+T_GO_ON = 100 * MS
+"""The longest time that any text lets a station wait for the answer to a poll (Tusage_timeout)."""
+
+T_STOPPED = 1_000 * MS
+"""A search for a successor that takes so long has stopped the bus."""
 
 _TOKEN, _POLL, _POLL_REPLY, _TEST, _TEST_REPLY, _POSTPONED = map(
     int,  # plain numbers compare faster than members
@@ -60,25 +80,41 @@ class _Asked:
     no: int
 
 
+@dataclass(slots=True)
+class _GivenUp:
+    """A station that did not use its token, who took the token back, and when it was sent."""
+
+    mac: int
+    by: int
+    token_end: int
+
+
 class RingObserver:
     """Fed every event of a bus in order; gives the `Ring` at any time. Total."""
 
     def __init__(self, timing: Timing) -> None:
         self._tally = RingTally(timing)
         self._least_gap = timing.line.bits(TURNAROUND_BITS) // 2
-        self._judges_use = 2 * timing.latency <= T_USAGE_DELAY  # whether the adapter's times can judge such limits
-        self._judges_replies = 2 * timing.latency <= T_REPLY_DELAY
         self._holder: int | None = None  # None: not known
         self._passed_by: int | None = None  # who passed the token to the holder, while the holder has not used it
         self._token: Frame | None = None  # that token, while unused
+        self._second: int | None = None  # who has another token, or was sent it, as far as seen
+        self._given_up: _GivenUp | None = None
+        self._two_until = 0  # ns; two tokens until then are known of
+        self._got: int | None = None  # when the holder got the token
         self._asked: _Asked | None = None
         self._hold = 0  # data frames sent on this token
         self._doubt = True  # something may have been missed since the last good frame
         self._before: Frame | None = None  # the last good frame
         self._quiet_since: int | None = None  # end of the last event of any kind
+        self._alone_since: int | None = None  # where the last event has a time of its own: the earliest it may begin
+        self._quiet_slack = 0  # of the last event
         self._missed: int | None = None  # where octets may be lost, until an event comes after it
-        self._unanswered: _Asked | None = None  # the newest request that nobody answered in time
+        self._unanswered: OrderedDict[tuple[int, int], _Asked] = OrderedDict()  # by server and client
         self._postponed: deque[tuple[int, int, int]] = deque(maxlen=_POSTPONED_MAX)  # server, client, end of request
+        self._turn = Turn(timing)
+        self._reads = HeldReads(self._least_gap)
+        self._storms = Storms()
 
     def see(self, no: int, event: FramerEvent, header: Header | None) -> None:
         """Take the next event; `header` is None for noise.
@@ -95,21 +131,35 @@ class RingObserver:
         if isinstance(event, Noise) or header is None:
             if event.octets:
                 tally.noise += len(event.octets)
+                if isinstance(event, Noise):
+                    self._turn.see_noise(event)
                 if len(event.octets) >= N_MIN_OCTETS:  # fewer prove nothing: who was asked may still answer
-                    self._see_collision(no, event)
+                    self._asked = None
                 self._doubt = True
             else:
                 self._see_hole(event.start)
         else:
             tally.frames += 1
             tally.octets += len(event.octets)
+            for late in self._reads.settle(event):
+                tally.note(late.what, late.time, late.no, late.mac, late.other, late.value)
             if not event.ok and event.damage is not Damage.LONG:
                 self._see_damage(no, event, header)
             elif header.source is not None and header.destination is not None and header.function is not None:
                 self._see_good(no, event, header.function, header.source, header.destination, header)
+                self._turn.see(event, header.function, header.source, header.destination)
                 self._before = event
                 self._doubt = False
+        self._see_gap(event)
         self._quiet_since = event.end
+
+    def _see_gap(self, event: FramerEvent) -> None:
+        """Frames that stand back to back came in one read, maybe a late one, and have no times of their own."""
+        if self._quiet_since is None or event.start - self._quiet_since >= self._least_gap:
+            self._alone_since = None if self._quiet_since is None else self._quiet_since - self._quiet_slack
+        else:
+            self._alone_since = None
+        self._quiet_slack = event.slack if isinstance(event, Frame) else self._tally.timing.latency
 
     def miss(self, time: int) -> None:
         """Say that octets may be lost about `time` (ns), before the next event that ends there or later."""
@@ -119,47 +169,35 @@ class RingObserver:
         """All that was seen so far."""
         return self._tally.value()
 
-    # Holes, noise and damage
+    # Holes and damage
 
     def _see_hole(self, end: int) -> None:
         """No wait that began before it is measured to its end."""
         self._forget()
         self._missed, self._quiet_since = None, end
-        self._unanswered = None
+        self._given_up = None
+        self._unanswered.clear()
         self._postponed.clear()
+        self._reads.forget()
         self._doubt = True
+        self._tally.hole = max(self._tally.hole, end)
         for node in self._tally.nodes.values():
-            node.got = None
+            node.got = node.searching_since = None
 
     def _see_damage(self, no: int, frame: Frame, header: Header) -> None:
-        if frame.damage is Damage.HEADER:
-            self._tally.header_errors += 1
-        elif frame.damage is Damage.CHECK:
-            self._tally.data_errors += 1
-        else:
-            self._tally.cut += 1
-        if frame.damage is Damage.CHECK and header.source is not None:
-            node = self._tally.node(header.source)
-            node.first = node.first or frame.start
-            node.last = frame.end
-            node.damaged += 1
-        self._see_collision(no, frame)
+        tally, asked = self._tally, self._asked
+        speaker = speaker_of(frame, header, self._turn)
+        count_damage(tally, frame, speaker)
         self._asked = None
+        if asked is None or speaker is None or asked.frame_type == _POLL:
+            pass
+        elif (speaker.source, speaker.destination) == (asked.destination, asked.source):
+            tally.note(What.DAMAGED_REPLY, frame.start, no, asked.destination, asked.source)
+        if is_whole_header(frame) and header.function in (*EXPECTING, _TEST) and header.destination != BROADCAST:
+            assert header.source is not None
+            assert header.destination is not None
+            self._asked = _Asked(header.function, header.source, header.destination, frame, no)
         self._doubt = True
-
-    def _see_collision(self, no: int, event: FramerEvent) -> None:
-        """Damaged octets where a station was to answer a request or poll, or to use its token."""
-        asked, token = self._asked, self._token
-        if asked is not None:
-            since, mac, other = asked.frame.end, asked.destination, asked.source
-        elif token is not None and self._holder is not None:
-            since, mac, other = token.end, self._holder, token.octets[4]
-        else:
-            return
-        if event.start - since < T_REPLY_DELAY:
-            self._tally.node(mac)
-            self._tally.note(What.COLLIDED_REPLY, event.start, no, mac, other)
-        self._asked = None
 
     # Good frames
 
@@ -176,7 +214,7 @@ class RingObserver:
                 self._lose_token(no, frame, source)
         answers = self._asked is not None and self._is_answer(no, frame, frame_type, source, destination, node)
         self._check_addresses(no, frame, frame_type, source, destination)
-        if not answers and self._unanswered is not None:
+        if not answers and self._unanswered:
             answers = self._is_late_answer(no, frame, source, destination)
         if frame_type == _TOKEN:
             if not answers:
@@ -203,14 +241,17 @@ class RingObserver:
 
     def _poll(self, no: int, frame: Frame, source: int, destination: int, node: NodeTally) -> None:
         node.polls_sent += 1
-        if node.searches or not node.tokens_sent:
+        if node.searches or node.after_search or not node.tokens_sent:
             node.polls_of_search += 1
         if node.highest_polled < destination <= MAX_MASTER:
             node.highest_polled = destination
         self._asked = _Asked(_POLL, source, destination, frame, no)
+        if source <= MAX_MASTER and destination <= MAX_MASTER:
+            self._tally.polled[source, destination] = frame.end
         polled = self._tally.nodes.get(destination)
         if polled is not None:
             polled.polls_received += 1
+            polled.last_polled = frame.end
 
     def _see_data(
         self,
@@ -224,13 +265,17 @@ class RingObserver:
         header: Header,
     ) -> None:
         node.data_sent += 1
+        if destination == BROADCAST:
+            node.broadcasts_sent += 1
+            if self._storms.see(frame.end):
+                self._tally.note(What.STORM, frame.start, no, source)
         if not answers:
             self._hold += 1
             self._end_postponed(frame, source, destination, node)
         if frame_type in EXPECTING and not answers:
             if destination == BROADCAST:
                 self._tally.note(What.BROADCAST_REQUEST, frame.start, no, source)
-            else:
+            elif header.role is Role.REQUEST:  # answers and what is unconfirmed ask for nothing, whatever the type says
                 node.requests_sent += 1
                 self._tally.node(destination).requests_received += 1
                 self._asked = _Asked(frame_type, source, destination, frame, no)
@@ -245,11 +290,16 @@ class RingObserver:
         if message.parameters[:1] != b"\xc4" or len(message.parameters) < 5:
             return
         instance = ObjectId.unpack(message.parameters[1:5]).instance
-        if instance in node.devices or len(node.devices) >= EVENTS_MAX:
+        before, node.device = node.device, instance
+        if instance in node.devices:
+            if before not in (None, instance):
+                self._tally.note(What.SECOND_DEVICE, frame.start, no, source, None, instance)
+            return
+        if len(node.devices) >= EVENTS_MAX:
             return
         node.devices.append(instance)
         if len(node.devices) > 1:
-            self._tally.note(What.SECOND_DEVICE, frame.start, no, source, None, instance)
+            self._tally.note(What.OTHER_DEVICE, frame.start, no, source, None, instance)
 
     # Who may send
 
@@ -261,58 +311,84 @@ class RingObserver:
         if asked is None:
             return False
         back = source == asked.destination and destination == asked.source
+        took = frame.start - asked.frame.end
         if asked.frame_type == _POLL:
             if back and frame_type == _POLL_REPLY:
-                node.poll_reply.add(frame.start - asked.frame.end)
-                if self._judges_use and self._surely_over(frame, asked.frame, T_USAGE_DELAY):
-                    self._tally.note(
-                        What.LATE_POLL_REPLY, frame.start, no, source, destination, frame.start - asked.frame.end
-                    )
+                node.poll_reply.add(took)
+                if self._surely_over(frame, asked.frame, T_USAGE_DELAY):
+                    self._late(What.LATE_POLL_REPLY, no, frame, source, destination, took)
                 return True
             self._unanswered_poll(frame, asked)
-            soon = frame.start - asked.frame.end + asked.frame.slack < T_USAGE_DELAY // 2
-            if soon and source == asked.source and not self._doubt and self._judges_use:
-                self._tally.note(
-                    What.TOO_SOON, frame.start, no, source, asked.destination, frame.start - asked.frame.end
-                )
+            if source == asked.source:
+                self._go_on(no, frame, asked, node)
             return False
         if asked.frame_type == _TEST:
-            return back and frame_type == _TEST_REPLY
-        answered = back and frame_type not in (_TOKEN, _POLL, _POLL_REPLY, _TEST)
-        if not answered:
+            answered = back and frame_type == _TEST_REPLY
+            if answered and asked.frame.ok and source == destination and not _same_data(frame, asked.frame):
+                self._tally.note(What.OTHER_ECHO, frame.start, no, source)
+            return answered
+        if not back or frame_type in (_TOKEN, _POLL, _POLL_REPLY, _TEST):
             self._unanswered_request(asked)
             return False
         node.replies += 1
-        node.reply.add(frame.start - asked.frame.end)
-        if self._judges_replies and self._surely_over(frame, asked.frame, T_REPLY_DELAY):
-            self._tally.note(What.LATE_REPLY, frame.start, no, source, destination, frame.start - asked.frame.end)
+        node.reply.add(took)
+        if self._surely_over(frame, asked.frame, T_REPLY_DELAY):
+            self._late(What.LATE_REPLY, no, frame, source, destination, took)
         if frame_type == _POSTPONED:
             self._postponed.append((source, destination, asked.frame.end))
         return True
 
+    def _go_on(self, no: int, frame: Frame, asked: _Asked, node: NodeTally) -> None:
+        """The station that polled has given the poll up: too soon, in time or late."""
+        took = frame.start - asked.frame.end
+        node.poll_wait.add(took)
+        if self._surely_over(frame, asked.frame, T_USAGE_DELAY):
+            node.polls_waited += 1
+        if self._surely_over(frame, asked.frame, T_GO_ON):
+            self._late(What.SLOW_SEARCH, no, frame, frame.octets[4], asked.destination, took)
+        if self._alone_since is None or took < self._least_gap or self._doubt or frame.octets == asked.frame.octets:
+            return
+        # the poll may have come in a late read too, and begun directly after what was before it
+        longest = frame.start - self._alone_since - (asked.frame.end - asked.frame.start)
+        if longest < T_USAGE_DELAY // 2:
+            self._tally.note(What.TOO_SOON, frame.start, no, frame.octets[4], asked.destination, took)
+
     def _unanswered_request(self, asked: _Asked) -> None:
-        self._unanswered = asked
-        if not self._doubt:
+        if not asked.frame.ok:  # it may have been damaged for everybody
+            return
+        key = asked.destination, asked.source
+        self._unanswered[key] = asked
+        self._unanswered.move_to_end(key)
+        if len(self._unanswered) > _UNANSWERED_MAX:
+            self._unanswered.popitem(last=False)
+        if not self._doubt and not messages.more_follows(asked.frame):
             self._tally.note(What.NO_REPLY, asked.frame.end, asked.no, asked.destination, asked.source)
 
     def _is_late_answer(self, no: int, frame: Frame, source: int, destination: int) -> bool:
-        """Data to the one that asked and has given up: late, but no second token."""
-        asked = self._unanswered
-        if asked is None or (source, destination) != (asked.destination, asked.source) or source == self._holder:
+        """Data to the one that asked and has given up: late, but neither lost nor a second token."""
+        asked = self._unanswered.get((source, destination))
+        if asked is None or source == self._holder or frame.octets[2] not in CARRIES_NPDU:
             return False
-        if frame.octets[2] not in CARRIES_NPDU or frame.start - asked.frame.end > T_LATE_ANSWER:
+        del self._unanswered[source, destination]
+        took = frame.start - asked.frame.end
+        if took > T_LATE_ANSWER:
             return False
-        self._unanswered = None
-        self._tally.note(What.LATE_REPLY, frame.start, no, source, destination, frame.start - asked.frame.end)
+        self._tally.take_back(What.NO_REPLY, asked.no, source)
+        self._tally.note(What.LATE_REPLY, frame.start, no, source, destination, took)
         return True
 
     def _lose_token(self, no: int, frame: Frame, source: int) -> None:
-        asked = self._asked
+        asked, tally = self._asked, self._tally
         if asked is not None and asked.frame_type == _POLL:
             self._unanswered_poll(frame, asked)
+            if source == asked.source:
+                self._go_on(no, frame, asked, tally.node(source))
         elif asked is not None and asked.frame_type != _TEST:
             self._unanswered_request(asked)
-        self._tally.note(What.LOST_TOKEN, frame.start, no, self._holder, source, self._silence(frame))
+        if tally.edges:  # where no token was ever seen, none can be lost
+            tally.note(What.LOST_TOKEN, frame.start, no, self._holder, source, self._silence(frame))
+            tally.node(source).searches = True
+            tally.node(source).searching_since = frame.start
         self._forget()
 
     def _unanswered_poll(self, frame: Frame, asked: _Asked) -> None:
@@ -334,22 +410,62 @@ class RingObserver:
                 gap = frame.start - self._token.end
                 if not self._doubt:
                     node.use.add(gap)
-                    if self._judges_use and self._surely_over(frame, self._token, T_USAGE_DELAY):
-                        self._tally.note(What.LATE_USE, frame.start, no, source, self._passed_by, gap)
+                    if self._surely_over(frame, self._token, T_USAGE_DELAY):
+                        self._late(What.LATE_USE, no, frame, source, self._passed_by, gap)
                 self._token = self._passed_by = None
             return
         if source == self._passed_by:  # nobody used it: it is repeated, or somebody else is looked for
-            if self._holder is not None and frame.octets[2] == _POLL:
+            self._take_back(no, frame, source, node)
+            return
+        if self._is_known_second(no, frame, source):
+            return
+        if self._holder is not None and not self._doubt:
+            if self._is_slave(frame, source, node):
+                self._tally.note(What.UNASKED, frame.start, no, source, self._holder)
+                self._token = None  # the time to its use is not its own any more
+            else:
+                self._tally.note(What.TWO_TOKENS, frame.start, no, source, self._holder)
+                self._second = source
+            return
+        self._forget()
+        self._holder = source
+
+    def _take_back(self, no: int, frame: Frame, source: int, node: NodeTally) -> None:
+        """The station that passed the token sends again: the next one has not used it."""
+        if self._holder is not None and frame.octets[2] != _TOKEN:
+            token_end = frame.start if self._token is None else self._token.end
+            self._given_up = _GivenUp(self._holder, source, token_end)
+            if frame.octets[2] == _POLL:
                 self._tally.note(What.LEFT, frame.start, no, self._holder, source)
                 self._tally.node(self._holder).gone = True
                 node.searches = True
-            self._holder = source
-            self._passed_by = None
-            return
-        if self._holder is not None and not self._doubt:
-            self._tally.note(What.TWO_TOKENS, frame.start, no, source, self._holder)
-        self._forget()
+                node.searching_since = frame.start
         self._holder = source
+        self._passed_by = self._token = None
+
+    def _is_known_second(self, no: int, frame: Frame, source: int) -> bool:
+        """Whether another token is known of that this station has: its cause is told once."""
+        late = self._given_up
+        if late is not None and source == late.mac and frame.start - late.token_end <= T_LATE_USE:
+            gap = frame.start - late.token_end
+            self._given_up = None
+            self._tally.node(source).gone = False
+            if not self._doubt:
+                self._tally.note(What.GIVEN_UP, frame.start, no, source, late.by, gap)
+            self._two_until = frame.end + T_LATE_USE
+            self._second = source
+            return True
+        if source == self._second:
+            return True
+        if frame.start < self._two_until:  # either may go on, or give way when it hears the other
+            self._holder, self._passed_by, self._token = source, None, None
+            return True
+        return False
+
+    def _is_slave(self, frame: Frame, source: int, node: NodeTally) -> bool:
+        """Whether it has never had a token, nor does what only masters do."""
+        takes_part = node.tokens_received or node.tokens_sent or node.polls_sent or node.poll_replies_sent
+        return source > MAX_MASTER or not (takes_part or frame.octets[2] in (_TOKEN, _POLL))
 
     def _pass_token(self, no: int, frame: Frame, source: int, destination: int, node: NodeTally) -> None:
         tally, before = self._tally, self._before
@@ -357,14 +473,18 @@ class RingObserver:
         target = tally.nodes.get(destination) or tally.node(destination)
         edge.tokens += 1
         edge.last = target.last_token = frame.end
+        if node.next != destination:
+            node.next, edge.since, edge.streak = destination, frame.start, 0
+        edge.streak += 1
         node.tokens_sent += 1
-        node.searches = False
-        if (
+        self._end_search(no, frame, source, node)
+        again = (
             before is not None
             and not self._doubt
             and before.octets[:HEADER] == frame.octets[:HEADER]
             and self._gap(frame) + before.slack >= T_USAGE_TIMEOUT // 2
-        ):
+        )
+        if again:
             edge.retries += 1
             tally.note(What.RETRY, frame.start, no, destination, source, self._gap(frame))
         else:
@@ -377,7 +497,27 @@ class RingObserver:
         self._hold = 0
         if source == destination:
             tally.note(What.SELF_TOKEN, frame.start, no, source)
+        if source == self._second and source != self._holder:
+            self._second = destination
+            return
+        if source == self._holder and self._got is not None and not self._doubt:
+            node.held += max(0, frame.end - self._got)
+        self._got = frame.end
+        if self._given_up is not None and self._given_up.mac == destination:
+            self._given_up = None
         self._holder, self._passed_by, self._token = destination, source, frame
+
+    def _end_search(self, no: int, frame: Frame, source: int, node: NodeTally) -> None:
+        """The token goes on: what a loss has cost, and for how long polls still belong to it."""
+        if node.searches:
+            node.after_search = _AFTER_SEARCH
+        elif node.after_search:
+            node.after_search -= 1
+        node.searches = False
+        since, node.searching_since = node.searching_since, None
+        if since is not None and frame.start - since >= T_STOPPED:
+            value = frame.start - since
+            self._tally.note(What.STOPPED, frame.start, no, source, node.highest_polled, value)
 
     def _check_addresses(self, no: int, frame: Frame, frame_type: int, source: int, destination: int) -> None:
         length = frame.octets[5] << 8 | frame.octets[6]
@@ -388,6 +528,10 @@ class RingObserver:
             self._tally.note(What.ILLEGAL, frame.start, no, source, destination, length)
 
     # Times
+
+    def _late(self, what: What, no: int, frame: Frame, mac: int, other: int | None, value: int) -> None:
+        """Something was late, unless the next frame shows that the read was."""
+        self._reads.add(Event(what, frame.start, no, mac, other, value))
 
     def _gap(self, frame: Frame) -> int:
         return 0 if self._before is None else max(0, frame.start - self._before.end)
@@ -400,5 +544,10 @@ class RingObserver:
         return frame.start - frame.slack - before.end > limit
 
     def _forget(self) -> None:
-        self._holder = self._passed_by = self._token = self._asked = None
+        self._holder = self._passed_by = self._token = self._asked = self._second = self._got = None
         self._hold = 0
+
+
+def _same_data(frame: Frame, other: Frame) -> bool:
+    """Whether two frames carry the same data; a pad behind them does not count."""
+    return data_of(frame.octets) == data_of(other.octets)

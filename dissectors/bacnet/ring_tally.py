@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
 from dissectors.bacnet.ring import SUMS, Edge, Event, Happened, Node, Ring, What
@@ -19,29 +19,40 @@ class NodeTally:
     polls_sent: int = 0
     polls_of_search: int = 0
     polls_unanswered: int = 0
+    polls_waited: int = 0
     polls_received: int = 0
     poll_replies_sent: int = 0
     requests_sent: int = 0
     requests_received: int = 0
     data_sent: int = 0
+    broadcasts_sent: int = 0
     postponed: int = 0
     replies: int = 0
     damaged: int = 0
+    damaged_octets: int = 0
+    cut_last: int = 0
     octets: int = 0
+    held: int = 0
     highest_polled: int = -1
     first: int = 0
     last: int = 0
     last_token: int = 0
+    last_polled: int = 0
     got: int | None = None  # when it last got the token
     use: Histogram = field(default_factory=Histogram)
     loop: Histogram = field(default_factory=Histogram)
     reply: Histogram = field(default_factory=Histogram)
     service: Histogram = field(default_factory=Histogram)
     poll_reply: Histogram = field(default_factory=Histogram)
+    poll_wait: Histogram = field(default_factory=Histogram)
     holds: dict[int, int] = field(default_factory=dict)
     devices: list[int] = field(default_factory=list)
     gone: bool = False  # it was passed over
     searches: bool = False  # its successor is lost, and it has passed the token to nobody since
+    searching_since: int | None = None  # since when, after a loss
+    after_search: int = 0  # tokens to come in which a poll still belongs to the search
+    next: int | None = None  # to whom it passed the token last
+    device: int | None = None  # the instance that it gave last
 
     def value(self) -> Node:
         """What was counted so far."""
@@ -51,11 +62,13 @@ class NodeTally:
             first=self.first,
             last=self.last,
             last_token=self.last_token,
+            last_polled=self.last_polled,
             use=self.use.copy(),
             loop=self.loop.copy(),
             reply=self.reply.copy(),
             service=self.service.copy(),
             poll_reply=self.poll_reply.copy(),
+            poll_wait=self.poll_wait.copy(),
             holds=MappingProxyType(dict(self.holds)),
             devices=tuple(self.devices),
         )
@@ -68,6 +81,8 @@ class EdgeTally:
     tokens: int = 0
     retries: int = 0
     last: int = 0
+    since: int = 0
+    streak: int = 0
 
 
 @dataclass(slots=True)
@@ -85,9 +100,11 @@ class RingTally:
     cut: int = 0
     poll_waste: int = 0
     impossible: int = 0
+    hole: int = 0
     nodes: dict[int, NodeTally] = field(default_factory=dict)
     edges: dict[tuple[int, int], EdgeTally] = field(default_factory=dict)
     happened: dict[tuple[What, int | None], Happened] = field(default_factory=dict)
+    polled: dict[tuple[int, int], int] = field(default_factory=dict)
 
     def node(self, mac: int) -> NodeTally:
         """The node of an address, a new one when it was not known."""
@@ -110,6 +127,14 @@ class RingTally:
         key = (what, mac)
         self.happened[key] = self.happened.get(key, Happened()).add(Event(what, time, no, mac, other, value))
 
+    def take_back(self, what: What, no: int, mac: int | None) -> None:
+        """What was noted of frame `no` turned out to be nothing."""
+        happened = self.happened.get((what, mac))
+        if happened is None:
+            return
+        events = tuple(event for event in happened.events if event.no != no)
+        self.happened[what, mac] = replace(happened, count=max(0, happened.count - 1), events=events)
+
     def value(self) -> Ring:
         """All that was counted so far."""
         return Ring(
@@ -124,7 +149,14 @@ class RingTally:
             self.cut,
             self.poll_waste,
             self.impossible,
+            self.hole,
             MappingProxyType({mac: node.value() for mac, node in sorted(self.nodes.items())}),
-            MappingProxyType({pair: Edge(one.tokens, one.retries, one.last) for pair, one in self.edges.items()}),
-            MappingProxyType(dict(self.happened)),
+            MappingProxyType(
+                {
+                    pair: Edge(one.tokens, one.retries, one.last, one.since, one.streak)
+                    for pair, one in self.edges.items()
+                }
+            ),
+            MappingProxyType({key: happened for key, happened in self.happened.items() if happened.count}),
+            MappingProxyType(dict(self.polled)),
         )

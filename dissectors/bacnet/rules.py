@@ -1,9 +1,10 @@
 """The rules of MS/TP: what each finds, against which limit, and what to check next. MS1 token, MS2 polls, MS3 answers,
-MS4 octets and frames, MS5 addresses.
+MS4 octets and frames, MS5 addresses, MS6 who uses the line, MS7 content (`content_findings.py`).
 """
 
 from __future__ import annotations
 
+from dissectors.bacnet.content_findings import CONTENT_RULES
 from dissectors.findings import Rule, Severity
 
 _WIRING = "termination and bias at both ends, the shield, and the line's length and stubs"
@@ -14,9 +15,12 @@ _ALL = (
         Severity.ERROR,
         "lost token",
         "Nothing was sent for 500 ms (Tno_token) and then a station began anew: the token was lost "
-        "(ASHRAE 135, 9.5.6). The one with the lowest address begins first, 10 ms (Tslot) per address later.",
+        "(ASHRAE 135, 9.5.6). The one with the lowest address begins first, 10 ms (Tslot) per address later. "
+        "Only where "
+        "tokens are in the capture.",
         "the station that had the token was reset, switched off or disturbed while it passed the token on",
         "power and wiring of the last holder; noise at that moment; whether it answers Test Request",
+        explains=("MS102", "MS105", "MS106", "MS201"),
     ),
     Rule(
         "MS102",
@@ -31,10 +35,14 @@ _ALL = (
         "MS103",
         Severity.WARNING,
         "slow to use the token",
-        "A station began to send later than 15 ms (Tusage_delay) after the token reached it. Judged only where the "
-        "adapter's timing allows it.",
+        "A station began to send later than 15 ms (Tusage_delay) after the token reached it, by the smallest "
+        "reading of the "
+        "time and more often than the others; or only when its neighbour had already taken the token back, which "
+        "makes two "
+        "tokens for a moment.",
         "an overloaded or old station; each round takes longer, and above 20 ms its neighbour repeats the token",
         "firmware and load of the station; Max_Info_Frames of the others",
+        explains=("MS102", "MS104", "MS105", "MS106", "MS401"),
     ),
     Rule(
         "MS104",
@@ -44,6 +52,7 @@ _ALL = (
         "and only where tokens are in the capture.",
         "a second token after a disturbance, two stations with one address, or a ring joined while running",
         "the stations named: address switches, and whether two segments were joined",
+        explains=("MS401", "MS402", "MS403", "LN2"),
     ),
     Rule(
         "MS105",
@@ -60,6 +69,7 @@ _ALL = (
         "A station did not use its token, was passed over, and has not come back.",
         "it is off, disconnected or has crashed",
         "the station's supply and wiring",
+        explains=("MS102", "MS301"),
     ),
     Rule(
         "MS107",
@@ -73,9 +83,11 @@ _ALL = (
         "MS108",
         Severity.WARNING,
         "slow round",
-        "95 of 100 rounds of the token may take up to 2 s; above that, masters appear off-line to many systems.",
+        "95 of 100 rounds of the token may take up to 2 s; above that, masters appear off-line to many systems. Said once, "
+        "with those who have the token longest.",
         "too many stations, too low a baud rate, large Max_Info_Frames, or slow stations",
         "the use time of each station, and how many frames each sends on one token",
+        explains=("MS603",),
     ),
     Rule(
         "MS109",
@@ -86,12 +98,35 @@ _ALL = (
         "wiring and polarity between this station and the next; baud rates",
     ),
     Rule(
+        "MS110",
+        Severity.ERROR,
+        "shut out of the ring",
+        "A station that was in the ring and used every token it got has had neither a token nor a poll for 20 "
+        "rounds and "
+        "more: the one before it passes the token on to a later address without ever having polled those between.",
+        "the station that passes the token on does not look for its successor as it must (ASHRAE 135, 9.5.6.2)",
+        "firmware of the station that skips it; switch that one off and see whether the other one is in the ring again",
+        explains=("MS301",),
+    ),
+    Rule(
+        "MS111",
+        Severity.WARNING,
+        "sent without being asked",
+        "A slave, which can have no token (its address is above 127, or it never gets one), sent a frame that "
+        "nobody had "
+        "asked it for. The station that has the token is not at fault. A single one is only noted.",
+        "a slave that answers broadcasts or reports by itself; it runs into the frames of whoever has the token",
+        "the slave's settings (unsolicited I-Am, COV), or make it a master",
+        explains=("MS401", "MS402"),
+    ),
+    Rule(
         "MS201",
         Severity.WARNING,
         "too many polls for masters",
         "A station polls for a new master once in 50 tokens (Npoll); more than one in 10 is counted here, "
         "with the share of time that unanswered polls take. Polls of a search for a successor, the first one or a lost "
-        "one, do not count.",
+        "one, do not count; but searches after a loss that stopped the bus for over a second are said, with "
+        "their cost.",
         "a station that does not count to Npoll, or polls far beyond the last address",
         "Max_Master and firmware of the stations named; gaps in the addresses",
     ),
@@ -102,6 +137,26 @@ _ALL = (
         "A Reply To Poll For Master came later than 15 ms (Tusage_delay) after the poll.",
         "the station risks not being taken into the ring",
         "load and firmware of the station",
+    ),
+    Rule(
+        "MS203",
+        Severity.WARNING,
+        "slow between polls",
+        "Half of the polls for masters that nobody answers, and five at least, are followed by the station's "
+        "next frame "
+        "only after more than 100 ms; 20 … 35 ms (Tusage_timeout) are usual.",
+        "an overloaded station or a wrong time in its program: a search for a master takes minutes, and it may "
+        "hold the "
+        "token for as long",
+        "firmware, load and settings of the station",
+    ),
+    Rule(
+        "MS204",
+        Severity.WARNING,
+        "does not wait for the answer to a poll",
+        "A station sent again sooner than the one that it polled could have answered (8 ms), three times and more.",
+        "a wrong time in its program: it finds no other station",
+        "firmware and settings of the station (Tusage_timeout is 20 … 35 ms)",
     ),
     Rule(
         "MS301",
@@ -158,9 +213,12 @@ _ALL = (
         "MS402",
         Severity.WARNING,
         "damaged frames of one station",
-        "Data CRC errors in frames whose header names the sender: at least three and one in 100 of its frames.",
+        "Frames of one sender, known by its header or by whose turn it was: at least three and one in 100 of its "
+        "frames, "
+        "and three times as many as its share of the octets would bring if noise hit everybody alike.",
         "the sender's transceiver, its connection, or somebody who talks over it",
         "that station's connection, and its address",
+        explains=("MS401",),
     ),
     Rule(
         "MS403",
@@ -179,16 +237,55 @@ _ALL = (
         "the station's settings",
     ),
     Rule(
+        "MS405",
+        Severity.WARNING,
+        "last octet missing",
+        "At least three damaged frames of one station, and four in five of all its damaged ones, are right but "
+        "for their "
+        "last octet or two, which are missing or wrong.",
+        "its driver is switched off too early, before the last octet is out",
+        "the turnaround or transmit-delay setting of that station, its firmware, its converter's direction control",
+        explains=("MS401", "MS402", "MS102", "MS301", "LN101", "LN2"),
+    ),
+    Rule(
         "MS501",
         Severity.ERROR,
         "two stations with one address",
-        "Two devices gave their instance from one address; or an address sent again before its own poll could be "
-        "answered (8 ms); or it sent without the token more than twice; or damaged octets came again and again where "
-        "it was to answer.",
+        "What one station cannot have done: it said two device instances in turns, answered a test of its own "
+        "address with "
+        "other octets than it sent, or now waits for the answer to its polls as it must and now goes on before "
+        "there can "
+        "be one (8 ms). Another instance that stays is only noted: the device may have been replaced. Damage, lateness "
+        "and repeats prove no second station.",
         "two stations with the same MS/TP address: both answer and both use the token",
         "switch one of the suspects off and see whether the address stays alive",
-        explains=("MS4", "LN101", "LN103", "LN2"),
+        explains=("MS1", "MS2", "MS3", "MS4", "LN101", "LN103", "LN2"),
+    ),
+    Rule(
+        "MS601",
+        Severity.INFO,
+        "one station uses most of the line",
+        "A station has the token for half of the time and more, and sends eight frames or more with one token.",
+        "a large Max_Info_Frames, or a client that asks without pause: all others wait for it",
+        "Max_Info_Frames of that station; how often its clients ask",
+    ),
+    Rule(
+        "MS602",
+        Severity.WARNING,
+        "broadcast storm",
+        "More than 20 broadcasts a second for ten seconds and more.",
+        "a loop of routers, a program that searches for devices without pause, or COV sent to everybody",
+        "who sends them and what they are; whether two routers join the same networks",
+        explains=("MS108", "MS603"),
+    ),
+    Rule(
+        "MS603",
+        Severity.NOTE,
+        "bus near its limit",
+        "Data take nine tenths of the time, and a round takes five times as long as an idle one.",
+        "as much is asked as the line can carry: whatever is added makes all slower",
+        "what is asked how often; the baud rate; a second segment",
     ),
 )
 
-RULES: dict[str, Rule] = {rule.code: rule for rule in _ALL}
+RULES: dict[str, Rule] = {rule.code: rule for rule in (*_ALL, *CONTENT_RULES)}

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 from dissectors.bacnet import message as messages
 from dissectors.bacnet import npdu as npdus
 from dissectors.bacnet.apdu import Apdu, PduType, reason_text
 from dissectors.bacnet.codec import Decoded
+from dissectors.bacnet.content import reply_flaw
 from dissectors.bacnet.frame_types import PROPRIETARY, FrameType
 from dissectors.bacnet.header import error_text
 from dissectors.bacnet.limits import BROADCAST
 from dissectors.bacnet.message import Message
+from dissectors.bacnet.station_address import remote
 from dissectors.bacnet.values import Record, escape, show, show_tag
-from dissectors.frame import Frame, Header, Role
+from dissectors.frame import Assembly, Frame, Header, Role
 
 LENGTH_MAX = 160
 """Longest line; longer ones end with an ellipsis."""
@@ -24,7 +27,10 @@ def text(frame: Frame, header: Header, role: Role) -> str:
     message = messages.read(frame)
     line = f"{_party(header.source)} → {_party(header.destination)} {header.kind}"
     if message is not None:
-        detail = _detail(message)
+        flaw = reply_flaw(message)
+        if flaw is not None:
+            line += f" ({flaw.value})"
+        detail = _detail(frame, message)
         if detail:
             line += " " + detail
     if not header.ok:
@@ -39,24 +45,40 @@ def _party(address: int | None) -> str:
     return "*" if address == BROADCAST else str(address)
 
 
-def _detail(message: Message) -> str:
+def _detail(frame: Frame, message: Message) -> str:
     npdu = message.npdu
     if npdu is None:
         return _plain_data(message)
     parts = []
     if npdu.dnet is not None:
-        parts.append("to " + ("all networks" if npdu.dnet == npdus.GLOBAL_BROADCAST else _remote(npdu.dnet, npdu.dadr)))
+        parts.append("to " + ("all networks" if npdu.dnet == npdus.GLOBAL_BROADCAST else remote(npdu.dnet, npdu.dadr)))
     if npdu.snet is not None:
-        parts.append("from " + _remote(npdu.snet, npdu.sadr))
+        parts.append("from " + remote(npdu.snet, npdu.sadr))
     if npdu.message is not None:
         parts.append(_network(message, npdu))
     elif message.apdu is not None:
         parts.append(apdu_text(message.apdu, message.parameters))
+        if frame.assembly is not None:
+            parts.append(_assembled(frame.assembly, message))
     return " ".join(part for part in parts if part)
 
 
-def _remote(net: int, address: bytes | None) -> str:
-    return f"network {net}" + (f":{address.hex()}" if address else "")
+def _assembled(assembly: Assembly, message: Message) -> str:
+    """What all segments say together, behind the last one."""
+    if message.whole is not None:
+        last = message.apdu is not None and not message.apdu.more_follows
+        so_far = f"of {len(assembly.frames)}" if last else f"(all {len(assembly.frames)} seen)"
+        return f"{so_far}: {_whole_text(*message.whole)}"
+    lost = len(assembly.missing)
+    which = ", ".join(map(str, assembly.missing[:4])) + (" …" if lost > 4 else "")
+    return f"({'segment' if lost == 1 else 'segments'} {which} not seen)"
+
+
+@lru_cache(maxsize=64)
+def _whole_text(apdu: Apdu, parameters: bytes) -> str:
+    """As much of a long message as a line can hold; a list asks for its lines again and again."""
+    decoded = messages.decode_parameters(apdu, parameters)
+    return parameters_text(apdu, decoded)[:LENGTH_MAX] if decoded is not None else ""
 
 
 def _plain_data(message: Message) -> str:
@@ -118,6 +140,8 @@ def parameters_text(apdu: Apdu, decoded: Decoded) -> str:
             line = ""
     if not line:
         line = " ".join(f"{name}={show(value)}" for name, value in record)
+    if decoded.wrong:
+        line += f" ({decoded.wrong[0].found}, not {decoded.wrong[0].expected})"
     if decoded.rest:
         line += " " + " ".join(show_tag(tag) for tag in decoded.rest[:8])
     if decoded.error is not None:

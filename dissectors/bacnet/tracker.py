@@ -10,7 +10,9 @@ The rules:
    same invoke id is a further attempt.
 4. A token is an exchange of its own: DATA when the new holder then sends, with the time it took; NO_RESPONSE when the
    token is sent again or the bus falls silent.
-5. Segments and their acknowledgements belong to the exchange of the request, which ends with the last segment.
+5. Segments and their acknowledgements belong to the exchange of the request, which ends with the last segment. What
+   comes after that of its segments (the last acknowledgement, repeats, an Abort) still belongs there and changes
+   nothing.
 6. Who sent a frame with a damaged header, the frames before it tell (turn.py). A damaged frame of the one who was asked
    closes what waits for it as DAMAGED_ANSWER; any other is a DAMAGED_REQUEST, unless its header is whole and an answer
    follows: then only the listener got it damaged.
@@ -22,19 +24,22 @@ from __future__ import annotations
 from collections import OrderedDict
 from dataclasses import replace
 
-from dissectors.bacnet.apdu import PduType
-from dissectors.bacnet.exchange import Exchange, Key, read
+from dissectors.bacnet.apdu import Apdu, PduType
+from dissectors.bacnet.exchange import Exchange, Key, mirrored, read, trails
 from dissectors.bacnet.frame_types import EXPECTING, FrameType, total
 from dissectors.bacnet.header import is_whole_header
 from dissectors.bacnet.limits import BROADCAST, MAX_ENCODED, MS, T_NO_TOKEN, T_USAGE_DELAY, TURNAROUND_BITS
-from dissectors.bacnet.message import Message
+from dissectors.bacnet.segmentation import Reassembler
 from dissectors.bacnet.turn import Turn
-from dissectors.frame import Event, Frame, Header, Noise, Role
+from dissectors.frame import Assembly, Event, Frame, Header, Noise, Role
 from dissectors.line import Timing
 from dissectors.tracker import Placement, Tracked, Transaction, Verdict
 
 POSTPONED_FOR = 10_000 * MS
 """How long a postponed answer may come (APDU timeouts are 3 s and more)."""
+
+SEGMENTS_FOR = 30_000 * MS
+"""How long a further segment may come: it is sent again several times when its acknowledgement was lost."""
 
 REMEMBERED = 256
 """Exchanges of the past that late and double answers are known by."""
@@ -46,6 +51,9 @@ _REPLY: dict[int, int] = {
     FrameType.POLL_FOR_MASTER: FrameType.REPLY_TO_POLL_FOR_MASTER,
     FrameType.TEST_REQUEST: FrameType.TEST_RESPONSE,
 }
+
+_ENDED = frozenset(Verdict) - {Verdict.NO_RESPONSE, Verdict.DAMAGED_ANSWER}
+"""How an exchange ended whose segments had come: what trails after it changes nothing."""
 
 
 class MstpTracker:
@@ -62,18 +70,21 @@ class MstpTracker:
         self._previous: tuple[Frame, int] | None = None  # the frame before, and its transaction
         self._turn = Turn(timing)
         self._clock: int | None = None
+        self._reassembler = Reassembler()
+        self._assembly: Assembly | None = None  # what the newest frame ended
 
     def track(self, no: int, event: Event, header: Header | None) -> Tracked:
         """Take the next event."""
         if isinstance(event, Noise) or header is None:
             if isinstance(event, Noise):
                 self._turn.see_noise(event)
-            return Tracked(None, ())
+            return Tracked(None, tuple(self._expire(event.start)))
         closed = self._expire(event.start)
         self._clock = event.end if self._clock is None else max(self._clock, event.end)
+        self._assembly = self._reassembler.add(no, event)
         placement = self._place(no, event, header, closed)
         self._previous = (event, placement.tx)
-        return Tracked(placement, tuple(closed))
+        return Tracked(placement, tuple(closed), self._assembly)
 
     def advance(self, now: int) -> tuple[Transaction, ...]:
         """Say that nothing came up to `now`; a frame may be under way that began its own length earlier."""
@@ -84,7 +95,7 @@ class MstpTracker:
         closed = []
         if self._waiting is not None:
             closed.append(self._waiting.close(Verdict.OPEN))
-        closed += [exchange.close(Verdict.OPEN) for exchange in self._postponed.values()]
+        closed += [exchange.close(exchange.becomes or Verdict.OPEN) for exchange in self._postponed.values()]
         self._waiting = None
         self._postponed.clear()
         return tuple(sorted(closed, key=lambda transaction: transaction.id))
@@ -92,26 +103,46 @@ class MstpTracker:
     # What time alone ends
 
     def _expire(self, now: int) -> list[Transaction]:
-        closed = []
+        closed: list[Transaction] = []
         waiting = self._waiting
         if waiting is not None and now - waiting.last >= T_NO_TOKEN:
-            closed.append(self._give_up(waiting))
+            self._let_go(waiting, closed)
         if not self._postponed:
             return closed
-        for key in [key for key, exchange in self._postponed.items() if now - exchange.last >= POSTPONED_FOR]:
-            closed.append(self._end(self._postponed.pop(key), Verdict.NO_RESPONSE))
+        over = [
+            key
+            for key, exchange in self._postponed.items()
+            if now - exchange.last >= (SEGMENTS_FOR if exchange.segmented else POSTPONED_FOR)
+        ]
+        for key in over:
+            closed.append(self._stop(self._postponed.pop(key)))
         return closed
+
+    def _let_go(self, waiting: Exchange, closed: list[Transaction]) -> None:
+        """No answer came at once: that is no answer, but to a segment that more follow it is nothing yet."""
+        if waiting.more_follows:
+            self._waiting = None
+            self._keep(waiting, closed)
+        else:
+            closed.append(self._give_up(waiting))
 
     def _give_up(self, waiting: Exchange) -> Transaction:
         """Nobody answered what held the bus."""
         self._waiting = None
         if waiting.damaged:
             return self._end(waiting, Verdict.DAMAGED_REQUEST)
-        return self._end(waiting, Verdict.DATA if waiting.may_be_silent else Verdict.NO_RESPONSE)
+        silent = waiting.may_be_silent or waiting.unconfirmed
+        return self._end(waiting, Verdict.DATA if silent else Verdict.NO_RESPONSE)
 
     def _end(self, exchange: Exchange, verdict: Verdict) -> Transaction:
         self._remember(exchange, verdict)
         return exchange.close(verdict)
+
+    def _stop(self, exchange: Exchange) -> Transaction:
+        """Nobody went on with what was postponed, or with segments."""
+        transaction = exchange.stopped()
+        self._remember(exchange, transaction.verdict)
+        return transaction
 
     def _remember(self, exchange: Exchange, verdict: Verdict) -> None:
         if exchange.key is not None:
@@ -142,6 +173,10 @@ class MstpTracker:
         if frame_type == FrameType.TEST_REQUEST:
             self._waiting = exchange = self._open(no, frame, header)
             return self._at(no, exchange.id, header)
+        if frame_type == FrameType.REPLY_POSTPONED and self._previous is not None:
+            before, tx = self._previous  # a segment or an acknowledgement of an exchange that goes on
+            if before.octets[2] in EXPECTING and before.octets[3:5] == bytes((frame.octets[4], frame.octets[3])):
+                return self._at(no, tx, header, Role.RESPONSE)
         if frame_type in (FrameType.REPLY_TO_POLL_FOR_MASTER, FrameType.TEST_RESPONSE, FrameType.REPLY_POSTPONED):
             return self._single(no, frame, header, Verdict.UNSOLICITED, closed, station=header.source)
         return self._data(no, frame, header, closed)
@@ -179,25 +214,35 @@ class MstpTracker:
             return self._at(no, waiting.id, header, Role.RESPONSE)
         if back and frame_type not in (FrameType.TOKEN, FrameType.POLL_FOR_MASTER):
             message, key = read(frame)
-            fits = waiting.damaged or key == waiting.key
-            if fits and (message is None or message.apdu is None or message.apdu.type != 0):
-                return self._answered(waiting, no, frame, header, message, closed)
+            if waiting.damaged:
+                waiting.key = key
+            apdu = message.apdu if message is not None else None
+            if apdu is not None and key is not None and apdu.type == PduType.SEGMENT_ACK and key != waiting.key:
+                key = mirrored(key)
+            if key == waiting.key and (apdu is None or apdu.type != PduType.CONFIRMED_REQUEST):
+                return self._answered(waiting, no, frame, header, apdu, closed)
             if waiting.key is not None:  # another answer went first: this one can only come later
                 self._waiting = None
                 self._keep(waiting, closed)
                 return None
-        closed.append(self._give_up(waiting))
+        if waiting.segmented and header.source == waiting.source:
+            message, key = read(frame)
+            if key == waiting.key and message is not None and message.apdu is not None and message.apdu.sequence:
+                self._waiting = None  # the same segment again
+                self._keep(waiting, closed)
+                return None
+        self._let_go(waiting, closed)
         return None
 
     def _keep(self, exchange: Exchange, closed: list[Transaction]) -> None:
         assert exchange.key is not None
         older = self._postponed.pop(exchange.key, None)
         if older is not None and older is not exchange:
-            closed.append(older.close(Verdict.NO_RESPONSE))
+            closed.append(older.stopped())
         self._postponed[exchange.key] = exchange
         while len(self._postponed) > REMEMBERED:
             _, oldest = self._postponed.popitem(last=False)
-            closed.append(self._end(oldest, Verdict.NO_RESPONSE))
+            closed.append(self._stop(oldest))
 
     def _data(self, no: int, frame: Frame, header: Header, closed: list[Transaction]) -> Placement:
         """Data that answer nothing that holds the bus."""
@@ -207,16 +252,24 @@ class MstpTracker:
         message, key = read(frame)
         apdu = message.apdu if message is not None else None
         if key is not None and apdu is not None and (apdu.is_answer or apdu.type != PduType.CONFIRMED_REQUEST):
-            return self._answer_later(key, no, frame, header, message, closed)
+            return self._answer_later(key, no, frame, header, apdu, closed)
         if not expecting and key is None:
             return self._single(no, frame, header, Verdict.DATA, closed)
-        if key is not None and apdu is not None and apdu.segmented and apdu.sequence:
+        further = apdu is not None and apdu.segmented and bool(apdu.sequence)
+        if key is not None and further:
             begun = self._postponed.pop(key, None)
             if begun is not None:
+                begun.more_follows = apdu is not None and apdu.more_follows
                 return self._next_segment(begun, no, frame, header, expecting, closed)
+            over = self._past.get(key)
+            if over is not None and over[0].segmented and over[1] in _ENDED and frame.start - over[2] < LATE_WITHIN:
+                return self._at(no, over[0].id, header, Role.REQUEST)
         exchange = self._open(no, frame, header, key)
+        exchange.segmented = apdu is not None and apdu.segmented
+        exchange.more_follows = apdu is not None and apdu.more_follows
+        exchange.unconfirmed = apdu is not None and apdu.type == PduType.UNCONFIRMED_REQUEST
         if key is not None:
-            self._count_attempt(exchange, key, closed)
+            self._count_attempt(exchange, key, closed, further)
         if expecting:
             self._waiting = exchange
         else:
@@ -226,7 +279,8 @@ class MstpTracker:
     def _next_segment(
         self, begun: Exchange, no: int, frame: Frame, header: Header, expecting: bool, closed: list[Transaction]
     ) -> Placement:
-        """One more segment of a request: the time to the answer counts from the last one."""
+        """One more segment of a request: the time to the answer counts from the last one, which holds the whole."""
+        begun.no = no
         begun.end = begun.last = frame.end
         begun.slack = frame.slack
         if expecting:
@@ -235,71 +289,102 @@ class MstpTracker:
             self._keep(begun, closed)
         return self._at(no, begun.id, header, Role.REQUEST)
 
-    def _count_attempt(self, exchange: Exchange, key: Key, closed: list[Transaction]) -> None:
-        """A request seen before without an answer is tried again."""
+    def _count_attempt(self, exchange: Exchange, key: Key, closed: list[Transaction], further: bool) -> None:
+        """A request seen before without an answer is tried again; `further`: from a later segment on."""
         older = self._postponed.pop(key, None)
         if older is not None:
-            closed.append(self._end(older, Verdict.NO_RESPONSE))
+            closed.append(self._stop(older))
         past = self._past.get(key)
         if past is None:
             return
         before, verdict, ended = past
-        same = before.octets[8:] == exchange.octets[8:]
+        same = before.octets[8:] == exchange.octets[8:] or (further and before.segmented)
         if same and verdict in (Verdict.NO_RESPONSE, Verdict.DAMAGED_ANSWER) and exchange.start - ended < LATE_WITHIN:
             exchange.attempt, exchange.of = before.attempt + 1, before.id
 
     def _answer_later(
-        self, key: Key, no: int, frame: Frame, header: Header, message: Message | None, closed: list[Transaction]
+        self, key: Key, no: int, frame: Frame, header: Header, apdu: Apdu, closed: list[Transaction]
     ) -> Placement:
+        """An answer, or an acknowledgement or Abort of either side, that answers nothing that holds the bus."""
+        if apdu.type in (PduType.SEGMENT_ACK, PduType.ABORT) and key not in self._postponed and key not in self._past:
+            key = mirrored(key)
         open_one = self._postponed.get(key)
         if open_one is not None:
-            return self._answered(open_one, no, frame, header, message, closed)
+            return self._answered(open_one, no, frame, header, apdu, closed)
         past = self._past.get(key)
         age = None if past is None else frame.start - past[2]
         if past is not None and age is not None:
             before, verdict, _ = past
-            if verdict is Verdict.NO_RESPONSE and age < LATE_WITHIN:
-                return self._afterwards(before, Verdict.LATE, no, frame, header, closed)
-            if verdict is not Verdict.NO_RESPONSE and age < TWICE_WITHIN:
-                return self._afterwards(before, Verdict.ANSWERED_TWICE, no, frame, header, closed)
+            if before.segmented and verdict in _ENDED and trails(apdu) and age < LATE_WITHIN:
+                return self._at(no, before.id, header, _side(apdu))
+            if not apdu.is_answer or apdu.type == PduType.SEGMENT_ACK:
+                return self._single(no, frame, header, Verdict.DATA, closed)
+            if before.response is None and age < LATE_WITHIN:  # a second answer needs a first
+                return self._afterwards(before, Verdict.LATE, no, frame, header, apdu, closed)
+            if before.response is not None and age < TWICE_WITHIN:
+                return self._afterwards(before, Verdict.ANSWERED_TWICE, no, frame, header, apdu, closed)
+        if not apdu.is_answer or apdu.type == PduType.SEGMENT_ACK:  # asks for nothing and answers nothing
+            return self._single(no, frame, header, Verdict.DATA, closed)
+        if apdu.segmented and (apdu.more_follows or apdu.sequence):  # what came before its later segments was not seen
+            verdict = Verdict.OPEN if apdu.sequence else Verdict.UNSOLICITED
+            return self._segments(None, key, verdict, no, frame, header, apdu, closed)
         return self._single(no, frame, header, Verdict.UNSOLICITED, closed, station=header.source)
 
-    def _answered(
+    def _segments(
         self,
-        exchange: Exchange,
+        before: Exchange | None,
+        key: Key,
+        verdict: Verdict,
         no: int,
         frame: Frame,
         header: Header,
-        message: Message | None,
+        apdu: Apdu,
         closed: list[Transaction],
     ) -> Placement:
-        apdu = message.apdu if message is not None else None
+        """The first seen segment of an answer to what is closed, or to nothing: all of them are one transaction."""
+        exchange = self._open(no, frame, header, key)
+        exchange.source, exchange.destination = exchange.destination, exchange.source
+        exchange.becomes, exchange.response = verdict, no
+        if before is not None:
+            exchange.kind, exchange.of, exchange.latency = before.kind, before.id, before.interval(frame)
+        return self._answered(exchange, no, frame, header, apdu, closed)
+
+    def _answered(
+        self, exchange: Exchange, no: int, frame: Frame, header: Header, apdu: Apdu | None, closed: list[Transaction]
+    ) -> Placement:
         exchange.last = frame.end
-        acknowledges = apdu is not None and apdu.type == PduType.SEGMENT_ACK
-        if exchange.response is None and not acknowledges and (apdu is None or apdu.is_answer):
-            exchange.response, exchange.latency = no, exchange.interval(frame)
-        role = Role.RESPONSE if apdu is None or apdu.is_answer else Role.REQUEST
-        unfinished = apdu is not None and (apdu.more_follows or acknowledges)
         if self._waiting is exchange:
             self._waiting = None
-        if unfinished:
+        if exchange.goes_on(no, frame, apdu, self._assembly is not None and not self._assembly.complete):
             self._keep(exchange, closed)
-            return self._at(no, exchange.id, header, role)
+            return self._at(no, exchange.id, header, _side(apdu))
         if exchange.key is not None:
             self._postponed.pop(exchange.key, None)
         verdict, error = Verdict.ANSWERED, None
-        if apdu is not None and apdu.type in (PduType.ERROR, PduType.REJECT, PduType.ABORT):
+        if apdu is not None and apdu.type == PduType.ABORT and not apdu.is_answer:  # the one that asked gives up
+            verdict, error = Verdict.OPEN, f"{header.error} by the one that asked"
+        elif apdu is not None and apdu.type in (PduType.ERROR, PduType.REJECT, PduType.ABORT):
             verdict, error = Verdict.EXCEPTION, header.error
         elif exchange.attempt > 1:
             verdict = Verdict.RETRY
+        verdict = exchange.becomes or verdict
         self._remember(exchange, verdict)
         closed.append(exchange.close(verdict, end=frame.end, error=error))
-        return self._at(no, exchange.id, header, role)
+        return self._at(no, exchange.id, header, _side(apdu))
 
     def _afterwards(
-        self, before: Exchange, verdict: Verdict, no: int, frame: Frame, header: Header, closed: list[Transaction]
+        self,
+        before: Exchange,
+        verdict: Verdict,
+        no: int,
+        frame: Frame,
+        header: Header,
+        apdu: Apdu,
+        closed: list[Transaction],
     ) -> Placement:
         """A late or second answer: a transaction of its own that names the one it belongs to."""
+        if apdu.more_follows and before.key is not None:
+            return self._segments(before, before.key, verdict, no, frame, header, apdu, closed)
         exchange = self._open(no, frame, header)
         closed.append(
             Transaction(
@@ -317,6 +402,7 @@ class MstpTracker:
             )
         )
         if before.key is not None and verdict is Verdict.LATE:
+            before.response = no
             self._remember(before, Verdict.LATE)
         return self._at(no, exchange.id, header, Role.RESPONSE)
 
@@ -433,3 +519,8 @@ class MstpTracker:
 
     def _at(self, no: int, tx: int, header: Header, role: Role | None = None) -> Placement:
         return Placement(no, tx, header.role if role is None else role, header.source, header.destination)
+
+
+def _side(apdu: Apdu | None) -> Role:
+    """The role of a frame in an exchange that was there before it."""
+    return Role.RESPONSE if apdu is None or apdu.is_answer else Role.REQUEST

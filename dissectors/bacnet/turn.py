@@ -55,7 +55,7 @@ class _Guess(NamedTuple):
 class Turn:
     """Fed the frames of a bus in order; total, and bounded by the 256 addresses.
 
-    `holder`: who has the token, or was sent it. `passed_by`: who sent it, while the holder has not used it. `asked`: type,
+    `holder`: who has the token, or was sent it. `passed_by`: who sent it, while unused. `asked`: type,
     source and destination of the frame that waits for its answer. `end`: ns, of the newest frame. None: not known.
     """
 

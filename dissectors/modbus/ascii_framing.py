@@ -11,6 +11,8 @@ Rules (Modbus over Serial Line V1.02, 2.5.2):
 4. A frame is good when its characters are hex digits in pairs and its LRC is right. Lower case is accepted and
    flagged. So is bit 7 where it behaves as a parity bit (a line of 7 data bits read with 8).
 5. A ':' without a station after it, and whatever stands outside frames, is noise.
+6. Hex pairs with a right LRC and the length that their function predicts are a damaged frame, and known, if ':' or
+   another character in its place, or CR LF is all that they lack.
 """
 
 from __future__ import annotations
@@ -20,7 +22,7 @@ from binascii import unhexlify
 from typing import Final
 
 from dissectors.checksums import sum8
-from dissectors.frame import Check, Chunk, Damage, Event, Found, Frame, LineError, Noise, Reason
+from dissectors.frame import Check, Chunk, Damage, Event, Flaw, Found, Frame, LineError, Noise, Reason, Repair
 from dissectors.framer import UNKNOWN_SILENCE, OctetWindow
 from dissectors.line import NS_PER_S, Timing
 from dissectors.modbus.functions import DIAGNOSTIC_DELIMITER, ascii_length, is_open_length
@@ -44,6 +46,7 @@ def _with_bit_7(characters: bytes) -> bytes:
 _START = re.compile(b"[%s]" % _with_bit_7(b":"))
 _NO_DIGIT = re.compile(b"[^%s]" % _with_bit_7(b"0123456789ABCDEFabcdef"))
 _BIT_7_OFF = bytes(c & 0x7F for c in range(256))
+_BARE = re.compile(rb"(?<![0-9A-Fa-f])[0-9A-Fa-f]?((?:[0-9A-Fa-f]{2}){3,}\r\n)")
 _PAIRS = re.compile(rb"(?:[0-9A-Fa-f]{2})+")
 _ODD_PARITY = bytes(c for c in range(256) if c.bit_count() & 1)
 _EVEN_PARITY = bytes(c for c in range(256) if not c.bit_count() & 1)
@@ -95,7 +98,7 @@ class AsciiFramer:
         if self._inside:
             self._end_early(Damage.SHORT)
         if len(self._window):
-            self._take_noise(len(self._window), Side.SILENCE, Reason.NO_DELIMITER)
+            self._take_noise(len(self._window), Side.SILENCE)
         return self._give()
 
     def deadline(self) -> int | None:
@@ -115,7 +118,10 @@ class AsciiFramer:
             return
         if not self._inside:
             if silence >= self._t35:
-                self._take_noise(len(self._window), Side.SILENCE, Reason.NO_DELIMITER)
+                pending = self._at < len(self._window)  # a start, and not yet two characters after it
+                self._take_noise(self._at if pending else len(self._window), Side.FRAME if pending else Side.SILENCE)
+                if pending:
+                    self._begin_frame()
         elif silence > LONGEST_SILENCE:
             self._end_early(Damage.TIMEOUT)
 
@@ -133,15 +139,29 @@ class AsciiFramer:
         match = _START.search(octets, self._at)
         end = match.start() if match else len(octets)
         if end >= MAX_NOISE:
-            self._take_noise(MAX_NOISE, Side.NOISE, Reason.NO_DELIMITER)
+            self._take_noise(MAX_NOISE, Side.NOISE)
             return True
         if match is None:
             self._at = end
             return False
-        if end:
-            self._take_noise(end, Side.FRAME, Reason.NO_DELIMITER)
-        self._inside, self._at, self._foreign = True, 1, 0
+        if end:  # noise goes on until a start with a station after it
+            station = octets[end + 1 : end + 3]
+            if _NO_DIGIT.search(station):
+                self._at = end + 1
+                return True
+            if len(station) < 2:
+                self._at = end
+                return False
+            self._take_noise(end, Side.FRAME)
+        self._begin_frame()
         return True
+
+    def _begin_frame(self) -> None:
+        self._inside, self._at, self._foreign = True, 1, 0
+
+    def _go_on_as_noise(self, count: int) -> None:
+        """The first `count` characters of the window are no frame; what follows is not known yet."""
+        self._inside, self._at = False, count
 
     def _scan_frame(self) -> bool:
         """Look for the end of the frame; whether the scan may go on."""
@@ -164,9 +184,12 @@ class AsciiFramer:
         elif character == _LF:
             self._take_ended(at + 1, at)
         elif octets[at] == octets[0] or (character == 0x3A and self._seven_bits):
-            self._take_broken(at, Damage.RESTARTED, Side.FRAME)
+            if at <= 2:
+                self._go_on_as_noise(at)
+            else:
+                self._take_broken(at, Damage.RESTARTED, Side.FRAME)
         elif at <= 2:
-            self._take_false_start(at, Side.NOISE)
+            self._go_on_as_noise(at)
         else:
             self._at = at + 1
             self._foreign += 1
@@ -188,7 +211,7 @@ class AsciiFramer:
     def _take_ended(self, count: int, digits_end: int) -> None:
         """Give a frame that its end characters end; they begin at `digits_end`."""
         if self._unit() is None:
-            self._take_false_start(count, Side.NOISE)
+            self._go_on_as_noise(count)
             return
         raw = bytes(self._window.octets[:count])
         plain = raw.translate(_BIT_7_OFF)
@@ -222,12 +245,20 @@ class AsciiFramer:
     def _take_broken(self, count: int, damage: Damage, after: Side) -> None:
         """Give a frame without its end."""
         if self._unit() is None:
-            self._take_false_start(count, after)
-        else:
-            self._take(count, Check.ABSENT, damage, None, ())
+            self._take_noise(count, after)
+            return
+        whole = bytes(self._window.octets[:count]) + b"\r\n"
+        repair = None if _message(whole) is None else Repair(Flaw.LAST_TWO_MISSING, whole)
+        self._take(count, Check.ABSENT, damage, None if repair is None else len(whole), (), repair)
 
     def _take(
-        self, count: int, check: Check, damage: Damage | None, expected: int | None, flags: tuple[str, ...]
+        self,
+        count: int,
+        check: Check,
+        damage: Damage | None,
+        expected: int | None,
+        flags: tuple[str, ...],
+        repair: Repair | None = None,
     ) -> None:
         octets, start, end, slack, marks = self._window.take(count)
         skipped, self._skipped = self._skipped, 0
@@ -245,15 +276,37 @@ class AsciiFramer:
                 slack,
                 marks,
                 flags,
+                repair,
             )
         )
         self._inside, self._at, self._before = False, 0, Side.FRAME
 
-    def _take_false_start(self, count: int, after: Side) -> None:
-        self._take_noise(count, after, Reason.FALSE_START)
+    def _take_noise(self, count: int, after: Side) -> None:
+        """Give the first `count` characters as noise, but for frames among them that lack their start."""
+        stretch = bytes(self._window.octets[:count])
+        if b"\r" in stretch or b"\x8d" in stretch:
+            plain = stretch.translate(_BIT_7_OFF)
+            taken = 0
+            for match in _BARE.finditer(plain):
+                begin, end = match.span(1)
+                flaw = Flaw.FIRST_MISSING
+                if begin > taken:  # the character before stands where the start should
+                    flaw, begin = Flaw.FIRST_SPOILT, begin - 1
+                whole = b":" + match[1]
+                if _message(whole) is None:
+                    continue
+                if begin > taken:
+                    self._take_piece(begin - taken, Side.FRAME)
+                self._take(end - begin, Check.GOOD, Damage.FORM, len(whole), (), Repair(flaw, whole))
+                taken = end
+            count -= taken
+        if count:
+            self._take_piece(count, after)
+        self._inside, self._at = False, 0
 
-    def _take_noise(self, count: int, after: Side, reason: Reason) -> None:
+    def _take_piece(self, count: int, after: Side) -> None:
         window = self._window
+        reason = Reason.FALSE_START if _START.match(window.octets) else Reason.NO_DELIMITER
         least, most = window.silence(0)
         before = Side.SILENCE if least >= self._t35 or most >= UNKNOWN_SILENCE else self._before
         place = noise_place(before, after, window.gap(0), window.gap(count) if after is Side.FRAME else 0)
@@ -262,7 +315,7 @@ class AsciiFramer:
             reason = Reason.BREAK
         self._out.append(Noise(octets, start, end, place, reason, marks))
         self._skipped += count
-        self._inside, self._at, self._before = False, 0, Side.NOISE
+        self._before = Side.NOISE
 
     def _track_delimiter(self, body: bytes) -> None:
         """Function 08/0003, asked and echoed, changes the end character of its station (V1.1b3, 6.8)."""
@@ -289,6 +342,16 @@ def _judge(body: bytes, formed: bool) -> tuple[Check, Damage | None, int | None]
     if right is None or right == own:
         return Check.BAD, Damage.CHECK, right
     return Check.BAD, Damage.SHORT if own < right else Damage.LONG, right
+
+
+def _message(whole: bytes) -> bytes | None:
+    """Unit, PDU and LRC of a whole frame, where all is right with it and its function predicts its length."""
+    digits = whole.translate(_BIT_7_OFF)[1:-2]
+    if len(digits) < 6 or not _PAIRS.fullmatch(digits):
+        return None
+    body = unhexlify(digits)
+    check, _, length = _judge(body, True)
+    return body if check is Check.GOOD and length == len(body) + 1 else None
 
 
 def _is_parity(raw: bytes) -> bool:

@@ -11,7 +11,6 @@ import re
 from typing import Final, NamedTuple
 
 from dissectors.checksums import crc16_modbus
-from dissectors.modbus.expectation import Expected
 from dissectors.modbus.functions import (
     BROADCAST,
     EXCEPTION_BIT,
@@ -42,6 +41,9 @@ ODD_BROADCAST: Final = -8
 
 WHOLE_STRETCH: Final = 12
 """All octets between two silences with a good CRC, whatever their function: good with both gaps proved, only then."""
+
+ANY_END: Final = CRC_BITS - 7
+"""A good CRC that was looked for at every place behind a begin."""
 
 ZERO_TAIL: Final = -8
 """A good frame and zeros after it is good again as a whole (the CRC is 0): where zeros stray, or are more than a CRC
@@ -196,13 +198,14 @@ def lacks_zeros(stretch: bytes) -> bool:
 
 
 def whole_stretch(
-    octets: Octets, at: int, end: int, start: int, past: Past, expected: Expected | None
+    octets: Octets, at: int, end: int, start: int, past: Past, awaited: bool, heard: bool
 ) -> Candidate | None:
     """All of [at, end) as one frame; None when its CRC is wrong or it is no frame.
 
     Only for stretches with silence (or a good frame before, silence after) at both ends. Where nothing predicts the
     length, up to two zeros at the end are the frame's, unless frames of that kind were shorter before or zeros tend
     to follow frames here; else they are left off. Text is refused: it is another protocol's.
+    `awaited`: the open request is for this station and function. `heard`: good frames named the station.
     """
     length = end - at
     if not MIN_FRAME <= length <= MAX_FRAME:
@@ -211,26 +214,32 @@ def whole_stretch(
     if crc16_modbus(stretch):
         return None
     if not stretch[-1]:
-        stretch = _without_zeros(stretch, past, expected)
+        stretch = without_zeros(stretch, past, awaited)
     code = stretch[1]
     if code & ~EXCEPTION_BIT not in FUNCTIONS:
         if code & EXCEPTION_BIT and len(stretch) != EXCEPTION_LENGTH:
             return None
-        if not _NOT_TEXT.search(stretch):
+        if not awaited and not heard and is_text(stretch):
             return None
     either = is_open_length(stretch)
     answers = either or bool(code & EXCEPTION_BIT and code ^ EXCEPTION_BIT not in FUNCTIONS)
     return Candidate(start, len(stretch), WHOLE_STRETCH, stretch[0], either, answers, stretch)
 
 
-def _without_zeros(stretch: bytes, past: Past, expected: Expected | None) -> bytes:
+def is_text(octets: bytes) -> bool:
+    """Whether octets look like a line of text, or some of it: another protocol's."""
+    return _TEXT.fullmatch(octets) is not None
+
+
+def without_zeros(stretch: bytes, past: Past, answer: bool) -> bytes:
     """A good frame of unpredicted length, less the zeros at its end that are not its own."""
     bare = stretch
     while len(bare) > MIN_FRAME and not bare[-1] and not crc16_modbus(bare[:-1]):
         bare = bare[:-1]
+    if stretch[1] & EXCEPTION_BIT:
+        return stretch[: max(EXCEPTION_LENGTH, len(bare))]
     if len(bare) == len(stretch) or not is_open_length(stretch):
         return bare
-    answer = expected is not None and (expected.unit, expected.function) == (stretch[0], stretch[1])
     always = past.only_length(stretch[0], stretch[1], answer)
     if always is not None and len(bare) <= always <= len(stretch):
         return stretch[:always]
@@ -238,7 +247,7 @@ def _without_zeros(stretch: bytes, past: Past, expected: Expected | None) -> byt
 
 
 _CRC_OCTETS = 2
-_NOT_TEXT = re.compile(rb"[^\x20-\x7e\r\n]")
+_TEXT = re.compile(rb"[\x20-\x7e\r\n]*[\r\n]|[\x20-\x7e\r\n]{7,}")
 _HEADS = re.compile(
     b"(?=.[%s])" % b"".join(re.escape(bytes((code, code | EXCEPTION_BIT))) for code in FUNCTIONS), re.DOTALL
 )

@@ -14,10 +14,11 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
+from itertools import pairwise
 
 from dissectors.line import NS_PER_S
 from dissectors.modbus.exchange import Exchange
-from dissectors.modbus.learnt import Learnt
+from dissectors.modbus.learnt import READ, Learnt
 from dissectors.tracker import Verdict
 
 _KEPT = 16
@@ -50,7 +51,7 @@ def of_next(request: Exchange, start: int, resembles: bool, learnt: Learnt) -> V
     cycle = start - request.request.frame.start
     if learnt.pauses_after_answers(gap, pause, cycle):
         return Verdict.ANSWERED
-    if learnt.pauses_after_timeouts(gap, pause, cycle) and not learnt.knows(request.unit):
+    if learnt.pauses_after_timeouts(gap, pause, cycle):
         return Verdict.NO_RESPONSE
     copy = request.copies[0]
     is_other = copy.octets != request.octets and len(copy.octets) != len(request.octets)
@@ -72,7 +73,7 @@ def is_full(request: Exchange) -> bool:
 
 def of_chain(chain: list[Exchange], learnt: Learnt) -> Verdict:
     """What requests are that equal each other and had no sure answer, where answers are known to come sooner."""
-    gaps = [before.gap(after.request.frame.start) for before, after in zip(chain, chain[1:], strict=False)]
+    gaps = [before.gap(after.request.frame.start) for before, after in pairwise(chain)]
     if any(learnt.is_timeout(gap) for gap in gaps):
         return Verdict.NO_RESPONSE
     steady = all(learnt.is_same(gap, gaps[0]) for gap in gaps)
@@ -112,11 +113,11 @@ class Doubts:
         learnt, unit = self._learnt, doubt.exchange.unit
         if learnt.is_timeout(doubt.gap):
             return Verdict.NO_RESPONSE
-        timeout, limit = learnt.timeout, learnt.response_limit(unit, doubt.exchange.writes)
+        timeout, limit = learnt.timeout, learnt.response_limit(unit, doubt.exchange.pace)
         if timeout is not None and doubt.gap < timeout * 9 // 10:
             return Verdict.ANSWERED  # the master was still waiting
         if limit is None:  # a write takes no less than a read
-            limit = learnt.response_limit(unit, not doubt.exchange.writes)
+            limit = learnt.response_limit(unit, READ)
         if (limit is not None and doubt.gap <= limit) or unit in varying:
             return Verdict.ANSWERED
         return None

@@ -6,9 +6,11 @@ from dataclasses import dataclass, field
 
 from dissectors.frame import Frame, Header, Role
 from dissectors.modbus.functions import BROADCAST, EXCEPTION_BIT, FUNCTIONS
+from dissectors.modbus.learnt import READ, WRITE
 from dissectors.tracker import Interval, Transaction, Verdict
 
-_READS = frozenset(code for code, function in FUNCTIONS.items() if not function.writes)
+_OWN_PACE = 0x100
+"""Added to a function code: a function that nobody knows takes a time of its own."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,9 +74,13 @@ class Exchange:
         self.end = self.request.frame.end
 
     @property
-    def writes(self) -> bool:
-        """Whether the station may have something to store, which takes it longer; also of functions not known."""
-        return self.request.header.function not in _READS
+    def pace(self) -> int:
+        """What of the station's response times its answer is to be compared with; see `learnt.py`."""
+        code = self.request.header.function
+        function = FUNCTIONS.get(code) if code is not None else None
+        if function is None:
+            return _OWN_PACE + (code or 0)
+        return WRITE if function.writes else READ
 
     @property
     def asks_nobody(self) -> bool:

@@ -17,13 +17,13 @@ from dissectors.modbus.functions import (
     answer_length,
 )
 
-EXACT = 10
+EXACT = 14
 """Bits that an answer of the right station, function and length is worth."""
 
-LOOSE = 8
+LOOSE = 12
 """The same where the request leaves the length open."""
 
-REPEATED = 8
+REPEATED = 14
 """Bits for the open request once more, octet for octet: a retry, or an answer that echoes."""
 
 ODD = 2
@@ -40,6 +40,10 @@ class Expected(NamedTuple):
     function: int
     length: int | None
     octets: bytes
+
+    def is_for(self, octets: Octets, start: int) -> bool:
+        """Whether the head at `start` names the station and the function asked, as an exception or not."""
+        return octets[start] == self.unit and octets[start + 1] & ~EXCEPTION_BIT == self.function
 
     def fit(self, octets: bytes, response: bool) -> int:
         """Bits that a complete frame gains from being expected (0: it is not); `response`: whether it can be one."""

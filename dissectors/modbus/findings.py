@@ -9,16 +9,18 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 
+from dissectors.checksums import crc16_modbus
 from dissectors.findings import ExceptionWords, Finding, Tally
-from dissectors.frame import Damage, Event, Frame, Header, LineError, Noise, Role
+from dissectors.frame import Damage, Event, Flaw, Frame, Header, Noise, Role
 from dissectors.line import Timing
-from dissectors.modbus.adu import RTU_NAME, adu, rtu_check
+from dissectors.modbus.adu import RTU_NAME, readable_adu, rtu_check
 from dissectors.modbus.evidence import Evidence
-from dissectors.modbus.functions import BROADCAST
+from dissectors.modbus.exchange import is_begin_of
+from dissectors.modbus.functions import BROADCAST, EXCEPTION_BIT, FUNCTIONS, answer_length
 from dissectors.modbus.judgement import judge
-from dissectors.modbus.learnt import Learnt
+from dissectors.modbus.learnt import READ, Learnt
 from dissectors.modbus.response_groups import Answered
-from dissectors.modbus.station_record import Key, Station, middle
+from dissectors.modbus.station_record import Key, Lost, Station, middle
 from dissectors.tracker import Placement, Transaction, Verdict
 
 MS = 1_000_000
@@ -31,6 +33,18 @@ _HASTY_KEPT = 256
 _LAST_STANDARD_UNIT = 247
 _SPACING_KEPT = 64
 _SPACING_LEAST = 8
+AT_ONCE = 50 * MS
+"""No master repeats a request so soon."""
+
+_BEGIN = 5  # octets of a request that no noise makes by chance: unit, function, address, half a quantity
+_NO_WAIT = 10 * MS  # no master gives up so soon: it does not wait for one answer before it asks for the next
+_LOST_KEPT = 64
+_FINAL_KEPT = 64
+_SLOW_KEPT = 2
+_STRAY_KEPT = 600  # octets, more than the longest frame; of more nothing is said
+_EXCESS_KEPT = 256
+_WORDS_KEPT = 16
+_TALKED_OVER = 3  # octets by which an answer must be too long before somebody else has spoken
 _SETTLED_ELSEWHERE = (Verdict.ECHO, Verdict.DATA, Verdict.OPEN, Verdict.BROADCAST)
 
 
@@ -51,6 +65,24 @@ class _Asked:
     def key(self) -> Key:
         return self.header.kind, self.header.address
 
+    @property
+    def is_for_nobody(self) -> bool:
+        """Whether it reads from address 0."""
+        return self.unit == BROADCAST and self.header.role is Role.REQUEST and self.header.ok
+
+    @property
+    def fault(self) -> str | None:
+        """What it says that contradicts itself, though its check is good."""
+        return self.header.error if self.header.ok and not self.octets[1] & EXCEPTION_BIT else None
+
+
+@dataclass(frozen=True, slots=True)
+class _Slow:
+    """An answer that took long, and where it counts."""
+
+    tally: Tally
+    transaction: Transaction
+
 
 class ModbusFindings:
     """Fed row by row and transaction by transaction; gives findings at any time."""
@@ -70,6 +102,18 @@ class ModbusFindings:
         self._no_requests: deque[int] = deque(maxlen=64)  # frames that the tracker takes for requests, but are none
         self._spacing: dict[str, deque[int]] = {}  # silence an octet of the last frames of each sender, ns
         self._damaged: deque[int] = deque(maxlen=64)  # transactions of the last damaged answers
+        self._flaws: dict[int, Flaw] = {}  # of damaged frames, by transaction
+        self._newest: int | None = None  # the transaction of the newest request
+        self._stray: dict[int, bytes] = {}  # octets that are no good frame, by the transaction they came in
+        self._lost: dict[int, Lost] = {}  # requests without answer, by transaction
+        self._begins: set[bytes] = set()  # the first octets of good requests
+        self._marked: deque[int] = deque(maxlen=64)  # transactions with line errors in what came in answer
+        self._waits: dict[int, int] = {}  # by request that nothing followed: until the next one, ns
+        self._slow: deque[_Slow] = deque()  # answers that took long, until the pause after them is known
+        self._pauses: deque[int] = deque(maxlen=_SPACING_KEPT)  # the master's, between an answer and its next request
+        self._answered: Frame | None = None  # the newest frame, if it was an answer
+        self._hurried: deque[int] = deque(maxlen=64)  # answers after which the master seemed to pause hardly
+        self._final: dict[int, bytes] = {}  # the last answers, by transaction
 
     # ---- the contract
 
@@ -78,33 +122,55 @@ class ModbusFindings:
         seen = self._seen
         seen.first = event.start if seen.first is None else seen.first
         seen.now = max(seen.now, event.end)
-        if isinstance(event, Noise) or header is None or placement is None:
-            self._see_noise(no, event)
-            self._before = self._open = None
+        if self._is_cut_echo(event):
+            seen.cut_echoes.add(event.start, no)
             return
-        octets = adu(event)
+        if isinstance(event, Noise) or header is None or placement is None:
+            self._gather(event)
+            self._see_broken(no, event, event.octets)
+            self._see_noise(no, event)
+            self._before = self._open = self._answered = None
+            return
+        octets = readable_adu(event)
+        if not header.ok:
+            self._see_broken(no, event, octets)
         self._see_gaps(no, event, header, placement)
+        self._see_pause_before(no, event, header, placement)
         if placement.role is Role.RESPONSE:
             self._see_answer(no, event, header, placement, octets)
+        elif placement.role is Role.EITHER:
+            self._open = self._broadcast = None
         else:
+            self._newest = placement.tx
             self._see_request(_Asked(no, event, header, octets), placement)
         if header.ok and octets and octets[0] > _LAST_STANDARD_UNIT:
             self._station(octets[0]).reserved.add(event.start, no)
         self._before = event if header.ok else None
+        self._answered = event if placement.role is Role.RESPONSE and header.ok else None
 
     def settle(self, transaction: Transaction) -> None:
         """See `dissectors.findings.Judge`."""
         asked = self._asked.pop(transaction.id, None)
         code = self._codes.pop(transaction.id, 0)
         answer = self._answers.pop(transaction.id, b"")
+        stray, flaw = self._stray.pop(transaction.id, b""), self._flaws.pop(transaction.id, None)
         verdict = transaction.verdict
         if verdict in _SETTLED_ELSEWHERE:
-            self._seen.echoes += verdict is Verdict.ECHO
+            if verdict is Verdict.ECHO:
+                self._seen.echoes += 1
+                if transaction.station is not None:
+                    self._station(transaction.station).echoed += 1
             if verdict is Verdict.BROADCAST and asked is not None:
                 self._seen.cycles.add(asked.octets, asked.key, transaction.start)
             return
         if verdict is Verdict.DAMAGED_REQUEST:
             self._seen.damaged_requests.add(transaction.start, transaction.request)
+            if flaw is not None:
+                tallies = self._seen.requests_damaged_by
+                tallies.setdefault(flaw, Tally()).add(transaction.start, transaction.request)
+            return
+        if asked is not None and asked.is_for_nobody:
+            self._settle_for_nobody(transaction, asked)
             return
         if verdict is Verdict.UNSOLICITED:
             self._settle_unasked(transaction)
@@ -112,15 +178,25 @@ class ModbusFindings:
         if transaction.station is None:
             return
         station = self._station(transaction.station)
+        if verdict is Verdict.UNDECIDED:
+            station.undecided.add(transaction.start, transaction.request, transaction.response)
+            return
         if transaction.attempt > 1:
             self._repeats.append(transaction.id)
         if verdict is Verdict.ANSWERED_TWICE and transaction.of not in self._repeats:
             station.twice.add(transaction.start, transaction.response)
+            first = self._final.get(transaction.of or 0)
+            station.same_twice += not answer or first is None or first == answer
         elif verdict in (Verdict.LATE, Verdict.ANSWERED_TWICE):  # each try has its answer, the first one came late
-            station.late.add(transaction.start, transaction.response)
-            station.heard(transaction.end)
+            self._settle_late(station, transaction)
         elif asked is not None:
+            if answer:
+                self._final[transaction.id] = answer
+                if len(self._final) > _FINAL_KEPT:
+                    del self._final[next(iter(self._final))]
             self._settle_request(station, transaction, asked, code, answer)
+            if verdict is Verdict.DAMAGED_ANSWER and asked.no not in self._no_requests:
+                self._settle_damaged(station, transaction, asked, stray, flaw)
 
     def word_exceptions(self, words: ExceptionWords) -> None:
         """See `dissectors.findings.WordsExceptions`."""
@@ -128,6 +204,8 @@ class ModbusFindings:
 
     def findings(self) -> tuple[Finding, ...]:
         """See `dissectors.findings.Judge`."""
+        while self._slow:
+            self._judge_slow(self._slow.popleft())
         return judge(self._seen, self._learnt.timeout)
 
     # ---- rows
@@ -135,14 +213,18 @@ class ModbusFindings:
     def _see_request(self, asked: _Asked, placement: Placement) -> None:
         if len(self._asked) < _OPEN_KEPT:
             self._asked[placement.tx] = asked
+        if not asked.header.ok:
+            self._note_flaw(placement.tx, asked.frame)
         if self._is_no_request(asked):
             self._no_requests.append(asked.no)
             self._open = self._broadcast = None
             return
         self._seen.requests += 1
+        if asked.header.ok and len(asked.octets) > _BEGIN and len(self._begins) < _OPEN_KEPT:
+            self._begins.add(asked.octets[:_BEGIN])
         if self._open is not None:
             self._waited_in_vain(self._open, asked)
-        is_broadcast = placement.role is Role.BROADCAST or asked.unit == BROADCAST
+        is_broadcast = placement.role is Role.BROADCAST or (asked.unit == BROADCAST and not asked.is_for_nobody)
         self._open = None if is_broadcast or not asked.header.ok else asked
         self._broadcast = asked if is_broadcast and asked.header.ok else None
 
@@ -150,6 +232,7 @@ class ModbusFindings:
         """Whether it is an answer in the shape of a request: to a broadcast, or by another unit than the one asked."""
         if self._broadcast is not None and self._is_answer_to_broadcast(asked):
             self._seen.answers_to_broadcast.add(asked.frame.start, self._broadcast.no, asked.no)
+            self._seen.broadcast_answers[asked.unit] += 1
             return True
         if self._open is not None and self._is_answer_of_another(self._open, asked):
             self._seen.pair((self._open.unit, asked.unit)).add(asked.frame.start, self._open.no, asked.no)
@@ -160,16 +243,19 @@ class ModbusFindings:
     def _waited_in_vain(self, before: _Asked, asked: _Asked) -> None:
         """A request after another that nothing has followed."""
         self._station(before.unit).waited += max(0, asked.frame.start - before.frame.start)
-        if not asked.header.ok:
+        if not asked.header.ok or before.is_for_nobody:
             return
         gap = max(0, asked.frame.start - before.frame.end)
         if asked.octets == before.octets:
-            if gap > self._timing.t35 + self._timing.latency:  # no echo
-                self._learnt.unanswered(gap)
+            if gap > self._timing.t35 + self._timing.latency and before.header.role is Role.REQUEST:  # no echo
+                self._learnt.unanswered(gap, repeated=True)
             return
         if before.header.role is not Role.REQUEST:  # a write has the shape of its answer, which may have come late
             return
         self._learnt.unanswered(gap)
+        self._waits[before.no] = gap
+        if len(self._waits) > _LOST_KEPT:
+            del self._waits[next(iter(self._waits))]
         if len(self._seen.hasty) < _HASTY_KEPT:
             self._seen.hasty.append((gap + before.frame.slack, before.unit, asked.frame.start, before.no, asked.no))
 
@@ -177,6 +263,8 @@ class ModbusFindings:
         self._seen.answers += 1
         if self._broadcast is not None and frame.start - self._broadcast.frame.end < TURNAROUND:
             self._seen.answers_to_broadcast.add(frame.start, self._broadcast.no, no)
+        if self._broadcast is not None and placement.source is not None:
+            self._seen.broadcast_answers[placement.source] += 1
         self._broadcast = self._open = None
         if header.ok:
             if header.error is not None and len(octets) > 2 and octets[1] & 0x80:
@@ -189,12 +277,12 @@ class ModbusFindings:
                     self._answers.clear()
         elif placement.source is not None:
             self._damaged.append(placement.tx)
+            self._gather(frame)
+            self._note_flaw(placement.tx, frame)
             station = self._station(placement.source)
             station.cut += frame.damage is Damage.SHORT
             if _ends_badly(frame):
                 station.last_octet.add(frame.end, no)
-            elif frame.damage is Damage.LONG or any(mark.error is LineError.FRAMING for mark in frame.marks[:-1]):
-                station.talked_over.add(frame.end, no)
 
     def _see_noise(self, no: int, event: Event) -> None:
         if self._broadcast is not None and event.start - self._broadcast.frame.end < TURNAROUND:
@@ -206,13 +294,17 @@ class ModbusFindings:
     def _see_gaps(self, no: int, frame: Frame, header: Header, placement: Placement) -> None:
         """Silences that are provably too short between frames, or too long inside one."""
         timing, before = self._timing, self._before
+        if placement.role is not Role.EITHER:
+            self._seen.frames[_sender(placement)] += 1
+            self._seen.octets[_sender(placement)] += max(len(frame.octets), frame.expected or 0)
         if frame.protocol != RTU_NAME:
             return
-        sender = "master" if placement.role is not Role.RESPONSE else f"station {placement.source}"
+        sender = _sender(placement)
+        # frames that touch came in one read, which says nothing of the silence between them
         if before is not None and header.ok and not frame.skipped and before.octets != frame.octets:
             longest = max(0, frame.start - before.end) + before.slack
-            if longest < timing.t35 - timing.line.bits(1):
-                self._seen.gap_tally(self._seen.close, sender).add(frame.start, no - 1, no)
+            if before.end < frame.start and longest < timing.t35 - timing.line.bits(1):
+                self._seen.too_close(sender, frame.start, no - 1, no)
         self._see_pause(no, frame, sender)
 
     def _see_pause(self, no: int, frame: Frame, sender: str) -> None:
@@ -251,6 +343,8 @@ class ModbusFindings:
             pair = (other.unit, transaction.station)
             self._seen.pair(pair).add(transaction.start, other.no, transaction.response)
             return
+        if transaction.response in self._no_requests:
+            return
         if not self._seen.requests and self._seen.answers == 1:
             return  # the capture began between a request and its answer
         if transaction.id in self._damaged:  # more likely a request, when nobody was asked
@@ -268,6 +362,10 @@ class ModbusFindings:
             del self._elsewhere[asked.no]  # the pair is reported instead
             self._seen.repeated_elsewhere[asked.unit] += transaction.attempt > 1
             return
+        if asked.fault is not None:
+            self._seen.malformed.add(transaction.start, transaction.request, transaction.response)
+            if len(self._seen.malformed_words) < _WORDS_KEPT:
+                self._seen.malformed_words[asked.fault] += 1
         request = station.request(asked.key)
         request.tries += 1
         if transaction.attempt == 1:
@@ -282,6 +380,9 @@ class ModbusFindings:
             request.missing.add(transaction.start, transaction.request)
             station.missing.add(transaction.start, transaction.request)
             station.silent.add(transaction.start, transaction.request)
+            self._lost[transaction.id] = Lost(asked.unit, asked.key, asked.no)
+            if len(self._lost) > _LOST_KEPT:
+                del self._lost[next(iter(self._lost))]
             return
         station.heard(transaction.end)
         if verdict is Verdict.DAMAGED_ANSWER:
@@ -292,18 +393,21 @@ class ModbusFindings:
         if transaction.latency is not None:
             station.times.add(transaction.latency)
             if asked.header.ok and transaction.attempt == 1:
-                self._learnt.answered(transaction.station or 0, False, transaction.latency.nominal)
+                self._learnt.answered(transaction.station or 0, READ, transaction.latency.nominal)
             self._compare_with_timeout(station, transaction, transaction.latency.low)
             if verdict is Verdict.ANSWERED and transaction.error is None and transaction.response is not None:
                 came = Answered(transaction.response, transaction.end, transaction.latency, answer)
                 station.compare(asked.key, asked.octets, came)
         if verdict is Verdict.EXCEPTION:
-            station.exception(asked.key, code).add(transaction.end, transaction.request, transaction.response)
+            if asked.fault is None:
+                station.exception(asked.key, code).add(transaction.end, transaction.request, transaction.response)
+            else:
+                self._seen.malformed_codes[code] += 1
         elif (
             transaction.error is not None and asked.header.ok and not transaction.error.startswith("before the answer")
         ):
             station.unfit.add(transaction.end, transaction.request, transaction.response)
-            if len(station.unfit_words) < 16:
+            if len(station.unfit_words) < _WORDS_KEPT:
                 station.unfit_words[transaction.error] += 1
 
     def _compare_with_timeout(self, station: Station, transaction: Transaction, least: int) -> None:
@@ -315,16 +419,119 @@ class ModbusFindings:
         station.slow_limit = limit
         station.slow_of += 1
         if least > (SLOW_UNLEARNT if limit is None else limit):
-            station.slow.add(transaction.end, transaction.request, transaction.response)
+            self._slow.append(_Slow(station.slow, transaction))
+            if len(self._slow) > _SLOW_KEPT:
+                self._judge_slow(self._slow.popleft())
+
+    def _judge_slow(self, slow: _Slow) -> None:
+        """Count an answer that took long, unless the computer was late for it and no later for what followed."""
+        transaction = slow.transaction
+        if transaction.response not in self._hurried:
+            slow.tally.add(transaction.end, transaction.request, transaction.response)
+
+    def _see_pause_before(self, no: int, frame: Frame, header: Header, placement: Placement) -> None:
+        """A request after an answer: a pause far below the usual says that the answer was read too late."""
+        if self._answered is None or placement.role is not Role.REQUEST or not header.ok:
+            return
+        pause = max(0, frame.start - self._answered.end)
+        if len(self._pauses) >= _SPACING_LEAST and 2 * pause < middle(self._pauses) - self._timing.latency:
+            self._hurried.append(no - 1)
+        self._pauses.append(pause)
+        self._learnt.paused(pause, 0)
+
+    def _settle_late(self, station: Station, transaction: Transaction) -> None:
+        """An answer after the next request: its own request is not lost; late only if the master has waited at all."""
+        station.heard(transaction.end)
+        self._seen.late(transaction.response)
+        lost = self._lost.pop(transaction.of or 0, None)
+        if lost is not None:
+            station.forgive(lost)
+            if self._waits.get(lost.no, AT_ONCE) < _NO_WAIT:
+                return
+        station.late.add(transaction.start, transaction.response)
+
+    def _settle_for_nobody(self, transaction: Transaction, asked: _Asked) -> None:
+        """A read of address 0, and who answered it."""
+        seen = self._seen
+        seen.to_nobody.add(transaction.start, transaction.request, transaction.response)
+        if transaction.verdict in (Verdict.ANSWERED, Verdict.RETRY, Verdict.EXCEPTION):
+            seen.for_nobody[transaction.station or 0] += 1
+        seen.cycles.add(asked.octets, asked.key, transaction.start)
+
+    def _settle_damaged(
+        self, station: Station, transaction: Transaction, asked: _Asked, stray: bytes, flaw: Flaw | None
+    ) -> None:
+        """Something came in place of an answer: in what way it is wrong."""
+        if flaw is not None:
+            station.flaw(flaw).add(transaction.end, transaction.request, transaction.response)
+            return
+        if not stray:
+            return
+        if len(stray) == _STRAY_KEPT:
+            return
+        station.garbage.add(
+            stray, transaction.id in self._marked, transaction.end, transaction.request, transaction.response
+        )
+        if asked.frame.protocol != RTU_NAME or stray[:2] != asked.octets[:2] or stray[1] not in FUNCTIONS:
+            return
+        expected = answer_length(asked.frame.octets)
+        if expected is None:
+            return
+        if len(stray) >= expected + _TALKED_OVER:
+            station.talked_over.add(transaction.end, transaction.request, transaction.response)
+            if len(station.excess) < _EXCESS_KEPT:
+                station.excess.append(len(stray) - expected)
+
+    def _gather(self, event: Event) -> None:
+        """Keep octets that are no good frame, in the transaction of the newest request."""
+        tx = self._newest
+        if tx is None:
+            return
+        before = self._stray.get(tx, b"")
+        self._stray[tx] = (before + event.octets)[:_STRAY_KEPT]
+        if event.marks:
+            self._marked.append(tx)
+        if len(self._stray) > _OPEN_KEPT:
+            self._stray.clear()
+
+    def _note_flaw(self, tx: int, frame: Frame) -> None:
+        if frame.repair is not None:
+            self._flaws[tx] = frame.repair.flaw
+            if len(self._flaws) > _OPEN_KEPT:
+                self._flaws.clear()
+
+    def _see_broken(self, no: int, event: Event, octets: bytes) -> None:
+        """A damaged frame that begins as a request to another station, while one is asked: somebody else spoke."""
+        asked, begin = self._open, octets[:_BEGIN]
+        if asked is None or begin not in self._begins or begin[0] == asked.unit:
+            return
+        gap = max(0, event.start - asked.frame.end)
+        if len(self._seen.broken_in) < _HASTY_KEPT:
+            self._seen.broken_in.append((gap + asked.frame.slack, asked.unit, event.start, asked.no, no))
+
+    def _is_cut_echo(self, event: Event) -> bool:
+        """Whether it is the begin of the request before it, given back at once and cut short."""
+        asked = self._open
+        if asked is None or not is_begin_of(event.octets, asked.frame.octets):
+            return False
+        gap = max(0, event.start - asked.frame.end)
+        return gap < (AT_ONCE if asked.header.role is Role.REQUEST else self._timing.t35)
 
     def _station(self, unit: int) -> Station:
         return self._seen.stations.setdefault(unit, Station())
 
 
+def _sender(placement: Placement) -> str:
+    return "master" if placement.role is not Role.RESPONSE else f"station {placement.source}"
+
+
 def _ends_badly(frame: Frame) -> bool:
     """Whether a damaged frame is right up to its last octet, or ends just before it."""
     if frame.damage is Damage.SHORT:
-        return frame.expected is not None and frame.expected - len(frame.octets) == 1
+        if frame.expected is None or frame.expected - len(frame.octets) != 1:
+            return False
+        # an octet lost further in leaves a wrong check
+        return frame.protocol != RTU_NAME or frame.octets[-1] == crc16_modbus(frame.octets[:-1]) & 0xFF
     if frame.damage is not Damage.CHECK:
         return False
     if frame.marks:

@@ -37,7 +37,15 @@ from dissectors.modbus.candidates import (
     readings,
     whole_stretch,
 )
-from dissectors.modbus.functions import BROADCAST, EXCEPTION_BIT, FUNCTIONS, MAX_FRAME, MAX_UNIT, MORE
+from dissectors.modbus.functions import (
+    BROADCAST,
+    EXCEPTION_BIT,
+    FUNCTIONS,
+    MAX_FRAME,
+    MAX_UNIT,
+    MORE,
+    is_open_length,
+)
 from dissectors.modbus.open_length import OpenLengthFinder
 from dissectors.modbus.past import KNOWN_LENGTH
 from dissectors.modbus.remains import Side
@@ -48,6 +56,7 @@ WINDOW: Final = 2 * MAX_FRAME
 """Most octets held without silence: then all but the last MAX_FRAME are given out."""
 
 _FIRST = 24  # a first look at a window: on a bus with silences most frames need none
+_FIRST_OPEN = 56  # the same where nothing predicts the length of what the window begins with
 _STEP = 32  # fewest octets between looks at a window that does not begin with a frame
 _PATIENT_STEP = 64  # the same while its begin may still become one
 _MOST_CUTS = 3  # silences over which a frame is pieced together
@@ -158,6 +167,9 @@ class RtuFramer:
         found = window.readings(count) if window.in_step() else ()
         if found and self._take_head(found, count, True):
             self._next = max(_FIRST, count - window.base + base)
+            return
+        if not found and count < _FIRST_OPEN and window.in_step() and is_open_length(window.octets):
+            self._next = _FIRST_OPEN
             return
         wait = WINDOW + 1  # until the shortest reading of the head that is still open is complete
         for length, _, _ in found:
@@ -274,7 +286,7 @@ class RtuFramer:
             paths.extend(finder.good + unpredicted)
         else:
             paths = self._extended_paths()
-        return paths.winner(), paths.agreed(finder.pending(), count)
+        return paths.winner(), paths.agreed(finder.pending(), self._open.unfinished, count)
 
     def _extended_paths(self) -> Paths:
         """The paths through all candidates found, kept from look to look while nothing is taken."""
@@ -294,11 +306,17 @@ class RtuFramer:
         starts = list(window.cuts)
         if window.start_bits() or window.good_before:
             starts.append(base)
-        for each in self._open.look(bytes(octets[:count]), base, starts, self._finder.good, silent):
+        known, good = bytes(octets[:count]), self._finder.good
+        for each in self._open.look(known, base, starts, good, silent, window.expected, window.past, window.units):
             found[each.start, each.length] = each
         if silent:
             for start in starts:
-                whole = whole_stretch(octets, start - base, count, start, window.past, window.expected)
+                at, heard = start - base, False
+                awaited = False
+                if at + 2 <= count:
+                    heard = window.heard(octets[at])
+                    awaited = window.expected is not None and window.expected.is_for(octets, at)
+                whole = whole_stretch(octets, at, count, start, window.past, awaited, heard)
                 if whole is not None:
                     found[start, whole.length] = whole
         return list(found.values())

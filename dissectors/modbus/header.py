@@ -31,11 +31,12 @@ _DAMAGE = {
 NO_EXCEPTIONS = frozenset((EXCEPTION_BIT, 0xFF))
 """Function octets with bit 7 set that are no exception: there is no function 00, and FF is all ones rather than 7F."""
 
+_WITH_MEI = 4  # octets of a frame of function 43 that ends before its type of interface
 _COUNTERS = frozenset((0x02, *range(0x0B, 0x13)))  # diagnostics whose request carries 0000, whose answer a value
 
 
 def peek_rtu(frame: Frame) -> Header:
-    """The header of an RTU frame. Total; of a damaged frame, what its first octets say, or those of its repair."""
+    """The header of an RTU frame. Total; of a damaged frame, what its first octets or its repair say."""
     if frame.repair is not None:
         return _repaired(peek_rtu(readable(frame)), frame.repair)
     error = None if frame.ok else _damage(frame, "CRC error: 0x{:04X}, computed 0x{:04X}", rtu_check(frame))
@@ -43,7 +44,7 @@ def peek_rtu(frame: Frame) -> Header:
 
 
 def peek_ascii(frame: Frame) -> Header:
-    """The header of an ASCII frame. Total; of a damaged frame, what its first characters say, or those of its repair."""
+    """The header of an ASCII frame. Total; of a damaged frame, what its first characters or its repair say."""
     if frame.repair is not None:
         return _repaired(peek_ascii(readable(frame)), frame.repair)
     octets = ascii_octets(frame)
@@ -96,7 +97,7 @@ def _peek(protocol: str, octets: bytes, frame: Frame, error: str | None, expecte
     if function is None:
         kind, role = kind_of(code), Role.EITHER
     else:
-        kind = function.name if code != 0x2B else kind_of(code, octets[2] if size > 2 else None)
+        kind = function.name if code != 0x2B else kind_of(code, octets[2] if size > _WITH_MEI else None)
         role = _role(function, octets, size, expected)
         if role is Role.UNKNOWN and ok:
             error = f"{size} octets fit neither request nor response"
@@ -144,7 +145,7 @@ def _role(function: Function, octets: bytes, size: int, expected: int | None) ->
         return Role.REQUEST if request else Role.RESPONSE
     if function.code == 0x08 and octets[2:4] == b"\0\0" and size >= 6:
         return Role.EITHER  # loop-back of any length
-    if function.code == 0x2B and octets[2:3] != b"\x0e":
+    if function.code == 0x2B and octets[2:3] != b"\x0e" and size > _WITH_MEI:
         return Role.EITHER  # an interface that this table does not know
     return Role.UNKNOWN
 

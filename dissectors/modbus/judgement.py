@@ -6,36 +6,57 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from dissectors.findings import Finding, Severity, Tally, counted, found, times
+from dissectors.modbus.damage_shares import Damage, shares_of_damage
 from dissectors.modbus.evidence import Evidence
-from dissectors.modbus.judgement_words import MS, ms, note_if, request_words, seconds, units, wilson
+from dissectors.modbus.judgement_words import MS, ms, note_if, request_words, seconds, units
 from dissectors.modbus.rules import RULES
-from dissectors.modbus.station_judgement import is_absent, of_station
+from dissectors.modbus.station_judgement import FLAWS, is_absent, of_station
 
-_HASTE = 100 * MS  # no master gives up sooner on a station that is alive, unless it always waits as long
 _WASTE = 0.05
+_HABIT = 10  # a sender that is too quick is so once in so many frames at least; what a computer holds up is rarer
+_HABIT_LEAST = 6
+_EVERYBODY = 3  # senders with the same pauses: no three of them fail alike
+_FRAMES_LEAST = 20
+_CUT_LEAST = 3
+_COMMON_LEAST = 3
 
 
 def judge(seen: Evidence, timeout: int | None) -> tuple[Finding, ...]:
     """All findings: the bus first, then station by station. `timeout`: the master's, ns, None while unlearnt."""
-    made = [*_of_bus(seen), *_of_masters(seen), *_of_gaps(seen)]
-    common = _common_damage(seen)
-    made += common
+    damage = shares_of_damage(seen)
+    made = [
+        *_of_bus(seen, "master" in damage.blamed),
+        *_of_masters(seen),
+        *_of_gaps(seen),
+        *_common_damage(seen, damage),
+    ]
     for unit in sorted(seen.stations):
-        made += of_station(seen, unit, seen.stations[unit], timeout, bool(common))
+        made += of_station(seen, unit, seen.stations[unit], timeout, f"station {unit}" not in damage.blamed)
     return tuple(made)
 
 
 # ---- the bus
 
 
-def _of_bus(seen: Evidence) -> Iterator[Finding]:
+def _of_bus(seen: Evidence, is_blamed: bool) -> Iterator[Finding]:
     requests = sum(station.asked for station in seen.stations.values()) + seen.damaged_requests.count
     damaged = seen.damaged_requests
     if damaged.count:
         words = f"{damaged.count} of {counted(requests, 'request')} damaged"
-        yield damaged.found(RULES["MB009"], "master", words, note_if(seen.rare(damaged.count, requests)))
+        yield damaged.found(
+            RULES["MB009"], "master", words, note_if(seen.rare(damaged.count, requests) or not is_blamed)
+        )
+    yield from _of_requests(seen)
+    scanned = seen.scanned()
+    if scanned:
+        words = f"{len(scanned)} addresses asked once and silent, {scanned[0]} to {scanned[-1]}"
+        first = min(seen.stations[unit].missing.first for unit in scanned)
+        last = max(seen.stations[unit].missing.last for unit in scanned)
+        yield found(RULES["MB402"], "bus", words, first=first, last=last, count=len(scanned))
     absent = {
-        unit: station for unit, station in seen.stations.items() if is_absent(station) and station.missing.count > 1
+        unit: station
+        for unit, station in seen.stations.items()
+        if is_absent(station) and station.missing.count > 1 and unit not in scanned
     }
     waited = sum(station.waited for station in absent.values())
     if waited:
@@ -54,6 +75,11 @@ def _of_bus(seen: Evidence) -> Iterator[Finding]:
         tally = broadcast if broadcast.count else seen.noise_after_broadcast
         what = counted(tally.count, "frame") if broadcast.count else f"octets that are no frame, {times(tally.count)},"
         words = f"{what} directly after a broadcast"
+        if seen.broadcast_answers:
+            words += f", from {units(seen.broadcast_answers)}"
+        new = [unit for unit in seen.broadcast_answers if unit not in seen.stations or not seen.stations[unit].asked]
+        if new:
+            words += f"; {units(new)} {'was' if len(new) == 1 else 'were'} never asked for anything"
         yield tally.found(RULES["MB204"], "bus", words, note_if(tally.count == 1))
     for (asked, answered), tally in sorted(seen.pairs.items()):
         if tally.count >= 2:
@@ -69,36 +95,93 @@ def _of_bus(seen: Evidence) -> Iterator[Finding]:
     yield from _cycle(seen)
 
 
+def _of_requests(seen: Evidence) -> Iterator[Finding]:
+    """What is wrong with what the master sends, and what its own adapter makes of it."""
+    malformed = seen.malformed
+    if malformed.count:
+        why, _ = seen.malformed_words.most_common(1)[0] if seen.malformed_words else ("", 0)
+        words = f"{counted(malformed.count, 'request')} that cannot be carried out: {why}"
+        refused = sum(seen.malformed_codes.values())
+        words += f"; refused {times(refused)}, rightly" if refused else ""
+        yield malformed.found(RULES["MB016"], "master", words)
+    nobody = seen.to_nobody
+    if nobody.count:
+        words = f"{counted(nobody.count, 'read')} of address 0, which is no station's"
+        following = RULES["MB017"].next
+        if seen.for_nobody:
+            words += f"; {units(seen.for_nobody)} answered {times(sum(seen.for_nobody.values()))}"
+        if len(seen.for_nobody) == 1:
+            following = f"set the unit number in the master to {next(iter(seen.for_nobody))}"
+        yield replace(nobody.found(RULES["MB017"], "master", words), next=following)
+    cut = seen.cut_echoes
+    if cut.count >= _CUT_LEAST and 2 * cut.count >= seen.requests:
+        words = f"{cut.count} of {counted(seen.requests, 'request')} came back at once, and not whole"
+        yield cut.found(RULES["MB013"], "bus", words)
+    echoed = {unit: s.echoed for unit, s in seen.stations.items() if s.asked >= 3}
+    copying = [unit for unit, count in echoed.items() if 10 * count >= 9 * seen.stations[unit].asked]
+    if len(copying) == 1 and len(echoed) > 1 and sum(echoed.values()) == echoed[copying[0]]:
+        station = seen.stations[copying[0]]
+        words = f"{station.echoed} of {counted(station.asked, 'request')} came back from it before its answer"
+        first, last = seen.first or 0, station.last_heard or 0
+        name = f"station {copying[0]}"
+        yield found(RULES["MB018"], name, words, first=first, last=last, count=station.echoed)
+    for flaw, tally in seen.requests_damaged_by.items():
+        if tally.count >= _CUT_LEAST and 2 * tally.count >= seen.damaged_requests.count:
+            words = f"{counted(tally.count, 'request')} good but for one thing: {flaw.value}"
+            severity = note_if(seen.rare(tally.count, seen.requests))
+            yield tally.found(RULES[FLAWS[flaw]], "master", words, severity)
+
+
 def _of_masters(seen: Evidence) -> Iterator[Finding]:
-    """Requests into the wait of another: sooner than the station asked can answer, or after ever other waits."""
+    """Requests into the wait of another, sooner than the station asked has ever answered.
+
+    An answer that this tap missed cannot have come before, and a master that never waits sends after the same time
+    always: both are left out.
+    """
     alive = {unit: s for unit, s in seen.stations.items() if s.answered >= 3 and 2 * s.answered > s.asked}
-    hasty = [row for row in seen.hasty if row[1] in alive and row[0] < _HASTE]
-    gaps = sorted(row[0] for row in hasty)
-    if len(hasty) < 3:
+
+    def too_soon(row: tuple[int, int, int, int, int]) -> bool:
+        return row[1] in alive and 10 * row[0] < 9 * alive[row[1]].times.quickest
+
+    hasty, broken_in = list(filter(too_soon, seen.hasty)), list(filter(too_soon, seen.broken_in))
+    gaps = sorted(row[0] for row in (*hasty, *broken_in))
+    if len(gaps) < 3:
         return
-    steady = gaps[-1] - gaps[0] <= max(gaps[-1] // 5, 2 * MS + seen.timing.latency)
-    medians = [block.low for unit in {row[1] for row in hasty} if (block := alive[unit].times.median()) is not None]
-    if steady and medians and gaps[0] > max(medians):  # one master with a short timeout
+    same = MS + seen.timing.latency
+    habitual = max(sum(abs(one - gap) <= same for one in gaps) for gap in gaps)
+    if not broken_in and len(gaps) >= _HABIT_LEAST and 4 * habitual > 3 * len(gaps):
         return
     tally = Tally()
-    for _, _, time, before, no in hasty:
+    for _, _, time, before, no in sorted((*hasty, *broken_in), key=lambda row: row[2]):
         tally.add(time, before, no)
-    words = f"{len(hasty)} requests came while another one waited for a station that answers"
+    words = f"{len(gaps)} requests came while another one waited for a station that answers, and never so soon"
     if gaps[len(gaps) // 2] < 10 * MS:
-        words += f", half of them within {ms(gaps[len(gaps) // 2])}"
+        words += f"; half of them within {ms(gaps[len(gaps) // 2])}"
     yield tally.found(RULES["MB203"], "bus", words)
 
 
 def _of_gaps(seen: Evidence) -> Iterator[Finding]:
     timing = seen.timing
-    for sender, tally in sorted(seen.close.items()):
-        if tally.count >= 3:
+    for sender, calls in sorted(seen.close.items()):
+        tally = Tally()
+        for time, before, no in calls:
+            if before not in seen.late_frames and no not in seen.late_frames:
+                tally.add(time, before, no)
+        if tally.count >= 3 and _HABIT * tally.count >= seen.frames[sender]:
             words = f"{tally.count} frames began less than {ms(timing.t35)} after the frame before"
             yield tally.found(RULES["MB301"], sender, words)
-    for sender, tally in sorted(seen.paused.items()):
-        if tally.count >= 3 and seen.judges_pauses:
-            words = f"{tally.count} frames with over {ms(timing.t15)} of silence inside"
-            yield tally.found(RULES["MB302"], sender, words)
+    paused = {sender: tally for sender, tally in seen.paused.items() if tally.count >= 3 and seen.judges_pauses}
+    if len(paused) >= _EVERYBODY and all(sender in paused for sender, n in seen.frames.items() if n >= _FRAMES_LEAST):
+        count = sum(tally.count for tally in paused.values())
+        words = f"{count} frames of {len(paused)} senders, of everybody, with over {ms(timing.t15)} of silence inside"
+        evidence = tuple(sorted(no for tally in paused.values() for no in tally.evidence))
+        yield found(
+            RULES["MB304"], "adapter", words, first=seen.first or 0, last=seen.now, count=count, evidence=evidence
+        )
+        paused = {}
+    for sender, tally in sorted(paused.items()):
+        words = f"{tally.count} frames with over {ms(timing.t15)} of silence inside"
+        yield tally.found(RULES["MB302"], sender, words)
     if not seen.judges_pauses and seen.stations:
         words = (
             f"the adapter may hold octets back for {ms(timing.latency)}; limits are {ms(timing.t15)} inside a frame "
@@ -107,29 +190,25 @@ def _of_gaps(seen: Evidence) -> Iterator[Finding]:
         yield found(RULES["MB303"], "adapter", words, first=seen.first or 0, last=seen.now)
 
 
-def _common_damage(seen: Evidence) -> list[Finding]:
-    """Whether the stations' answers are damaged alike."""
-    asked = {unit: station for unit, station in seen.stations.items() if station.asked >= 5 and station.answered}
-    struck = {unit: station for unit, station in asked.items() if station.damaged.count >= 2}
-    if len(struck) < 2:
+def _common_damage(seen: Evidence, damage: Damage) -> list[Finding]:
+    """What is damaged of senders none of which has more of it than its share."""
+    hits, struck = damage.common, [int(sender.split()[1]) for sender in damage.common if sender != "master"]
+    damaged = sum(hits.values())
+    if len(hits) < 2 or not struck or damaged < _COMMON_LEAST:
         return []
-    total = sum(station.asked for station in asked.values())
-    damaged = sum(station.damaged.count for station in asked.values())
-    rate = damaged / total
-    for station in asked.values():
-        low, high = wilson(station.damaged.count, station.asked)
-        if not low <= rate <= high:
-            return []
+    asked = sum(seen.stations[unit].asked for unit in struck)
+    answers = damaged - hits.get("master", 0)
     tally = Tally()
-    for station in struck.values():
-        for no in station.damaged.evidence:
-            tally.add(station.damaged.first, no)
-    words = f"{damaged} of {total} answers damaged ({rate:.1%}), of {units(struck)} alike"
-    if seen.damaged_requests.count:
-        words += f"; {counted(seen.damaged_requests.count, 'request')} too"
-    finding = tally.found(RULES["MB007"], "bus", words, note_if(seen.rare(damaged, total)))
-    last = max(station.damaged.last for station in struck.values())
-    return [replace(finding, count=damaged, last=last)]
+    for unit in struck:
+        for no in seen.stations[unit].damaged.evidence:
+            tally.add(seen.stations[unit].damaged.first, no)
+    words = f"{answers} of {counted(asked, 'answer')} damaged ({answers / max(1, asked):.1%}), of {units(struck)}"
+    if "master" in hits:
+        words += f", and {counted(hits['master'], 'request')}"
+    words += ": of each about as much as it sends"
+    finding = tally.found(RULES["MB007"], "bus", words, note_if(seen.rare(damaged, asked)))
+    last = max(seen.stations[unit].damaged.last for unit in struck)
+    return [replace(finding, count=answers, last=last)]
 
 
 def _cycle(seen: Evidence) -> Iterator[Finding]:

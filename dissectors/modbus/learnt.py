@@ -12,6 +12,11 @@ from itertools import pairwise
 from dissectors.line import Timing
 
 _SAMPLES = 16
+READ, WRITE = 0, 1
+"""Paces of a station: what it only reads, and what it has to store. Others are the functions that nobody knows."""
+
+_PACES_KEPT = 1024
+_ANSWER_CHARS = 32  # of an answer as long as most
 _MARGIN = 2_000_000  # of a host clock: no limit is finer than 2 ms
 UNLEARNT_LIMIT = 100_000_000
 """A copy of a request within 100 ms is its answer while nothing is learnt: hardly a master gives up so soon. Later
@@ -21,32 +26,35 @@ than that it may be the answer of a slow station as well as the request again.""
 class Learnt:
     """Response times by unit, the master's timeout, its pauses between an answer and the next request."""
 
-    __slots__ = ("_cycles", "_margin", "_pauses", "_reads", "_timeout", "_tolerance", "_unanswered", "_writes")
+    __slots__ = ("_answer", "_cycles", "_margin", "_pauses", "_timeout", "_times", "_tolerance", "_unanswered")
 
     def __init__(self, timing: Timing) -> None:
         self._margin = _MARGIN + timing.latency
+        self._answer = _ANSWER_CHARS * timing.char
         self._tolerance = _MARGIN + timing.latency + 4 * timing.char
-        self._reads: dict[int, deque[int]] = {}
-        self._writes: dict[int, deque[int]] = {}
+        self._times: dict[tuple[int, int], deque[int]] = {}  # by unit and pace
         self._unanswered: deque[int] = deque(maxlen=_SAMPLES)
         self._pauses: deque[int] = deque(maxlen=2 * _SAMPLES)
         self._cycles: deque[int] = deque(maxlen=2 * _SAMPLES)
         self._timeout: int | None = None
 
-    def answered(self, unit: int, write: bool, latency: int) -> None:
-        """A sure request was answered after `latency`."""
-        by_unit = self._writes if write else self._reads
-        by_unit.setdefault(unit, deque(maxlen=_SAMPLES)).append(latency)
+    def answered(self, unit: int, pace: int, latency: int) -> None:
+        """A sure request was answered after `latency`. `pace`: READ, WRITE, or what else takes its own time."""
+        key = unit, pace
+        if key in self._times or len(self._times) < _PACES_KEPT:
+            self._times.setdefault(key, deque(maxlen=_SAMPLES)).append(latency)
         if self._timeout is not None and latency > self._timeout:  # the master was still waiting
             self._unanswered = deque((gap for gap in self._unanswered if gap > latency), maxlen=_SAMPLES)
             self._timeout = self._agreed()
 
-    def unanswered(self, elapsed: int) -> None:
-        """A sure request got nothing for `elapsed`; then a master sent another.
+    def unanswered(self, elapsed: int, repeated: bool = False) -> None:
+        """A sure request got nothing for `elapsed`; then a master sent another, or the same one again (`repeated`).
 
         Not a timeout when answers have been waited for longer: then a second master broke in, or the answer was missed.
+        Nor when it is no longer than an answer and the pause after it may take: then the answer was missed, too.
         """
-        if elapsed <= self._slowest():
+        cycle = self._slowest() + self._answer + max(self._pauses, default=0) * 11 // 10
+        if elapsed <= (self._slowest() if repeated or not self._pauses else cycle):
             return
         self._unanswered.append(elapsed)
         self._timeout = self._agreed()
@@ -67,9 +75,11 @@ class Learnt:
 
     def pauses_after_timeouts(self, gap: int, pause: int, cycle: int) -> bool:
         """Whether `pause` is what a master leaves that waited `gap` in vain once more, and no pause after an answer."""
-        if len(self._pauses) < 4 or self._sends_by_the_clock(cycle):
+        if len(self._pauses) < 4 or self._sends_by_the_clock(cycle) or self._is_pause(pause):
             return False
-        return not self._is_pause(pause) and pause >= gap and self._is_pause(pause - gap)
+        if 2 * max(self._pauses) > 3 * min(self._pauses) + 2 * self._margin:
+            return False  # it pauses as it likes
+        return abs(pause - gap) <= self._margin or (pause >= gap and self._is_pause(pause - gap))
 
     def _sends_by_the_clock(self, cycle: int) -> bool:
         return len(self._pauses) < 2 or any(self.is_same(cycle, one) for one in self._cycles)
@@ -99,7 +109,7 @@ class Learnt:
 
     def knows(self, unit: int) -> bool:
         """Whether the unit has answered anything whose direction is sure."""
-        return bool(self._reads.get(unit) or self._writes.get(unit))
+        return any(one == unit for one, _ in self._times)
 
     def is_timeout(self, gap: int) -> bool:
         """Whether that long is how long the master waits before it repeats."""
@@ -112,23 +122,24 @@ class Learnt:
 
     def fastest(self, unit: int) -> int | None:
         """Shortest response time of a unit, of any unit where it has none; None while unlearnt."""
-        samples = self._reads.get(unit) or self._writes.get(unit)
+        samples = self._times.get((unit, READ)) or self._times.get((unit, WRITE))
         if samples:
             return min(samples)
-        return min((min(each) for each in self._reads.values()), default=None)
+        return min((min(each) for (_, pace), each in self._times.items() if pace == READ), default=None)
 
     def response_times(self) -> dict[int, tuple[int, int]]:
         """Shortest and longest of the last response times, by unit."""
-        units = self._reads.keys() | self._writes.keys()
-        both = {unit: [*self._reads.get(unit, ()), *self._writes.get(unit, ())] for unit in sorted(units)}
+        both: dict[int, list[int]] = {}
+        for (unit, _), samples in sorted(self._times.items()):
+            both.setdefault(unit, []).extend(samples)
         return {unit: (min(samples), max(samples)) for unit, samples in both.items()}
 
-    def response_limit(self, unit: int, write: bool) -> int | None:
+    def response_limit(self, unit: int, pace: int) -> int | None:
         """Until when a frame may be the unit's answer rather than the master's next word; None while unlearnt.
 
-        Writes have a limit of their own: storing a parameter takes longer than reading one.
+        Each pace has a limit of its own: storing a parameter takes longer than reading one.
         """
-        samples = (self._writes if write else self._reads).get(unit, ())
+        samples = self._times.get((unit, pace), ())
         if len(samples) < 2:
             return None
         ordered = sorted(samples)
@@ -136,13 +147,13 @@ class Learnt:
         limit = slowest + slowest // 2 + self._tolerance
         return limit if self._timeout is None else min(limit, self._patience(unit))
 
-    def in_time(self, unit: int, write: bool, gap: int) -> bool:
+    def in_time(self, unit: int, pace: int, gap: int) -> bool:
         """Whether a frame `gap` after a request may be its answer; where nothing is learnt, a fixed limit decides."""
-        limit = self.response_limit(unit, write)
+        limit = self.response_limit(unit, pace)
         if limit is None and self._timeout is not None:
             limit = self._patience(unit)
         if limit is None:  # a write takes no less than a read
-            limit = max(UNLEARNT_LIMIT, self.response_limit(unit, not write) or 0)
+            limit = max(UNLEARNT_LIMIT, self.response_limit(unit, READ) or 0)
         return gap <= limit
 
     def too_soon(self, silence: int) -> int:
@@ -150,14 +161,13 @@ class Learnt:
         return max(silence, min(self._pauses) // 2) if len(self._pauses) >= 4 else silence
 
     def _slowest(self) -> int:
-        samples = (each for by_unit in (self._reads, self._writes) for each in by_unit.values())
-        return max((max(each) for each in samples), default=0)
+        return max((max(each) for each in self._times.values()), default=0)
 
     def _patience(self, unit: int) -> int:
         """Until when something is an answer rather than the repeat after the timeout: 4/5 of that, or half way between
         it and the slowest answer of a unit that takes longer."""
         timeout = self._timeout or 0
-        slowest = max((*self._reads.get(unit, ()), *self._writes.get(unit, ())), default=0)
+        slowest = max((max(each) for (one, _), each in self._times.items() if one == unit), default=0)
         return max(timeout * 4 // 5, min(timeout, (slowest + timeout) // 2))
 
     def _agreed(self) -> int | None:

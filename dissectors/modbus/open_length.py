@@ -4,21 +4,25 @@ Between two silences a good CRC over all of the octets is enough (candidates.who
 any stretch from a place where a frame may begin could be one, and one of 260 such places in random octets has a good
 CRC somewhere behind it. So the end of such a frame counts only where something agrees: silence; a good frame of a known
 function that begins there; or a frame of the same station and function (a request and its answer, or its exception).
+The answer itself, behind its request, ends at the first place where its CRC is good.
 """
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 from typing import Final
 
 from dissectors.checksums import crc16_modbus
 from dissectors.modbus.candidates import (
+    ANY_END,
     CRC_BITS,
     WHOLE_STRETCH,
     Candidate,
     exception_bits,
+    is_text,
+    without_zeros,
 )
+from dissectors.modbus.expectation import Expected
 from dissectors.modbus.functions import (
     BROADCAST,
     EXCEPTION_BIT,
@@ -28,13 +32,10 @@ from dissectors.modbus.functions import (
     MIN_FRAME,
     is_open_length,
 )
-
-ANY_END: Final = CRC_BITS - 7
-"""Bits of a good CRC that was looked for at every place behind a begin."""
+from dissectors.modbus.past import Past
 
 _MOST_BEGINS: Final = 32
 _INITIAL: Final = 0xFFFF
-_NOT_TEXT = re.compile(rb"[^\x20-\x7e\r\n]")
 
 
 def _step(value: int) -> int:
@@ -69,39 +70,63 @@ class _Begin:
 
 
 class OpenLengthFinder:
-    """Finds such frames in a growing window. Positions count from the first octet ever fed."""
+    """Finds such frames in a growing window. Positions count from the first octet ever fed.
 
-    __slots__ = ("_begins",)
+    `unfinished`: where, when last looked, a frame began behind one of its station and function and had no end yet.
+    """
+
+    __slots__ = ("_begins", "unfinished")
 
     def __init__(self) -> None:
+        self.unfinished: list[int] = []
         self._begins: dict[int, _Begin] = {}
 
     def look(
-        self, known: bytes, base: int, begins: Iterable[int], good: Iterable[Candidate], silent: bool
+        self,
+        known: bytes,
+        base: int,
+        begins: Iterable[int],
+        good: Iterable[Candidate],
+        silent: bool,
+        expected: Expected | None,
+        past: Past,
+        heard: Container[int],
     ) -> list[Candidate]:
         """Candidates in the known octets of a window at `base`.
 
         `begins`: where a frame may begin beside the ends of `good`, the candidates of known functions. `silent`:
-        whether silence follows the octets.
+        whether silence follows the octets. `expected`: the open request before the window.
+        `past`: what was said before. `heard`: the stations that good frames named.
         """
         for position in [p for p in self._begins if p < base]:
             del self._begins[position]
         good = list(good)
         starts = {candidate.start for candidate in good}
         ahead = {p for p in (*begins, *(candidate.end for candidate in good)) if self._opens(known, p - base)}
+        self.unfinished = []
         if not ahead:
             return []
         found: dict[tuple[int, int], Candidate] = {}
-        partner: dict[int, bool] = dict.fromkeys(ahead, False)
+        partner = dict.fromkeys(ahead, False)
+        if base in ahead and expected is not None:
+            partner[base] = expected.is_for(known, 0)
         while ahead:
             position = min(ahead)
             ahead.discard(position)
-            for candidate in self._frames(known, base, position, partner[position], starts, silent):
+            frames = self._frames(known, base, position, partner[position], starts, silent, heard)
+            if not frames and partner[position] and not silent and base + len(known) - position < MAX_FRAME:
+                self.unfinished.append(position)
+            for candidate in frames:
+                if silent and candidate.end == base + len(known) and not known[-1]:
+                    bare = without_zeros(candidate.octets, past, partner[position])
+                    candidate = candidate._replace(length=len(bare), octets=bare)
                 found[position, candidate.length] = candidate
                 end = candidate.end
                 answers = _same(known, position - base, end - base)
                 if end not in partner and self._opens(known, end - base):
                     ahead.add(end)
+                elif answers and not silent and end - base > len(known) - MIN_FRAME:
+                    self.unfinished.append(end)  # no more than its head is there
                 partner[end] = partner.get(end, False) or answers
         return list(found.values())
 
@@ -112,10 +137,18 @@ class OpenLengthFinder:
         return is_open_length(known, at) or _is_exception(known, at)
 
     def _frames(
-        self, known: bytes, base: int, position: int, partner: bool, starts: set[int], silent: bool
+        self,
+        known: bytes,
+        base: int,
+        position: int,
+        partner: bool,
+        starts: set[int],
+        silent: bool,
+        heard: Container[int],
     ) -> list[Candidate]:
         """Those that begin at a position; `partner`: the frame directly before is of the same station and function."""
         at, end = position - base, len(known)
+        known_station = partner or known[at] in heard
         if _is_exception(known, at):
             stretch = known[at : at + EXCEPTION_LENGTH]
             if len(stretch) < EXCEPTION_LENGTH or crc16_modbus(stretch):
@@ -135,8 +168,9 @@ class OpenLengthFinder:
             agreed = last or position_after in starts or _same(known, at, after)
             if not agreed and not (partner and after + 2 <= end and known[after]):
                 continue
+            partner = False  # where nothing agrees but what is before, only its first end counts
             stretch = known[at:after]
-            if _NOT_TEXT.search(stretch):
+            if known_station or not is_text(stretch):
                 bits = WHOLE_STRETCH if last else ANY_END
                 frames.append(Candidate(position, after - at, bits, stretch[0], True, True, stretch))
         return frames

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from typing import Final
 
+from dissectors.frame import Flaw
 from dissectors.modbus.functions import EXCEPTION_BIT, FUNCTIONS
 
-KNOWN_REQUEST: Final = 8
+KNOWN_REQUEST: Final = 14
 """Bits for octets that were a request before, octet for octet."""
 
 KNOWN_LENGTH: Final = 6
@@ -21,6 +22,9 @@ _MOST_LENGTHS: Final = 4096
 _FIXED: Final = frozenset({0x05, 0x06, 0x07, 0x08, 0x0B, 0x0F, 0x10, 0x16})
 """Functions whose answers have one length, or (diagnostics) that of their request: it tells nothing."""
 
+_CONSTANT: Final = 4
+"""So many frames of one length, and none of another, make it the length of their kind."""
+
 _STRAY: Final = 1024
 _STRAY_BUS: Final = 1500
 """Each stray zero adds _STRAY to a sum that loses 1/64 with every frame: two within some thirty frames make a habit."""
@@ -29,11 +33,14 @@ _STRAY_BUS: Final = 1500
 class Past:
     """Requests and lengths of answers by station and function; whether zeros tend to follow frames on this bus."""
 
-    __slots__ = ("_lengths", "_requests", "_strays")
+    __slots__ = ("_calls", "_constant", "_flaws", "_lengths", "_requests", "_strays")
 
     def __init__(self) -> None:
-        self._requests: dict[bytes, None] = {}  # the newest last
+        self._requests: dict[bytes, None] = {}  # in the order they came first
         self._lengths: dict[int, int] = {}  # unit, function, direction → a bit for each length
+        self._constant: dict[int, tuple[int, int]] = {}  # of functions of unknown layout: first length, how often
+        self._calls: set[int] = set()  # unit and function of all requests
+        self._flaws: dict[int, Flaw] = {}  # of the newest answer, by station
         self._strays = 0
 
     def bits(self, octets: bytes, request: bool, response: bool) -> int:
@@ -44,30 +51,54 @@ class Past:
             return KNOWN_LENGTH
         return 0
 
+    def has_asked(self, octets: bytes) -> bool:
+        """Whether octets were a request before, octet for octet."""
+        return octets in self._requests
+
+    def has_called(self, unit: int, code: int) -> bool:
+        """Whether this station was asked for this function before."""
+        return unit << 8 | code in self._calls
+
     def knows_length(self, unit: int, code: int, length: int) -> bool:
         """Whether a frame of this length has answered."""
         return bool(self._lengths.get(_key(unit, code, True), 0) >> length & 1)
 
     def only_length(self, unit: int, code: int, answer: bool) -> int | None:
-        """The length that requests or answers of a function of unknown layout always had; None when it varies."""
-        lengths = self._lengths.get(_key(unit, code, answer), 0)
-        return lengths.bit_length() - 1 if lengths and not lengths & lengths - 1 else None
+        """The length that requests or answers of a function of unknown layout always had, or None."""
+        length, times = self._constant.get(_key(unit, code, answer), (0, 0))
+        return length if times >= _CONSTANT else None
+
+    def is_habit(self, unit: int, flaw: Flaw) -> bool:
+        """Whether the answer before of this station had the same flaw; the answer under way has it."""
+        before = self._flaws.get(unit)
+        self._flaws[unit] = flaw
+        return before is flaw
 
     def note(self, octets: bytes, request: bool) -> None:
         """A good frame, and what it was taken for."""
-        self._strays -= self._strays >> 6
+        if self._strays:
+            self._strays -= self._strays >> 6
+        if not request:
+            self._flaws.pop(octets[0], None)
         code = octets[1]
         known = code & ~EXCEPTION_BIT in FUNCTIONS
         if request:
-            self._requests.pop(octets, None)
+            self._calls.add(octets[0] << 8 | code)
+        if request and octets not in self._requests:
             self._requests[octets] = None
             if len(self._requests) > _MOST_REQUESTS:
                 del self._requests[next(iter(self._requests))]
         if (known and request) or code & EXCEPTION_BIT or code in _FIXED:
             return
         key = _key(octets[0], code, not request)
-        if key in self._lengths or len(self._lengths) < _MOST_LENGTHS:
-            self._lengths[key] = self._lengths.get(key, 0) | 1 << len(octets)
+        if key not in self._lengths and len(self._lengths) >= _MOST_LENGTHS:
+            return
+        self._lengths[key] = self._lengths.get(key, 0) | 1 << len(octets)
+        if not known:
+            length, times = self._constant.get(key, (len(octets), 0))
+            self._constant[key] = (
+                (length, min(times + 1, _CONSTANT)) if length == len(octets) and times >= 0 else (0, -1)
+            )
 
     def note_stray_zero(self) -> None:
         """A zero behind a frame that cannot be its last octet."""

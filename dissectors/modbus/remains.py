@@ -6,7 +6,7 @@ from enum import Enum, auto
 from typing import NamedTuple
 
 from dissectors.frame import Damage, LineError, Mark, Place, Reason
-from dissectors.modbus.candidates import SHORT_FRAME, octet_bits, readings
+from dissectors.modbus.candidates import SHORT_FRAME, Reading, octet_bits, readings
 from dissectors.modbus.expectation import Expected
 from dissectors.modbus.functions import (
     BROADCAST,
@@ -40,14 +40,17 @@ class Injury(NamedTuple):
     damage: Damage
 
 
-def injury(octets: bytes, before: Side, after: Side, heard: bool | None, expected: Expected | None) -> Injury | None:
+def injury(
+    octets: bytes, before: Side, after: Side, heard: bool | None, called: bool, expected: Expected | None
+) -> Injury | None:
     """The damaged frame that a stretch without a good one is; None when it is noise.
 
     It must begin where a frame may begin, with a station and a known function, and end where a frame may end. From a
     station that was never heard it must have a predicted length too: one random burst in eight begins plausibly, and
     would put stations on the bus that are not there.
     `heard`: whether good frames named the station that its first octet names; None when no good frame came yet.
-    `expected`: the open request.
+    `called`: whether that station was asked before for the function that its second octet names; then two or three
+    octets between silences are the begin of a frame. `expected`: the open request.
     """
     count = len(octets)
     if before is Side.NOISE or after is Side.NOISE or not 2 <= count <= MAX_FRAME:
@@ -64,12 +67,12 @@ def injury(octets: bytes, before: Side, after: Side, heard: bool | None, expecte
         return None
     lengths = [r.length for r in readings(octets, 0, count) if r.length != MORE]
     answers = awaited is not None and awaited.function == code & ~EXCEPTION_BIT
-    if count < MIN_FRAME and not answers:
+    alone = before is Side.SILENCE and after is Side.SILENCE
+    if count < MIN_FRAME and not answers and not (called and alone):
         return None
     fits = count in lengths or (answers and awaited is not None and count == awaited.length)
     if not fits and not heard:
-        alone = heard is None and before is Side.SILENCE and after is Side.SILENCE
-        if not (alone and code & ~EXCEPTION_BIT in _COMMON):
+        if not (heard is None and alone and code & ~EXCEPTION_BIT in _COMMON):
             return None
     if fits:
         return Injury(count, Damage.CHECK)
@@ -79,6 +82,22 @@ def injury(octets: bytes, before: Side, after: Side, heard: bool | None, expecte
     if right is None or count < right:
         return Injury(right, Damage.SHORT)
     return Injury(right, Damage.LONG)
+
+
+def cut_echo_of(octets: bytes, expected: Expected | None) -> int | None:
+    """The length of the open request, where octets are its begin, given back and cut short, rather than that of its
+    answer; else None.
+
+    Of functions whose answer repeats the request it may be either: it is no echo here, but misses the same length.
+    """
+    count = len(octets)
+    if expected is None or expected.length == len(expected.octets):
+        return None
+    if not 3 <= count < len(expected.octets) or not expected.octets.startswith(octets):
+        return None
+    if count == 3 and readings(octets, 0, count)[-1:] == (Reading(expected.length or 0, False, True),):
+        return None  # its third octet is the byte count of the answer as well
+    return len(expected.octets)
 
 
 def predicted(octets: bytes) -> int | None:

@@ -6,24 +6,28 @@ framing.py decides what is a frame; here is what it knows, and what becomes of i
 from __future__ import annotations
 
 from dissectors.checksums import crc16_modbus
-from dissectors.frame import Check, Damage, Event, Found, Frame, Noise, Place, Reason
+from dissectors.frame import Check, Damage, Event, Flaw, Found, Frame, Noise, Place, Reason, Repair
 from dissectors.framer import UNKNOWN_SILENCE, OctetWindow
 from dissectors.line import Timing
-from dissectors.modbus.candidates import Candidate, Reading, readings
+from dissectors.modbus.candidates import SHORT_FRAME, Candidate, Reading, octet_bits, readings
 from dissectors.modbus.expectation import Expected, expectation
-from dissectors.modbus.functions import is_open_length
+from dissectors.modbus.functions import EXCEPTION_BIT, is_open_length
 from dissectors.modbus.past import Past
 from dissectors.modbus.remains import (
     ODD_LENGTH,
     Injury,
     Side,
+    cut_echo_of,
     injury,
     noise_place,
     noise_reason,
     predicted,
     zeros_at_start,
 )
+from dissectors.modbus.repair import repaired
 from dissectors.modbus.segmentation import LIKELY, PROVED
+
+_ALL_AGREES = frozenset({Flaw.CHECK_SWAPPED, Flaw.FIRST_MISSING, Flaw.FIRST_SPOILT})
 
 
 class RtuWindow:
@@ -174,22 +178,41 @@ class RtuWindow:
                     return
                 before, stretch, count = Side.NOISE, stretch[zeros:], count - zeros
         heard = stretch[0] in self.units if self.units else None
-        hurt = injury(stretch, before, after, heard, self.expected)
-        if hurt is None:
+        called = count > 1 and self.past.has_called(stretch[0], stretch[1] & ~EXCEPTION_BIT)
+        hurt = injury(stretch, before, after, heard, called, self.expected)
+        bounded = before is not Side.NOISE and after is not Side.NOISE
+        if bounded and (echoed := cut_echo_of(stretch, self.expected)):
+            self._take_damaged(count, Injury(echoed, Damage.SHORT), None)
+        elif bounded and crc16_modbus(stretch) and (repair := repaired(stretch, self.expected, self.past, self.units)):
+            self._take_repaired(count, repair)
+        elif hurt is None:
             self._take_noise(count, before, after, None)
         elif not crc16_modbus(stretch):  # too weak to be found in a run of octets, but nothing else is beside it
             fits = [r for r in readings(stretch, 0, count) if r.length == count]
             self.take_frame(count, any(r.request for r in fits), any(r.response for r in fits))
         else:
-            self._take_damaged(count, hurt)
+            self._take_damaged(count, hurt, None)
+
+    def _take_repaired(self, count: int, repair: Repair) -> None:
+        """Give a damaged frame that is known all the same. A request of which all of the check agrees is open now."""
+        whole = repair.octets
+        self._take_damaged(count, Injury(len(whole), Damage.CHECK if len(whole) == count else Damage.SHORT), repair)
+        fits = [r for r in readings(whole, 0, len(whole)) if r.length == len(whole)]
+        request = any(r.request for r in fits) or is_open_length(whole)
+        if request and (repair.flaw in _ALL_AGREES or self.past.has_asked(whole)):
+            response = any(r.response for r in fits) or is_open_length(whole)
+            self.expected = expectation(self.expected, whole, request, response)
 
     def _note_stray_zeros(self, count: int) -> None:
-        """Zeros follow a frame: they teach where they cannot be the end of it."""
+        """Zeros follow a frame: they teach where no well-formed frame ends with them."""
         good = self._last_good
-        lengths = [len(good) + zeros for zeros in range(1, min(count, 2) + 1)]
+        if is_open_length(good):
+            return
         whole = good + bytes(min(count, 2))
-        if not any(length in lengths for length, _, _ in readings(whole, 0, len(whole))) and not is_open_length(good):
-            self.past.note_stray_zero()
+        for reading in readings(whole, 0, len(whole)):
+            if reading.length > len(good) and octet_bits(whole, 0, reading) >= SHORT_FRAME:
+                return
+        self.past.note_stray_zero()
 
     def _take_noise(self, count: int, before: Side, after: Side, reason: Reason | None) -> None:
         place = self._place(count, before, after)
@@ -200,16 +223,27 @@ class RtuWindow:
         self._skipped += count
         self._out.append(Noise(taken.octets, taken.start, taken.end, place, reason, taken.marks))
 
-    def _take_damaged(self, count: int, hurt: Injury) -> None:
+    def _take_damaged(self, count: int, hurt: Injury, repair: Repair | None) -> None:
         found = self._found(count)
         octets, start, end, slack, marks = self._octets.take(count)
         check = Check.ABSENT if hurt.damage is Damage.SHORT else Check.BAD
+        skipped, self._skipped = self._skipped, 0
         self._out.append(
             Frame(
-                "modbus-rtu", octets, start, end, check, found, hurt.damage, hurt.expected, self._skipped, slack, marks
+                "modbus-rtu",
+                octets,
+                start,
+                end,
+                check,
+                found,
+                hurt.damage,
+                hurt.expected,
+                skipped,
+                slack,
+                marks,
+                repair=repair,
             )
         )
-        self._skipped = 0
         self._taken(count, Side.FRAME)
 
     def _taken(self, count: int, kind: Side) -> None:

@@ -13,24 +13,30 @@ _OF_COLLISIONS = (
 )
 """What two senders at once make of good frames."""
 
+_OF_DAMAGE = ("MB002", "MB005", "MB007", "MB104", "MB202")
+"""What damage that is always the same would otherwise be taken for."""
+
 _ALL = (
     Rule(
         "MB001",
         Severity.ERROR,
         "no answer",
         "Requests to a station of which no good frame was ever heard, and at most 1 in 4 of them followed by octets "
-        "that are no frame. After a single request it is only noted.",
+        "that are no frame. Where it was asked only once, repeats not counted, it is only noted.",
         "no station at this address: off, set to another address or baud rate, or cut off",
         "its supply, address switch and baud rate; if it is gone, take it out of the master's list",
+        explains=("MB105", "MB104"),
     ),
     Rule(
         "MB002",
         Severity.WARNING,
         "some requests without answer",
-        "Requests that no octet followed before the master went on, to a station that answers others. A single one, or "
+        "Requests that no octet followed before the master went on, to a station that answers others; not those that "
+        "were answered late. A single one, or "
         "fewer than 1 in 100 and at most two a minute, is only noted.",
         "requests or answers get lost: a loose wire, a missing ground, a station too busy to answer",
         "whether requests or answers are damaged at the same times; the station's terminals and supply",
+        explains=("MB104",),
     ),
     Rule(
         "MB003",
@@ -39,6 +45,7 @@ _ALL = (
         "A station that used to answer left at least its last five requests without an answer, to the end.",
         "the station was switched off, crashed or lost its connection at that time",
         "what happened at the time of the last answer; supply, fuse and connector of the station",
+        explains=("MB002", "MB104", "MB105"),
     ),
     Rule(
         "MB004",
@@ -47,6 +54,7 @@ _ALL = (
         "A station answers other requests but never this one (function and first register), asked three times or more.",
         "the station drops what it does not support instead of answering with an exception",
         "the device's register map; take the request out of the master's list",
+        explains=("MB002", "MB104"),
     ),
     Rule(
         "MB005",
@@ -56,6 +64,7 @@ _ALL = (
         "station that was asked. A single one, or fewer than 1 in 100 and at most two a minute, is only noted.",
         "noise on this station's drop: a long stub, a bad connector, its driver",
         "termination and bias; this station's connector and stub; its distance from power cables",
+        explains=("MB002", "MB104"),
     ),
     Rule(
         "MB006",
@@ -65,14 +74,17 @@ _ALL = (
         "are most of its damaged answers. In RTU the low octet of the CRC is right and the high one wrong.",
         "the station releases its driver before the last octet is out",
         "its turnaround or transmit-delay setting; with a converter, the timer that switches direction",
+        explains=("MB002", "MB005", "MB104"),
     ),
     Rule(
         "MB007",
         Severity.WARNING,
-        "damage to all stations",
-        "Damaged answers of two stations or more, at least two each, at rates that do not differ by chance alone.",
+        "damage whoever sends",
+        "At least three damaged frames, none of whose senders has a greater part in them than its part of all octets "
+        "sent explains (95% confidence).",
         "a cause common to all: termination, bias, ground, cable, or noise near the master",
         "120 Ω at both ends only, one bias, the shield grounded once; then halve the line to find the place",
+        explains=("MB002", "MB005", "MB009", "MB104"),
     ),
     Rule(
         "MB008",
@@ -90,21 +102,114 @@ _ALL = (
         "Requests that arrive damaged at this tap. A station ignores such a request, so it also goes unanswered.",
         "noise near the master or the tap, a second master, or a driver of the master that switches too late",
         "the master's connection, termination there, and whether a second master is on the bus",
+        explains=("MB104",),
     ),
     Rule(
         "MB010",
         Severity.WARNING,
         "answer does not fit the request",
-        "A good frame in answer whose count, address or copy is not what was asked for.",
+        "A good frame in answer whose function, count, address or copy is not what was asked for.",
         "a fault in the device, an answer to another request, or two stations with this address",
         "the frames named; the device's firmware",
+    ),
+    Rule(
+        "MB011",
+        Severity.WARNING,
+        "check octets swapped",
+        "Answers whose check is right once its two octets change places: at least three, and most of the station's "
+        "damaged answers. RTU sends the low octet of the CRC first (Modbus over Serial Line V1.02, 2.5.1.2).",
+        "the device sends its check the wrong way round; what it says is sound",
+        "the device's firmware; a master that is told to take the check so can read it",
+        explains=_OF_DAMAGE,
+    ),
+    Rule(
+        "MB012",
+        Severity.WARNING,
+        "first octet lost",
+        "Frames that are good once their first octet, the address, is put there or put right: at least three, and most "
+        "of the sender's damaged frames.",
+        "the sender switches its driver on too late, or a receiver or repeater is not ready when a frame begins",
+        "the time that its driver is on before it sends; bias that keeps the line at rest; a converter on the way",
+        explains=_OF_DAMAGE,
+    ),
+    Rule(
+        "MB013",
+        Severity.ERROR,
+        "echo cut short",
+        "Octets directly after a request that are the begin of the same request, and not all of it: at least three, "
+        "after every second request. No station can answer so.",
+        "the adapter gives back what it sends, and the program that wrote this capture stopped reading too soon: it "
+        "waited for as many octets as the answer has; the answer itself may have come and was not read",
+        "switch the adapter's echo off, or let the program read its echo away before the answer",
+        explains=("MB001", "MB002", "MB003", "MB004", "MB104", "MB105", "LN205", *_OF_DAMAGE),
+    ),
+    Rule(
+        "MB014",
+        Severity.ERROR,
+        "answers in something else",
+        "Octets in place of answers, at least three times and most of what came so: always the same ones, or such that "
+        "all runs of equal bits are multiples of 2 … 8, as a slower line looks when it is read too fast. Noise is "
+        "never the same twice, and neither are two stations that talk at once.",
+        "the device has another baud rate, or speaks another protocol",
+        "baud rate, parity and protocol in the device's settings",
+        explains=(
+            "MB001",
+            "MB002",
+            "MB003",
+            "MB004",
+            "MB104",
+            "MB105",
+            "LN201",
+            "LN202",
+            "LN203",
+            "LN204",
+            *_OF_DAMAGE,
+        ),
+    ),
+    Rule(
+        "MB015",
+        Severity.WARNING,
+        "always the same damaged answer",
+        "Damaged answers that are octet for octet the same, at least three and 3 in 4 of those that came.",
+        "no noise, which is never the same twice: the device makes its check or its length wrongly",
+        "the device's firmware; whether a converter on the way changes octets (XON, XOFF, line ends)",
+        explains=_OF_DAMAGE,
+    ),
+    Rule(
+        "MB016",
+        Severity.WARNING,
+        "requests that contradict themselves",
+        "Good frames to functions 15, 16 or 23 whose byte count is not what their quantity takes (Modbus Application "
+        "Protocol V1.1b3, 6.11, 6.12, 6.17). Exceptions in answer to them are not held against the station.",
+        "the master builds the request wrongly; a station can only refuse it",
+        "the data type and length of this write in the master's configuration or program",
+    ),
+    Rule(
+        "MB017",
+        Severity.WARNING,
+        "reads of address 0",
+        "Requests to address 0 that ask for an answer. Address 0 is for broadcasts, which only write and which nobody "
+        "answers (Modbus over Serial Line V1.02, 2.1); some devices answer all the same.",
+        "the unit number is not set in the master",
+        "the unit number of this device in the master's configuration",
+        explains=("MB204", "MB206", "MB207", "MB005", "MB104", "MB105"),
+    ),
+    Rule(
+        "MB018",
+        Severity.WARNING,
+        "request copied back",
+        "Nine in ten requests to one station come back at once, and those to others never.",
+        "this station's driver hears itself, or its converter repeats what it hears, before the station answers",
+        "how its driver and receiver are enabled; the converter in front of it",
+        explains=("MB005", "MB104", "MB301", "LN205"),
     ),
     Rule(
         "MB101",
         Severity.WARNING,
         "slow station",
         "Response times, less all that the adapter may have added, above 70% of the master's timeout as seen on "
-        "the bus, or above 500 ms while no timeout is known. At least three and 1 in 100 of its answers.",
+        "the bus, or above 500 ms while no timeout is known (then only noted). At least three and 1 in 100 of its "
+        "answers. Answers after which the master hardly pauses were read late, not sent late, and do not count.",
         "a busy station, a gateway behind it, or a response delay set too high",
         "the station's response-delay setting and load; a longer timeout in the master",
     ),
@@ -125,6 +230,7 @@ _ALL = (
         "Good answers that come after the master's timeout, often into the next request.",
         "the master's timeout is too short for this station",
         "raise the master's response timeout above the times seen here",
+        explains=("MB101", "MB104", "MB201", "MB301", "MB010"),
     ),
     Rule(
         "MB104",
@@ -149,7 +255,8 @@ _ALL = (
         Severity.ERROR,
         "answered twice",
         "A second answer from the same address directly after the first, to a request that was sent once. A single one "
-        "is only noted, and so are no more than the station's late answers.",
+        "is only noted, and so are no more than the station's late answers. An error only where the two ever differ: "
+        "the same octets again may also come from one device or a converter that sends twice.",
         "two stations have the same address, the second one slower",
         "switch the station off and see whether something still answers; give one another address",
         explains=(*_OF_COLLISIONS, "MB301", "MB401"),
@@ -158,9 +265,10 @@ _ALL = (
         "MB202",
         Severity.ERROR,
         "two stations seem to have one address",
-        "At least three answers from one station, and 1 in 4 of its answers, that carry more octets than the answer "
-        "asked for or octets with framing errors inside, while answers of other stations are not so damaged.",
-        "two stations with this address talk over each other; or that station's driver is faulty",
+        "At least three answers from one station, and 1 in 4 of its answers, that begin as they should and go on for "
+        "more octets than the answer asked for, by about the same number each time, with a wrong check. Damage makes "
+        "no octets more, and noise does not always begin and end alike.",
+        "two stations with this address talk over each other, one a little later",
         "switch the station off and see whether something still answers",
         explains=_OF_COLLISIONS,
     ),
@@ -168,8 +276,9 @@ _ALL = (
         "MB203",
         Severity.ERROR,
         "two masters",
-        "Requests that come while another one waits for a station that is alive, sooner than that station can answer "
-        "or than any timeout seen. At least three.",
+        "Requests that come while another one waits for a station that is alive, sooner than that station has ever "
+        "answered, so that no answer can have been missed. At least three; not where they always come after the same "
+        "time, as those of a single master do that never waits.",
         "two masters on one bus, or a commissioning tool left connected",
         "find the second master; a bus has one, use a gateway or multiplexer for more",
         explains=(*_OF_COLLISIONS, "MB002", "MB003", "MB201", "MB202", "MB302"),
@@ -182,6 +291,7 @@ _ALL = (
         "(Modbus over Serial Line V1.02, 2.1).",
         "a station with a faulty protocol stack; with several, their answers collide",
         "the frames named; the device's firmware; write to each station separately",
+        explains=("MB005", "MB010", "MB301", "MB002", "MB104"),
     ),
     Rule(
         "MB205",
@@ -199,6 +309,7 @@ _ALL = (
         "never repeats such a request: it takes the answers.",
         "a device that always answers so (some battery systems do), or a wrong address in the master's list",
         "if the master takes these answers, nothing; else the address in its list",
+        explains=("MB002", "MB104", "MB207"),
     ),
     Rule(
         "MB207",
@@ -225,7 +336,8 @@ _ALL = (
         Severity.WARNING,
         "frames too close together",
         "Less than 3.5 characters of silence between two good RTU frames (Modbus over Serial Line V1.02, 2.5.1.1; "
-        "1.75 ms above 19200 Bd), even by the longest reading that the adapter leaves. At least three.",
+        "1.75 ms above 19200 Bd), even by the longest reading that the adapter leaves. At least three, and 1 in 10 of "
+        "the sender's frames; not of answers that came too late.",
         "strict receivers take the two for one frame and drop both",
         "the response delay of the station, or the pause of the master",
     ),
@@ -249,12 +361,38 @@ _ALL = (
         "lower the adapter's latency timer, or use a port of the computer itself",
     ),
     Rule(
+        "MB304",
+        Severity.NOTE,
+        "pauses in everybody's frames",
+        "Pauses of over 1.5 characters inside the frames of three senders or more, and of all that sent twenty frames.",
+        "the adapter or the computer hands octets over late, though this capture says nothing of it",
+        "the adapter's latency timer; what else the computer does; whether the capture names its adapter",
+        explains=("MB302",),
+    ),
+    Rule(
         "MB401",
         Severity.INFO,
         "poll cycle",
         "Time from one request to the same request again, of the request that was sent most often.",
         "how old a value in the master can be",
         "nothing, if that is fresh enough",
+    ),
+    Rule(
+        "MB402",
+        Severity.INFO,
+        "addresses searched",
+        "At least four addresses that the master asked once, and that nobody has.",
+        "somebody searched the bus for stations",
+        "nothing",
+    ),
+    Rule(
+        "MB403",
+        Severity.INFO,
+        "answered or repeated",
+        "Frames that say the same as the request before them, or have no known layout, and come later than this "
+        "station is known to answer: its answer, or the request again. Nothing else on the bus tells which.",
+        "a station that takes long to confirm, or one that does not and a master that repeats",
+        "the master's timeout and number of repeats: what comes after exactly that time is a repeat",
     ),
 )
 

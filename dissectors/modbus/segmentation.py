@@ -6,7 +6,7 @@ Evidence is counted in bits. A candidate brings those of its octets (candidates.
     +2  silence of 1.5 characters proved there
     +4  a station that has been heard before
     +2 … +14  it answers the open request, or repeats it (expectation.py)
-    +6 … +8   this station was asked the same before, or answered at this length (past.py)
+    +6 … +14  this station was asked the same before, or answered at this length (past.py)
     -6  each silence proved inside it
 
 and THRESHOLD is taken off. What remains is its worth. A candidate that stands on its own gains a sixteenth of a bit an
@@ -16,14 +16,14 @@ that fits it, and neither alone.
 
 A good frame and zeros is good again (the CRC is 0), and one frame in 256 ends with a zero: two readings of the same
 octets. The request that is open decides between them; where none speaks, a request is likelier than an answer that
-nobody asked for, and between two silences the reading that uses all octets is likelier than one that leaves a zero over.
+nobody asked for, and between two silences the reading that uses all octets is likelier than one that leaves a zero.
 More zeros than a CRC has, or a bus on which zeros tend to follow frames, speak for the shorter reading.
 
 A path is extended by a candidate from the best path before it, the best that ends directly before it, and the best
 that left the request open which it would answer.
 
 A stretch that would be a frame if the octets to come make its CRC good is weighed too, at its best. Frames are
-committed as far as the best path and the best path that ends in such a hope agree.
+committed as far as the best path and all better ones that end in such a hope agree.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ from bisect import bisect_right
 from collections.abc import Iterable, Sequence
 from typing import Final, NamedTuple, Protocol
 
-from dissectors.modbus.candidates import CRC_BITS, ZERO_TAIL, Candidate, Pending, Reading, octet_hope
-from dissectors.modbus.expectation import LOOSE, Expected, expectation
-from dissectors.modbus.functions import EXCEPTION_BIT, MORE
+from dissectors.modbus.candidates import ANY_END, CRC_BITS, ZERO_TAIL, Candidate, Pending, Reading, octet_hope
+from dissectors.modbus.expectation import LOOSE, REPEATED, SAME_UNKNOWN, Expected, expectation
+from dissectors.modbus.functions import EXCEPTION_BIT, MIN_FRAME, MORE
 from dissectors.modbus.past import KNOWN_LENGTH, Past
 
 THRESHOLD: Final = 20
@@ -47,9 +47,16 @@ ADJACENT: Final = 4
 HEARD: Final = 4
 SILENCE_INSIDE: Final = -6
 
-WHOLE: Final = 4
-"""A frame whose last octets are zeros, and that fills the room between two silences: good without them, too."""
+WHOLE: Final = 12
+"""A request whose last octets are zeros, and that fills the room between two silences: good without them, too."""
 
+WHOLE_ANSWER: Final = 4
+"""An answer whose last octets are zeros, and that is as long as was asked for."""
+
+_WELL_TOLD: Final = frozenset({0x0F, 0x10, 0x17})
+"""Functions whose first octets are ill formed by chance nearly always."""
+
+_MOST_FROM_CONTEXT: Final = ADJACENT + SAME_UNKNOWN
 _CRC_OCTETS: Final = 2
 
 
@@ -80,13 +87,14 @@ class Surroundings(Protocol):
 
 
 class _Step(NamedTuple):
-    """A path: the candidate it ends with, the path before, and its worth."""
+    """A path: the candidate it ends with, the path before, and its worth; `asked`: the newest request in it."""
 
     worth: int
     candidate: Candidate | None
     before: _Step | None
     end: int  # position directly after a good frame, or -1
     expected: Expected | None
+    asked: bytes
 
 
 def worth(bits: int, length: int) -> int:
@@ -101,7 +109,7 @@ def worth(bits: int, length: int) -> int:
 def zero_bits(window: Surroundings, candidate: Candidate, expected: Expected | None, fit: int) -> int:
     """Bits for a frame that is good without its last zeros too; `fit`: those it has from the open request."""
     if fit >= LOOSE:
-        return 0
+        return 0 if window.past.zeros_stray else WHOLE_ANSWER
     if candidate.zeros > _CRC_OCTETS or window.past.zeros_stray:
         return ZERO_TAIL
     if candidate.request and window.edge(candidate.start) == PROVED and window.edge(candidate.end) == PROVED:
@@ -116,14 +124,15 @@ class Paths:
     Valid until something is taken out of the window.
     """
 
-    __slots__ = ("_awaiting", "_best", "_ends", "_touching", "_window", "base")
+    __slots__ = ("_awaiting", "_best", "_ends", "_steps", "_touching", "_window", "base")
 
     def __init__(self, window: Surroundings) -> None:
         self._window = window
         self.base = window.base
-        root = _Step(0, None, None, window.base if window.good_before else -1, window.expected)
+        root = _Step(0, None, None, window.base if window.good_before else -1, window.expected, b"")
         self._ends = [window.base]  # of every path found, ascending
         self._best = [root]  # the best of those that end there or before
+        self._steps = [root]
         self._touching: dict[int, list[_Step]] = {window.base: [root]}  # by the position that they end at
         self._awaiting: dict[int, tuple[list[int], list[_Step]]] = {}  # as the first two, by request left open
         self._remember_awaiting(window.base, root)
@@ -141,26 +150,58 @@ class Paths:
         """The frames of the best path, in order."""
         return _frames(self._best[-1])
 
-    def agreed(self, pending: Sequence[Pending], count: int) -> list[Candidate]:
-        """Those of them that nothing yet to come can undo. `count`: how many octets of the window are known."""
+    def agreed(self, pending: Sequence[Pending], unfinished: Sequence[int], count: int) -> list[Candidate]:
+        """Those of them that nothing yet to come can undo. `count`: how many octets of the window are known.
+
+        `unfinished`: where frames of unpredicted length have begun (open_length.py).
+        """
         winner = self._best[-1]
         if winner.candidate is None:
             return []
-        hope: _Step | None = None
-        most = winner.worth
-        for start, reading in pending:
-            total, step = self._hope(start, reading, count)
-            if total > most:
-                most, hope = total, step
         path = _frames(winner)
-        if hope is None:
-            return path
-        agreed = []
-        for ours, theirs in zip(path, _frames(hope), strict=False):
-            if ours is not theirs:
-                break
-            agreed.append(ours)
-        return agreed
+        end = path[-1].end
+        rivalled = self._is_rivalled(winner)
+        hoping: dict[int, _Step] = {}  # paths that would be better than the best if their last frame comes true
+        for start, reading in pending:
+            if start >= end and not rivalled:
+                continue  # it follows the best path, whatever becomes of it
+            if self._is_spoken_for(start):
+                total, step = self._hope(start, reading, count)
+                if total > winner.worth:
+                    hoping[id(step)] = step
+        for start in unfinished:
+            total, step = self._open_hope(start)
+            if total > winner.worth:
+                hoping[id(step)] = step
+        agreed = len(path)
+        for step in hoping.values():
+            other = _frames(step)
+            while other[:agreed] != path[:agreed]:
+                agreed -= 1
+        return path[:agreed]
+
+    def _is_spoken_for(self, start: int) -> bool:
+        """Whether anything but its first octets speaks for a frame that is not complete: of 65536 that nothing speaks
+        for, one becomes a frame."""
+        window = self._window
+        at = start - window.base
+        unit, code = window.octets[at], window.octets[at + 1]
+        return (
+            window.heard(unit)
+            or code in _WELL_TOLD
+            or start in self._touching
+            or unit << 8 | code & ~EXCEPTION_BIT in self._awaiting
+            or window.edge(start) > 0
+        )
+
+    def _is_rivalled(self, winner: _Step) -> bool:
+        """Whether another path is so near that what follows could make it the better one."""
+        near, path = winner.worth - _MOST_FROM_CONTEXT * SCALE, set()
+        step: _Step | None = winner
+        while step is not None:
+            path.add(id(step))
+            step = step.before
+        return any(each.worth > near and id(each) not in path for each in self._steps)
 
     def _add(self, candidate: Candidate) -> None:
         window, start, end = self._window, candidate.start, candidate.end
@@ -168,23 +209,27 @@ class Paths:
         bits = candidate.bits + window.edge(end) + _standing(window, candidate.unit, start, end)
         known = window.past.bits(octets, candidate.request, candidate.response)
         edge = window.edge(start)
-        total, before = None, self._best[0]
+        either = candidate.request and candidate.response
+        chosen: dict[bool, tuple[int, _Step]] = {}  # one that may be both is tried as request and as answer
         for step in self._options(start, candidate.unit, octets[1]):
             fit = step.expected.fit(octets, candidate.response) if step.expected is not None else 0
+            if candidate.request and octets == step.asked:
+                fit = max(fit, REPEATED)
             own = bits + max(fit, known) + (ADJACENT if step.end == start else edge)
             if candidate.zeros:
                 own += zero_bits(window, candidate, step.expected, fit)
             reached = step.worth + worth(own, candidate.length)
-            if total is None or reached > total:
-                total, before = reached, step
-        if total is None:
-            return
-        after = expectation(before.expected, octets, candidate.request, candidate.response)
-        step = _Step(total, candidate, before, end, after)
-        self._ends.append(end)
-        self._best.append(step if total > self._best[-1].worth else self._best[-1])
-        self._touching.setdefault(end, []).append(step)
-        self._remember_awaiting(end, step)
+            answers = either and step.expected is not None and step.expected.is_for(octets, 0)
+            if answers not in chosen or reached > chosen[answers][0]:
+                chosen[answers] = reached, step
+        for total, before in chosen.values():
+            after = expectation(before.expected, octets, candidate.request, candidate.response)
+            step = _Step(total, candidate, before, end, after, before.asked if after is None else octets)
+            self._ends.append(end)
+            self._best.append(step if total > self._best[-1].worth else self._best[-1])
+            self._touching.setdefault(end, []).append(step)
+            self._steps.append(step)
+            self._remember_awaiting(end, step)
 
     def _options(self, start: int, unit: int, code: int) -> Sequence[_Step]:
         """Paths that a frame may follow; the best of them is among these."""
@@ -215,6 +260,22 @@ class Paths:
             own = bits + (ADJACENT if step.end == start else edge)
             own += max(known, step.expected.hope(octets, at, length) if step.expected is not None else 0)
             total = step.worth + worth(own, length)
+            if total > most:
+                most, best = total, step
+        return most, best
+
+    def _open_hope(self, start: int) -> tuple[int, _Step]:
+        """The same for a frame of unpredicted length, which answers one of its station and function."""
+        window = self._window
+        octets, at = window.octets, start - window.base
+        unit, code = octets[at], octets[at + 1]
+        edge = window.edge(start)
+        most, best = -1, self._best[0]
+        for step in self._options(start, unit, code):
+            bits = ANY_END + (ADJACENT if step.end == start else edge) + (HEARD if window.heard(unit) else 0)
+            if step.expected is not None and step.expected.is_for(octets, at):
+                bits += SAME_UNKNOWN
+            total = step.worth + worth(bits, MIN_FRAME)
             if total > most:
                 most, best = total, step
         return most, best

@@ -7,24 +7,43 @@ from dataclasses import replace
 from itertools import pairwise
 
 from dissectors.findings import Finding, Severity, Tally, counted, found, times
+from dissectors.frame import Flaw
 from dissectors.modbus.evidence import Evidence
 from dissectors.modbus.functions import EXCEPTIONS as EXCEPTION_NAMES
 from dissectors.modbus.judgement_words import MS, ms, note_if, request_words, seconds, wilson
 from dissectors.modbus.response_groups import Answered
 from dissectors.modbus.rules import EXCEPTIONS, MAKER_EXCEPTION, RULES, USED_ALIKE, VENDOR_EXCEPTION
-from dissectors.modbus.station_record import Key, Requested, Station
+from dissectors.modbus.station_record import Key, Requested, Station, middle
 
 SILENT_AT_END = 5
 """Unanswered requests in a row to the end, from which on a station that used to answer has fallen silent."""
 
+FLAWS = {
+    Flaw.CHECK_SWAPPED: "MB011",
+    Flaw.FIRST_MISSING: "MB012",
+    Flaw.FIRST_SPOILT: "MB012",
+    Flaw.LAST_MISSING: "MB006",
+    Flaw.LAST_TWO_MISSING: "MB006",
+    Flaw.LAST_SPOILT: "MB006",
+}
+"""The rule about each kind of damage that is always the same."""
+
+_SYSTEM_LEAST = 3  # of one kind, before it is a system
+_EXCESS_SPREAD = 2  # octets
+_HEX_SHOWN = 16
 _REPEATS_COST = 0.02
 _REPEATS_LEAST = 3  # fewer are no habit, however short the capture
 
 
 def of_station(seen: Evidence, unit: int, station: Station, timeout: int | None, is_common: bool) -> Iterator[Finding]:
     name = f"station {unit}"
-    yield from _missing(seen, name, station)
-    yield from _damaged(seen, name, station, is_common)
+    yield from _missing(seen, name, unit, station)
+    foreign = _foreign(seen, name, unit, station)
+    systematic = [*_flawed(seen, name, station), *([foreign] if foreign else [])]
+    yield from systematic
+    explained = sum(finding.count for finding in systematic)
+    if 4 * explained < 3 * station.damaged.count:
+        yield from _damaged(seen, name, station, is_common)
     for (key, code), tally in sorted(station.exceptions.items(), key=lambda item: str(item[0])):
         yield _exception(name, station, key, code, tally, seen.maker_words(unit, code))
     if station.unfit.count:
@@ -35,7 +54,10 @@ def of_station(seen: Evidence, unit: int, station: Station, timeout: int | None,
     if station.twice.count:
         words = f"a second answer came to {counted(station.twice.count, 'request')}"
         slow = station.twice.count <= station.late.count  # two tries, two answers: the first one came late
-        yield station.twice.found(RULES["MB201"], name, words, note_if(station.twice.count == 1 or slow))
+        yield _twice(name, station, words, slow)
+    if station.undecided.count:
+        words = f"{counted(station.undecided.count, 'frame')} may be the answer or the request again"
+        yield station.undecided.found(RULES["MB403"], name, words)
     yield from _two_times(name, station)
     if station.reserved.count:
         yield station.reserved.found(
@@ -43,18 +65,21 @@ def of_station(seen: Evidence, unit: int, station: Station, timeout: int | None,
         )
 
 
-def _missing(seen: Evidence, name: str, station: Station) -> Iterator[Finding]:
+def _missing(seen: Evidence, name: str, unit: int, station: Station) -> Iterator[Finding]:
     missing = station.missing
     if not missing.count:
         return
     if is_absent(station):
-        if missing.count >= 2:
+        if missing.count > 1 and not seen.is_scanned(unit):
             words = f"no answer to any of {station.asked} requests"
             stray = station.damaged.count
             words += f"; octets that are no good answer followed {times(stray)}" if stray else ""
             yield missing.found(RULES["MB001"], name, words)
         else:
-            yield missing.found(RULES["MB001"], name, "no answer to the only request", Severity.NOTE)
+            again = f", sent {times(missing.count)}" if missing.count > 1 else ""
+            words = f"no answer to the only request{again}"
+            if not seen.is_scanned(unit):
+                yield missing.found(RULES["MB001"], name, words, Severity.NOTE)
         return
     silent = station.silent
     if silent.count >= SILENT_AT_END and station.answered and station.last_heard is not None:
@@ -80,7 +105,7 @@ def _missing(seen: Evidence, name: str, station: Station) -> Iterator[Finding]:
 
 def is_absent(station: Station) -> bool:
     """Whether no good frame ever came from it, and no more than stray damage in place of answers."""
-    heard = station.answered or station.late.count or station.twice.count
+    heard = station.answered or station.late.count or station.twice.count or station.undecided.count > station.asked
     return bool(station.missing.count) and not heard and 4 * station.damaged.count <= station.asked
 
 
@@ -98,11 +123,13 @@ def _damaged(seen: Evidence, name: str, station: Station, is_common: bool) -> It
         yield ends.found(RULES["MB006"], name, words, note_if(rare))
         if 4 * ends.count >= 3 * damaged.count:
             return
-    over = station.talked_over.count + station.garbled
-    if over >= 3 and 4 * over >= station.asked and not is_common:
-        words = f"{over} of {counted(station.asked, 'answer')} longer than asked for, or garbled inside"
-        tally = station.talked_over if station.talked_over.count else damaged
-        yield replace(tally.found(RULES["MB202"], name, words), count=over)
+    over = station.talked_over
+    if over.count >= 3 and 4 * over.count >= station.asked and _is_steady(station.excess):
+        words = (
+            f"{over.count} of {counted(station.asked, 'answer')} begin as they should and go on for "
+            f"{_octets(middle(station.excess))} more than they can have, damaged: two talk at once"
+        )
+        yield over.found(RULES["MB202"], name, words)
     details = []
     if station.cut:
         details.append(f"{station.cut} ended early")
@@ -114,6 +141,69 @@ def _damaged(seen: Evidence, name: str, station: Station, is_common: bool) -> It
     if station.asked >= 20:
         words += f"; that is {low:.1%} to {high:.1%} of all, with 95% confidence"
     yield damaged.found(RULES["MB005"], name, words, note_if(rare or is_common))
+
+
+def _twice(name: str, station: Station, words: str, slow: bool) -> Finding:
+    """Two different answers are two stations'; the same octets again may be a converter's, or one station's."""
+    twice, rule = station.twice, RULES["MB201"]
+    different = twice.count - station.same_twice
+    if different:
+        words += f", {times(different)} another than the first"
+        return twice.found(rule, name, words, note_if(twice.count == 1 or slow))
+    words += ", each time octet for octet the first one again"
+    severity = Severity.NOTE if twice.count == 1 or slow else Severity.WARNING
+    means = "two stations with this address and the same values, or one device or converter that sends twice"
+    return replace(twice.found(rule, name, words, severity), means=means)
+
+
+def _flawed(seen: Evidence, name: str, station: Station) -> Iterator[Finding]:
+    """Damage of one kind that most damaged answers of a station share."""
+    by_code: dict[str, list[tuple[Flaw, Tally]]] = {}
+    for flaw, tally in station.flaws.items():
+        by_code.setdefault(FLAWS[flaw], []).append((flaw, tally))
+    for code, parts in sorted(by_code.items()):
+        count = sum(tally.count for _, tally in parts)
+        if count < _SYSTEM_LEAST or 2 * count < station.damaged.count:
+            continue
+        flaw, tally = max(parts, key=lambda part: part[1].count)
+        words = f"{count} of {counted(station.asked, 'answer')} good but for one thing: {flaw.value}"
+        if count == station.damaged.count == station.asked:
+            words += ", every time"
+        yield replace(tally.found(RULES[code], name, words, note_if(seen.rare(count, station.asked))), count=count)
+
+
+def _foreign(seen: Evidence, name: str, unit: int, station: Station) -> Finding | None:
+    """Octets in place of answers that are always the same, or those of another baud rate."""
+    garbage, own = station.garbage, bytes((unit,))
+    same, factor = garbage.always(), garbage.slower_by()
+    if (same is None and factor is None) or 2 * garbage.tally.count < station.damaged.count:
+        return None
+    if same is not None and 2 * garbage.marked > garbage.tally.count and factor is None and same[:1] in (b":", own):
+        return None  # what breaks characters on the way is no device's
+    if same is not None and len(same) > 2 and (same[0] == unit or same[:1] == b":"):
+        words = f"{counted(garbage.tally.count, 'damaged answer')}, always the same {_octets(len(same))}: {_hex(same)}"
+        return garbage.tally.found(RULES["MB015"], name, words)
+    words = f"{times(garbage.tally.count)} something that is not this protocol came in answer"
+    if same is not None:
+        words += f", always the same {_octets(len(same))}: {_hex(same)}"
+    if factor is not None:
+        baud = seen.timing.line.baud
+        words += f"; its bits are {factor} times as long as those of this line: about {baud // factor} Bd, not {baud}"
+    return garbage.tally.found(RULES["MB014"], name, words)
+
+
+def _is_steady(values: Sequence[int]) -> bool:
+    """Whether most of them lie close together, as they do when two always begin a little apart."""
+    usual = middle(values) if values else 0
+    return 3 * sum(abs(value - usual) <= _EXCESS_SPREAD for value in values) >= 2 * len(values) > 0
+
+
+def _octets(count: int) -> str:
+    return counted(count, "octet")
+
+
+def _hex(octets: bytes) -> str:
+    return octets[:_HEX_SHOWN].hex(" ").upper() + (" …" if len(octets) > _HEX_SHOWN else "")
 
 
 def _exception(name: str, station: Station, key: Key, code: int, tally: Tally, maker: str) -> Finding:
@@ -135,7 +225,7 @@ def _times(name: str, station: Station, timeout: int | None, seen: Evidence, is_
         against = "500 ms" if timeout is None else f"70% of the master's timeout of {ms(timeout)}"
         words = f"{slow.count} of {counted(station.slow_of, 'answer')}{since} took longer than {against}"
         words += f", the longest at least {ms(times_.longest)}"
-        yield slow.found(RULES["MB101"], name, words)
+        yield slow.found(RULES["MB101"], name, words, note_if(timeout is None))
     quarters = times_.quarters()
     if quarters:
         first, last = quarters[0], quarters[-1]
@@ -149,7 +239,9 @@ def _times(name: str, station: Station, timeout: int | None, seen: Evidence, is_
     if station.late.count:
         words = f"{counted(station.late.count, 'answer')} came after the master had given up"
         waits = f"; it waits {ms(timeout)}" if timeout is not None else ""
-        yield station.late.found(RULES["MB103"], name, words + waits, note_if(station.late.count == 1))
+        yield station.late.found(
+            RULES["MB103"], name, words + waits, note_if(seen.rare(station.late.count, station.asked))
+        )
     if station.answered and station.repeats.count:
         share = station.repeats_cost / seen.span
         words = (
@@ -172,9 +264,9 @@ def _two_times(name: str, station: Station) -> Iterator[Finding]:
         f"{_range(slow)} ({times(len(slow))}), in turns"
     )
     agreeing = ["the slow ones never say what the quick ones say"] if groups.apart else []
-    if station.twice.count:
+    if station.twice.count > station.same_twice:
         agreeing.append(f"a second answer came to {counted(station.twice.count, 'request')}")
-    mixed = station.talked_over.count + station.garbled
+    mixed = station.talked_over.count
     if mixed >= 2:
         agreeing.append(f"{mixed} answers had other octets mixed in")
     tally = Tally()

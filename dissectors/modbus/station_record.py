@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from dissectors.findings import Tally
+from dissectors.frame import Flaw
+from dissectors.modbus.garbage import Garbage
 from dissectors.modbus.response_groups import Answered, SameRequest
 from dissectors.tracker import Interval
 
@@ -38,6 +40,7 @@ class ResponseTimes:
 
     count: int = 0
     longest: int = 0  # by the shortest reading, ns
+    quickest: int = 0  # by the shortest reading, ns
     blocks: list[Block] = field(default_factory=list)
     _size: int = 8
     _latest: list[Interval] = field(default_factory=list)
@@ -46,6 +49,7 @@ class ResponseTimes:
         """Take the next one."""
         self.count += 1
         self.longest = max(self.longest, latency.low)
+        self.quickest = min(self.quickest, latency.low) if self.count > 1 else latency.low
         self._latest.append(latency)
         if len(self._latest) < self._size:
             return
@@ -111,6 +115,15 @@ class Requested:
     missing: Tally = field(default_factory=Tally)
 
 
+@dataclass(frozen=True, slots=True)
+class Lost:
+    """A request that nothing answered, so far."""
+
+    unit: int
+    key: Key
+    no: int
+
+
 @dataclass(slots=True)
 class Station:
     """One station. `missing`: no octet followed. `silent`: those since its last sign of life."""
@@ -122,8 +135,14 @@ class Station:
     damaged: Tally = field(default_factory=Tally)
     cut: int = 0  # of the damaged answers: ended early
     last_octet: Tally = field(default_factory=Tally)  # only the last octet is wrong
-    talked_over: Tally = field(default_factory=Tally)  # too long, or framing errors inside
+    talked_over: Tally = field(default_factory=Tally)  # begun as an answer, and longer than it can be
+    excess: list[int] = field(default_factory=list)  # octets by which those were too long
     garbled: int = 0  # octets in place of an answer that are no frame at all
+    garbage: Garbage = field(default_factory=Garbage)  # what came in place of an answer, whole
+    flaws: dict[Flaw, Tally] = field(default_factory=dict)  # damaged answers that one change makes good
+    undecided: Tally = field(default_factory=Tally)  # a frame that is the answer or the request again
+    echoed: int = 0  # requests that were given back at once
+    same_twice: int = 0  # second answers that say the same as the first
     unfit: Tally = field(default_factory=Tally)
     unfit_words: Counter[str] = field(default_factory=Counter)
     slow: Tally = field(default_factory=Tally)
@@ -142,6 +161,19 @@ class Station:
     exceptions: dict[tuple[Key, int], Tally] = field(default_factory=dict)
     same: dict[tuple[Key, bytes], SameRequest] = field(default_factory=dict)  # by request, octet by octet
 
+    @property
+    def explained(self) -> int:
+        """How many damaged answers are no damage of the line: always the same, or always in the same way."""
+        flawed = sum(tally.count for tally in self.flaws.values() if tally.count >= 3)
+        garbage = self.garbage
+        foreign = garbage.always() is not None or garbage.slower_by() is not None
+        return flawed + (garbage.tally.count if foreign else 0)
+
+    @property
+    def turns(self) -> int:
+        """How often the request was asked for the first time that was asked most often."""
+        return max((request.turns for request in self.requests.values()), default=0)
+
     def request(self, key: Key) -> Requested:
         """The record of one kind of request; beyond KEYS_KEPT kinds, one for all others."""
         if key not in self.requests and len(self.requests) >= KEYS_KEPT:
@@ -158,6 +190,19 @@ class Station:
         """Keep an answer beside the others to exactly the same request; the first SAME_KEPT requests only."""
         if (key, request) in self.same or len(self.same) < SAME_KEPT:
             self.same.setdefault((key, request), SameRequest()).answers.append(answer)
+
+    def flaw(self, flaw: Flaw) -> Tally:
+        """The record of one way in which answers are damaged."""
+        return self.flaws.setdefault(flaw, Tally())
+
+    def forgive(self, lost: Lost) -> None:
+        """The request was answered, after its master had given up: it is not lost as well."""
+        request = self.requests.get(lost.key)
+        for tally in (self.missing, request.missing if request is not None else None):
+            if tally is not None and tally.count:
+                tally.count -= 1
+                if lost.no in tally.evidence:
+                    tally.evidence.remove(lost.no)
 
     def heard(self, time: int) -> None:
         """Something came from it."""

@@ -26,7 +26,7 @@ from dissectors.modbus.adu import readable_adu
 from dissectors.modbus.doubts import Doubts, is_full, of_chain, of_next, of_run
 from dissectors.modbus.exchange import Exchange, Garble, Seen, answer_apart, echo_of, is_begin_of
 from dissectors.modbus.functions import BROADCAST, FUNCTIONS
-from dissectors.modbus.learnt import Learnt
+from dissectors.modbus.learnt import READ, Learnt
 from dissectors.modbus.pairing import another_function, is_listen_only, is_restart, mismatch
 from dissectors.tracker import Placement, Tracked, Transaction, Verdict
 
@@ -66,6 +66,7 @@ class ModbusTracker:
         self._last: Exchange | None = None  # the exchange that closed last
         self._last_end: int | None = None  # of the newest frame
         self._last_was_answer = False
+        self._answered: deque[Exchange] = deque(maxlen=4)  # the exchanges that were answered last
         self._given_up: deque[Exchange] = deque(maxlen=8)
         self._echoing: bool | None = None  # whether this bus repeats requests at once; None while unlearnt
         self._mute: set[int] = set()  # units in listen-only mode
@@ -174,10 +175,14 @@ class ModbusTracker:
         if request is not None:
             if request.is_for(seen.octets):
                 why = mismatch(request.octets, seen.octets)
+                before = self._repeats(request, seen) if why and late is None else None
+                if before is not None:
+                    request.disturbed = True
+                    return self._answer_apart(seen, Verdict.ANSWERED_TWICE, before)
                 if late is None or not (why or self._is_too_soon(request, seen)):
                     return self._answer(request, seen, why)
             elif request.unit == seen.unit and late is None and not request.fault:
-                return self._answer(request, seen, another_function(request.octets, seen.octets))
+                return self._another_function(request, seen)
             elif request.fault and self._in_time(request, seen):
                 return self._answer(request, seen, None)
             elif late is None:
@@ -189,6 +194,24 @@ class ModbusTracker:
         if self._is_second_answer(seen):
             return self._answer_apart(seen, Verdict.ANSWERED_TWICE, self._last)
         return self._answer_apart(seen, Verdict.UNSOLICITED)
+
+    def _another_function(self, request: Exchange, seen: Seen) -> Placement:
+        """An answer of the station that was asked, to something else: to a request before, or to this one, wrong."""
+        before = self._repeats(request, seen)
+        if before is not None:
+            request.disturbed = True
+            return self._answer_apart(seen, Verdict.ANSWERED_TWICE, before)
+        if request.latency(seen.frame).high < self._silence:
+            return self._from_elsewhere(request, seen)
+        return self._answer(request, seen, another_function(request.octets, seen.octets))
+
+    def _repeats(self, request: Exchange, seen: Seen) -> Exchange | None:
+        """The request answered lately that an answer fits which comes sooner than the station has ever answered."""
+        fastest = self.learnt.fastest(request.unit)
+        if fastest is None or request.latency(seen.frame).high >= fastest:
+            return None
+        fitting = (before for before in reversed(self._answered) if before.is_for(seen.octets) and not before.fault)
+        return next((before for before in fitting if mismatch(before.octets, seen.octets) is None), None)
 
     # ---- what only time decides
 
@@ -206,7 +229,7 @@ class ModbusTracker:
                 return self._request(seen, sure=False)
             why = None if request.fault else mismatch(request.octets, seen.octets)
             # a station may answer with the value that it really took, or with a wrong length
-            near = self._knows(request) and request.octets[:4] == seen.octets[:4]
+            near = request.octets[:4] == seen.octets[:4] and self._is_prompt(request, seen)
             if (why is None or near or seen.header.role is Role.UNKNOWN) and self._in_time(request, seen):
                 return self._answer(request, seen, why)
             if self._is_doubtful(request, seen):
@@ -228,7 +251,7 @@ class ModbusTracker:
             return self._answer_apart(seen, Verdict.ANSWERED_TWICE, request)
         if newest.octets != request.octets:  # the newest was a request, and this answers it
             return self._request(seen, sure=False)
-        if self.learnt.in_time(request.unit, request.writes, pause) and not self.learnt.is_same(gap, pause):
+        if self.learnt.in_time(request.unit, request.pace, pause) and not self.learnt.is_same(gap, pause):
             return self._answer(request, seen, None)
         if self.learnt.is_same(gap, pause) and not is_full(request):
             return self._join(request, seen)
@@ -251,14 +274,14 @@ class ModbusTracker:
 
     def _damaged(self, seen: Seen) -> Placement:
         """A damaged frame: in answer to the open request, a damaged request, or neither."""
-        request, role = self._open, seen.header.role
+        request = self._open
         if request is not None and self._is_cut_echo(request, seen.frame.octets, seen.frame.start):
             return self._echo(seen, f"the echo ends after {len(seen.frame.octets)} octets")
         error = seen.header.error or "damaged"
         if request is None:
-            if role is Role.RESPONSE:
+            if seen.header.role is Role.RESPONSE:
                 return self._answer_apart(seen, Verdict.UNSOLICITED)
-        elif role is not Role.REQUEST and (request.is_for(seen.octets) or self._in_time(request, seen)):
+        elif self._is_damaged_answer(request, seen):
             if request.garble is None:
                 request.garble = Garble(seen.no, seen.frame.end, error)
             return Placement(seen.no, request.tx, Role.RESPONSE, source=request.unit)
@@ -274,16 +297,29 @@ class ModbusTracker:
             return
         if request.garble or noise.reason in _QUIET_NOISE or len(noise.octets) < _GARBLE:
             return
-        if self.learnt.in_time(request.unit, request.writes, request.gap(noise.start)):
+        if self.learnt.in_time(request.unit, request.pace, request.gap(noise.start)):
             request.garble = Garble(None, noise.end, f"{len(noise.octets)} octets came in answer, but no frame")
 
     # ---- judging
 
     def _in_time(self, request: Exchange, seen: Seen) -> bool:
-        return self.learnt.in_time(request.unit, request.writes, request.gap(seen.frame.start))
+        return self.learnt.in_time(request.unit, request.pace, request.gap(seen.frame.start))
 
     def _knows(self, request: Exchange) -> bool:
-        return self.learnt.response_limit(request.unit, request.writes) is not None
+        return self.learnt.response_limit(request.unit, request.pace) is not None
+
+    def _is_damaged_answer(self, request: Exchange, seen: Seen) -> bool:
+        """Whether a damaged frame came in answer. One that was cut may have the length of a request by chance: it is
+        an answer all the same when it comes as soon as that station's answers do, which no master does."""
+        if seen.header.role is Role.REQUEST:
+            return request.is_for(seen.octets) and self._is_prompt(request, seen)
+        return request.is_for(seen.octets) or self._in_time(request, seen)
+
+    def _is_prompt(self, request: Exchange, seen: Seen) -> bool:
+        """Whether it comes as soon as answers of that station are known to come, or sooner than any master goes on."""
+        limits = (self.learnt.response_limit(request.unit, pace) for pace in (request.pace, READ))
+        limit = max((limit for limit in limits if limit is not None), default=_AT_ONCE)
+        return request.gap(seen.frame.start) <= limit
 
     def _is_doubtful(self, request: Exchange, seen: Seen) -> bool:
         """Whether a frame that comes late, for all that is learnt, may be the answer of a slow station."""
@@ -294,7 +330,7 @@ class ModbusTracker:
         return request.octets == seen.octets or seen.header.function not in FUNCTIONS
 
     def _may_be_answered_by(self, before: Exchange, seen: Seen) -> bool:
-        """Whether an equal request that comes later than answers are known to come may be a slow answer all the same."""
+        """Whether an equal request that comes later than answers usually do may be a slow answer all the same."""
         if before.sure or not self._is_plain(before) or before.echoed:
             return False
         gap = before.gap(seen.frame.start)
@@ -324,7 +360,7 @@ class ModbusTracker:
         gap = newest.gap(seen.frame.start)
         if self.timeout is not None:
             return gap < self._echo_limit or gap * 8 < self.timeout
-        return gap < max(self._echo_limit, _AT_ONCE)
+        return gap < self._echo_limit or (gap < _AT_ONCE and newest.unit != BROADCAST)
 
     def _is_echo_of_write(self, request: Exchange, seen: Seen) -> bool:
         """Whether a copy that could be an answer comes too soon to be one."""
@@ -333,6 +369,8 @@ class ModbusTracker:
             return False
         if self._echoing is not None:
             return self._echoing
+        if not latency.nominal:
+            return False  # both came in one read, which says nothing of the time between
         if latency.high < self._silence:
             return True
         fastest = self.learnt.fastest(request.unit)
@@ -371,10 +409,10 @@ class ModbusTracker:
         if before is not None:
             undisturbed = not (before.disturbed or before.fault or before.garble or before.silent)
             if sure and before.sure and undisturbed:
-                self.learnt.unanswered(before.gap(seen.frame.start))
+                self.learnt.unanswered(before.gap(seen.frame.start), before.octets == seen.octets)
         elif last is not None:
             if last.copied is not None and last.octets != seen.octets:
-                self.learnt.answered(last.unit, last.writes, last.copied)
+                self.learnt.answered(last.unit, last.pace, last.copied)
             last.copied = None
             asks = sure or seen.unit != last.unit
             if asks and last.answered and self._last_was_answer and self._last_end is not None:
@@ -386,7 +424,7 @@ class ModbusTracker:
         if request.octets == seen.octets:
             request.copied = gap
         elif request.sure and seen.header.role is Role.RESPONSE and not (why or request.fault):
-            self.learnt.answered(request.unit, request.writes, gap)
+            self.learnt.answered(request.unit, request.pace, gap)
             if self._echoing is None or request.echoed:
                 self._echoing = request.echoed
 
@@ -406,6 +444,7 @@ class ModbusTracker:
     def _answer(self, request: Exchange, seen: Seen, why: str | None) -> Placement:
         self._learn_from_answer(request, seen, why)
         request.answered = True
+        self._answered.append(request)
         self._drop_chain(Verdict.NO_RESPONSE)
         self._open, self._last = None, request
         self._mute.discard(seen.octets[0])
@@ -503,7 +542,7 @@ class ModbusTracker:
         if verdict is Verdict.ANSWERED:
             answer = request.copies[0]
             request.answered = True
-            self.learnt.answered(request.unit, request.writes, request.gap(answer.frame.start))
+            self.learnt.answered(request.unit, request.pace, request.gap(answer.frame.start))
             self._closed.append(request.close_with(answer, None))
             return
         if verdict is Verdict.NO_RESPONSE:

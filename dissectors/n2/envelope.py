@@ -83,10 +83,10 @@ def repaired_command(octets: bytes) -> Repair | None:
 def _is_known(command: bytes) -> bool:
     """Whether a command is one of the known ones, as long as it should be."""
     expected = expected_length(command)
-    return expected == len(command) if expected is not None else parse_command(command).type.kind in _ANY_LENGTH
-
-
-_ANY_LENGTH = frozenset(("synchronise-time", "write-attribute"))
+    if expected is not None:
+        return expected == len(command)
+    told = parse_command(command)
+    return told.type.kind == "synchronise-time" or (told.type.kind == "write-attribute" and told.value is not None)
 
 
 def repaired_answer(octets: bytes, asked: Command | None) -> Repair | None:

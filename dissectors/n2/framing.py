@@ -17,8 +17,8 @@ from dissectors.frame import Check, Chunk, Damage, Event, Found, Frame, LineErro
 from dissectors.framer import OctetWindow, Taken
 from dissectors.line import Timing
 from dissectors.n2.commands import Command, expected_length, parse_command
-from dissectors.n2.envelope import COMMAND, CR, NOT_TEXT, judge
-from dissectors.n2.stretch import Before, Piece, Stretch
+from dissectors.n2.envelope import COMMAND, CR, NOT_TEXT, is_good, judge
+from dissectors.n2.stretch import SHORTEST, Before, Piece, Stretch, good_whole
 
 __all__ = ["MAX_LENGTH", "SILENCE", "N2Framer", "judge"]
 
@@ -145,6 +145,8 @@ class N2Framer:
 
     def _conclude(self, end: int, damage: Damage | None) -> None:
         """Give what was collected up to `end`."""
+        if damage is None and not self._seams and self._takes_at_once(end):
+            return
         done = 0
         stretch = self._stretch(end, damage)
         for piece in stretch.pieces():
@@ -159,6 +161,20 @@ class N2Framer:
             if self._start in self._seams:
                 self._before = Before.LINE_END
             self._seams = [seam for seam in self._seams if seam > self._start]
+
+    def _takes_at_once(self, end: int) -> bool:
+        """Take a stretch that is one good frame, or too short for any that nobody waits for: nearly all are."""
+        octets = bytes(self._window.octets[self._start : end])
+        if octets.rfind(b">") > 0:
+            return False
+        check = good_whole(octets, self._before, waits=self._waits, proved=self._proved) if len(octets) > 1 else None
+        if check is not None:
+            self._emit(octets, Piece(end, check), check, joined=False)
+            return True
+        if len(octets) == 1 or (len(octets) < SHORTEST and not self._waits):
+            self._pass_noise(octets)
+            return True
+        return False
 
     # --- noise ---
 
@@ -218,7 +234,8 @@ class N2Framer:
         if is_command:
             self._waits = True
             self._asked = parse_command(told) if piece.damage is None or piece.repair is not None else None
-        elif piece.damage is None:  # a damaged one may have been junk, and the answer come yet
+        elif piece.damage is None or (piece.repair is not None and is_good(told)):
+            # any other damaged one may have been junk, and the answer come yet
             self._waits, self._asked = False, None
         self._proved |= piece.damage is None and check is Check.GOOD
         self._foreign = False

@@ -31,26 +31,31 @@ RULES: dict[str, Rule] = {
             "slow station",
             "Time from the end of a command to the begin of its answer, over 250 ms even when all that the adapter may "
             "have added is taken off. 250 ms is the shortest message timeout of an NAE; the standard's own limit is "
-            "not public.",
+            "not public. Only a note where no answer of it came too late for the master, or where fewer than 1 in 100 "
+            "are slow: a busy computer explains those.",
             "a station busy with other work, or a gateway in between",
             "raise the master's message timeout, or relieve the station",
+            explains=("N2005", "N2011"),
         ),
         Rule(
             "N2004",
             Severity.WARNING,
             "damaged frames",
-            "Frames of or to a station whose checksum is wrong or whose form is spoilt. An answer carries no address: "
-            "it is counted at the station that was asked. A single one, or fewer than 1 in 100 and at most two a "
-            "minute, is only noted: Johnson Controls calls up to two a minute tolerable.",
-            "noise, wrong termination or bias, or two stations that talk at once",
+            "Frames whose checksum is wrong or whose form is spoilt, counted at who sent them: an answer carries no "
+            "address and is counted at the station that was asked. A sender is named that has over four times the "
+            "damage that noise at the rate of all others would have done while it sends; else it is the bus's. One "
+            "alone, or fewer than 1 in 100 and at most two a minute, is only noted: Johnson Controls calls up to two "
+            "a minute tolerable.",
+            "noise, wrong termination or bias, or two that talk at once",
             "if one station only: its stub, its connector; if all: termination, bias, ground",
         ),
         Rule(
             "N2005",
             Severity.WARNING,
             "no answer",
-            "Commands that no answer followed before the next command. An error where none of several got one; a "
-            "single one, or fewer than 1 in 100 and at most two a minute, is only noted.",
+            "Commands that no answer followed, not even a late one. An error where the master turned to a station "
+            "several times, or over 11 times at once, and got none. A single turn is only noted, or fewer than 1 in "
+            "100 and at most two a minute; and so are many addresses that are only asked who they are: a scan.",
             "station off, wrong address or wrong baud rate, or a broken wire",
             "check its supply, address and wiring; take it out of the master's list when it is gone",
         ),
@@ -67,20 +72,22 @@ RULES: dict[str, Rule] = {
             "N2007",
             Severity.ERROR,
             "two masters",
-            "Commands that break into another command, or follow an unanswered one sooner than 100 ms although it is "
-            "no repeat: no master gives up so soon. At least two such.",
+            "Commands that begin in the middle of another one, or follow one within 100 ms and sooner than the station "
+            "asked ever answered; answers in their usual time, within 100 ms, and yet after the next command. No "
+            "master does that. At least two such.",
             "two masters on one bus, or a commissioning tool beside the controller",
             "find the second master and take it off",
-            explains=("N2004", "N2005", "N2008", "N2010", "N2011", "LN1", "LN2"),
+            explains=("N2004", "N2005", "N2008", "N2010", "N2011", "N2013", "LN1", "LN2"),
         ),
         Rule(
             "N2008",
             Severity.ERROR,
             "answered twice",
-            "A second answer came to one command that was sent once.",
+            "A second, different good answer came to one command that was sent once. A single time it is only noted: a "
+            "command may not have been heard here.",
             "two stations have the same address",
             "switch the station off and see whether something still answers",
-            explains=("N2004", "N2011", "LN101", "LN103", "LN2"),
+            explains=("N2004", "N2011", "N2013", "LN101", "LN103", "LN2"),
         ),
         Rule(
             "N2009",
@@ -105,6 +112,30 @@ RULES: dict[str, Rule] = {
             "Answers without a command before them, or after the master had gone on.",
             "a master that is not heard at this place of the bus, or a station far slower than the master's timeout",
             "compare the answer times with the master's timeout; move the tap",
+            explains=("N2005", "N2003"),
+        ),
+        Rule(
+            "N2012",
+            Severity.ERROR,
+            "damaged always in the same way",
+            "At least three damaged frames of one sender, and 4 in 5 of all its damaged ones, are right but for one "
+            "and the same thing: the first or the last octet missing or spoilt, or the two checksum digits swapped. "
+            "What they were follows from the checksum and from what was asked, and is shown, marked as repaired. Where "
+            "all stations have it, one finding names the bus. A warning where fewer than half of its frames have it.",
+            "first octet: a driver or converter that is switched on too late; last octet: one that lets go too soon; "
+            "checksum: the program of the device",
+            "the direction control of that station and of the converter in between; the same with another adapter",
+            explains=("N2004", "N2005", "LN1", "LN2"),
+        ),
+        Rule(
+            "N2013",
+            Severity.WARNING,
+            "answer repeated",
+            "The same good answer came again to one command, later than an echo would. A single one, or fewer than 1 "
+            "in 100 and at most two a minute, is only noted. It proves no second station: the octets are the same.",
+            "a repeater or converter that gives back what it hears, a station that sends twice, or two stations with "
+            "one address that hold the same",
+            "switch the station off and see whether something still answers; then the repeater",
         ),
     )
 }

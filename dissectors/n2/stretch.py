@@ -39,6 +39,10 @@ from dissectors.n2.forms import fits, may_answer
 STRAY: Final = 3
 """Most octets of junk directly before an answer, as of a driver that is switched on too late."""
 
+SHORTEST: Final = 4
+"""Fewest octets of a damaged frame that nobody waits for."""
+
+_WITH_CHECK = 6  # octets of the shortest answer with a checksum
 _LEAST: Final = 4  # octets of text that may be a damaged frame without its first octet
 _STARTS = frozenset((ANSWER, REFUSAL))
 _AFTER_NOT_TEXT = re.compile(rb"(?<=[^\x20-\x7e])[AN]")
@@ -63,6 +67,17 @@ class Piece(NamedTuple):
     damage: Damage | None = None
     split: bool = False
     repair: Repair | None = None
+
+
+def good_whole(octets: bytes, before: Before, *, waits: bool, proved: bool) -> Check | None:
+    """The check of octets that are one good frame where they stand (rule 2); None where they are none."""
+    first = octets[0]
+    if first != COMMAND and (
+        first not in _STARTS or before is Before.TEXT or (before is Before.NOT_TEXT and not waits)
+    ):
+        return None
+    check, damage = judge(octets)
+    return check if damage is None and (check is Check.GOOD or proved) else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,21 +147,10 @@ class Stretch:
 
     def _whole(self) -> Piece | None:
         """The stretch as one good frame (rule 2)."""
-        octets = self.octets
-        if self.damage is not None or not self._may_begin():
+        if self.damage is not None:
             return None
-        check, damage = judge(octets)
-        if damage is not None or not (check is Check.GOOD or self.proved):
-            return None
-        return Piece(len(octets), check)
-
-    def _may_begin(self) -> bool:
-        """Whether a frame may begin with the first octet, where it stands."""
-        if self.octets[0] == COMMAND:
-            return True
-        if self.octets[0] not in _STARTS or self.before is Before.TEXT:
-            return False
-        return self.waits or self.before is not Before.NOT_TEXT
+        check = good_whole(self.octets, self.before, waits=self.waits, proved=self.proved)
+        return Piece(len(self.octets), check) if check is not None else None
 
     def _good_answer(self) -> int | None:
         """Where a good answer begins at the end of a bad stretch (rule 3)."""
@@ -192,11 +196,12 @@ class Stretch:
         for said in (before, before[:-1]):
             if said[:1] == b">" and is_good(said + b"\r"):
                 asked, waits, stray = parse_command(said + b"\r"), True, True
-        if has_check and self._is_cut_short(before):
+        if has_check and self._stands_behind_command(before):
             return False
         if not (has_check or self.proved):
             return None
-        if answer[0] == REFUSAL and not silence and before[:1] in (b">", b"A") and _HEX.issuperset(before[1:]):
+        begun = len(before) > 1 and before[:1] in (b">", b"A") and _HEX.issuperset(before[1:])
+        if answer[0] == REFUSAL and not silence and begun:
             return None  # one spoilt octet of what began there
         if silence and not waits:
             return False
@@ -206,10 +211,14 @@ class Stretch:
         free = stray or silence or (before != b"" and NOT_TEXT.match(before[-1:]) is not None)
         return told if free or (told and has_check) else None
 
-    def _is_cut_short(self, before: bytes) -> bool:
-        """Whether a command that ends before its length stands there, so that its answer follows at once."""
-        expected = expected_length(before) if before[:1] == b">" and self.proved else None
-        return expected is not None and len(before) < expected != len(self.octets)
+    def _stands_behind_command(self, before: bytes) -> bool:
+        """Whether a damaged command stands there, so that its answer may follow at once: one that ends before its
+        length, or has octets in it that are no text."""
+        if before[:1] != b">" or len(before) < _LEAST or not self.proved:
+            return False
+        expected = expected_length(before)
+        cut_short = expected is not None and len(before) < expected != len(self.octets)
+        return cut_short or NOT_TEXT.search(before) is not None
 
     # --- damaged ones ---
 
@@ -250,10 +259,16 @@ class Stretch:
             rest = octets[at:]
             if rest[0] in _STARTS:
                 return None
-            repair = repaired_answer(rest, self.asked) if answers else repaired_command(rest)
+            repair = repaired_answer(rest, self.asked) if answers else None
+            if repair is None or not self._is_asked(repair.octets):
+                repair = repaired_command(rest) or repair
             if repair is not None and len(rest) > 1:
                 return [*self._noise(at), Piece(size, Check.BAD, Damage.FORM, repair=repair)]
         return None
+
+    def _is_asked(self, answer: bytes) -> bool:
+        """Whether an answer has surely the form that is asked for."""
+        return self.asked is not None and fits(self.asked, answer) is True
 
     def _answer_from(self, at: int) -> Piece | None:
         """A damaged answer that begins with its own start character."""
@@ -262,7 +277,7 @@ class Stretch:
         if self.before is Before.NOTHING and at == 0 and not self.waits:
             return None
         if not self.waits:
-            if foreign or size < _LEAST:
+            if foreign or size < _WITH_CHECK:
                 return None
         elif size < _LEAST:
             more = octets[1:].removesuffix(b"\r")

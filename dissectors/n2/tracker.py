@@ -8,12 +8,12 @@
 3. A command closes the one before it: no response, or a damaged answer where one came, or octets that may be one.
 4. The same octets again, at once, are an echo; within GIVE_UP of the unanswered try, with no other command between,
    a retry.
-5. A second good answer without a command between: late where a command within GIVE_UP is owed one of that form (of
-   the two answers either may be the late one), else answered twice. Whether that means two stations is for the rules
-   to say: the same octets again may be a repeater's.
+5. A second good answer without a command between: late where a command a short while ago is owed one of that form (of
+   the two answers either may be the late one), or was damaged or had a damaged answer, else answered twice. Whether
+   that means two stations is for the rules to say: the same octets again may be a repeater's.
 6. How long a master waits is its own setting (NAE 250 ms to 3 s), so silence alone closes a command after GIVE_UP.
-7. A damaged command is for the station that it names where that one is known; and for the one known station whose
-   address makes its checksum right.
+7. A damaged command is for the station that it names where that one is known; else for the one known station whose
+   address makes its checksum right, and is most like what was sent.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ GIVE_UP = 3 * NS_PER_S
 
 _LONGEST = 256  # characters of an answer that may have begun in time and not be read yet
 _OWING = 16  # commands remembered that a late answer may still answer
-_FEW = 3  # answers of a station after which its shortest time says something
+_FEW = 16  # answers of a station after which its shortest time says something
 
 
 @dataclass(slots=True)
@@ -57,6 +57,11 @@ class _Exchange:
     bad: Transaction | None = None  # how it ends if the damaged answer that came was all
     answer: bytes = b""
     answer_end: int = 0
+
+    @property
+    def is_owed(self) -> bool:
+        """Whether it is known what was asked, and nothing came that may have been the answer."""
+        return not self.damaged and not self.spoilt and self.bad is None
 
     @property
     def first_try(self) -> int:
@@ -85,7 +90,7 @@ class N2Tracker:
         self._next = 1
         self._open: _Exchange | None = None
         self._missed: _Exchange | None = None  # the last command, closed without a good answer
-        self._owing: deque[_Exchange] = deque(maxlen=_OWING)  # commands without any answer, oldest first
+        self._owing: deque[_Exchange] = deque(maxlen=_OWING)  # commands without a good answer, oldest first
         self._done: _Exchange | None = None  # the last command, when it was closed by an answer
         self._times: dict[int, _Times] = {}  # by station that was named in a good command
 
@@ -149,16 +154,24 @@ class N2Tracker:
 
     def _station_of(self, octets: bytes, header: Header) -> int | None:
         """Whom a damaged command is for (rule 7)."""
-        if not self._times:
-            return header.destination
-        if len(octets) >= 7 and octets.endswith(b"\r"):
-            fitting = [known for known in self._times if is_good(b">%02X" % known + octets[3:])]
-            if len(fitting) == 1:
-                return fitting[0]
-        return header.destination if header.destination in self._times else None
+        named = header.destination
+        if not self._times or named in self._times:
+            return named
+        sent, best, station = octets[1:3], (False, 0), None
+        for known in self._times:
+            name = b"%02X" % known
+            alike = sum(one == other for one, other in zip(name, sent, strict=False))
+            mine = (octets.endswith(b"\r") and len(octets) >= 7 and is_good(b">" + name + octets[3:]), alike)
+            if mine == best:
+                station = None
+            elif mine > best:
+                best, station = mine, known
+        return station
 
     def _close_unanswered(self, exchange: _Exchange) -> Transaction:
         self._open, self._missed, self._done = None, exchange, None
+        if exchange.station != BROADCAST:
+            self._owing.append(exchange)
         if exchange.bad is not None:
             return exchange.bad
         if exchange.spoilt:
@@ -167,14 +180,15 @@ class N2Tracker:
             return _transaction(exchange, Verdict.DAMAGED_REQUEST)
         if exchange.station == BROADCAST:
             return _transaction(exchange, Verdict.BROADCAST)
-        self._owing.append(exchange)
         return _transaction(exchange, Verdict.NO_RESPONSE)
 
     def _hear_noise(self, event: Event) -> None:
         """A few stray octets are nobody's answer; more, or what ends like one, may be."""
+        octets = event.octets
+        if len(octets) > STRAY:
+            self._done = None  # it may have been a command
         if self._open is None or not isinstance(event, Noise) or event.reason is Reason.PAD:
             return
-        octets = event.octets
         self._open.spoilt |= len(octets) > STRAY or (len(octets) > 1 and octets.endswith(b"\r"))
 
     # --- answers ---
@@ -214,13 +228,13 @@ class N2Tracker:
         soon = times is not None and times.count >= _FEW and 2 * latest < times.least
         if not (formless or soon):
             return None
-        candidates = [e for e in self._within(frame.start) if e.octets != open_.octets or not formless]
+        candidates = [e for e in self._within(frame.start) if e.is_owed and (e.octets != open_.octets or not formless)]
         if self._missed is not None and self._missed not in candidates and self._missed.bad is None:
             candidates.append(self._missed)
         return _best_owed(candidates, frame)
 
     def _within(self, now: int) -> list[_Exchange]:
-        """Commands that had no answer and may still get one."""
+        """Commands that had no good answer and may still get one."""
         return [exchange for exchange in self._owing if now - exchange.end <= 2 * GIVE_UP]
 
     def _forget(self, exchange: _Exchange) -> None:
@@ -235,20 +249,27 @@ class N2Tracker:
             station = done.station if done is not None else missed.station if missed is not None else None
             return self._separate(no, frame, header, Verdict.UNSOLICITED, None, closed, station)
         if done is not None:
-            owed = [exchange for exchange in self._within(frame.start) if frame.start - exchange.end <= GIVE_UP]
+            owed = self._within(frame.start)
             same = [exchange for exchange in owed if exchange.station == done.station]
-            owing = _best_owed(same, frame) or _best_owed(owed, frame)
+            owing = _best_owed(same, frame) or _best_owed(owed, frame) or self._crossed(owed, done, frame)
+            owing = owing or next((exchange for exchange in owed if not exchange.is_owed), None)
             if owing is not None:
                 self._forget(owing)
                 return self._separate(no, frame, header, Verdict.LATE, owing, closed)
             if frame.octets == done.answer and frame.start - done.answer_end <= self._at_once:
                 return self._echo(no, frame, Role.RESPONSE, done, closed)
-            if frame.start - done.end <= GIVE_UP:
+            if frame.start - done.end <= GIVE_UP and may_answer(parse_command(done.octets), frame.octets):
                 return self._separate(no, frame, header, Verdict.ANSWERED_TWICE, done, closed)
         elif missed is not None and frame.start - missed.end <= 2 * GIVE_UP:
             self._forget(missed)
             return self._separate(no, frame, header, Verdict.LATE, missed, closed)
         return self._separate(no, frame, header, Verdict.UNSOLICITED, None, closed)
+
+    def _crossed(self, owed: list[_Exchange], done: _Exchange, frame: Frame) -> _Exchange | None:
+        """A command that the answer before this one rather answered, if this one may answer the last command."""
+        if not may_answer(parse_command(done.octets), frame.octets):
+            return None
+        return _best_owed(owed, replace(frame, octets=done.answer))
 
     def _separate(
         self,
@@ -306,8 +327,8 @@ class N2Tracker:
 
 
 def _best_owed(exchanges: list[_Exchange], frame: Frame) -> _Exchange | None:
-    """The command that an answer belongs to: the oldest whose form it surely has, else the oldest that it may answer."""
-    able = [e for e in exchanges if not e.damaged and may_answer(parse_command(e.octets), frame.octets)]
+    """The command that an answer belongs to: the oldest whose form it surely has, else the oldest it may answer."""
+    able = [e for e in exchanges if e.is_owed and may_answer(parse_command(e.octets), frame.octets)]
     sure = [e for e in able if fits(parse_command(e.octets), frame.octets)]
     return next(iter(sure or able), None)
 

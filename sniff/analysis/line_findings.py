@@ -4,13 +4,18 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 from dissectors.findings import Finding, Severity, Tally, counted, found, times
-from dissectors.frame import Damage, Event, Frame, LineError, Mark, Noise, Place, Reason, Role
+from dissectors.frame import Chunk, Damage, Event, Frame, LineError, Noise, Place, Reason, Role
 from dissectors.line import NS_PER_S
 from dissectors.tracker import Transaction, Verdict
 from sniff.analysis.line_rules import LINE_RULES as RULES
+from sniff.analysis.line_use import LineUse
+from sniff.analysis.other_settings import SAMPLE_OCTETS, Fit, what_fits
+from sniff.analysis.sender_findings import BUS, WRONG, Senders
+from sniff.analysis.slower_bus import slower_by
+from sniff.analysis.time_patterns import TimePatterns
 from sniff.analysis.wording import milliseconds, station_word
 from sniff.engine import Row
 from sniff.session import LineEvent, LineEventKind, Session
@@ -19,18 +24,10 @@ STRAY_MOST = 3
 """So many octets that are no frame are stray ones; more are the remains of something."""
 
 RUBBISH_LEAST = 60  # octets before "hardly anything is a frame" is said
-_WRONG = LineError.PARITY | LineError.FRAMING
+MOST_RESTS = 16
+"""Stretches that are no frame and are asked what they may be."""
 
-
-@dataclass(slots=True)
-class _Sender:
-    """Frames of one sender, and what went wrong with them."""
-
-    frames: int = 0
-    wrong: Tally = field(default_factory=Tally)
-    at: Counter[str] = field(default_factory=Counter)  # place of the wrong octets in the frame
-    stray: dict[str, Tally] = field(default_factory=dict)  # by rule
-    values: Counter[tuple[str, int]] = field(default_factory=Counter)  # of those octets, by rule
+RUBBISH_TOLD = 40  # the same where it is known what they are
 
 
 class LineFindings:
@@ -38,11 +35,13 @@ class LineFindings:
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        self._packets = "whole" in session.adapter.detail  # an error flag is somewhere among the octets marked
+        self._patterns = TimePatterns(session)
+        self._use = LineUse(session.line)
+        self._senders = Senders(session.timing, "whole" in session.adapter.detail)
         self._octets = self._in_frames = self._marked = self._rows = self._frames = self._good = 0
         self._first = self._now = 0
-        self._senders: dict[str, _Sender] = {}
-        self._breaks, self._overruns, self._lost = Tally(), Tally(), Tally()
+        self._damaged = self._damaged_here = 0  # rows that are no good frame, and those of them with an overrun
+        self._overruns, self._lost = Tally(), Tally()
         self._unplugged, self._stepped, self._rest = Tally(), Tally(), Tally()
         self._counted: dict[str, Tally] = {}
         self._unplugged_at: int | None = None
@@ -50,9 +49,12 @@ class LineFindings:
         self._lost_octets = self._rest_octets = self._only_heard = 0
         self._echo, self._asked = Tally(), 0
         self._values: Counter[int] = Counter()
-        self._before: str | None = None  # who sent the frame before
         self._awaiting = False  # a request was the newest frame of a known kind
         self._pending: list[tuple[int, Noise]] = []  # noise directly before the frame to come
+        self._sample: list[Chunk] = []  # what came first, to ask what else it may be
+        self._sampled = 0
+        self._rests: list[bytes] = []  # the first stretches that are no frame
+        self._fit: tuple[int, Fit | None] = (0, None)  # asked when so many octets were sampled
 
     # ---- taking in
 
@@ -66,12 +68,21 @@ class LineFindings:
         self._octets += len(event.octets)
         if len(event.octets) <= 4096:
             self._values.update(event.octets)
+        if self._sampled < SAMPLE_OCTETS:
+            self._sample.append(Chunk(event.end, event.octets[:SAMPLE_OCTETS], event.marks))
+            self._sampled += len(event.octets)
         if event.marks:
             self._see_marks(row.no, event)
+        if not isinstance(event, Frame) or not event.ok:
+            self._damaged += 1
+            self._damaged_here += any(mark.error & LineError.OVERRUN for mark in event.marks)
         if isinstance(event, Frame):
-            self._see_frame(row, event)
+            sender = self._see_frame(row, event)
         else:
+            sender = BUS
             self._see_noise(row.no, event)
+        self._patterns.see(row.no, event, sender)
+        self._use.see(row.no, event, row.placement.role if row.placement is not None else Role.UNKNOWN)
 
     def pass_by(self, row: Row) -> None:
         """Take a row of a search for settings: the bus was not silent, and that is all it says."""
@@ -79,6 +90,7 @@ class LineFindings:
 
     def settle(self, transaction: Transaction) -> None:
         """Take a transaction that closed."""
+        self._patterns.settle(transaction)
         if transaction.verdict is Verdict.ECHO:
             self._echo.add(transaction.start, transaction.request)
         elif transaction.request is not None:
@@ -86,6 +98,7 @@ class LineFindings:
 
     def add_line_event(self, event: LineEvent) -> None:
         """Take something that happened to the line."""
+        self._patterns.add_line_event(event)
         kind = event.kind
         if kind is LineEventKind.DROPPED:
             self._lost.add(event.time)
@@ -104,34 +117,30 @@ class LineFindings:
             tally.count += max(0, event.count - 1)
 
     def _see_marks(self, no: int, event: Event) -> None:
+        breaks = sum(bool(mark.error & LineError.BREAK) for mark in event.marks)
+        for _ in range(min(breaks, 1) if self._senders.packets else breaks):
+            self._senders.see_break(no, event.start, isinstance(event, Frame))
         for mark in event.marks:
-            if mark.error & LineError.BREAK:
-                self._breaks.add(event.start, no)
             if mark.error & LineError.OVERRUN:
                 self._overruns.add(event.start, no)
-            self._marked += bool(mark.error & _WRONG)
+            self._marked += bool(mark.error & WRONG)
 
-    def _see_frame(self, row: Row, frame: Frame) -> None:
+    def _see_frame(self, row: Row, frame: Frame) -> str:
+        """Gives the sender."""
         sender = _sender(row)
         role = row.placement.role if row.placement is not None else Role.UNKNOWN
         if role is Role.RESPONSE and not frame.ok and not self._awaiting:
             sender = "bus"  # nobody was asked: it may be anything
         self._awaiting = role is Role.REQUEST or (self._awaiting and role is not Role.RESPONSE)
-        record = self._senders.setdefault(sender, _Sender()) if len(self._senders) < 600 else _Sender()
-        record.frames += 1
         self._frames += 1
         if frame.ok:
             self._good += 1
             self._in_frames += len(frame.octets)
+        self._senders.see(sender, row.no, frame)
         for no, noise in self._pending:
-            _stray(record, "LN201", no, noise)
+            self._senders.stray(sender, "LN201", no, noise)
         self._pending.clear()
-        wrong = [mark for mark in frame.marks if mark.error & _WRONG]
-        if wrong and not (self._packets and frame.ok):
-            record.wrong.add(frame.start, row.no)
-            if not self._packets:
-                record.at.update(_place(frame, mark) for mark in wrong)
-        self._before = sender
+        return sender
 
     def _see_noise(self, no: int, noise: Noise) -> None:
         if noise.reason in (Reason.BREAK, Reason.PAD) or any(m.error & LineError.BREAK for m in noise.marks):
@@ -141,13 +150,15 @@ class LineFindings:
         if len(noise.octets) > STRAY_MOST:
             self._rest.add(noise.start, no)
             self._rest_octets += len(noise.octets)
+            if len(self._rests) < MOST_RESTS and len(noise.octets) <= 300:
+                self._rests.append(noise.octets)
         elif noise.place is Place.BEFORE:
             self._pending.append((no, noise))
             del self._pending[:-8]
-        elif noise.place is Place.AFTER and self._before is not None:
-            _stray(self._senders.setdefault(self._before, _Sender()), "LN202", no, noise)
+        elif noise.place is Place.AFTER and self._senders.before is not None:
+            self._senders.stray(self._senders.before, "LN202", no, noise)
         else:
-            _stray(self._senders.setdefault("bus", _Sender()), "LN203", no, noise)
+            self._senders.stray(BUS, "LN203", no, noise)
 
     # ---- judging
 
@@ -155,7 +166,9 @@ class LineFindings:
     def rubbish(self) -> bool:
         """Whether hardly anything is a frame, so that nothing else can be judged."""
         few = 10 * self._in_frames < 3 * self._octets and 10 * self._good < 3 * self._rows
-        return self._octets >= RUBBISH_LEAST and few
+        if not few or self._octets < RUBBISH_TOLD:
+            return False
+        return self._octets >= RUBBISH_LEAST or self._other_settings() is not None
 
     def findings(self) -> tuple[Finding, ...]:
         """All findings so far."""
@@ -164,12 +177,14 @@ class LineFindings:
             return (*made, self._whole("LN002", "bus", "not one octet was heard"))
         if self.rubbish:
             return (*made, self._rubbish())
-        many = 2 if self._packets else 10  # where one flag marks a whole packet, few errors mark many octets
+        many = 2 if self._senders.packets else 10  # where one flag marks a whole packet, few errors mark many octets
         if many * self._marked > self._octets and 10 * self._in_frames >= 8 * self._octets:
             made.append(self._parity_setting())
         else:
             made += self._wrong_octets()
         made += self._of_bus()
+        made += self._patterns.findings()
+        made += self._use.findings()
         return tuple(made)
 
     def _can_tell(self) -> Finding:
@@ -201,16 +216,22 @@ class LineFindings:
             yield self._stepped.found(RULES["LN007"], "adapter", f"the clock stepped {times(self._stepped.count)}")
         if self._overruns.count:
             words = f"overrun reported {times(self._overruns.count)}"
-            yield self._overruns.found(RULES["LN104"], "adapter", words)
+            mostly = 4 * self._damaged_here >= 3 * self._damaged
+            words += f", in {self._damaged_here} of {self._damaged} that are no good frames" if self._damaged else ""
+            yield self._overruns.found(RULES["LN104"], "adapter", words, None if mostly else Severity.NOTE)
 
     def _rubbish(self) -> Finding:
         share = self._in_frames / self._octets
         how_many = "not one" if not self._in_frames else "hardly one" if share < 0.005 else f"only {share:.0%}"
         words = f"{how_many} of {self._octets} octets is part of a good frame"
+        fit = self._other_settings()
+        if fit is not None:
+            finding = self._whole("LN003", "bus", f"{words}; {fit.seen}")
+            return replace(finding, means=fit.means, next=fit.next)
         extremes = sum(self._values[value] for value in (0x00, 0x80, 0xC0, 0xE0, 0xF0, 0xF8, 0xFC, 0xFE, 0xFF))
         total = max(1, sum(self._values.values()))
         reports = self._session.adapter.reports
-        if self._marked * 10 > self._octets or self._breaks.count * 10 > self._octets:
+        if self._marked * 10 > self._octets or self._senders.breaks.count * 10 > self._octets:
             words += f"; {self._marked / self._octets:.0%} of all octets have parity or framing errors"
             words += ": the baud rate or the format is wrong, or A and B are swapped"
         elif 2 * extremes > total:
@@ -218,6 +239,15 @@ class LineFindings:
         elif reports and not self._marked:
             words += "; none has a line error, so the line is well and the protocol may be another one"
         return self._whole("LN003", "bus", words)
+
+    def _other_settings(self) -> Fit | None:
+        """What these octets are; asked again when there are twice as many."""
+        asked, fit = self._fit
+        if self._sampled >= 2 * asked or (asked < self._sampled >= SAMPLE_OCTETS):
+            session = self._session
+            fit = what_fits(self._sample, session.line, session.adapter.latency, session.protocol)
+            self._fit = self._sampled, fit
+        return fit
 
     def _parity_setting(self) -> Finding:
         words = (
@@ -227,81 +257,42 @@ class LineFindings:
         return replace(self._whole("LN004", "bus", words), count=self._marked)
 
     def _wrong_octets(self) -> Iterator[Finding]:
-        struck = {name: record for name, record in sorted(self._senders.items()) if record.wrong.count}
-        whole = {name for name, record in self._senders.items() if record.frames >= 20}
-        if len(whole) >= 3 and all(
-            name in struck and self._note_if(struck[name].wrong.count, struck[name].frames) is None for name in whole
-        ):
-            yield self._wrong_everywhere(struck)
-            struck = {}
-        for name, record in struck.items():
-            kinds = "line errors somewhere in" if self._packets else "parity or framing errors in"
-            words = f"{kinds} {record.wrong.count} of {counted(record.frames, 'frame')}"
-            if record.at:
-                words += f" ({', '.join(f'{count} {place}' for place, count in record.at.most_common())})"
-            finding = record.wrong.found(RULES["LN101"], name, words, self._note_if(record.wrong.count, record.frames))
-            if 4 * record.at["at the last octet"] >= 3 * sum(record.at.values()) > 8:
-                finding = replace(
-                    finding,
-                    means="the station releases its driver before the last octet is out",
-                    next="its turnaround or transmit-delay setting; its converter's direction control",
-                )
-            yield finding
+        yield from self._senders.wrong_octets(self._note_if)
         for kind, tally in sorted(self._counted.items()):
             words = counted(tally.count, f"{kind or 'line'} error") + " counted by the driver"
             yield tally.found(RULES["LN102"], "bus", words)
 
-    def _wrong_everywhere(self, struck: dict[str, _Sender]) -> Finding:
-        """One finding in place of one for each sender."""
-        tally = Tally()
-        for record in struck.values():
-            for no in record.wrong.evidence:
-                tally.add(record.wrong.first, no)
-        count = sum(record.wrong.count for record in struck.values())
-        each = ", ".join(f"{name} {record.wrong.count}" for name, record in struck.items())
-        words = f"parity or framing errors in {count} of {self._frames} frames, whoever sends ({each})"
-        finding = tally.found(RULES["LN101"], "bus", words)
-        return replace(
-            finding,
-            count=count,
-            last=max(record.wrong.last for record in struck.values()),
-            means="a cause common to all: termination, bias, ground, cable, or noise at the tap",
-            next="120 Ω at both ends only, one bias, the shield grounded once; the tap's own wires",
-        )
-
     def _of_bus(self) -> Iterator[Finding]:
-        if self._breaks.count:
-            words = f"the line was held low {times(self._breaks.count)}"
-            yield self._breaks.found(RULES["LN103"], "bus", words, self._note_if(self._breaks.count, self._frames))
-        for name, record in sorted(self._senders.items()):
-            for code, tally in sorted(record.stray.items()):
-                frames = self._frames if name == "bus" else record.frames
-                yield self._stray_finding(RULES[code].code, name, record, tally, frames)
+        yield from self._senders.breaks_found(self._note_if)
+        yield from self._senders.strays_found(self._note_if)
         if self._rest.count:
             share = self._rest_octets / self._octets
             stretches = counted(self._rest.count, "stretch", "stretches")
             words = f"{self._rest_octets} octets in {stretches} are no frame, {share:.1%} of all"
             severity = None if share >= 0.02 and self._rest.count > 1 else Severity.NOTE
-            yield self._rest.found(RULES["LN204"], "bus", words, severity)
+            yield self._of_rests(self._rest.found(RULES["LN204"], "bus", words, severity))
         if self._echo.count:
             words = f"{self._echo.count} of {counted(self._asked, 'request')} came twice, the copy directly behind"
             severity = Severity.WARNING if 10 * self._echo.count >= self._asked else None
             yield self._echo.found(RULES["LN205"], "bus", words, severity)
 
-    def _stray_finding(self, code: str, name: str, record: _Sender, tally: Tally, frames: int) -> Finding:
-        where = {"LN201": "before", "LN202": "after"}.get(code)
-        if where is None:
-            words = f"stray octets {times(tally.count)} in the silence between {counted(frames, 'frame')}"
-        elif tally.count > frames:
-            words = f"stray octets {times(tally.count)} {where} {counted(frames, 'frame')}"
-        else:
-            words = f"stray octets {where} {tally.count} of {counted(frames, 'frame')}"
-        values = [(value, count) for (rule, value), count in record.values.most_common() if rule == code]
-        most = values[:4]
-        if 2 * sum(count for _, count in most) > sum(count for _, count in values):
-            mostly = "" if len(values) == len(most) else "mostly "
-            words += f" ({mostly}{', '.join(f'{value:02X}' for value, _ in most)})"
-        return tally.found(RULES[code], name, words, self._note_if(tally.count, frames))
+    def _of_rests(self, finding: Finding) -> Finding:
+        """With what the stretches that are no frame have in common."""
+        rests, line = self._rests, self._session.line
+        same, often = Counter(rests).most_common(1)[0] if rests else (b"", 0)
+        if often >= 3 and 2 * often >= len(rests):
+            words = f"{finding.seen}; the same {len(same)} octets {often} times ({same[:8].hex(' ').upper()}"
+            finding = replace(finding, seen=words + (" …)" if len(same) > 8 else ")"))
+        factor = slower_by(rests, line)
+        if not factor:
+            return finding
+        rate = f"{factor} times slower, at about {line.baud // factor} Bd" if factor < 12 else "over 10 times slower"
+        return replace(
+            finding,
+            seen=f"{finding.seen}; every level in them lasts a multiple of {factor} bits: they were sent {rate}",
+            means="a device that speaks with another baud rate, by its own protocol or by a wrong setting",
+            next="which station answers so: its baud rate and protocol; two stations with one address look otherwise",
+        )
 
     def _whole(self, code: str, subject: str, words: str) -> Finding:
         return found(RULES[code], subject, words, first=self._first, last=self._now)
@@ -322,14 +313,3 @@ def _sender(row: Row) -> str:
         return f"{station_word(header.protocol) if header is not None else 'station'} {source}"
     role = placement.role if placement is not None else header.role if header is not None else Role.UNKNOWN
     return "master" if role in (Role.REQUEST, Role.BROADCAST) else "bus"
-
-
-def _place(frame: Frame, mark: Mark) -> str:
-    if mark.offset >= len(frame.octets) - 1:
-        return "at the last octet"
-    return "at the first octet" if mark.offset == 0 else "inside"
-
-
-def _stray(record: _Sender, code: str, no: int, noise: Noise) -> None:
-    record.stray.setdefault(code, Tally()).add(noise.start, no)
-    record.values.update((code, octet) for octet in noise.octets)

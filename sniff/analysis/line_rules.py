@@ -1,6 +1,7 @@
 """The rules of the line itself, whatever protocol runs on it: what each measures, what it means, what to check next.
 
-LN0xx what this capture can tell, LN1xx octets that arrive wrong, LN2xx octets that nobody should have sent.
+LN0xx what this capture can tell, LN1xx octets that arrive wrong, LN2xx octets that nobody should have sent, LN3xx
+patterns in time, LN4xx who uses the line.
 Where noise lies tells its cause; the table behind it was collected from reports of users and is worded as
 "consistent with", never as proof.
 """
@@ -10,6 +11,9 @@ from __future__ import annotations
 from dissectors.findings import Rule, Severity
 
 _WIRING = "termination at both ends and nowhere else, one fail-safe bias, A and B, ground"
+
+_DAMAGE = ("LN1", "LN2", "MB002", "MB005", "MB006", "MB007", "MB009", "MB104", "MB401", "N2004", "N2010", "MS4")
+"""What damage to frames is told by, in every protocol."""
 
 _ALL = (
     Rule(
@@ -34,7 +38,10 @@ _ALL = (
         Severity.ERROR,
         "hardly anything is a frame",
         "Under 3 in 10 octets, and under 3 in 10 of all frames and other stretches, are good frames; of at least 60 "
-        "octets. All other rules are left out then: they would judge rubbish.",
+        "octets, or 40 where it is known what they are. All other rules are left out then: they would judge rubbish. "
+        "What fits is named: another protocol whose checks agree, seven bits read as eight, data bits that the port "
+        "lacks, inverted octets, a bus that is slower (every level lasts a multiple of so many bits) or faster (the "
+        "same few octets again and again, too few for a frame).",
         "wrong baud rate, wrong parity, wrong protocol, or A and B swapped",
         "the settings of the line (-s) and the protocol (-p); then A and B",
     ),
@@ -76,8 +83,11 @@ _ALL = (
         Severity.WARNING,
         "parity or framing errors",
         "Octets of frames that the adapter marked, counted at the station that sent the frame (a master's frames at "
-        "the master). A single one, or fewer than 1 frame in 100 and at most two a minute, is only noted. Where one "
-        "flag covers a whole packet, only damaged frames count. Where all are struck, one finding names the bus.",
+        "the master). A single one, or fewer than 1 frame in 100 and at most two a minute, is only noted. A sender is "
+        "named that is struck clearly more often than the octets that it sends explain (2.5 times the rate of the "
+        "other stations, by chance less than once in a thousand); else one finding names the bus. Where one flag "
+        "covers a whole packet, damaged frames count, and packets with a flag: a station is named that is in nearly "
+        "all of them while the others are mostly in packets without one.",
         "noise while this station sends, weak levels from it, or two that send at once",
         "this station's connector, stub and ground; " + _WIRING,
     ),
@@ -93,7 +103,8 @@ _ALL = (
         "LN103",
         Severity.WARNING,
         "breaks",
-        "The line was held low for longer than a character. A single one is only noted.",
+        "The line was held low for longer than a character. A single one is only noted. Where 8 in 10 of them are in "
+        "or directly after the frames of one station, far more than its share, that station is named.",
         "no fail-safe bias while nobody drives the line, A and B swapped at one device, or a short circuit",
         "bias resistors at one place of the line; A and B of devices added last",
     ),
@@ -101,18 +112,23 @@ _ALL = (
         "LN104",
         Severity.WARNING,
         "octets lost in the adapter",
-        "The adapter reported overruns: octets came faster than they were fetched from it.",
+        "The adapter reported overruns: octets came faster than they were fetched from it. A note where most of what "
+        "is damaged is so without an overrun.",
         "an adapter or computer that is too slow for this baud rate; the bus itself may be in order",
         "another adapter; fewer programs on the computer; a UART with a FIFO",
+        explains=(*_DAMAGE, "MB003", "N2005"),
     ),
     Rule(
         "LN201",
         Severity.WARNING,
         "stray octets before frames",
         "One to three octets that are no frame directly before a frame, counted at the station that sent the frame. A "
-        "single one, or fewer than 1 frame in 100 and at most two a minute, is only noted.",
+        "single one, or fewer than 1 frame in 100 and at most two a minute, is only noted. A sender is named that has "
+        "clearly more of them than its share of the frames; what falls before everybody's frames is the bus's, told "
+        "once, and what falls anywhere is LN203.",
         "the driver is switched on too late or the line floats until then; weak bias",
         "the turnaround of that station; bias; its converter's direction control",
+        explains=("LN204",),
     ),
     Rule(
         "LN202",
@@ -122,22 +138,24 @@ _ALL = (
         "limits as in LN201.",
         "the driver lets go too late or the line falls when it does; weak bias",
         "bias; the turnaround of that station; its converter's direction control",
+        explains=("LN204",),
     ),
     Rule(
         "LN203",
         Severity.WARNING,
         "stray octets in silence",
-        "One to three octets that are no frame, with silence on both sides. A single one, or fewer than 1 to 100 "
-        "frames and at most two a minute, is only noted.",
+        "One to three octets that are no frame, with silence on both sides, or anywhere, whoever sends before or "
+        "after. A single one, or fewer than 1 to 100 frames and at most two a minute, is only noted.",
         "the line floats when nobody drives it: no or weak fail-safe bias; or noise coupled in",
         "bias at one place of the line; the cable's way along power lines and motors",
+        explains=("LN204",),
     ),
     Rule(
         "LN204",
         Severity.WARNING,
         "octets that are no frame",
         "Stretches of four octets or more that are no frame, 1 in 50 octets or more of all. A smaller share is only "
-        "noted.",
+        "noted. Said is where they are always the same, and where they were sent with a slower baud rate.",
         "damaged frames beyond recognition, another protocol on the same line, or a device with another baud rate",
         "what the stretches have in common: their place, time and first octets",
     ),
@@ -148,6 +166,78 @@ _ALL = (
         "An exact copy of a request directly behind it. A warning from 1 in 10 requests on.",
         "a repeater or converter that gives back what it hears, or an adapter that hears itself",
         "the echo setting of the master's adapter or of the converter; it halves the time left on the bus",
+    ),
+    Rule(
+        "LN301",
+        Severity.WARNING,
+        "disturbances in step with the mains",
+        "Marked octets, stray octets and short damaged frames that follow one another at whole waves or half waves of "
+        "50 or 60 Hz: at least 15 within 2 s of each other, seven tenths locked to it, by chance less than once in a "
+        "million, while the undisturbed frames are not in step with it, whoever sends, and at many intervals. "
+        "Times must be known to a sixth of a wave.",
+        "hum: a mains cable beside the bus, a missing or twofold ground, a dimmer, a drive or a supply that couples in",
+        "the cable's way beside mains cables; the shield, grounded at one end; the ground between far stations; "
+        "supplies and drives, one switched off after the other",
+        explains=_DAMAGE,
+    ),
+    Rule(
+        "LN302",
+        Severity.WARNING,
+        "disturbances at a steady interval",
+        "At least six bursts of damage or noise with 8% between their intervals, a second or more apart, that strike "
+        "several senders, with good frames between: no single station's rhythm, and none at "
+        "which anything is sent on this bus.",
+        "something that switches at that interval: a contactor, a pump, a heater, a compressor, a thermostat",
+        "what in the plant switches at that interval, and its cable beside the bus; a suppressor at its coil",
+        explains=_DAMAGE,
+    ),
+    Rule(
+        "LN303",
+        Severity.WARNING,
+        "unreadable for a while",
+        "At least 40 octets without one good frame, while there are good frames before or after, and the octets are no "
+        "noise: other settings fit them, or a third of them have line errors.",
+        "for a while somebody spoke with another baud rate, format or protocol: a device that searches for the rate, a "
+        "service tool, a gateway that starts",
+        "what was switched on or configured at that time",
+        explains=_DAMAGE,
+    ),
+    Rule(
+        "LN304",
+        Severity.WARNING,
+        "silent for a while",
+        "Not one octet for 5 s or more and 30 times as long as all but 2 in 100 pauses, in the middle of traffic that "
+        "goes on as before; not where such pauses are regular, and not where octets were lost or the adapter was away.",
+        "the master stopped: a restart, a busy controller, a changeover, a program that was loaded",
+        "the master's log and watchdog at that time",
+    ),
+    Rule(
+        "LN305",
+        Severity.ERROR,
+        "several stations lost at one moment",
+        "Two stations or more that had answered, and then left three requests in a row without answer, all from the "
+        "same moment on as far as their polls tell. A warning where they came back.",
+        "something they share: a supply, a fuse, a stretch of cable, a repeater",
+        "what these stations have in common: supply, cabinet, the piece of cable behind the last one that answers",
+        explains=("MB001", "MB002", "MB003", "MB104", "MB105", "N2005", "N2010"),
+    ),
+    Rule(
+        "LN401",
+        Severity.NOTE,
+        "bus near its limit",
+        "Octets on the line in over 80% of 10 s; a warning over 92% of 30 s. The gaps that a protocol needs between "
+        "its frames come on top of that.",
+        "more is asked than the line can carry, or it waits for nobody: a lost frame costs the next ones their turn",
+        "poll less often, read whole blocks, a higher baud rate, or another line for some of the stations",
+    ),
+    Rule(
+        "LN402",
+        Severity.NOTE,
+        "many broadcasts",
+        "At least 30 broadcasts that make up 1 in 5 of all octets; a warning from 2 in 5 on. Every station must listen "
+        "to each of them.",
+        "a device or a tool that looks for others again and again, or a gateway that lets all broadcasts through",
+        "who sends them (`show` with their frames) and why; what the gateway lets through",
     ),
 )
 

@@ -14,7 +14,7 @@ from sniff.engine import Row
 
 @dataclass(slots=True)
 class Node:
-    """One station. Times are ns; `damaged` counts frames to or from it that were not good.
+    """One station. Times are ns; `damaged` counts frames from it that were not good, and those to it of unknown sender.
 
     `verdicts`: of requests and data to it. Tokens and polls for masters are `passed` to it instead; a token that it did
     not use is `unused`, and no request without answer.
@@ -24,7 +24,7 @@ class Node:
     sent: int = 0  # frames from it
     received: int = 0  # frames to it
     damaged: int = 0
-    heard: int = 0  # good frames from it: a damaged frame may name a station that there is not
+    heard: int = 0  # good frames from it, or put right: a damaged frame may name a station that there is not
     first: int | None = None
     last: int | None = None
     verdicts: Counter[Verdict] = field(default_factory=Counter)
@@ -41,13 +41,14 @@ class Node:
 
     @property
     def asked(self) -> int:
-        """Transactions that expected an answer from it."""
-        return sum(self.verdicts[verdict] for verdict in EXPECTING)
+        """Requests that expected an answer from it; an answer that came late has its request among them."""
+        late = min(self.verdicts[Verdict.LATE], self.verdicts[Verdict.NO_RESPONSE])
+        return sum(self.verdicts[verdict] for verdict in EXPECTING) - late
 
     @property
     def unanswered(self) -> int:
-        """Those of them that got none in time."""
-        return self.verdicts[Verdict.NO_RESPONSE]
+        """Those of them that got none, not even late."""
+        return max(0, self.verdicts[Verdict.NO_RESPONSE] - self.verdicts[Verdict.LATE])
 
     def merge(self, other: Node) -> Node:
         """Both together, as a new value."""
@@ -99,8 +100,8 @@ class NodeTable:
             node = self._node(address)
             node.sent += sends
             node.received += not sends
-            node.damaged += not row.event.ok
-            node.heard += sends and row.event.ok
+            node.damaged += not row.event.ok and (sends or source is None)
+            node.heard += sends and (row.event.ok or row.event.repair is not None)
             node.first = row.event.start if node.first is None else node.first
             node.last = row.event.end
 

@@ -151,11 +151,12 @@ class _Walk:
         name = field_name(description.name)
         packets = [item for item in (value if isinstance(value, list) else [value]) if hasattr(item, "fields_desc")]
         if packets:
+            aside = self.lost or first == last  # what is not in the octets of this frame has no place there
             children: list[Field] = []
             for packet in packets:
                 size = len(bytes(packet))
                 inner = tuple(_layers(packet, self.octets, first, first + size, self.depth + 1))
-                children.extend(_without_spans(inner) if self.lost else inner)
+                children.extend(_without_spans(inner) if aside else inner)
                 first += size
             return Field(name, "", span[0], span[1], tuple(children))
         if isinstance(value, list) and hasattr(description, "field"):
@@ -184,7 +185,7 @@ def _whole(built: Any) -> bytes:
 
 
 def _text(description: Any, layer: Any, value: Any) -> str:
-    if isinstance(value, bytes):
+    if isinstance(value, bytes) and type(description).i2repr.__module__.startswith("scapy."):
         return octets_text(value)
     try:
         shown = plain(description.i2repr(layer, value))

@@ -240,6 +240,9 @@ class CaptureLoop:
         self.outlet.flush()
         busy = now < self._busy_until or self.outlet.size
         self._beat_at = now + (BEAT if busy else IDLE_BEAT)
+        for recorder in self.recorders:
+            if recorder.due is not None:
+                self._beat_at = min(self._beat_at, max(now, recorder.due))
         if self.end_at is not None:
             self._beat_at = min(self._beat_at, self.end_at)
             if now >= self.end_at:

@@ -1,21 +1,23 @@
 """The command line: one command, one file a subcommand. Only the chosen subcommand is imported.
 
-Exit codes: 0 fine · 1 findings at or above --fail-on · 2 usage · 3 unreadable input · 4 port trouble · 130 interrupted.
+Exit codes: 0 fine · 1 findings at or above --fail-on · 2 usage · 3 unreadable input, or output that was not written ·
+4 port trouble · 70 a defect of this program · 130 interrupted.
 """
 
 from __future__ import annotations
 
 import argparse
-import codecs
-import io
-import json
+import contextlib
 import os
 import sys
+import traceback
 from importlib import import_module
 from types import ModuleType
+from typing import cast
 
 from dissectors import registry
 from sniff import __version__
+from sniff.cli import standard_streams
 from sniff.formats import CaptureError
 
 COMMANDS: dict[str, str] = {
@@ -50,7 +52,8 @@ COMMANDS: dict[str, str] = {
 DESCRIPTION = """Passive RS-485 fieldbus sniffer and protocol analyzer. It listens; it never writes to a port."""
 
 EPILOG = """Start with `sniff485 demo`, then `sniff485 ports` and `sniff485 live PORT -s 19200,8E1 -p PROTOCOL`.
-Exit codes: 0 fine, 1 findings, 2 usage, 3 unreadable input, 4 port trouble, 130 interrupted."""
+Exit codes: 0 fine, 1 findings, 2 usage, 3 unreadable input or output not written, 4 port trouble, 70 internal error,
+130 interrupted."""
 
 
 class Failure(Exception):
@@ -61,40 +64,81 @@ class Failure(Exception):
         self.code = code
 
 
-ESCAPE = "sniff485.escape"
+USAGE, UNREADABLE, PORT_TROUBLE, INTERNAL, INTERRUPTED = 2, 3, 4, 70, 130
 
-USAGE, UNREADABLE, PORT_TROUBLE, INTERRUPTED = 2, 3, 4, 130
+TRACEBACK = "--traceback"
+"""For developers, anywhere on the command line: where an internal error came from."""
+
+_OURS = ("sniff", "dissectors")
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Run one command; give its exit code."""
-    arguments = sys.argv[1:] if argv is None else argv
-    _print_anything()
+    """Run one command; give its exit code. No exception leaves here but argparse's SystemExit."""
+    arguments = sys.argv[1:] if argv is None else list(argv)
+    traced = TRACEBACK in arguments
+    arguments = [word for word in arguments if word != TRACEBACK]
+    standard_streams.prepare()
     try:
-        return _run(arguments)
-    except Failure as failure:
-        print(f"sniff485: {_plain(failure)}", file=sys.stderr)
-        return failure.code
-    except CaptureError as error:  # a file that turned out to be damaged while it was read
+        code = _run(arguments)
         sys.stdout.flush()
-        print(f"sniff485: {_plain(error)}", file=sys.stderr)
-        return UNREADABLE
-    except registry.UnknownProtocol as error:  # of a capture, or a plug-in that is broken
-        print(f"sniff485: {_plain(error)}", file=sys.stderr)
-        return USAGE
+        return code
+    except SystemExit:  # argparse, after --help, --version or a line of its own
+        broken = standard_streams.output_error()
+        if broken is None:
+            raise
+        return _failed(broken, traced)
     except KeyboardInterrupt:
         return INTERRUPTED
     except BrokenPipeError:  # the reader of our output went away (`| head`)
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        standard_streams.give_output_up()
         return 0
+    except Exception as error:
+        return _failed(error, traced)
+
+
+def _failed(error: Exception, traced: bool) -> int:
+    """What ended a command, as one line; the exit code."""
+    from sniff.formats.files import explain
+
+    broken = standard_streams.output_error()
+    if isinstance(
+        error, Failure | CaptureError | registry.UnknownProtocol
+    ):  # a damaged file is found out while it is read
+        standard_streams.say(_plain(error))
+        return getattr(error, "code", USAGE if isinstance(error, registry.UnknownProtocol) else UNREADABLE)
+    if broken is not None or (isinstance(error, OSError) and error.filename is not None):
+        cause = broken or cast("OSError", error)
+        where = "standard output" if cause.filename is None else os.fsdecode(cause.filename)
+        standard_streams.say(_plain(explain(where, cause)))
+        return UNREADABLE
+    if isinstance(error, MemoryError):
+        standard_streams.say("not enough memory for that")
+        return UNREADABLE
+    if traced:
+        with contextlib.suppress(OSError, ValueError):
+            traceback.print_exception(error)
+    what = f"{type(error).__name__}: {error}"
+    standard_streams.say(
+        f"internal error: {_plain(what)} ({_place(error)}); please report it, with what {TRACEBACK} says"
+    )
+    return INTERNAL
+
+
+def _place(error: Exception) -> str:
+    """Where it happened: file and line of the innermost frame of our own."""
+    frames = traceback.extract_tb(error.__traceback__)
+    ours = [frame for frame in frames if any(f"{os.sep}{name}{os.sep}" in frame.filename for name in _OURS)]
+    frame = (ours or frames)[-1]
+    return f"{os.path.basename(os.path.dirname(frame.filename))}/{os.path.basename(frame.filename)}:{frame.lineno}"
 
 
 def _run(arguments: list[str]) -> int:
     name = next((word for word in arguments if not word.startswith("-")), None)
+    asked = name is None and {"-h", "--help"} & {*arguments}  # all protocols are imported only then
     parser = argparse.ArgumentParser(
         prog="sniff485",
         description=DESCRIPTION,
-        epilog=EPILOG if name is not None else f"{_protocols()}\n\n{EPILOG}",
+        epilog=f"{_protocols()}\n\n{EPILOG}" if asked else EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"sniff485 {__version__}")
@@ -140,22 +184,7 @@ def _no_such_command(word: str) -> str:
     return f"{word!r}: no such command; `sniff485 --help` lists them"
 
 
-def _print_anything() -> None:
-    """Where the output's encoding has no such character (Windows writes files as cp1252), print its escape."""
-    codecs.register_error(ESCAPE, _escape)
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors=ESCAPE)
-
-
-def _escape(error: UnicodeError) -> tuple[str, int]:
-    """\\u2190 and such, as JSON has it, so that JSON stays JSON."""
-    if not isinstance(error, UnicodeEncodeError):
-        raise error
-    return json.dumps(error.object[error.start : error.end])[1:-1], error.end
-
-
-def _plain(error: Exception) -> str:
+def _plain(error: Exception | str) -> str:
     """A message may quote a hostile file."""
     from sniff.analysis.plain import plain
 

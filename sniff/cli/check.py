@@ -27,6 +27,9 @@ if TYPE_CHECKING:
     from sniff.live import LiveBus
 
 DEFAULT_DURATION = 30.0
+_EARLIEST, _LATEST = -(1 << 63), (1 << 63) - 1
+"""Times that fit into 64 bits; a damaged file may have others."""
+
 SEVERITIES = tuple(severity.label for severity in Severity)
 
 
@@ -73,7 +76,8 @@ def _check(args: argparse.Namespace) -> list[Checked]:
     if not ports:
         return [_read(name, capture, args) for name, capture in arguments.open_captures(args.sources)]
     source = ports[0]
-    if not source.startswith(("/dev/", "COM", "\\\\")) and "://" not in source and ("." in source or "/" in source):
+    named = source.startswith(("/dev/", "COM", "\\\\")) or "://" in source or Path(source).is_char_device()
+    if not named and ("." in source or "/" in source):
         raise Failure(f"{source}: no such file", UNREADABLE)
     if len(args.sources) > 1:
         raise Failure(f"{source}: a port is checked alone; files end in {', '.join(READERS)}", USAGE)
@@ -81,7 +85,8 @@ def _check(args: argparse.Namespace) -> list[Checked]:
 
 
 def _is_file(source: str) -> bool:
-    return source == "-" or source.lower().endswith(tuple(READERS)) or Path(source).is_file()
+    path = Path(source)
+    return source == "-" or source.lower().endswith(tuple(READERS)) or path.is_file() or path.is_fifo()
 
 
 def _read(source: str, capture: Capture, args: argparse.Namespace) -> Checked:
@@ -159,7 +164,7 @@ class Checking:
         if isinstance(item, Output):
             self.judging.add(item)
             self.summary.add(item)
-            self._starts.extend(row.event.start for row in item.rows)
+            self._starts.extend(min(max(row.event.start, _EARLIEST), _LATEST) for row in item.rows)
         elif isinstance(item, LineEvent):
             self.judging.add_line_event(item)
             self.summary.add_line_event(item)

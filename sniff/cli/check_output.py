@@ -16,6 +16,7 @@ from dissectors.findings import Finding, Rule, Severity, merged, times, under_ca
 from dissectors.line import NS_PER_S
 from sniff.analysis.health import Health
 from sniff.analysis.judging import rules_over
+from sniff.analysis.plain import plain
 from sniff.analysis.wording import station_word
 from sniff.cli.rows import iso
 from sniff.reading import dissector_for
@@ -86,7 +87,8 @@ def write_text(checked: Sequence[Checked], colour: bool) -> None:
 
 def _write_head(one: Checked, width: int) -> None:
     session = one.session
-    print(f"{one.source}: {session.protocol_words}, {session.line_words}, {_span(one.seconds)}, {one.frames} frames")
+    heard = f"{_span(one.seconds)}, {one.frames} frames"
+    print(f"{plain(one.source)}: {session.protocol_words}, {session.line_words}, {heard}")
     if one.note:
         print(f"  incomplete: {one.note}")
     if one.frames:

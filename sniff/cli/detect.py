@@ -7,6 +7,7 @@ from __future__ import annotations
 import argparse
 
 from sniff.analysis.detecting import Ending, Outcome, Reading, sureness
+from sniff.analysis.plain import plain
 from sniff.cli import PORT_TROUBLE, arguments, json_output, listening
 from sniff.cli.searching import TIMEOUT, search, sentence
 from sniff.config import AUTO
@@ -47,7 +48,7 @@ def run(args: argparse.Namespace) -> int:
 
 def write(port: str, outcome: Outcome) -> None:
     """Print for people."""
-    print(f"{port}: {sentence(outcome)}")
+    print(f"{plain(port)}: {sentence(outcome)}")
     reading = outcome.reading
     if reading is None:
         return

@@ -305,7 +305,8 @@ def lost_something(live: LiveBus) -> bool:
     status, ended = live.status, live.ended
     if not live.link.paths:
         return False
-    killed = ended is not None and not ended.clean and status.unwritten > 0
+    late = status.closing or status.behind  # else it lacks the last second, as a killed process may
+    killed = ended is not None and not ended.clean and late and status.unwritten > 0
     return bool(status.error or status.lost or killed or (ended is not None and ended.lossy) or not_there(live))
 
 
@@ -322,10 +323,10 @@ def _gone_for_good(live: LiveBus) -> bool:
 
 @contextlib.contextmanager
 def _stopped_by_its_reader(live: LiveBus) -> Iterator[None]:
-    """End the capture when whoever reads our output goes away (`| head`): a recording would go on for ever."""
+    """End the capture when nobody takes our output any more (`| head`, a full disk): it would go on for ever."""
     try:
         yield
-    except BrokenPipeError:
+    except OSError:
         live.stop()
         raise
 
@@ -335,7 +336,7 @@ def say_not_found(live: LiveBus, how: str) -> None:
     if live.search is None:
         return
     said = searching.sentence(live.search.outcome(), "a longer capture may find them")
-    print(f"sniff485: {live.session.port}: {how} while searching, no settings found: {said}", file=sys.stderr)
+    print(f"sniff485: {plain(live.session.port)}: {how} while searching, no settings found: {said}", file=sys.stderr)
     if live.status.path:
         print("sniff485: the recording has every octet; read it with -s and -p once they are known", file=sys.stderr)
 

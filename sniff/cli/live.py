@@ -39,7 +39,7 @@ def run(args: argparse.Namespace) -> int:
         target.source, RecordSpec(path) if path else None, args.duration, target.devices, target.search
     )
     if path and not args.port:
-        print(f"sniff485: recording to {path}", file=sys.stderr)
+        print(f"sniff485: recording to {plain(path)}", file=sys.stderr)
     return show(live, args.json, args.lines)
 
 

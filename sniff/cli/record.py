@@ -39,8 +39,12 @@ def run(args: argparse.Namespace) -> int:
         raise Failure("--keep: of which rotation? say when a new file begins with --rotate size:64MB or time:1h", USAGE)
     record = RecordSpec(path, args.rotate, args.keep)
     live = listening.start(target.source, record, args.duration, target.devices, target.search, args.count)
-    printer = listening.Printer(live, quiet=True)
-    code = listening.run(printer, not args.quiet)
+    try:
+        printer = listening.Printer(live, quiet=True)
+        code = listening.run(printer, not args.quiet)
+    except KeyboardInterrupt:  # before anybody listened to signals: the capture must not go on
+        live.stop()
+        raise
     if not args.quiet:
         listening.say_end(printer)
     return code

@@ -11,6 +11,7 @@ import os
 import sys
 from pathlib import Path
 
+from sniff.analysis.plain import plain
 from sniff.cli import UNREADABLE, USAGE, Failure, arguments, json_output
 from sniff.formats import READERS, Capture
 from sniff.reporting.collecting import collect
@@ -55,7 +56,7 @@ def run(args: argparse.Namespace) -> int:
         Path(place).write_text(text, "utf-8", "backslashreplace")  # names need not be text
     except OSError as error:
         raise Failure(f"{place}: cannot be written: {error.strerror}", UNREADABLE) from None
-    print(f"sniff485: report in {place}", file=sys.stderr)
+    print(f"sniff485: report in {plain(place)}", file=sys.stderr)
     return 0
 
 

@@ -67,9 +67,9 @@ def write(
         raise Failure(str(error), UNREADABLE) from None
     finally:
         progress.end()
-    print(f"{target}: {octets} octets in {chunks} reads", file=sys.stderr)
+    print(f"{plain(target)}: {octets} octets in {chunks} reads", file=sys.stderr)
     for loss in getattr(writer, "losses", ()):
-        print(f"sniff485: {target}: {loss}", file=sys.stderr)
+        print(f"sniff485: {plain(target)}: {plain(loss)}", file=sys.stderr)
     return octets
 
 
@@ -85,7 +85,7 @@ def say_incomplete(path: str, capture: Capture) -> None:
     complete = capture.completeness()
     if not complete.whole:
         sys.stdout.flush()
-        print(f"sniff485: {path}: {plain(complete.text)}", file=sys.stderr)
+        print(f"sniff485: {plain(path)}: {plain(complete.text)}", file=sys.stderr)
 
 
 class _Frames:

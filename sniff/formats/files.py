@@ -6,10 +6,14 @@ import contextlib
 import errno
 import os
 import stat
+from io import BufferedReader, FileIO
 from pathlib import Path
-from typing import BinaryIO
+from typing import TYPE_CHECKING, BinaryIO
 
 from sniff.formats import CaptureError
+
+if TYPE_CHECKING:
+    from _typeshed import WriteableBuffer as Buffer
 
 WAYS_OUT = {
     FileNotFoundError: "no such file",
@@ -34,11 +38,44 @@ def explain(path: str | Path, error: OSError) -> CaptureError:
 
 
 def open_capture(path: Path) -> BinaryIO:
-    """Open a file for reading. Raises CaptureError."""
+    """Open a file for reading, as far as it goes now: what somebody appends meanwhile comes at the next opening.
+
+    What is no file is not opened: a pipe would be waited for, a port would move its control lines, and a device may
+    have no end. Raises CaptureError.
+    """
     try:
-        return open(path, "rb")
+        mode = os.stat(path).st_mode
+        if not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):
+            raise CaptureError(f"{path}: {_what(mode)}")
+        return BufferedReader(_AsOfNow(path))
     except OSError as error:
         raise explain(path, error) from None
+    except ValueError:  # a name with NUL in it
+        raise CaptureError(f"{str(path)!r}: no file can have that name") from None
+
+
+def _what(mode: int) -> str:
+    if stat.S_ISFIFO(mode):
+        return "not a regular file but a pipe; read it as standard input: `- < PIPE`"
+    if stat.S_ISCHR(mode):
+        return "not a regular file but a device; a serial port is listened to with `sniff485 live` or `record`"
+    return "not a regular file; copy it to one first"
+
+
+class _AsOfNow(FileIO):
+    """A file that ends where it ended when it was opened."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path, "rb")
+        self._end = os.fstat(self.fileno()).st_size
+
+    def readinto(self, buffer: Buffer) -> int:
+        view = memoryview(buffer).cast("B")
+        left = max(0, self._end - self.tell())
+        return super().readinto(view[:left]) or 0
+
+    def readall(self) -> bytes:
+        return super().read(max(0, self._end - self.tell())) or b""
 
 
 class NewFile:

@@ -50,7 +50,7 @@ def read() -> Capture:
         path = path.rename(f"{path}{suffix}")
         capture = text.read(path, "-") if suffix == TEXT else formats.read(path)
     except OSError as error:
-        raise explain("-", error) from None
+        raise explain(error.filename or "-", error) from None
     except CaptureError as error:
         raise CaptureError(str(error).replace(str(path), "-")) from None
     if capture.session.port == path.name:  # of a format that does not say it

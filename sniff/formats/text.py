@@ -41,10 +41,11 @@ from dissectors.frame import Chunk
 from dissectors.line import LineSettings
 from sniff.formats import CaptureError
 from sniff.formats.files import NewFile, explain, open_capture
-from sniff.formats.text_line import DEVICE, EPOCH, HEADER, MAGIC, MARKS, VERSION, Line, is_device
+from sniff.formats.text_line import DEVICE, EPOCH, HEADER, LATEST, MAGIC, MARKS, VERSION, Line, is_device
 from sniff.session import DEVICES_NOTE, Completeness, Item, LineEvent, Session, settings_change
 
 MOST_DEVICES = 256
+MOST_COUNT = 10**19 - 1
 LONGEST_LINE = 4 << 20  # octets; a chunk of a megabyte fits
 
 _DEVICES = f"note_{DEVICES_NOTE}"
@@ -169,26 +170,31 @@ class TextWriter:
 
     def __init__(self, file: NewFile, session: Session) -> None:
         self._file = file
-        self._last = session.started
+        self._last = readable_time(session.started)
         self._not_kept = 0
+        self._moved = 0
         self.losses: list[str] = []
         self._put(header_lines(session))
 
     def write(self, item: Item) -> None:
         """Add a chunk or line event. An empty chunk says nothing and is not written. Raises CaptureError."""
+        self._moved += readable_time(item.time) != item.time
         if isinstance(item, LineEvent):
             self._put([event_line(item, self._last)])
         elif item.octets:
             lines = list(chunk_lines(item, self._last))
             self._not_kept += len(lines) - 1
             self._put(lines)
-            self._last = item.time
+            self._last = readable_time(item.time)
 
     def close(self) -> None:
         """Finish the file and give it its name. Raises CaptureError."""
         if self._not_kept:
             self.losses.append(f"line errors that stand at no octet of their read became comments: {self._not_kept}")
             self._not_kept = 0
+        if self._moved:
+            self.losses.append(f"times beyond 1677 … 2262 became the last there is: {self._moved}")
+            self._moved = 0
         self._file.close()
 
     def _put(self, lines: Iterable[str]) -> None:
@@ -206,14 +212,14 @@ class TextWriter:
 
 def render(session: Session, items: Iterable[Item]) -> str:
     """A whole text capture as a string."""
-    last = session.started
+    last = readable_time(session.started)
     parts: list[Iterable[str]] = [header_lines(session)]
     for item in items:
         if isinstance(item, LineEvent):
             parts.append([event_line(item, last)])
         elif item.octets:
             parts.append(chunk_lines(item, last))
-            last = item.time
+            last = readable_time(item.time)
     return "".join(f"{line}\n" for line in chain.from_iterable(parts))
 
 
@@ -225,9 +231,9 @@ def header_lines(session: Session) -> Iterator[str]:
     for key, name in HEADER.items():
         value = record.get(name, "")
         if key == "start":
-            value = iso(session.started)
+            value = iso(readable_time(session.started))
         elif key == "latency":
-            value = milliseconds(session.adapter.latency)
+            value = milliseconds(min(session.adapter.latency, LATEST))
         if key in _ALWAYS or record.get(name) != default.get(name):
             yield f"# {key}: {_quoted(value)}"
     devices = session.notes.get(DEVICES_NOTE, "").split(",")
@@ -250,17 +256,23 @@ def chunk_lines(chunk: Chunk, last: int) -> Iterator[str]:
             pairs[mark.offset] += letters
         else:
             yield f"# not kept: {mark.error!r} at offset {mark.offset}"
-    yield f"{_delay(chunk.time - last):<9} {' '.join(pairs)}"
+    yield f"{_delay(readable_time(chunk.time) - last):<9} {' '.join(pairs)}"
 
 
 def event_line(event: LineEvent, last: int) -> str:
     """One line for an event of the line; `last`: time of the chunk before, ns."""
-    count = f" count={event.count}" if event.count else ""
+    number = min(max(event.count, -MOST_COUNT), MOST_COUNT)
+    count = f" count={number}" if number else ""
     text = event.text
     shown = ""
     if text:
         shown = f" {json.dumps(text)}" if text.startswith("count=") else f" {_quoted(text)}"
-    return f"#! {_delay(event.time - last)} {event.kind.value}{count}{shown}"
+    return f"#! {_delay(readable_time(event.time) - last)} {event.kind.value}{count}{shown}"
+
+
+def readable_time(time: int) -> int:
+    """The nearest time (ns) that a text capture can say."""
+    return min(max(time, -LATEST), LATEST)
 
 
 def milliseconds(time: int) -> str:

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
 MOST_CHUNKS = 256
-MOST_TIME = 500_000_000  # ns
+MOST_TIME = 900_000_000  # ns
 MOST_OCTETS = 1 << 20
 MOST_CHUNK = 16 << 20  # octets
 LONGEST = 65535  # octets of one entry

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -23,11 +24,14 @@ from sniff.recording.batch import Message
 from sniff.recording.part import PartFile
 from sniff.recording.rotation import NewestParts, Rotation, part_name, parts
 from sniff.recording.syncing import Syncer
-from sniff.recording.topics import RAW
+from sniff.recording.topics import LINE, RAW
 from sniff.session import Session
 
 MOST_WAITING = 32 << 20
 """Octets kept in memory for a disk that is slow or full: 45 min at 115200 Bd."""
+
+RELEASE_AFTER = 30.0
+"""Seconds that results of the engine are kept back, so that many are packed together."""
 
 MOVED, REMOVED = "moved away", "removed"
 """What somebody can do to a file that is being written."""
@@ -103,6 +107,7 @@ class Keeper:
         self._first = 0  # of the part
         self._part_octets = 0  # of the bus, in the part
         self._began: int | None = None  # time of the part's first batch
+        self._released = time.monotonic()
         self._syncer = Syncer()
         try:
             self._open()
@@ -168,8 +173,9 @@ class Keeper:
         self.taken += batch.weight
         if batch.messages[-1].topic == RAW and self._part_is_full(batch):
             self._try("rotate", self._rotate)  # the old part goes on when it fails; the next batch tries again
+        add = self._part.add if batch.messages[-1].topic in (RAW, LINE) else self._part.hold
         for message in batch.messages:
-            self._part.add(message, batch.schema, batch.metadata)
+            add(message, batch.schema, batch.metadata)
         self._octets += batch.octets
         self._part_octets += batch.octets
         self._unwritten += batch.octets
@@ -184,6 +190,10 @@ class Keeper:
         return self._rotation.due(self._part.size, age, self._next - self._first)
 
     def _flush(self, number: int) -> None:
+        now = time.monotonic()
+        if self._part.holds_enough or now - self._released >= RELEASE_AFTER:
+            self._released = now
+            self._part.release()
         self._part.flush()
         self._written()
         self.flushed = number

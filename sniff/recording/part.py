@@ -1,5 +1,8 @@
 """One MCAP file being written: session first, messages in compressed chunks, cut off whenever it is flushed.
 
+Octets of the bus must be in the file within a second, in small chunks; results of the engine need not, and are kept
+back until there are enough for a chunk of their own: JSON of half a minute packs many times smaller than by the second.
+
 What the file does not take (disk full) waits in memory, so that the file stays whole up to where it ends and goes on
 without a seam when there is room again.
 """
@@ -7,11 +10,13 @@ without a seam when there is room again.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import BinaryIO
 
 from sniff import __version__
 from sniff.recording import frames
 from sniff.recording.batch import Message
+from sniff.recording.chunk_indices import ChunkIndices
 from sniff.recording.topics import (
     FIXED_CHANNELS,
     PART_RECORD,
@@ -25,6 +30,9 @@ from sniff.recording.topics import (
 from sniff.session import Session
 
 CHUNK_SIZE = 1 << 20
+
+HELD_SIZE = 1 << 17
+"""Octets of results that are kept back at most."""
 
 _WRITTEN_AT_ONCE = 1 << 18
 _KNOWN = {**SCHEMAS, frames.SCHEMA.name: frames.SCHEMA}
@@ -48,6 +56,15 @@ class _Pending:
         pass
 
 
+@dataclass(frozen=True, slots=True)
+class _Held:
+    """A message with what its channel needs when it is new."""
+
+    message: Message
+    schema: str
+    metadata: Mapping[str, str] | None
+
+
 class PartFile:
     """A part. `before`: what the parts before it held, as words → numbers, for its metadata."""
 
@@ -57,6 +74,9 @@ class PartFile:
         self.stream = stream
         self._pending = _Pending()
         self._writer = Writer(self._pending, chunk_size=CHUNK_SIZE, enable_data_crcs=True)  # type: ignore[arg-type]
+        self._writer._Writer__chunk_indices = ChunkIndices()  # type: ignore[attr-defined]
+        self._held: list[_Held] = []
+        self._held_size = 0
         self._channels: dict[str, int] = {}
         self._schemas: dict[str, int] = {}
         self._writer.start(PROFILE, f"sniff485 {__version__}")
@@ -83,9 +103,32 @@ class PartFile:
 
     def add(self, message: Message, schema: str = "", metadata: Mapping[str, str] | None = None) -> None:
         """Add a message; `schema` and `metadata` are for a topic that is new. Writes nothing out."""
+        self._add(_Held(message, schema, metadata))
+
+    def hold(self, message: Message, schema: str = "", metadata: Mapping[str, str] | None = None) -> None:
+        """Add a message that may be kept back; arguments as for `add`."""
+        self._held.append(_Held(message, schema, metadata))
+        self._held_size += len(message.data)
+
+    @property
+    def holds_enough(self) -> bool:
+        """Whether it is time for `release`."""
+        return self._held_size >= HELD_SIZE
+
+    def release(self) -> None:
+        """Put what was kept back into a chunk of its own. Writes nothing out."""
+        held, self._held, self._held_size = self._held, [], 0
+        if held:
+            self._writer.flush()  # type: ignore[no-untyped-call]
+            for one in held:
+                self._add(one)
+            self._writer.flush()  # type: ignore[no-untyped-call]
+
+    def _add(self, one: _Held) -> None:
+        message = one.message
         channel = self._channels.get(message.topic)
         if channel is None:
-            channel = self._register(message.topic, schema, dict(metadata or {}))
+            channel = self._register(message.topic, one.schema, dict(one.metadata or {}))
         self._writer.add_message(
             channel, message.log_time, message.data, message.publish_time, sequence=message.sequence
         )
@@ -97,6 +140,7 @@ class PartFile:
 
     def finish(self) -> None:
         """Write summary and footer. Raises OSError. The stream stays open."""
+        self.release()
         self._writer.finish()  # type: ignore[no-untyped-call]
         self._drain()
         self.stream.flush()

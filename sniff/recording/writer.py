@@ -33,8 +33,8 @@ from sniff.session import (
     settings_change,
 )
 
-FLUSH_AFTER = 700_000_000
-"""ns that something may wait before it is written: with a tick each 0.25 s, all is in the file within 1 s."""
+FLUSH_AFTER = 900_000_000
+"""ns that something may wait before it is written: with a tick when it is `due`, all is in the file within 1 s."""
 
 SYNC_AFTER = 8_000_000_000
 """ns between syncs: all is on the disk within 10 s, unless it takes more than 2 s for a sync."""
@@ -213,6 +213,8 @@ class Recorder:
         """Say what time it is on the capture's clock, at least every 0.25 s: closes, flushes and syncs what is due."""
         self._ticked = now_ns
         if not self._closed:
+            if self.due is not None and now_ns >= self.due:
+                self._flush(now_ns)
             self._step(now_ns)
 
     def finish(self) -> None:
@@ -289,6 +291,11 @@ class Recorder:
         """Octets of the bus that are not in a file yet."""
         return max(0, self.octets - self._dropped_octets - self._keeper.lost_octets - self._keeper.confirmed)
 
+    @property
+    def due(self) -> int | None:
+        """When (ns on the clock of `tick`) the next tick is wanted at the latest; None while nothing waits."""
+        return None if self._oldest is None or self._closed else self._oldest_came + FLUSH_AFTER
+
     def behind(self, now: int) -> int:
         """Age of the oldest thing that is not in the file yet (ns at `now`, the capture's clock), 0 for nothing."""
         while self._flushes and self._flushes[0][0] <= self._keeper.flushed:
@@ -312,20 +319,23 @@ class Recorder:
     def _step(self, now: int) -> None:
         self._now = now
         if self._oldest is not None and _due(self._oldest, now, FLUSH_AFTER):
-            self._close_batch()
-            self._flush_number += 1
-            if len(self._flushes) < MOST_FLUSHES:
-                self._flushes.append((self._flush_number, self._oldest_came))
-            self._keeper.orders.put(Flush(self._flush_number))
-            self._oldest = None
-            if self._unsynced is None:
-                self._unsynced = now
+            self._flush(now)
         if self._unsynced is not None and _due(self._unsynced, now, SYNC_AFTER):
             self._unsynced = None
             self._keeper.orders.put(SYNC)
         if self._checked is None or _due(self._checked, now, CHECK_EVERY):
             self._checked = now
             self._keeper.orders.put(CHECK)
+
+    def _flush(self, now: int) -> None:
+        self._close_batch()
+        self._flush_number += 1
+        if len(self._flushes) < MOST_FLUSHES:
+            self._flushes.append((self._flush_number, self._oldest_came))
+        self._keeper.orders.put(Flush(self._flush_number))
+        self._oldest = None
+        if self._unsynced is None:
+            self._unsynced = now
 
     def _close_batch(self) -> None:
         messages = self._batcher.close()

@@ -37,7 +37,7 @@ from sniff.session import DEVICES_NOTE, LineEvent, Session
 EVIDENCE_SHOWN, EVIDENCE_OF_NOTES = 5, 2
 HAPPENINGS_SHOWN = 200
 LONGEST_TEXT = 180
-GOOD = frozenset((Verdict.ANSWERED, Verdict.BROADCAST, Verdict.DATA, Verdict.OPEN))
+GOOD = frozenset((Verdict.ANSWERED, Verdict.BROADCAST, Verdict.DATA, Verdict.OPEN, Verdict.UNDECIDED))
 
 
 def collect(source: str, capture: Capture, session: Session, devices: Devices) -> Numbers:

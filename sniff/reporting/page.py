@@ -8,6 +8,7 @@ from importlib import resources
 from typing import Any
 
 from dissectors.tracker import Verdict
+from sniff.analysis.plain import plain
 from sniff.analysis.wording import station_word
 from sniff.reporting.numbers import Numbers
 from sniff.reporting.pictures import pictures
@@ -31,7 +32,13 @@ def page(reports: Sequence[Numbers]) -> str:
     from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup
 
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    def harmless(value: object) -> object:
+        """What a capture says may be made for the terminal that the page is printed to."""
+        return plain(value) if isinstance(value, str) and not isinstance(value, Markup) else value
+
+    environment = Environment(
+        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True, finalize=harmless
+    )
     environment.filters |= {"ms": _ms, "number": _number, "percent": _percent, "seconds": _seconds, "span": _span,
                             "verdict": _verdict, "damage": _damage}  # fmt: skip
     template = environment.from_string(resources.files(__package__).joinpath(TEMPLATE).read_text("utf-8"))

@@ -13,23 +13,36 @@ from __future__ import annotations
 import contextlib
 import socket
 import threading
+import time
 from collections import deque
 from typing import Any, NoReturn, cast
 
-from serial import rfc2217
+from serial import SerialException, rfc2217
 
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
 from sniff.session import Item, LineEvent, LineEventKind
 from sniff.sources.clock import Clock
-from sniff.sources.telnet import Data, Negotiation, TelnetDecoder
+from sniff.sources.telnet import Data, Negotiation, OutOfStep, TelnetDecoder
 from sniff.sources.tty import stop_bits
 
 READ_SIZE = 65536
+MOST_HELD = 1 << 20
+"""Octets that wait to be taken."""
+
+OUT_OF_STEP = "a Telnet option without end came; what follows it cannot be told from it, and is not recorded"
+ANSWER_PATIENCE = 1.0
+"""Seconds for the answer to a request for RTS, DTR or flow control; gateways that have no such lines give none."""
 
 _ERRORS = {2: "overrun", 4: "parity", 8: "framing", 16: "break"}
 _MASK = bytes([sum(_ERRORS)])
 _COM_PORT = 44
+CONTROLS = {
+    rfc2217.SET_CONTROL_RTS_ON: "RTS",
+    rfc2217.SET_CONTROL_RTS_OFF: "RTS",
+    rfc2217.SET_CONTROL_DTR_ON: "DTR",
+    rfc2217.SET_CONTROL_DTR_OFF: "DTR",
+}
 _NOTIFY_LINESTATE = 106
 
 _Base: Any = rfc2217.Serial  # pyserial's inner names have no types
@@ -47,7 +60,10 @@ class _ListeningGateway(_Base):  # type: ignore[misc]
         self.wake_in.setblocking(False)
         self.wake_out.setblocking(False)
         self.listening = False  # octets from before the settings were in force belong to another line
+        self.held = self.taken = 0  # octets of the line put into `items`, and taken from there
         self.lost: str | None = None
+        self.silent = False  # nothing came in answer to the last request for control lines
+        self.unknown: set[str] = set()  # what it did not confirm
         super().__init__()
 
     def ask_line_states(self) -> None:
@@ -55,8 +71,33 @@ class _ListeningGateway(_Base):  # type: ignore[misc]
         self.rfc2217_send_subnegotiation(rfc2217.SET_LINESTATE_MASK, _MASK)
 
     def _reconfigure_port(self) -> None:
-        if not self.batch:
+        if self.batch:
+            return
+        try:
             super()._reconfigure_port()
+        except SerialException:
+            settings = self._rfc2217_port_settings.items()
+            silent = ", ".join(name for name, item in settings if item.state == rfc2217.REQUESTED)
+            if not silent:
+                raise
+            raise SerialException(f"the gateway does not confirm {silent}") from None
+
+    def rfc2217_set_control(self, value: bytes) -> None:
+        """Ask for RTS, DTR or no flow control; a gateway that does not answer, or refuses, is taken as it is."""
+        item = self._rfc2217_options["control"]
+        item.set(value)
+        until = time.monotonic() + (0 if self.silent else ANSWER_PATIENCE)
+        try:
+            while not item.is_ready():
+                if time.monotonic() >= until:
+                    self.silent = True  # one wait is enough
+                    break
+                time.sleep(0.02)
+            else:
+                return
+        except ValueError:  # refused
+            pass
+        self.unknown.add(CONTROLS.get(value, "flow control"))
 
     def _telnet_read_loop(self) -> None:
         decoder = TelnetDecoder()
@@ -75,8 +116,11 @@ class _ListeningGateway(_Base):  # type: ignore[misc]
             try:
                 for token in decoder.feed(octets):
                     self._take(now, token)
-            except OSError as error:  # an answer could not be sent
+            except OSError as error:  # an answer could not be sent, or the gateway is out of step
                 self._lose(error.strerror or str(error))
+                return
+            except Exception as error:  # answers that pyserial did not expect
+                self._lose(f"{type(error).__name__}: {error}")
                 return
 
     def _take(self, now: int, token: object) -> None:
@@ -85,6 +129,8 @@ class _ListeningGateway(_Base):  # type: ignore[misc]
                 self._give(Chunk(now, token.octets))
         elif isinstance(token, Negotiation):
             self._telnet_negotiate_option(bytes([token.command]), bytes([token.option]))
+        elif isinstance(token, OutOfStep):
+            raise ConnectionResetError(OUT_OF_STEP)  # made anew, both sides agree again
         else:
             sub = cast(Any, token).octets
             if sub[:2] == bytes([_COM_PORT, _NOTIFY_LINESTATE]) and len(sub) >= 3:
@@ -97,6 +143,10 @@ class _ListeningGateway(_Base):  # type: ignore[misc]
                     self._telnet_process_subnegotiation(sub)
 
     def _give(self, item: Item) -> None:
+        octets = len(getattr(item, "octets", b""))
+        while octets and self.held - self.taken > MOST_HELD and self.is_open:
+            time.sleep(0.01)  # the gateway is to wait: what it sends next stays in the network's buffers
+        self.held += octets
         self.items.append(item)
         self.wake()
 
@@ -142,6 +192,11 @@ class Rfc2217Stream:
             raise
         gateway.listening = True
         self._gateway = gateway
+        lines = "/".join(sorted(gateway.unknown & set(CONTROLS.values())))
+        if lines:
+            said = f"{lines} unknown: the gateway does not confirm them"
+            self.detail = f"{said}; {self.detail}"
+            gateway._give(LineEvent(clock.now(), LineEventKind.NOTE, said))
 
     def fileno(self) -> int:
         """Readable when something has come."""
@@ -153,8 +208,11 @@ class Rfc2217Stream:
         with contextlib.suppress(BlockingIOError):
             gateway.wake_out.recv(READ_SIZE)
         items: list[Item] = []
-        while gateway.items:
+        for _ in range(len(gateway.items)):  # not what comes meanwhile: a flood would never let us go
             items.append(gateway.items.popleft())
+            gateway.taken += len(getattr(items[-1], "octets", b""))
+        if gateway.items:
+            gateway.wake()
         if not items and gateway.lost is not None:
             raise ConnectionResetError(gateway.lost)
         if gateway.lost is not None:

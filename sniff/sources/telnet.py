@@ -4,6 +4,9 @@ FF FF                    data octet FF
 FF FB…FE option          WILL, WONT, DO, DONT
 FF FA … FF F0            subnegotiation
 FF anything else         a command without meaning here
+
+Within a subnegotiation only FF F0 ends it; FF and anything else is passed over there. What grows beyond all that RFC
+2217 knows has lost its end: nobody can say any more what is data, so nothing is, until the connection is made anew.
 """
 
 from __future__ import annotations
@@ -14,7 +17,7 @@ from enum import Enum, auto
 _IAC, _SB, _SE = 0xFF, 0xFA, 0xF0
 _NEGOTIATIONS = range(0xFB, 0xFF)
 LONGEST = 1024
-"""Octets of a subnegotiation that are kept; RFC 2217 needs fewer than 260."""
+"""Octets that a subnegotiation may have; RFC 2217 needs fewer than 260."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +42,14 @@ class Subnegotiation:
     octets: bytes
 
 
-Token = Data | Negotiation | Subnegotiation
+@dataclass(frozen=True, slots=True)
+class OutOfStep:
+    """A subnegotiation that does not end: from here on everything is dropped. `octets`: how many of it there were."""
+
+    octets: int
+
+
+Token = Data | Negotiation | Subnegotiation | OutOfStep
 
 
 class _State(Enum):
@@ -48,6 +58,7 @@ class _State(Enum):
     OPTION = auto()
     SUB = auto()
     SUB_COMMAND = auto()
+    LOST = auto()
 
 
 class TelnetDecoder:
@@ -60,6 +71,8 @@ class TelnetDecoder:
 
     def feed(self, octets: bytes) -> list[Token]:
         """Tokens that are complete now. Never raises."""
+        if self._state is _State.LOST:
+            return []
         if self._state is _State.DATA and _IAC not in octets:
             return [Data(octets)] if octets else []
         tokens: list[Token] = []
@@ -99,16 +112,19 @@ class TelnetDecoder:
             if octet == _IAC:
                 self._state = _State.SUB_COMMAND
             else:
-                self._keep(octet)
-        elif octet == _IAC:
-            self._keep(octet)
+                return self._keep(octet)
+        elif state is _State.SUB_COMMAND:
             self._state = _State.SUB
-        else:  # SE; anything else breaks the subnegotiation off
-            self._state = _State.DATA
             if octet == _SE:
+                self._state = _State.DATA
                 return Subnegotiation(bytes(self._sub))
+            if octet == _IAC:
+                return self._keep(octet)
         return None
 
-    def _keep(self, octet: int) -> None:
-        if len(self._sub) < LONGEST:
-            self._sub.append(octet)
+    def _keep(self, octet: int) -> Token | None:
+        self._sub.append(octet)
+        if len(self._sub) <= LONGEST:
+            return None
+        self._state = _State.LOST
+        return OutOfStep(len(self._sub))

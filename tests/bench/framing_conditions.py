@@ -78,7 +78,7 @@ def _in_gaps(wire: OnWire, line: LineSettings, dice: Random, places: Callable[[i
         if octet.of != noisy[-1].of and count > 0:
             spare = room - count * char
             for number, place in enumerate(places(spare, count), 1):
-                noisy.append(Octet(begin + place + number * char, dice.randrange(256)))
+                noisy.append(Octet(begin + place + number * char, dice.randrange(1 << line.data_bits)))
         noisy.append(octet)
     return noisy
 
@@ -127,7 +127,7 @@ def bursts(rate: float) -> Condition:
             if dice.random() < rate:
                 begin = dice.randrange(len(octets))
                 for at in range(begin, min(len(octets), begin + dice.randint(2, 12))):
-                    value = dice.randrange(256)
+                    value = dice.randrange(1 << line.data_bits)
                     octets[at] = replace(octets[at], value=value, right=value == octets[at].value)
             struck += octets
         return struck

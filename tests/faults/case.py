@@ -53,8 +53,8 @@ class Said:
                 yield text
 
     def __str__(self) -> str:
-        what = "/".join(self.codes) + ("" if not self.words else f"/{self.words}/" if self.codes else f"/{self.words}/")
-        return f"{what} {'|'.join(self.subjects)}"
+        words = [f"/{self.words}/"] if self.words else []
+        return f"{' or '.join((*self.codes, *words))} about {' or '.join(self.subjects)}"
 
 
 @dataclass(frozen=True, slots=True)

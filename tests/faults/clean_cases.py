@@ -18,6 +18,7 @@ from tests.faults.buses import MSTP_LINE, modbus, mstp, n2
 from tests.faults.case import Case, Heard
 from tests.faults.hearing import busy_host, hidden_latency
 from tests.faults.misbehaving import ScansOnce
+from tests.faults.n2_clean_cases import n2_clean_cases
 from tests.faults.ring_nodes import TestsItself
 from tests.faults.ring_programs import Lister, Scans, Segmenting, controller, drive
 from tests.faults.uneven_stations import Waits
@@ -180,7 +181,11 @@ def _asks_slaves(*, seed: int) -> Station:
 
 
 def _no_token(*, seed: int = 0) -> Scenario:
-    others = {"reader": _asks_slaves, "slave 5": partial(_slave, 5), "slave 9": partial(_slave, 9)}
+    others: dict[str, Callable[..., Station]] = {
+        "reader": _asks_slaves,
+        "slave 5": partial(_slave, 5),
+        "slave 9": partial(_slave, 9),
+    }
     return Ring((), others=others)(seed=seed)
 
 
@@ -248,6 +253,7 @@ def clean_cases(seconds: float) -> Iterator[Case]:
             shorter = kind.is_ring and kind.name != "MS/TP clean" and tap not in (EXACT, FTDI)
             heard = seconds / 6 if shorter else seconds
             yield Case(f"{kind.name}, {tap.name}", kind.make, (), tap, heard, kind.hear)
+    yield from n2_clean_cases(seconds / 6)
     yield from unsteady_cases()
 
 

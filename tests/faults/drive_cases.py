@@ -34,6 +34,11 @@ DRIVE_CASES: tuple[Case, ...] = (
     ),
     Case("drive trips", partial(drives, extra=(_trip,)), (("PR004", "drive 2"),)),
     Case("drive warns", partial(drives, change={2: partial(Shows, values={0x2528: 9})}), (("PR005", "drive 2"),)),
+    Case(
+        "drive tells a fault by its status alone",
+        partial(drives, change={2: partial(Shows, values={0x2520: 0x0009})}),
+        (("PR004", "drive 2"),),
+    ),
     Case("drive, frame too long", partial(drives, extra=(_too_long,)), (("PR006", "drive 2"),), struck=_refused),
     Case("drive later than promised", partial(drives, delay=14 * MS), (("PR007", "drive 2"),)),
 )

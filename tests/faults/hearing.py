@@ -108,7 +108,7 @@ def echoing(missing: int, plan: Scenario, seconds: float, tap: TapModel) -> Hear
             if not burst.octets:
                 continue
             yield Chunk(burst.end, burst.octets, burst.marks)
-            if burst.sent[0].party == "master":
+            if burst.sent[0].party in ("master", "supervisor"):
                 copy = burst.octets[: len(burst.octets) - missing]
                 yield Chunk(burst.end + len(copy) * plan.line.char + MS // 5, copy)
 

@@ -20,7 +20,7 @@ class Outcome:
 
     `missed`: what should have been said. `accused`: findings at warning or above about somebody innocent.
     `mistaken`: errors about whoever may be named that are not what is wrong, and codes that must never come.
-    `graves`: number of findings at warning or above that are nobody's consequence. `frames`: good ones.
+    `unneeded`: warnings about the bus where it is somebody else's fault: told, but no accusation of anybody.
     """
 
     name: str
@@ -29,6 +29,7 @@ class Outcome:
     missed: tuple[str, ...]
     accused: tuple[str, ...]
     mistaken: tuple[str, ...]
+    unneeded: tuple[str, ...] = ()
 
     @property
     def false(self) -> tuple[str, ...]:
@@ -43,6 +44,16 @@ class Outcome:
     def graves(self) -> tuple[str, ...]:
         """What was said at warning or above."""
         return tuple(f"{f.code} {f.subject}" for f in self.findings if f.severity >= Severity.WARNING)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was said as a note."""
+        return tuple(f"{f.code} {f.subject}" for f in self.findings if f.severity is Severity.NOTE)
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """Every finding in full."""
+        return tuple(f"{f.severity.label} {f.code} {f.subject}: {f.seen} [{f.means}]" for f in self.findings)
 
 
 def findings_of(session: Session, items: Iterable[Item]) -> tuple[Finding, ...]:
@@ -75,4 +86,10 @@ def run(case: Case, seed: int = 1) -> Outcome:
             one.severity is Severity.ERROR and id(one) not in meant and one.code not in case.also
         ):  # what is called an error must be what is wrong
             mistaken.append(named)
-    return Outcome(case.name, seed, findings, missed, tuple(accused), tuple(mistaken))
+    shared = "bus" in case.struck or any("bus" in said.subjects for said in case.wanted)
+    unneeded = () if shared or not case.expect else tuple(_bus_warnings(findings))
+    return Outcome(case.name, seed, findings, missed, tuple(accused), tuple(mistaken), unneeded)
+
+
+def _bus_warnings(findings: Iterable[Finding]) -> Iterable[str]:
+    return (f"{one.code} bus" for one in findings if one.severity >= Severity.WARNING and one.subject == "bus")

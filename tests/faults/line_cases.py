@@ -9,10 +9,20 @@ from dissectors.frame import Place
 from dissectors.line import LineSettings, Timing
 from dissectors.modbus.simulated_master import read_holding, write_register
 from dissectors.simulated import Station
-from sniff.simulation.faults import NoiseInGaps
+from sniff.simulation.faults import LostResponse, NoiseInGaps
+from sniff.simulation.tap import FTDI
 from tests.faults.buses import modbus, mstp, n2
 from tests.faults.case import Case, Said
-from tests.faults.hearing import as_protocol, from_to, other_settings, sent_otherwise, swapped
+from tests.faults.hearing import (
+    as_protocol,
+    busy_host,
+    echoing,
+    from_to,
+    hidden_latency,
+    other_settings,
+    sent_otherwise,
+    swapped,
+)
 from tests.faults.interference import Interference
 from tests.faults.misbehaving import Halts
 from tests.faults.ring_programs import controller, drive
@@ -31,6 +41,7 @@ _CONTACTOR = r"every (5|4\.9|5\.0)|regular|period|rhythm|contactor|switch"
 _STOPPED = r"silen|stopp?ed|paus|nothing|quiet|stood still|stands still"
 _TOGETHER = r"at (one|the same|that) (moment|time)|together|at once|same moment|in common|simultaneous"
 _OTHER = r"other protocol|another protocol|ms/?tp|bacnet|another baud|two protocols"
+_COPY = r"\becho|\bcop(y|ies|ied)|gives? back|repeats? the request"
 _LOAD = r"\bload|busy|limit|occup|capacity|in use|utili|of the (line|time)|line time"
 
 RTU_8N1 = LineSettings.parse("19200,8N1")
@@ -49,11 +60,11 @@ _ringing = NoiseInGaps(0.3, most=1, places=(Place.AFTER,), values=b"\xff\xfe\xf8
 
 
 def _with(bus: Modbus, **more: object) -> Modbus:
-    return Modbus(**{**bus.__dict__, **more})  # type: ignore[arg-type]
+    return Modbus(**{**bus.__dict__, **more})
 
 
 def _with_n2(**more: object) -> N2:
-    return N2(**{**_n2.__dict__, **more})  # type: ignore[arg-type]
+    return N2(**{**_n2.__dict__, **more})
 
 
 def _dying(*units: int) -> dict[int, partial[Dies]]:
@@ -94,7 +105,7 @@ LINE_CASES: tuple[Case, ...] = (
     Case(
         "RTU baud rate another one for a while",
         partial(modbus, pause=60 * MS),
-        (Said(_bus, words=r"baud|9600|settings"),),
+        (Said(_bus, words=r"baud|9600", own_words=True),),
         hear=partial(sent_otherwise, partial(from_to, 20 * S, 34 * S, LineSettings(9600, 8, "E", 1))),
         seconds=60,
         seeds=1,
@@ -155,7 +166,14 @@ LINE_CASES: tuple[Case, ...] = (
     ),
     Case(
         "ASCII noise anywhere, mostly on the one with long answers",
-        Modbus(_uneven, usual_stations(_FOUR, is_ascii=True), others={"sparks": _sparks}, pause=40 * MS, is_ascii=True),
+        Modbus(
+            _uneven,
+            usual_stations(_FOUR, is_ascii=True),
+            others={"sparks": _sparks},
+            pause=40 * MS,
+            timeout=500 * MS,
+            is_ascii=True,
+        ),
         (Said(_bus, _NOISE, r"noise|stray|damag"),),
         seconds=120,
     ),
@@ -189,11 +207,62 @@ LINE_CASES: tuple[Case, ...] = (
             usual_stations(_FOUR),
             others={"bacnet drive": _bacnet_drive},
             line=RTU_8N1,
-            interval=2 * S,
+            interval=1_300 * MS,
         ),
         (Said(_bus, ("LN204",), _OTHER),),
+        also=("LN003",),
         never=("MB203",),
         seeds=1,
+    ),
+    # a converter that gives back what the master sends
+    Case("ASCII echo", _ascii, (("LN205", "bus"),), hear=partial(echoing, 0), never=("MB203", "MB201"), seeds=1),
+    Case(
+        "ASCII echo cut short",
+        _ascii,
+        (Said(("bus", "master", "adapter"), ("LN205",), _COPY),),
+        hear=partial(echoing, 3),
+        never=("MB203", "MB201", "MB202"),
+        seeds=1,
+    ),
+    Case("N2 echo", _n2, (("LN205", "bus"),), hear=partial(echoing, 0), never=("N2007", "N2008"), seeds=1),
+    # a busy computer, or one that hides how late it was, beside a fault
+    Case("busy host, station absent", partial(modbus, absent=(4,)), (("MB001", "station 4"),), FTDI, hear=busy_host),
+    Case(
+        "busy host, answers lost",
+        partial(modbus, (LostResponse(0.1, ("unit 2",)),)),
+        (("MB002", "station 2"),),
+        hear=busy_host,
+    ),
+    Case(
+        "busy host, N2 answers lost",
+        partial(n2, (LostResponse(0.1, ("drive 2",)),)),
+        (("N2005", "station 2"),),
+        hear=busy_host,
+        seconds=120,
+    ),
+    Case(
+        "busy host, MS/TP silent drive",
+        partial(mstp, node_faults={9: {"silent": True}}),
+        (("MS301", "MAC 9"),),
+        FTDI,
+        hear=busy_host,
+        seconds=30,
+    ),
+    Case(
+        "hidden latency, N2 answers lost",
+        partial(n2, (LostResponse(0.1, ("drive 2",)),)),
+        (("N2005", "station 2"),),
+        FTDI,
+        hear=hidden_latency,
+        seconds=120,
+    ),
+    Case(
+        "hidden latency, MS/TP silent drive",
+        partial(mstp, node_faults={9: {"silent": True}}),
+        (("MS301", "MAC 9"),),
+        FTDI,
+        hear=hidden_latency,
+        seconds=30,
     ),
     # who uses the line
     Case(
@@ -219,6 +288,16 @@ LINE_CASES: tuple[Case, ...] = (
         seeds=1,
     ),
     Case(
+        "N2 bus near its limit",
+        N2(
+            partial(by_turns, 1, 2),
+            {"drive 1": partial(follower, 1, 2 * MS), "drive 2": partial(follower, 2, 2 * MS)},
+            pause=2 * MS,
+        ),
+        (Said(("bus", "master"), words=_LOAD),),
+        seeds=1,
+    ),
+    Case(
         "RTU mostly broadcasts",
         Modbus(
             (*(write_register(0, k, 7) for k in range(9)), read_holding(1, 0, 4)),
@@ -234,6 +313,7 @@ LINE_CASES: tuple[Case, ...] = (
         "listens with 7 data bits",
         partial(modbus, line=RTU_8N1),
         (Said(_bus, words=r"(7|seven) data bits|data bits", own_words=True),),
+        also=("LN003",),
         hear=partial(other_settings, "19200,7E1"),
         seconds=20,
         seeds=1,
@@ -242,6 +322,7 @@ LINE_CASES: tuple[Case, ...] = (
         "listens twice as fast",
         modbus,
         (Said(_bus, words=r"19200|half", own_words=True),),
+        also=("LN003",),
         hear=partial(other_settings, "38400,8E1"),
         seconds=20,
         seeds=1,
@@ -250,6 +331,7 @@ LINE_CASES: tuple[Case, ...] = (
         "pair swapped, and it says so",
         modbus,
         (Said(_bus, words=r"swap|revers", own_words=True),),
+        also=("LN003",),
         hear=swapped,
         seconds=20,
         seeds=1,
@@ -258,6 +340,7 @@ LINE_CASES: tuple[Case, ...] = (
         "N2 heard as RTU",
         n2,
         (Said(_bus, words=r"\bn2\b", own_words=True),),
+        also=("LN003",),
         hear=partial(as_protocol, "modbus-rtu"),
         seeds=1,
     ),
@@ -265,6 +348,7 @@ LINE_CASES: tuple[Case, ...] = (
         "MS/TP heard as RTU",
         mstp,
         (Said(_bus, words=r"ms/?tp|bacnet", own_words=True),),
+        also=("LN003",),
         hear=partial(as_protocol, "modbus-rtu"),
         seconds=20,
         seeds=1,
@@ -273,6 +357,7 @@ LINE_CASES: tuple[Case, ...] = (
         "RTU heard as MS/TP",
         modbus,
         (Said(_bus, words=r"rtu", own_words=True),),
+        also=("LN003",),
         hear=partial(as_protocol, "mstp"),
         seeds=1,
     ),
@@ -280,6 +365,7 @@ LINE_CASES: tuple[Case, ...] = (
         "ASCII heard as RTU",
         partial(modbus, is_ascii=True),
         (Said(_bus, words=r"ascii", own_words=True),),
+        also=("LN003",),
         hear=partial(as_protocol, "modbus-rtu"),
         seeds=1,
     ),
@@ -287,6 +373,7 @@ LINE_CASES: tuple[Case, ...] = (
         "RTU heard as N2",
         modbus,
         (Said(_bus, words=r"rtu", own_words=True),),
+        also=("LN003",),
         hear=partial(as_protocol, "n2"),
         seeds=1,
     ),

@@ -2,25 +2,24 @@
 
 python -m tests.faults.make_captures captures/findings && pytest --sniff-update captures
 
-Further words choose cases by name. The same code gives the same files.
+Further words choose cases by name, those of FURTHER_CASES too. The same code gives the same files.
 """
 
 from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from dissectors.findings import Finding
-from sniff.analysis.judging import Judging
-from sniff.engine import Output
+from sniff.analysis.judging import rules_over
 from sniff.formats import create
-from sniff.profile_files import noted_devices
-from sniff.reading import dissector_for, outputs
+from sniff.reading import dissector_for
 from sniff.session import DEVICES_NOTE, Item, Session
-from tests.faults.cases import CASES, Case
+from tests.faults.case import Case
+from tests.faults.cases import CASES, FURTHER_CASES
+from tests.faults.judged import findings_of
 
 SECONDS = (1, 2, 3, 5, 8, 12, 20, 30, 45, 60, 120, 300, 660)
 STARTED = 1_772_359_200 * 1_000_000_000
@@ -28,26 +27,17 @@ LARGEST = 150_000
 """Octets of a capture file: a larger one is left to the matrix."""
 
 
-def findings_of(items: Iterable[Item], session: Session) -> tuple[Finding, ...]:
-    judging = Judging(session, dissector_for(session), noted_devices(session))
-    for item in outputs(items, session):
-        if isinstance(item, Output):
-            judging.add(item)
-        else:
-            judging.add_line_event(item)
-    return judging.findings()
-
-
 def shortest(case: Case) -> tuple[Session, list[Item]] | None:
     """The session and the items of the shortest stretch from the start that shows all that is expected."""
     session, heard = case.hear(case.make(seed=1), case.seconds, case.tap)
     everything = list(heard)
+    rules = rules_over(dissector_for(session))
     first = everything[0].time if everything else 0
     for seconds in SECONDS:
         limit = first + seconds * 1_000_000_000
         items = [item for item in everything if item.time <= limit]
-        said = {(finding.code, finding.subject.split(",")[0]) for finding in findings_of(items, session)}
-        if said.issuperset(case.expect):
+        findings = findings_of(session, items)
+        if all(any(said.fits(one, rules.get(one.code)) for one in findings) for said in case.wanted):
             return session, items
     return None
 
@@ -59,7 +49,7 @@ def file_name(case: Case) -> str:
 
 def make(folder: Path, words: Sequence[str] = ()) -> None:
     folder.mkdir(parents=True, exist_ok=True)
-    for case in CASES:
+    for case in (*CASES, *FURTHER_CASES) if words else CASES:
         if words and not any(word.lower() in case.name.lower() for word in words):
             continue
         found = shortest(case)

@@ -1,6 +1,7 @@
 """Runs cases of the matrix and prints them as a table: `python -m tests.faults.matrix`, or `make faults`.
 
-Words choose cases by their names. Cases run on all cores; progress goes to standard error, the table to standard output.
+Words choose cases by their names. Cases run on all cores; progress goes to standard error, the table to standard
+output.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from dataclasses import dataclass
 from functools import cache
 
 from tests.faults.case import Case
-from tests.faults.cases import CASES
+from tests.faults.cases import CASES, FURTHER_CASES
 from tests.faults.clean_cases import clean_cases
 from tests.faults.judged import Outcome, run
 
@@ -41,13 +42,16 @@ class Done:
     accused: tuple[str, ...]
     mistaken: tuple[str, ...]
     graves: tuple[str, ...]
+    unneeded: tuple[str, ...]
+    notes: tuple[str, ...]
+    sentences: tuple[str, ...]
     took: float
 
 
 @cache
 def every_case(minutes: float) -> tuple[Case, ...]:
     """All faults, then all clean buses, each heard for that many minutes."""
-    return (*CASES, *clean_cases(60 * minutes))
+    return (*CASES, *FURTHER_CASES, *clean_cases(60 * minutes))
 
 
 def work(job: Job) -> Done:
@@ -59,7 +63,17 @@ def work(job: Job) -> Done:
     except Exception as error:  # a rule that raises is one more thing to tell of, and the table must go on
         outcome = Outcome(case.name, job.seed, (), (), (), (f"raised {type(error).__name__}: {error}",))
     took = time.monotonic() - began
-    return Done(job, outcome.missed, outcome.accused, outcome.mistaken, outcome.graves, took)
+    return Done(
+        job,
+        outcome.missed,
+        outcome.accused,
+        outcome.mistaken,
+        outcome.graves,
+        outcome.unneeded,
+        outcome.notes,
+        outcome.sentences,
+        took,
+    )
 
 
 def jobs_of(words: Sequence[str], minutes: float, seeds: int) -> list[Job]:
@@ -84,11 +98,13 @@ def done(jobs: Sequence[Job], processes: int) -> Iterator[Done]:
 class Table:
     """Prints one line a case as soon as its last run is there, and adds up."""
 
-    def __init__(self, jobs: Sequence[Job]) -> None:
+    def __init__(self, jobs: Sequence[Job], tells: bool = False) -> None:
+        self._tells = tells
         self._left = {job.place: sum(other.place == job.place for other in jobs) for job in jobs}
         self._of: dict[int, list[Done]] = {}
-        self.faults = self.clean = self.runs = self.found = self.said_all = 0
+        self.faults = self.clean = self.runs = self.found = self.graves = 0
         self.accusations: list[str] = []
+        self.about_bus: list[str] = []
         self.false_alarms: list[str] = []
 
     def add(self, result: Done) -> None:
@@ -108,6 +124,8 @@ class Table:
             self.faults += 1
             self.runs += len(results)
             self.found += sum(not one.missed for one in results)
+            self.graves += sum(len(one.graves) for one in results)
+            self.about_bus += [f"{case.name}: {what}" for what in sorted({w for one in results for w in one.unneeded})]
             self.accusations += [f"{case.name}: {what}" for what in (*accused, *mistaken)]
         else:
             self.clean += 1
@@ -119,13 +137,24 @@ class Table:
         print(f"{good}/{len(results)}  {case.name:<44} {took:6.1f} s  said {said}", flush=True)
         for what in trouble:
             print(f"       {what}", flush=True)
+        notes = sorted({what for one in results for what in one.notes})
+        if missed and notes:
+            print(f"       (notes: {', '.join(notes)})", flush=True)
+        if self._tells:
+            for sentence in results[0].sentences:
+                print(f"         {sentence}", flush=True)
 
     def close(self) -> int:
         """Print what it adds up to; give the exit code."""
         recall = self.found / self.runs if self.runs else 1.0
         print(f"\n{self.faults} cases with a fault, {self.runs} runs, recall {recall:.1%}")
+        if self.runs:
+            print(f"{self.graves / self.runs:.2f} findings at warning or above a run (one cause, one finding: 1.00)")
         print(f"{len(self.accusations)} accusations of innocents or wrong errors")
         for what in self.accusations:
+            print(f"  {what}")
+        print(f"{len(self.about_bus)} warnings about the bus where one station, or the capture, is to blame")
+        for what in self.about_bus:
             print(f"  {what}")
         print(f"{self.clean} clean buses, {len(self.false_alarms)} false alarms")
         for what in self.false_alarms:
@@ -140,9 +169,10 @@ def main(words: list[str]) -> int:
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes (default: one a core)")
     parser.add_argument("--clean-minutes", type=float, default=60, help="how long clean buses are heard (default: 60)")
     parser.add_argument("--seeds", type=int, default=3, help="most runs of one case (default: 3)")
+    parser.add_argument("--tell", action="store_true", help="print every finding of the first run in full")
     wanted = parser.parse_args(words)
     jobs = jobs_of(wanted.words, wanted.clean_minutes, wanted.seeds)
-    table = Table(jobs)
+    table = Table(jobs, wanted.tell)
     for count, result in enumerate(done(jobs, min(wanted.jobs, len(jobs))), 1):
         sys.stderr.write(f"\r{count}/{len(jobs)} runs\033[K")
         sys.stderr.flush()

@@ -70,6 +70,17 @@ def other_quantity(request: bytes, answer: bytes) -> bytes:
     return seal_rtu(inside[:4] + (int.from_bytes(inside[4:6], "big") - 1).to_bytes(2, "big"))
 
 
+class TakesReadsOnly(Wrapped):
+    """Obeys what is as long as a request to read and nothing else: not the answer of another one with its number."""
+
+    def __init__(self, inner: Station, is_ascii: bool = False) -> None:
+        super().__init__(inner)
+        self.size = 17 if is_ascii else 8
+
+    def hear(self, now: int, octets: bytes, quiet: bool) -> tuple[Send, ...]:
+        return super().hear(now, octets, quiet) if len(octets) == self.size else ()
+
+
 class Blinks(Wrapped):
     """Off for `off` ns every `every` ns: it sends nothing then, answers and what it begins itself alike."""
 

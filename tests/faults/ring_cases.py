@@ -66,7 +66,7 @@ RING_CASES: tuple[Case, ...] = (
     Case(
         "MS/TP slow round",
         partial(mstp, requests=5, node_faults={5: {"reply_delay": 245 * MS}, 9: {"reply_delay": 245 * MS}}),
-        (("MS108", "MAC 1"),),
+        (("MS108", "bus"),),
         struck=("MAC 2", "MAC 5", "MAC 9"),
     ),
     Case("MS/TP alone", partial(mstp, present=(5,)), (("MS109", "MAC 5"),)),

@@ -92,7 +92,7 @@ class TestsItself(Wrapped):
 
     def __init__(self, inner: Node, line: LineSettings, every: int = 0, wait: int = 30_000_000) -> None:
         super().__init__(inner)
-        self.mac, self.char, self.every, self.wait = inner.mac, line.char, every, wait
+        self.node, self.char, self.every, self.wait = inner, line.char, every, wait
         self.next: int | None = 0
 
     def wake(self, now: int) -> tuple[Send, ...]:
@@ -103,8 +103,10 @@ class TestsItself(Wrapped):
         for send in sends:
             if send.octets[2] == FrameType.TOKEN and self.next is not None and now >= self.next:
                 self.next = now + self.every if self.every else None
-                asking = frame(FrameType.TEST_REQUEST, self.mac, self.mac, b"is it me?")
+                asking = frame(FrameType.TEST_REQUEST, self.node.mac, self.node.mac, b"is it me?")
                 later = (len(asking) + 6) * self.char + self.wait
+                self.node._busy_until += later  # what it waits for begins with what it really sends
+                self.node._wake_at = (self.node._wake_at or 0) + later
                 sent += (Send(send.at, asking), replace(send, at=send.at + later))
             else:
                 sent.append(send)

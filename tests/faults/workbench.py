@@ -134,11 +134,16 @@ class N2:
         return parties + [Party(name, make(seed=seed), answers=False) for name, make in self.others.items()]
 
 
-def follower(address: int, delay: int = 10 * MS, *, values: Mapping[tuple[int, int], float] | None = None) -> Station:
-    """A drive; `values`: what some of its points have, by region and number."""
+def follower(
+    address: int, delay: int = 10 * MS, *, values: Mapping[tuple[int, int], float] | None = None, few: bool = False
+) -> Station:
+    """A drive; `values`: what some of its points have, by region and number. `few`: only those read `by_turns`, so
+    that its reports are short."""
+    from dissectors.n2.f510 import POINTS
     from dissectors.n2.simulated import Follower
 
-    made = Follower(address, delay=delay)
+    points = [point for point in POINTS if point.region in (1, 2)][:6] if few else POINTS
+    made = Follower(address, points=points, delay=delay)
     for (region, number), value in (values or {}).items():
         made.set(region, number, value)
     return made

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -104,3 +105,30 @@ def test_any_file(tmp_path_factory: pytest.TempPathFactory, octets: bytes) -> No
         return
     assert complaint.startswith(str(path))
     assert complaint.isprintable()
+
+
+ANY = st.integers(-(2**80), 2**80)
+ENDS = st.sampled_from([-(2**63), 2**63 - 1, 2**63, 2**64 - 1, 253402300800 * 10**9])
+FAR = st.one_of(ANY, ENDS)
+
+
+@given(
+    SESSIONS,
+    FAR,
+    st.integers(0, 2**90),
+    st.lists(
+        st.one_of(
+            st.builds(Chunk, FAR, st.binary(min_size=1, max_size=4)),
+            st.builds(LineEvent, FAR, st.sampled_from(LineEventKind), PLAIN, FAR),
+        ),
+        max_size=6,
+    ),
+)
+@settings(deadline=None)
+def test_what_is_written_can_be_read(session: Session, started: int, latency: int, items: list[Item]) -> None:
+    """A damaged or hostile file may have any times; octets and events are kept, at the nearest time there is."""
+    session = replace(session, started=started, adapter=replace(session.adapter, latency=latency))
+    found = parse(render(session, items), "x")
+    there = list(found.items())
+    assert [getattr(item, "octets", None) for item in there] == [getattr(item, "octets", None) for item in items]
+    assert [item.time for item in there] == [min(max(item.time, 1 - 2**63), 2**63 - 1) for item in items]

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from dissectors.frame import Chunk, Frame
 from dissectors.line import LineSettings
+from dissectors.tracker import Verdict
 from sniff.analysis.judging import Judging
 from sniff.analysis.summary import Summary
 from sniff.editing.cutting import Stretch, cut
@@ -192,3 +193,21 @@ def test_no_octet_is_lost_and_numbers_have_no_hole(steps: list, session: Session
 def test_the_text_of_a_change_is_read_whatever_it_is(text: str) -> None:
     change = SettingsChange.parse(text)
     assert SettingsChange.parse(str(change)) == change
+
+
+def test_no_request_is_paired_across_a_hole() -> None:
+    """The answer that comes first after a replug answers a request that nobody heard."""
+    request, answer = poll(100)
+    for kind in (LineEventKind.UNPLUGGED, LineEventKind.REPLUGGED, LineEventKind.DROPPED):
+        assert isinstance(answer, Chunk)
+        items: list[Item] = [
+            *poll(0), request, LineEvent(103 * MS, kind), replace(answer, time=3900 * MS), *poll(4000)
+        ]  # fmt: skip
+        closed = [one for output in outputs(items, FOUND) if isinstance(output, Output) for one in output.transactions]
+        assert [one.verdict for one in closed] == [
+            Verdict.ANSWERED,
+            Verdict.OPEN,
+            Verdict.UNSOLICITED,
+            Verdict.ANSWERED,
+        ]
+        assert [row.no for row in rows_of(items, FOUND)] == list(range(1, 7))

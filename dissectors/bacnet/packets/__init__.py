@@ -10,6 +10,8 @@ Lengths and checks are computed where they are None. Types 32 … 127 are encode
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 from scapy.packet import Packet, Raw
 
 from dissectors.bacnet.frame_types import HEADER, is_encoded, total
@@ -35,6 +37,7 @@ from dissectors.bacnet.packets.network import (
     Route,
     RoutingTable,
 )
+from dissectors.bacnet.packets.segments import Assembled, assembled
 from dissectors.bacnet.packets.tags import Parameters, Tag, parameters
 from dissectors.frame import Frame, Role
 
@@ -42,6 +45,7 @@ __all__ = [
     "MSTP",
     "NPDU",
     "Abort",
+    "Assembled",
     "ComplexAck",
     "ConfirmedRequest",
     "Connection",
@@ -67,8 +71,12 @@ __all__ = [
 
 
 def packet(frame: Frame, role: Role) -> Packet:
-    """The packet of a frame; its role makes no difference."""
-    return dissect(frame.octets)
+    """The packet of a frame; its role makes no difference. Behind a last segment stands the message as a whole."""
+    found = dissect(frame.octets)
+    if frame.assembly is not None and isinstance(found, MSTP):
+        with suppress(Exception):  # as in `dissect`: the frame must show whatever its message holds
+            found.lastlayer().add_payload(assembled(frame.assembly))
+    return found
 
 
 def dissect(octets: bytes) -> Packet:

@@ -18,14 +18,42 @@ from scapy.fields import (
 )
 from scapy.packet import Packet, Raw
 
-from dissectors.bacnet import npdu
+from dissectors.bacnet import apdu, npdu
+from dissectors.bacnet.content import ReplyFlaw, reply_flaw
+from dissectors.bacnet.message import Message
 from dissectors.bacnet.packets.apdus import BY_TYPE
+from dissectors.bacnet.station_address import mac_text
 
 
 def _flag(mask: int) -> Any:
     shift = mask.bit_length() - 1
     field = {7: "network_message", 5: "has_destination", 3: "has_source"}[shift]
     return lambda pkt: bool(getattr(pkt, field))
+
+
+class _ReplyBit(BitField):
+    """The reply bit, with what contradicts it."""
+
+    def i2repr(self, pkt: Any, x: Any) -> str:
+        flaw = _reply_flaw(pkt)
+        return str(x) if flaw is None else f"{x} ({flaw.words})"
+
+
+def _reply_flaw(pkt: Any) -> ReplyFlaw | None:
+    link, body = pkt.underlayer, bytes(pkt.payload)
+    header = npdu.decode(bytes(pkt))
+    if link is None or header is None or "frame_type" not in link.fields:
+        return None
+    inner = None if header.is_network_message else apdu.decode(body)
+    return reply_flaw(Message(link.frame_type, link.destination, link.source, npdu=header, apdu=inner))
+
+
+class _Mac(XStrLenField):
+    """The address of a station on another network, as that network writes it, with its octets where they differ."""
+
+    def i2repr(self, pkt: Any, x: Any) -> str:
+        words = mac_text(bytes(x))
+        return f"{words} ({bytes(x).hex(' ').upper()})" if len(x) == 6 else words
 
 
 class NPDU(Packet):
@@ -39,14 +67,14 @@ class NPDU(Packet):
         BitField("has_destination", 0, 1),
         BitField("reserved_4", 0, 1),
         BitField("has_source", 0, 1),
-        BitField("expects_reply", 0, 1),
+        _ReplyBit("expects_reply", 0, 1),
         BitEnumField("priority", 0, 2, dict(enumerate(npdu.PRIORITIES))),
         ConditionalField(ShortField("dnet", 0xFFFF), _flag(0x20)),
         ConditionalField(FieldLenField("dlen", None, length_of="dadr", fmt="B"), _flag(0x20)),
-        ConditionalField(XStrLenField("dadr", b"", length_from=lambda pkt: pkt.dlen), _flag(0x20)),
+        ConditionalField(_Mac("dadr", b"", length_from=lambda pkt: pkt.dlen), _flag(0x20)),
         ConditionalField(ShortField("snet", 1), _flag(0x08)),
         ConditionalField(FieldLenField("slen", None, length_of="sadr", fmt="B"), _flag(0x08)),
-        ConditionalField(XStrLenField("sadr", b"", length_from=lambda pkt: pkt.slen), _flag(0x08)),
+        ConditionalField(_Mac("sadr", b"", length_from=lambda pkt: pkt.slen), _flag(0x08)),
         ConditionalField(ByteField("hop_count", 255), _flag(0x20)),
         ConditionalField(ByteEnumField("message", 0, {n: npdu.message_name(n) for n in range(256)}), _flag(0x80)),
         ConditionalField(ShortField("vendor_id", 0), lambda pkt: pkt.network_message and pkt.message >= 0x80),

@@ -21,7 +21,8 @@ from scapy.packet import Packet
 from dissectors.bacnet import codec, services
 from dissectors.bacnet.values import APPLICATION, escape, primitive, show
 
-_TAGS_MAX = 8192
+_TAGS_MAX = 3000
+"""Tags that are taken apart, more than any single frame holds: of a longer message in segments the rest is octets."""
 
 
 def _wide(pkt: Any) -> bool:
@@ -62,7 +63,7 @@ def _plain_meaning(pkt: Any) -> str:
     number = pkt.extended_number if pkt.number == 15 else pkt.number
     if number >= len(APPLICATION):
         return ""
-    content = bytes((pkt.lvt,)) if number == 1 and pkt.lvt < 5 else bytes(pkt.value)
+    content = bytes((pkt.lvt,)) if number == 1 and pkt.lvt < 5 else bytes(pkt.value or b"")
     try:
         return escape(f"{APPLICATION[number]} {show(primitive(APPLICATION[number], content))}")
     except ValueError:
@@ -89,11 +90,17 @@ class Tag(Packet):
         return b"", s
 
 
+def _tags_at_most(pkt: Any) -> int:
+    return _TAGS_MAX
+
+
 class Parameters(Packet):
     """The parameters of a service, tag by tag; what is no tag is Raw at the end."""
 
     name = "Parameters"
-    fields_desc: ClassVar[list[Any]] = [PacketListField("tags", [], Tag, max_count=_TAGS_MAX)]
+    fields_desc: ClassVar[list[Any]] = [
+        PacketListField("tags", [], Tag, count_from=_tags_at_most, max_count=_TAGS_MAX + 1)
+    ]
 
     def post_dissection(self, pkt: Packet) -> None:
         under = self.underlayer

@@ -141,13 +141,32 @@ def test_two_stations_with_one_address():
     assert all(heard.headers[no].source == 9 for no in finding.evidence)
 
 
-def test_the_same_two_stations_seen_by_their_device_instances():
-    """The second one is switched on when the first has long said who it is."""
+def test_another_device_in_its_place_is_only_noted():
+    """The first one is off for good when the other begins: it may have been replaced."""
     nodes = [*ring(), Node(9, TIMING, f510(777), max_master=24, faults=Faults(off=True))]
     heard = run(
         nodes,
         20,
         after=[(6, switch(nodes[2], Faults(off=True))), (8, switch(nodes[4], Faults()))],
+    )
+    finding = heard.finding("MS501")
+    assert finding.severity is Severity.NOTE
+    assert "511, 777" in finding.seen
+
+
+def test_two_stations_seen_by_their_device_instances_in_turns():
+    """Each says who it is when it is switched on."""
+    nodes = [*ring(), Node(9, TIMING, f510(777), max_master=24, faults=Faults(off=True))]
+    again = Node(9, TIMING, f510(511), max_master=24, faults=Faults(off=True))
+    heard = run(
+        [*nodes, again],
+        30,
+        after=[
+            (6, switch(nodes[2], Faults(off=True))),
+            (8, switch(nodes[4], Faults())),
+            (14, switch(nodes[4], Faults(off=True))),
+            (16, switch(again, Faults())),
+        ],
     )
     finding = heard.finding("MS501")
     assert finding.severity is Severity.ERROR

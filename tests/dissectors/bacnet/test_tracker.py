@@ -254,8 +254,9 @@ def test_segments_belong_to_the_exchange_of_the_request():
         (10, acknowledge(1)),
     )
     tx = next(t for t in run.closed if t.verdict is Verdict.ANSWERED)
-    assert (tx.request, tx.response) == (0, 1)
-    assert [p.tx for p in run.placements[:4]] == [tx.id] * 4
+    assert (tx.request, tx.response) == (0, 3)
+    assert [p.tx for p in run.placements] == [tx.id] * 5
+    assert [t.verdict for t in run.closed] == [Verdict.ANSWERED]
 
 
 def gather(*pieces: bytes):
@@ -275,25 +276,21 @@ def test_segments_are_joined_in_their_order():
     pieces = [segment(n, piece, n < len(cuts) - 1) for n, piece in enumerate(cuts)]
     assert len(pieces) > 256
     (whole,) = gather(*pieces)
-    assert whole.complete
-    assert whole.parameters == body
-    decoded = whole.decode()
-    assert decoded is not None
-    assert decoded.error is None
-    assert len(decoded.record["list-of-read-access-results"]) == 40
+    assert whole.frames == tuple(range(len(cuts)))
+    assert whole.octets == apdus.encode(3, body, invoke_id=17, service=14)
     repeated = [pieces[0], pieces[1], pieces[1], pieces[0], *pieces[2:]]
-    assert gather(*repeated)[-1].parameters == body
+    assert gather(*repeated)[-1].octets == whole.octets
 
 
 def test_a_lost_segment_leaves_a_hole():
     pieces = [segment(n, RESULT[n * 4 : n * 4 + 4], n < 4) for n in range(5)]
     (broken,) = gather(pieces[0], pieces[1], pieces[3], pieces[4])
     assert broken.missing == (2,)
-    assert broken.decode() is None
+    assert broken.octets == b""
     broken, whole = gather(pieces[0], pieces[1], pieces[3], pieces[4], pieces[2])
     assert not broken.complete
     assert whole.complete
-    assert whole.parameters == RESULT
+    assert whole.octets == apdus.encode(3, RESULT, invoke_id=17, service=14)
 
 
 BUS = st.sampled_from(
@@ -334,6 +331,18 @@ def test_whatever_passes_each_transaction_closes_once(steps: list[tuple[float, b
     for transaction in run.closed:
         assert transaction.start <= transaction.end
         assert transaction.of is None or transaction.of < transaction.id
+
+
+def test_a_second_answer_needs_a_first():
+    """What came first was damaged: the good answer is late, and only one more after it is a second one."""
+    damaged = answer()[:-1] + bytes((answer()[-1] ^ 1,))
+    run = track((10, request()), (10, damaged), (300, answer()), (300, answer()))
+    assert [t.verdict for t in run.closed] == [Verdict.DAMAGED_ANSWER, Verdict.LATE, Verdict.ANSWERED_TWICE]
+
+
+def test_noise_after_a_long_silence_ends_what_waited():
+    run = track((10, request()), (11_000, b"\x00\xff"))
+    assert [t.verdict for t in run.closed] == [Verdict.NO_RESPONSE]
 
 
 @settings(max_examples=80, deadline=None)

@@ -18,6 +18,7 @@ from bacpypes3.pdu import PDU
 from bacpypes3.primitivedata import TagList
 
 from dissectors.bacnet import Reassembler, fields, peek
+from dissectors.bacnet import apdu as apdus
 from dissectors.bacnet import message as messages
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
@@ -223,7 +224,9 @@ def test_segments_are_gathered_to_what_tshark_gathers(readings: dict[str, list[t
         whole = reassembler.add(number, frame_of(sample.octets))
         if whole is not None:
             gathered.append(whole)
-            found = messages.decode_parameters(whole.apdu, whole.parameters)
+            header = apdus.decode(whole.octets)
+            assert header is not None
+            found = messages.decode_parameters(header, whole.octets[header.body :])
             assert found is not None
             assert found.error is None
             (_, items) = found.record.entries[0]

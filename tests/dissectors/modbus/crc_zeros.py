@@ -14,6 +14,7 @@ from typing import Final
 from dissectors.checksums import crc16_modbus
 from dissectors.frame import Chunk, Event, Frame, Role
 from dissectors.line import LineSettings, Timing
+from dissectors.modbus.candidates import is_text
 from dissectors.modbus.framing import RtuFramer
 from dissectors.modbus.functions import BROADCAST, EXCEPTION_BIT
 from dissectors.modbus.header import peek_rtu
@@ -119,12 +120,14 @@ def exchanges_with_zeros(code: int, dice: random.Random, count: int) -> Iterator
         asked, answered = exchange(code, dice)
         if tried % 8 == 0 and len(answered) > 6 and asked != answered:
             answered = _with_both(unit, answered)
-        elif (tried % 8 == 1 and code in (6, 8, 0x16)) or (tried % 8 == 1 and code not in CODES and len(asked) > 4):
+        elif tried % 8 == 1 and (code in (6, 8, 0x16) or (code not in CODES and len(asked) > 4)):
             body = _with_both(unit, asked)
             asked, answered = body, body if asked == answered else answered
         elif tried % 8 == 2:
             answered = bytes([code | EXCEPTION_BIT, dice.choice([1, 2, 3, 4])])
         frames = sealed(unit + asked), sealed(unit + answered)
+        if any(frame.endswith(b"\0\0\0") or is_text(frame) for frame in frames) and code not in CODES:
+            continue  # nothing but a length could tell the former from zeros after a frame, the latter from text
         if zeros_of(frames[0]) or zeros_of(frames[1]):
             yield frames
             given += 1
@@ -142,7 +145,7 @@ def _with_both(unit: bytes, body: bytes) -> bytes:
 
 @dataclass(frozen=True, slots=True)
 class Pace:
-    """How fast a bus is: silences before an answer and before the next request, and after a request nobody answers, ms."""
+    """How fast a bus is: silences before an answer, before the next request, after a request nobody answers, ms."""
 
     answer: float
     pause: float

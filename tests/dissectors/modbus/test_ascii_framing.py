@@ -10,7 +10,21 @@ from pathlib import Path
 import pytest
 
 from dissectors.checksums import lrc
-from dissectors.frame import Check, Chunk, Damage, Event, Found, Frame, LineError, Mark, Noise, Place, Reason
+from dissectors.frame import (
+    Check,
+    Chunk,
+    Damage,
+    Event,
+    Flaw,
+    Found,
+    Frame,
+    LineError,
+    Mark,
+    Noise,
+    Place,
+    Reason,
+    Repair,
+)
 from dissectors.line import NS_PER_S, LineSettings, Timing
 from dissectors.modbus.ascii_framing import MAX_CHARACTERS, MAX_NOISE, AsciiFramer
 from sniff.testing.driving import drive
@@ -90,7 +104,7 @@ def test_a_colon_without_a_station_is_a_false_start() -> None:
     assert brief(read(b":::", REQUEST))[-1] == (REQUEST,)
     events = read(b":?", REQUEST)
     assert [e.octets for e in events if isinstance(e, Frame)] == [REQUEST]
-    assert events[0].octets == b":"
+    assert events[0].octets == b":?"
     assert isinstance(events[0], Noise)
     assert events[0].reason is Reason.FALSE_START
 
@@ -130,6 +144,47 @@ def test_lf_alone_ends_a_damaged_frame() -> None:
     (event,) = read(bare)
     assert isinstance(event, Frame)
     assert (event.damage, event.check, event.flags) == (Damage.FORM, Check.GOOD, ("lf-only",))
+
+
+@pytest.mark.parametrize("gap", [0, 20 * MS])
+def test_false_starts_in_a_row_are_one_stretch_of_noise(gap: int) -> None:
+    events = read(REQUEST, b"::0:::0::\r", REQUEST, gap=gap)
+    assert brief(events) == [(REQUEST,), (Reason.FALSE_START, b"::0:::0::\r"), (REQUEST,)]
+
+
+def test_a_start_at_the_end_of_noise_waits_for_its_frame() -> None:
+    events = read(REQUEST, b"\x99:", REQUEST[1:], gap=500 * MS)
+    assert brief(events) == [(REQUEST,), (Reason.NO_DELIMITER, b"\x99"), (REQUEST,)]
+
+
+@pytest.mark.parametrize("gap", [0, 20 * MS])
+@pytest.mark.parametrize(
+    ("flaw", "first"), [(Flaw.FIRST_MISSING, b""), (Flaw.FIRST_SPOILT, b"\xba"), (Flaw.FIRST_SPOILT, b"A")]
+)
+def test_a_start_that_is_missing_or_spoilt(flaw: Flaw, first: bytes, gap: int) -> None:
+    spoilt = first + RESPONSE[1:]
+    if first == b"\xba":
+        spoilt = b"\x1a" + RESPONSE[1:]
+    events = read(REQUEST, spoilt, REQUEST, spoilt, gap=gap)
+    assert [e.octets for e in events] == [REQUEST, spoilt, REQUEST, spoilt]
+    for event in events[1::2]:
+        assert isinstance(event, Frame)
+        assert (event.damage, event.repair) == (Damage.FORM, Repair(flaw, RESPONSE))
+
+
+def test_an_end_that_is_missing() -> None:
+    events = read(REQUEST, RESPONSE[:-2], REQUEST, RESPONSE[:-2])
+    assert [e.octets for e in events] == [REQUEST, RESPONSE[:-2], REQUEST, RESPONSE[:-2]]
+    for event, damage in zip(events[1::2], (Damage.RESTARTED, Damage.SHORT), strict=True):
+        assert isinstance(event, Frame)
+        assert (event.damage, event.repair) == (damage, Repair(Flaw.LAST_TWO_MISSING, RESPONSE))
+
+
+def test_what_is_cut_earlier_is_not_repaired() -> None:
+    for count in range(3, len(RESPONSE) - 2):
+        (event, _) = read(RESPONSE[:count], REQUEST)
+        assert isinstance(event, Frame)
+        assert event.repair is None
 
 
 def test_a_changed_delimiter_is_learnt_for_its_station_alone() -> None:

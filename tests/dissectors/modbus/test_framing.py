@@ -293,6 +293,14 @@ def test_the_open_request_tells_the_length_that_a_damaged_byte_count_hides() -> 
     ]
 
 
+def test_two_octets_between_silences_are_a_frame_where_they_were_asked_before() -> None:
+    events = read((0, REQUEST), (5, RESPONSE), (60, REQUEST[:2]), (60, OTHER[:2]), (60, REQUEST))
+    assert brief(events)[2:4] == [
+        (Damage.SHORT, REQUEST[:2], Check.ABSENT, 8),
+        (Reason.NO_FRAME, OTHER[:2], Place.BETWEEN),
+    ]
+
+
 def test_octets_too_many_make_a_long_frame() -> None:
     bad = RESPONSE[:6] + b"\x55" + RESPONSE[6:]
     assert brief(read((0, REQUEST), (5, bad), (50, OTHER)))[1] == (Damage.LONG, bad, Check.BAD, 9)

@@ -107,6 +107,27 @@ def test_noise_in_every_gap(line: str, adapter: str) -> None:
 
 
 @pytest.mark.parametrize("line", ["9600", "19200,8E1", "115200"])
+def test_noise_in_every_gap_and_frames_cut_at_the_edges_of_reads(line: str) -> None:
+    """Once each station was heard, nothing whose request is answered is lost, however reads cut the frames."""
+    timing = Timing(LineSettings.parse(line), FTDI_LATENCY)
+    lost = tried = 0
+    for seed in range(4):
+        dice = random.Random(f"{line} {seed}")
+        wire, frames = poll(dice, timing, 40)
+        first = len(b"".join(frames[:40]))
+        noisy, added = with_noise(wire[first:], timing, dice, timing.t35)
+        assert added > len(frames) // 3
+        found = good(drive(RtuFramer(timing), ftdi(wire[:first] + noisy)))
+        sent = Counter(frames)
+        assert not found - sent
+        short = sum(each for frame, each in (sent - found).items() if len(frame) <= 5)
+        lost += (sent - found).total() - short
+        tried += len(frames)
+    assert tried > 250
+    assert not lost
+
+
+@pytest.mark.parametrize("line", ["9600", "19200,8E1", "115200"])
 def test_a_host_that_reads_late_more_often_than_its_latency_says(line: str) -> None:
     """One read in ten comes up to 15 ms late on an adapter that promised 2 ms: silences are proved that never were."""
     timing = Timing(LineSettings.parse(line), ADAPTERS["1 ms"])

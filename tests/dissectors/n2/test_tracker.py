@@ -273,3 +273,109 @@ def test_any_times(parts):
             tracker.track(no, frame, peek(frame))
             tracker.advance(time)
     tracker.close()
+
+
+# --- whose it is, where two readings stand ----------------------------------------------------------------------------
+
+STATUS, ASK_STATUS, ASK_OTHER_STATUS = b"A4064\r", b">01120A0297\r", b">10120A0297\r"
+
+
+def test_a_good_answer_behind_a_damaged_one_is_the_answer():
+    bus = Bus()
+    bus.say(READ)
+    bus.say(b"A00429\r")
+    bus.say(VALUE)
+    bus.say(POLL)
+    closed = bus.end()
+    assert [t.verdict for t in closed] == [Verdict.ANSWERED, Verdict.OPEN]
+    assert closed[0].response == 3
+
+
+def test_damage_behind_an_answer_is_no_second_answer():
+    bus = Bus()
+    bus.say(READ)
+    bus.say(VALUE)
+    assert bus.say(b"A00429\r", after=2 * MS).placement.source == 1
+    assert bus.verdicts() == [Verdict.ANSWERED, Verdict.UNSOLICITED]
+
+
+def test_an_answer_behind_octets_that_may_have_been_a_command_is_no_second_answer():
+    bus = Bus()
+    bus.say(READ)
+    bus.say(VALUE)
+    bus.noise(b"\x81\xfe\x00\x9e\xc5\r")
+    bus.say(b"A4291000090\r")
+    assert bus.verdicts() == [Verdict.ANSWERED, Verdict.UNSOLICITED]
+
+
+def test_a_few_stray_octets_are_no_answer():
+    bus = Bus()
+    bus.say(READ)
+    bus.noise(b"\x81\xfe")
+    bus.noise(b"7")
+    bus.say(POLL, after=250 * MS)
+    assert bus.verdicts() == [Verdict.NO_RESPONSE, Verdict.OPEN]
+
+
+def test_a_late_answer_in_the_turn_of_another_is_told_by_its_form():
+    bus = Bus()
+    bus.say(READ_OTHER)
+    bus.say(ASK_STATUS, after=250 * MS)
+    late, own = bus.say(VALUE), bus.say(STATUS)
+    closed = bus.end()
+    assert (late.placement.source, own.placement.source) == (16, 1)
+    assert [t.verdict for t in closed] == [Verdict.NO_RESPONSE, Verdict.LATE, Verdict.ANSWERED]
+    assert closed[1].of == closed[0].id
+
+
+def test_a_late_answer_of_the_same_form_accuses_nobody_else():
+    bus = Bus()
+    bus.say(ASK_OTHER_STATUS)
+    bus.say(ASK_STATUS, after=250 * MS)
+    bus.say(STATUS)
+    bus.say(b"A0060\r")
+    assert {(t.station, t.verdict) for t in bus.end()} == {
+        (16, Verdict.NO_RESPONSE),
+        (1, Verdict.ANSWERED),
+        (16, Verdict.LATE),
+    }
+
+
+def test_two_answers_that_crossed_are_no_second_answer():
+    # the value is the late one of station 16; a poll might have been answered so too
+    bus = Bus()
+    bus.say(READ_OTHER)
+    bus.say(POLL, after=250 * MS)
+    bus.say(VALUE)
+    bus.say(ACK)
+    assert [t.verdict for t in bus.end()] == [Verdict.NO_RESPONSE, Verdict.ANSWERED, Verdict.LATE]
+
+
+def test_an_answer_sooner_than_its_station_ever_answered_is_the_late_one():
+    bus = Bus()
+    for _ in range(20):
+        bus.say(ASK_STATUS)
+        bus.say(STATUS, after=80 * MS)
+    bus.say(ASK_OTHER_STATUS)
+    bus.say(ASK_STATUS, after=250 * MS)
+    late, own = bus.say(b"A0060\r", after=5 * MS), bus.say(STATUS, after=60 * MS)
+    assert (late.placement.source, own.placement.source) == (16, 1)
+
+
+@pytest.mark.parametrize(
+    ("damaged", "station"),
+    [
+        (b">0q11010387\r", 1),
+        (b">9111010387\r", 1),
+        (b">2011010387\r", 16),  # 01 and 10 have the same sum: the likeness decides
+        (b">1\x1011010387\r", 16),
+        (b">0111010388\r", 1),
+        (b">7711010399\r", None),
+    ],
+)
+def test_a_damaged_command_stands_at_the_known_station_that_it_fits(damaged, station):
+    bus = Bus()
+    for command in (READ, READ_OTHER):
+        bus.say(command)
+        bus.say(VALUE)
+    assert bus.say(damaged).placement.destination == station

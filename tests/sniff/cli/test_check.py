@@ -62,7 +62,7 @@ def test_junit_fails_the_rules_that_found_something(absent, capsys):
     main(["check", absent, "--format", "junit"])
     suite = ElementTree.fromstring(capsys.readouterr().out).find("testsuite")
     failed = {case.get("name")[:5] for case in suite if case.find("failure") is not None}
-    assert failed == {"MB001", "MB105"}
+    assert failed == {"MB001"}  # the time lost is a consequence
     assert int(suite.get("failures")) == len(failed)
     assert int(suite.get("tests")) == len(suite)
 

@@ -12,10 +12,9 @@ from dissectors.frame import Check, Chunk, Damage, Found, Frame, Header, LineErr
 from dissectors.line import LineSettings
 from dissectors.tracker import Interval, Placement, Transaction, Verdict
 from sniff.engine import Output, Row
-from sniff.formats import read
 from sniff.recording import frames
 from sniff.recording.frames import FrameBatch, FrameLog, encode
-from sniff.recording.reader import McapCapture
+from sniff.recording.reader import McapCapture, read
 from sniff.recording.topics import FRAMES
 from sniff.recording.writer import Recorder
 from sniff.session import Session

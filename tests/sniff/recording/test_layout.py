@@ -69,7 +69,7 @@ def test_the_stock_reader_reads_it(path: Path) -> None:
                 assert message.sequence == len(entries)
                 assert (message.publish_time, message.log_time) == (batch[0][0], batch[-1][0])
                 assert len(batch) <= 256
-                assert batch[-1][0] - batch[0][0] <= 500_000_000
+                assert batch[-1][0] - batch[0][0] <= 900_000_000
                 entries += batch
             else:
                 lines.append(json.loads(message.data))

@@ -123,10 +123,14 @@ def test_nobody_there(raw) -> None:
 
 
 class Rfc2217Gateway(Gateway):
-    """pyserial's own server side. `sent_out`: data that would have gone out on the bus; `heard_octets`: everything."""
+    """pyserial's own server side. `sent_out`: data that would have gone out on the bus; `heard_octets`: everything.
 
-    def __init__(self) -> None:
+    `mute`: it does not answer for RTS, DTR and flow control, as gateways do whose ports have no such lines.
+    """
+
+    def __init__(self, mute: bool = False) -> None:
         super().__init__()
+        self.mute = mute
         self.sent_out = b""
         self.heard_octets = b""
         self.masks: list[bytes] = []
@@ -145,6 +149,8 @@ class Rfc2217Gateway(Gateway):
 
         class Manager(rfc2217.PortManager):
             def _telnet_process_subnegotiation(self, suboption):
+                if outer.mute and suboption[1:2] == rfc2217.SET_CONTROL:
+                    return
                 if suboption[1:2] == rfc2217.SET_LINESTATE_MASK:
                     outer.masks.append(suboption[2:])
                     outer.ready.set()
@@ -313,3 +319,63 @@ def test_a_raw_server_is_not_taken_for_rfc2217(raw, monkeypatch) -> None:
         open_source(f"rfc2217://127.0.0.1:{raw.port}", LINE)
     opened.set()
     thread.join()
+
+
+@pytest.fixture
+def mute() -> Iterator[Rfc2217Gateway]:
+    server = Rfc2217Gateway(mute=True)
+    yield server
+    server.close()
+
+
+def test_a_gateway_without_modem_lines_is_listened_to_all_the_same(mute, monkeypatch) -> None:
+    monkeypatch.setattr("sniff.sources.rfc2217.ANSWER_PATIENCE", 0.05)
+    source = open_source(f"rfc2217://127.0.0.1:{mute.port}", LineSettings.parse("38400,8E2"))
+    assert mute.ready.wait(5)
+    mute.feed(b"\x01\xff\x02")
+    items = gather(source, lambda items: octets(items) == b"\x01\xff\x02")
+    note = next(item for item in items if isinstance(item, LineEvent))
+    assert (note.kind, note.text) == (LineEventKind.NOTE, "DTR/RTS unknown: the gateway does not confirm them")
+    assert source.session_adapter.detail.startswith("DTR/RTS unknown")
+    assert (mute.port_behind.baudrate, mute.port_behind.parity) == (38400, "E")
+    source.reconfigure(LINE)
+    assert mute.port_behind.baudrate == 19200
+    assert mute.sent_out == b""
+    source.close()
+
+
+def test_an_option_without_end_is_no_bus_traffic(smart, monkeypatch) -> None:
+    """It is dropped and said, and the connection made anew: nobody knows what is data after it."""
+    source = open_source(f"rfc2217://127.0.0.1:{smart.port}", LINE)
+    assert smart.ready.wait(5)
+    smart.feed(b"before")
+    gather(source, lambda items: octets(items) == b"before")
+    smart.client.sendall(b"\xff\xfa\x2c" + b"\x00\xff\x07" * 100_000)
+    items = gather(source, lambda items: any(isinstance(item, LineEvent) for item in items))
+    assert octets(items) == b""
+    assert items[-1].kind is LineEventKind.UNPLUGGED
+    assert "a Telnet option without end" in items[-1].text
+    source.close()
+
+
+def test_a_flood_is_held_back_and_every_octet_comes(smart) -> None:
+    from sniff.sources.rfc2217 import MOST_HELD, READ_SIZE
+
+    source = open_source(f"rfc2217://127.0.0.1:{smart.port}", LINE)
+    assert smart.ready.wait(5)
+    sent = 16 * MOST_HELD
+    thread = threading.Thread(target=lambda: smart.client.sendall(bytes(sent)), daemon=True)
+    thread.start()
+    connection = source._stream._gateway
+    until = time.monotonic() + 20
+    while connection.held <= MOST_HELD:
+        assert time.monotonic() < until
+        time.sleep(0.01)
+    came, most = 0, 0
+    while came < sent:
+        assert time.monotonic() < until + 20
+        most = max(most, connection.held - connection.taken)
+        came += len(octets(source.read()))
+    thread.join(5)
+    assert most <= MOST_HELD + READ_SIZE
+    source.close()

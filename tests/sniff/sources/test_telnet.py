@@ -5,7 +5,7 @@ from itertools import pairwise
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sniff.sources.telnet import LONGEST, Data, Negotiation, Subnegotiation, TelnetDecoder, Token
+from sniff.sources.telnet import LONGEST, Data, Negotiation, OutOfStep, Subnegotiation, TelnetDecoder, Token
 
 
 def merged(tokens: list[Token]) -> list[Token]:
@@ -45,10 +45,19 @@ def test_any_cut_gives_the_same(data: bytes, cuts: list[int]) -> None:
 @given(st.binary(max_size=200))
 def test_any_octets_are_survived(stream: bytes) -> None:
     tokens = TelnetDecoder().feed(stream)
-    assert sum(len(token.octets) for token in tokens if not isinstance(token, Negotiation)) <= len(stream)
+    assert sum(len(token.octets) for token in tokens if isinstance(token, Data | Subnegotiation)) <= len(stream)
 
 
-def test_a_subnegotiation_without_end_is_bounded() -> None:
+def test_a_subnegotiation_without_end_is_no_data() -> None:
     decoder = TelnetDecoder()
-    decoder.feed(b"\xff\xfa" + bytes(10 * LONGEST))
-    assert decoder.feed(b"\xff\xf0") == [Subnegotiation(bytes(LONGEST))]
+    tokens = decoder.feed(b"\x01\xff\xfa" + bytes(10 * LONGEST) + b"\xff\x00\x55")
+    assert tokens == [Data(b"\x01"), OutOfStep(LONGEST + 1)]
+    assert decoder.feed(b"\xff\xf0\x55") == [], "nobody knows what is data"
+
+
+def test_what_is_no_end_does_not_end_a_subnegotiation() -> None:
+    """An octet FF that the gateway forgot to double: what follows is no bus traffic."""
+    assert TelnetDecoder().feed(b"\xff\xfa\x2c\x6a\xff\x04\x05\xff\xf0\x55") == [
+        Subnegotiation(b"\x2c\x6a\x05"),
+        Data(b"\x55"),
+    ]

@@ -1,0 +1,96 @@
+"""What the rules say of damaged frames and noise, and of two stations with one address."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from math import sqrt
+
+from dissectors.bacnet.findings_of_use import has_two_rhythms
+from dissectors.bacnet.ring import Happened, Node, Ring, What
+from dissectors.bacnet.ring_remarks import Remark, listed, of, plain
+from dissectors.findings import Severity, counted, times
+
+DAMAGED_LEAST = 3
+DAMAGED_SHARE = 0.001
+DAMAGED_OF_ONE_SHARE = 0.01
+NOISE_LEAST = 20
+NOISE_SHARE = 0.005
+LIKE_ALL = 3
+"""A station is named for damage where it has so many times what its share of the octets would bring."""
+
+AT_END_SHARE = 0.8
+"""Share of a station's damaged frames that lack their end alone, from which on that is its driver."""
+
+
+def damage(ring: Ring) -> Iterable[Remark]:
+    """Damaged frames: of one station where they are its own, else of the bus; noise."""
+    damaged = ring.header_errors + ring.data_errors + ring.cut
+    if damaged >= DAMAGED_LEAST and damaged > DAMAGED_SHARE * ring.frames:
+        kinds = (
+            (ring.header_errors, "with a wrong header CRC"),
+            (ring.data_errors, "with a wrong data CRC"),
+            (ring.cut, "cut off"),
+        )
+        seen = (
+            f"{damaged} of {counted(ring.frames, 'frame')} damaged: "
+            f"{', '.join(f'{count} {what}' for count, what in kinds if count)}"
+        )
+        yield plain("MS401", ring, None, seen, damaged)
+    for mac, node in ring.nodes.items():
+        if node.damaged >= DAMAGED_LEAST and _is_its_own(ring, node):
+            yield from _of_one(ring, mac, node)
+    if ring.noise >= NOISE_LEAST and ring.noise > NOISE_SHARE * (ring.octets + ring.noise):
+        seen = f"{ring.noise} octets of {ring.octets + ring.noise} belong to no frame"
+        yield plain("MS403", ring, None, seen, ring.noise)
+
+
+def _is_its_own(ring: Ring, node: Node) -> bool:
+    """Whether a station has more damaged frames than noise that hits everybody brings, by its share of the octets."""
+    own = node.octets + node.damaged_octets
+    others = [other for other in ring.nodes.values() if other is not node]
+    theirs = sum(other.octets + other.damaged_octets for other in others)
+    expected = sum(other.damaged for other in others) * own / max(1, theirs)
+    return node.damaged > LIKE_ALL * expected + 3 * sqrt(expected)
+
+
+def _of_one(ring: Ring, mac: int, node: Node) -> Iterable[Remark]:
+    sent = _sent(node)
+    replies = ring.of(What.DAMAGED_REPLY, mac).count
+    if node.cut_last >= DAMAGED_LEAST and node.cut_last >= AT_END_SHARE * node.damaged:
+        seen = f"{node.cut_last} of its {sent} frames lack their last octet, or it is wrong; all before it is right"
+        yield plain("MS405", ring, mac, seen, node.cut_last)
+    if node.damaged > DAMAGED_OF_ONE_SHARE * sent:
+        seen = f"{node.damaged} of its {sent} frames damaged"
+        if replies:
+            seen += f", {replies} of them answers"
+        yield plain("MS402", ring, mac, seen, node.damaged)
+
+
+def _sent(node: Node) -> int:
+    return node.data_sent + node.tokens_sent + node.polls_sent + node.poll_replies_sent + node.postponed + node.damaged
+
+
+def duplicates(ring: Ring) -> Iterable[Remark]:
+    """Two stations with one address: only what a single one cannot have done."""
+    for mac in sorted({mac for _, mac in ring.happened if mac is not None}):
+        second, echo = ring.of(What.SECOND_DEVICE, mac), ring.of(What.OTHER_ECHO, mac)
+        other, node = ring.of(What.OTHER_DEVICE, mac), ring.nodes.get(mac, Node())
+        reasons, evidence = [], Happened()
+        if second.count:
+            reasons.append(f"devices {listed(node.devices)} said I-Am from this address in turns")
+            evidence = evidence.merge(other).merge(second)
+        if echo.count:
+            reasons.append(f"answered a test of its own address {times(echo.count)} with other octets")
+            evidence = evidence.merge(echo)
+        if has_two_rhythms(ring, mac):
+            soon = ring.of(What.TOO_SOON, mac)
+            reasons.append(
+                f"sent again {times(soon.count)} before its own poll could be answered, and waited for the answer "
+                f"{times(node.polls_waited)}"
+            )
+            evidence = evidence.merge(soon)
+        if reasons:
+            yield of("MS501", mac, "; ".join(reasons), evidence)
+        elif other.count:
+            seen = f"devices {listed(node.devices)} said I-Am from this address, one after the other"
+            yield of("MS501", mac, seen, other, Severity.NOTE)

@@ -1,0 +1,174 @@
+"""What the rules say of polls for masters, and of who uses the line."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from dissectors.bacnet.limits import N_POLL, T_USAGE_TIMEOUT_MAX
+from dissectors.bacnet.ring import Ring, What
+from dissectors.bacnet.ring_observer import T_GO_ON
+from dissectors.bacnet.ring_remarks import Remark, listed, milliseconds, of, plain
+from dissectors.findings import Severity, counted, times
+
+POLLS_SHARE = 0.1
+LEAST_POLLS = 20
+SLOW_POLLS_LEAST = 5
+HASTY_LEAST = 3
+_S = 1_000_000_000
+
+SLOW_ROUND = 2 * _S
+LEAST_ROUNDS = 20
+HOG_SHARE = 0.5
+HOG_FRAMES = 8
+LEAST_WATCHED = 10 * _S
+STORM_LEAST = 10 * _S
+"""A storm lasts at least so long: a search for all devices is over sooner."""
+
+STORM_OF_ONE = 0.8
+NEAR_LIMIT = 0.9
+STRETCHED = 5
+"""So many times longer than an idle one is a round where data take nearly all of the time."""
+
+
+def polls(ring: Ring) -> Iterable[Remark]:
+    """Too many polls for masters, searches that stop the bus, and polls that wait too long or too short."""
+    advice = {int(words.split()[1]): words for words in ring.advice()}
+    for mac, node in ring.nodes.items():
+        seen, tokens = [], node.tokens_received
+        made = node.polls_sent - node.polls_of_search
+        if made >= LEAST_POLLS and tokens and made > POLLS_SHARE * tokens:
+            seen.append(
+                f"{made} polls to {tokens} tokens (one in {N_POLL} is usual), {min(made, node.polls_unanswered)} "
+                "of them "
+                f"unanswered, up to address {node.highest_polled}; "
+                f"unanswered polls of all stations take {ring.poll_waste_share:.0%} of the time"
+            )
+        stopped = ring.of(What.STOPPED, mac)
+        if stopped.count > 1:
+            longest = max(event.value or 0 for event in stopped.events)
+            seen.append(
+                f"{times(stopped.count)} it polled up to {node.highest_polled} for a successor after a loss, and "
+                "the bus "
+                f"stood still for up to {milliseconds(longest)}"
+            )
+        if seen:
+            words = "; ".join(seen)
+            yield plain("MS201", ring, mac, f"{words}; {advice[mac]}" if mac in advice else words, made)
+    yield from _waits(ring)
+
+
+def _waits(ring: Ring) -> Iterable[Remark]:
+    for (what, mac), happened in ring.happened.items():
+        node = ring.nodes.get(mac) if mac is not None else None
+        if node is None or mac is None:
+            continue
+        waited = node.poll_wait
+        if what is What.SLOW_SEARCH and happened.count >= max(SLOW_POLLS_LEAST, waited.count // 2):
+            seen = (
+                f"{happened.count} of {times(waited.count)} it went on later than {milliseconds(T_GO_ON)} after a "
+                "poll that "
+                f"nobody answered (20 … 35 ms are usual); median {milliseconds(waited.quantile(0.5))}, longest "
+                f"{milliseconds(waited.most)}"
+            )
+            yield of("MS203", mac, seen, happened)
+        if (
+            what is What.TOO_SOON
+            and happened.count >= HASTY_LEAST
+            and not ring.coarse
+            and not has_two_rhythms(ring, mac)
+        ):
+            seen = (
+                f"{happened.count} of {counted(waited.count, 'time')} it went on before the station that it "
+                "polled could "
+                f"answer; median {milliseconds(waited.quantile(0.5))}, {milliseconds(T_USAGE_TIMEOUT_MAX)} at "
+                "most are usual"
+            )
+            yield of("MS204", mac, seen, happened)
+
+
+def has_two_rhythms(ring: Ring, mac: int) -> bool:
+    """Whether an address now waits for the answer to its polls, and now goes on before there can be one.
+
+    No single station does both.
+    """
+    node = ring.nodes.get(mac)
+    soon = ring.of(What.TOO_SOON, mac).count
+    return node is not None and not ring.coarse and soon >= HASTY_LEAST and node.polls_waited >= HASTY_LEAST
+
+
+def use(ring: Ring) -> Iterable[Remark]:
+    """Who uses the line: slow rounds, a station that takes most of the time, broadcasts in masses, nearly no "
+    "time left."""
+    yield from _slow_rounds(ring)
+    if ring.span < LEAST_WATCHED:
+        return
+    masters = ring.masters
+    for mac in masters:
+        node = ring.nodes[mac]
+        share = node.held / ring.span
+        if len(masters) > 1 and share >= HOG_SHARE and node.most_in_a_hold >= HOG_FRAMES:
+            seen = (
+                f"has the token for {share:.0%} of the time and sends up to {node.most_in_a_hold} frames with one "
+                "(its Max_Info_Frames is at least that)"
+            )
+            yield plain("MS601", ring, mac, seen)
+    yield from _storm(ring)
+    yield from _near_limit(ring)
+
+
+def _slow_rounds(ring: Ring) -> Iterable[Remark]:
+    slow = {}
+    for mac in ring.masters:
+        loop = ring.nodes[mac].loop
+        quantile = loop.quantile(0.95)
+        if quantile is not None and loop.count >= LEAST_ROUNDS and quantile > SLOW_ROUND:
+            slow[mac] = quantile
+    if not slow:
+        return
+    users = sorted(ring.masters, key=lambda mac: -ring.nodes[mac].held)[:3]
+    shares = ", ".join(
+        f"MAC {mac} {ring.nodes[mac].held / max(1, ring.span):.0%} with up to "
+        f"{counted(ring.nodes[mac].most_in_a_hold, 'frame')} a token"
+        for mac in users
+    )
+    seen = f"95% of the rounds took up to {milliseconds(max(slow.values()))}; most of the time had {shares}"
+    yield plain("MS108", ring, None, seen, len(slow))
+
+
+def _storm(ring: Ring) -> Iterable[Remark]:
+    storms = {
+        mac: happened for (what, mac), happened in ring.happened.items() if what is What.STORM and mac is not None
+    }
+    if not storms:
+        return
+    together = None
+    for happened in storms.values():
+        together = happened if together is None else together.merge(happened)
+    assert together is not None
+    if together.last - together.first < STORM_LEAST:
+        return
+    sent = {mac: ring.nodes[mac].broadcasts_sent for mac in storms}
+    total = sum(node.broadcasts_sent for node in ring.nodes.values())
+    most = max(sent, key=lambda mac: sent[mac])
+    alone = sent[most] >= STORM_OF_ONE * total
+    who = f"{sent[most]} of them by MAC {most}" if alone else f"most by MAC {listed(sorted(sent))}"
+    lasted = (together.last - together.first) / _S
+    seen = f"{counted(total, 'broadcast')}, {who}; over 20 a second for at least {lasted:.0f} s"
+    yield of("MS602", most if alone else None, seen, together)
+
+
+def _near_limit(ring: Ring) -> Iterable[Remark]:
+    idle = ring.predicted_loop
+    loops = [ring.nodes[mac].loop.quantile(0.5) for mac in ring.order if mac in ring.nodes]
+    known = [loop for loop in loops if loop is not None]
+    if not idle or not known or ring.span < LEAST_WATCHED:
+        return
+    loop = sorted(known)[len(known) // 2]
+    rounds = max((ring.nodes[mac].loop.count for mac in ring.order if mac in ring.nodes), default=0)
+    for_data = 1 - rounds * idle / ring.span - ring.poll_waste_share
+    if for_data >= NEAR_LIMIT and loop >= STRETCHED * idle:
+        seen = (
+            f"data take {for_data:.0%} of the time; a round takes {milliseconds(loop)} where an idle one would take "
+            f"{milliseconds(idle)}"
+        )
+        yield plain("MS603", ring, None, seen, severity=Severity.NOTE)

@@ -1,0 +1,58 @@
+"""Damage on a ring: whose it is, and of what kind."""
+
+from __future__ import annotations
+
+from dissectors.bacnet.frame_types import HEADER, is_encoded
+from dissectors.bacnet.header import is_whole_header
+from dissectors.bacnet.mending import WITHOUT_DATA
+from dissectors.bacnet.ring_tally import RingTally
+from dissectors.bacnet.turn import Speaker, Turn
+from dissectors.checksums import crc8_mstp, crc16_x25
+from dissectors.frame import Damage, Flaw, Frame, Header
+
+_AT_END = frozenset((Flaw.LAST_MISSING, Flaw.LAST_TWO_MISSING))
+
+
+def speaker_of(frame: Frame, header: Header, turn: Turn) -> Speaker | None:
+    """Who sent a damaged frame: by its header where that is whole, else by whose turn it was. Tells the turn."""
+    if is_whole_header(frame) and header.source is not None:
+        if header.destination is not None and header.function is not None:
+            turn.see(frame, header.function, header.source, header.destination)
+        return Speaker(header.source, header.destination, header.function)
+    speaker = turn.speaker(frame)
+    if speaker is not None and speaker.frame_type is not None and speaker.destination is not None:
+        turn.see_likely(frame, speaker.frame_type, speaker.source, speaker.destination)
+    return speaker
+
+
+def count_damage(tally: RingTally, frame: Frame, speaker: Speaker | None) -> None:
+    """Count a damaged frame, with its sender where there is one."""
+    if frame.damage is Damage.HEADER:
+        tally.header_errors += 1
+    elif frame.damage is Damage.CHECK:
+        tally.data_errors += 1
+    else:
+        tally.cut += 1
+    if speaker is None:
+        return
+    node = tally.node(speaker.source)
+    if is_whole_header(frame):
+        node.first = node.first or frame.start
+        node.last = frame.end
+    node.damaged += 1
+    node.damaged_octets += len(frame.octets)
+    node.cut_last += only_its_end(frame, speaker)
+
+
+def only_its_end(frame: Frame, speaker: Speaker) -> bool:
+    """Whether only the last octet, or two, is missing or wrong, as when a driver lets go too early."""
+    if frame.repair is not None:
+        return frame.repair.flaw in _AT_END
+    octets = frame.octets
+    if frame.damage is Damage.CHECK and not is_encoded(octets[2]):
+        return octets[-2] == crc16_x25(octets[HEADER:-2]) & 0xFF
+    if frame.damage is not Damage.HEADER or len(octets) != HEADER:
+        return False
+    said = octets[2], octets[3], octets[4], octets[5:7]
+    due = speaker.frame_type, speaker.destination, speaker.source, b"\x00\x00"
+    return said == due and octets[2] in WITHOUT_DATA and crc8_mstp(octets[2:7]) != octets[7]

@@ -1,0 +1,80 @@
+"""A finding about a ring together with the station that it is about: what the rules of MS/TP are written in."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from dissectors.bacnet.ring import Happened, Ring
+from dissectors.bacnet.rules import RULES
+from dissectors.findings import EVIDENCE_MAX, Finding, Severity, found
+
+_MS = 1_000_000
+
+
+class Remark(NamedTuple):
+    """`mac`: the station that it is about; None for the whole bus."""
+
+    mac: int | None
+    finding: Finding
+
+
+def of(
+    code: str,
+    mac: int | None,
+    seen: str,
+    happened: Happened,
+    severity: Severity | None = None,
+    *,
+    pair: bool = False,
+) -> Remark:
+    """A finding about things that happened to a station, or to the bus (None).
+
+    `pair`: the subject names the other party too where it is always the same.
+    """
+    evidence = tuple(dict.fromkeys(event.no for event in happened.events))[:EVIDENCE_MAX]
+    finding = found(
+        RULES[code],
+        _pair(happened, mac) if pair else subject(mac),
+        seen,
+        first=happened.first,
+        last=happened.last,
+        count=happened.count,
+        evidence=evidence,
+        severity=severity,
+    )
+    return Remark(mac, finding)
+
+
+def plain(
+    code: str, ring: Ring, mac: int | None, seen: str, count: int = 1, severity: Severity | None = None
+) -> Remark:
+    """A finding about the whole time that the ring was watched."""
+    finding = found(
+        RULES[code], subject(mac), seen, first=ring.first or 0, last=ring.last or 0, count=count, severity=severity
+    )
+    return Remark(mac, finding)
+
+
+def subject(mac: int | None) -> str:
+    """How a finding names a station; None is the bus."""
+    return "bus" if mac is None else f"MAC {mac}"
+
+
+def _pair(happened: Happened, mac: int | None) -> str:
+    others = {event.other for event in happened.events}
+    if mac is not None and len(others) == 1 and (other := others.pop()) is not None:
+        return f"{other} → {mac}"
+    return subject(mac)
+
+
+def milliseconds(duration: int | None) -> str:
+    """A duration (ns) for people, "?" where it is not known."""
+    return (
+        "?" if duration is None else f"{duration / _MS:.3g} ms" if duration < 1000 * _MS else f"{duration / 1e9:.2f} s"
+    )
+
+
+def listed(numbers: Iterable[int]) -> str:
+    """Numbers with commas between."""
+    return ", ".join(str(number) for number in numbers) or "nobody"

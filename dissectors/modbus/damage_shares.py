@@ -1,0 +1,75 @@
+"""Whose the damage is: a sender's own, or the bus's, that falls on whoever sends. Pure.
+
+Noise that falls anywhere strikes each sender as often as it sends octets. So a sender is blamed only where so great a
+part of all damage as it has would seldom come about by its share of the octets; the worst one first, then the others
+among themselves.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import erfc, exp, lgamma, log, log1p, sqrt
+
+from dissectors.modbus.evidence import Evidence
+
+_SELDOM = 0.002  # with a handful of senders, one in a hundred buses blames somebody wrongly
+_SELDOM_ALONE = 0.05  # where nobody else has any damage, which speaks for itself
+_EXACT_MOST = 400
+
+
+@dataclass(frozen=True, slots=True)
+class Damage:
+    """Senders ("master", "station 3") that have more damage than their share; how much the others have."""
+
+    blamed: frozenset[str]
+    common: dict[str, int]
+
+
+def shares_of_damage(seen: Evidence) -> Damage:
+    """Sort all senders into those that are to blame and those that are not.
+
+    Stations are compared with each other, and the master with all: what strikes all answers is no station's fault.
+    """
+    hits = {f"station {unit}": one.damaged.count - one.explained for unit, one in seen.stations.items()}
+    octets = {sender: max(1, seen.octets[sender]) for sender in (*hits, "master")}
+    requests = seen.damaged_requests.count
+    if len(hits) == 1:
+        hits["master"] = requests
+    blamed = _to_blame(hits, octets)
+    hits["master"] = requests
+    if requests and "master" not in blamed:
+        share = octets["master"] / sum(octets.values())
+        alone = not any(count for sender, count in hits.items() if sender != "master")
+        if chance(requests, sum(hits.values()), share) < (_SELDOM_ALONE if alone else _SELDOM):
+            blamed.add("master")
+    common = {sender: count for sender, count in hits.items() if count > 0 and sender not in blamed}
+    return Damage(frozenset(blamed), common)
+
+
+def _to_blame(hits: dict[str, int], octets: dict[str, int]) -> set[str]:
+    """Those with more than their share, the worst one first, then the others among themselves."""
+    left, blamed = dict(hits), set[str]()
+    while len(left) > 1:
+        damaged, sent = sum(left.values()), sum(octets[sender] for sender in left)
+        chances = {sender: chance(count, damaged, octets[sender] / sent) for sender, count in left.items() if count > 0}
+        if not chances:
+            break
+        worst = min(chances, key=lambda sender: chances[sender])
+        if chances[worst] >= (_SELDOM_ALONE if len(chances) == 1 else _SELDOM):
+            break
+        blamed.add(worst)
+        del left[worst]
+    return blamed
+
+
+def chance(count: int, of: int, share: float) -> float:
+    """How likely `count` or more of `of` fall on a sender with that share: the upper tail of the binomial."""
+    if count <= 0 or share >= 1:
+        return 1.0
+    if of > _EXACT_MOST:
+        return erfc((count - 0.5 - of * share) / sqrt(2 * of * share * (1 - share))) / 2
+    whole, hit, missed = lgamma(of + 1), log(share), log1p(-share)
+    terms = (
+        exp(whole - lgamma(k + 1) - lgamma(of - k + 1) + k * hit + (of - k) * missed) for k in range(count, of + 1)
+    )
+    return min(1.0, sum(terms))

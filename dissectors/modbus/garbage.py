@@ -1,0 +1,86 @@
+"""Octets in place of answers: are they always the same, and do they look like a line at a fraction of the baud rate?
+
+A UART that listens k times too fast sees each bit of the line k bits long. Of a character it shows, in the order of
+the line, the start bit, then the data bits, the lowest first:
+
+    78h     0 000 1111 0|      two whole runs of 4, and one that the stop bit cuts off: 1/4 of the baud rate fits
+
+So all runs but the last one of a character are multiples of k. Noise is not like that, nor is another protocol at the
+same baud rate. Pure.
+"""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from itertools import groupby
+from math import log2
+from typing import Final
+
+from dissectors.findings import Tally
+
+_FACTORS: Final = (8, 6, 5, 4, 3, 2)
+_STRETCHES_KEPT = 32
+_DIFFERENT_KEPT = 64
+_LEAST = 3
+_CERTAIN = 24  # bits: chance makes octets that fit so well once in 16 million
+_STRAY = 20  # one octet in so many may not fit: an edge that jitter moved
+
+
+def whole_runs(octet: int) -> list[int]:
+    """Lengths of the runs of equal bits in a character, start bit first; without the last, which may go on."""
+    bits = [0, *(octet >> bit & 1 for bit in range(8))]
+    return [len(list(run)) for _, run in groupby(bits)][:-1]
+
+
+def _fits(octet: int, factor: int) -> bool:
+    return all(run % factor == 0 for run in whole_runs(octet))
+
+
+_FITTING: Final = {factor: frozenset(o for o in range(256) if _fits(o, factor)) for factor in _FACTORS}
+
+
+def slower_by(stretches: Iterable[bytes]) -> int | None:
+    """The factor by which the sender is slower than the line is set, if the octets show it; None otherwise."""
+    octets = b"".join(stretches)
+    telling = [octet for octet in octets if octet]  # a long low is 00 at any baud rate
+    if len(set(telling)) < 2:
+        return None
+    for factor in _FACTORS:
+        fitting = _FITTING[factor]
+        strays = sum(octet not in fitting for octet in telling)
+        if strays * _STRAY > len(telling):
+            continue
+        if (len(telling) - strays) * log2(255 / (len(fitting) - 1)) >= _CERTAIN:
+            return factor
+    return None
+
+
+@dataclass(slots=True)
+class Garbage:
+    """What came in place of the answers of one station, and was none."""
+
+    tally: Tally = field(default_factory=Tally)
+    stretches: deque[bytes] = field(default_factory=lambda: deque(maxlen=_STRETCHES_KEPT))
+    marked: int = 0  # of them with line errors
+    _counts: Counter[bytes] = field(default_factory=Counter)
+
+    def add(self, octets: bytes, is_marked: bool, time: int, *frames: int | None) -> None:
+        """Count one more; `is_marked`: with line errors."""
+        self.marked += is_marked
+        self.tally.add(time, *frames)
+        self.stretches.append(octets)
+        if octets in self._counts or len(self._counts) < _DIFFERENT_KEPT:
+            self._counts[octets] += 1
+
+    def always(self) -> bytes | None:
+        """The octets, if they were the same nearly every time (at least three times and 3 in 4); None otherwise."""
+        if not self._counts:
+            return None
+        octets, count = self._counts.most_common(1)[0]
+        return octets if count >= _LEAST and 4 * count >= 3 * self.tally.count else None
+
+    def slower_by(self) -> int | None:
+        """See the function of that name; None where there is too little of it."""
+        return slower_by(self.stretches) if self.tally.count >= _LEAST else None

@@ -1,0 +1,51 @@
+"""Whose damage it is: one sender's where it has far more than its share of the time on the line, else the bus's."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import sqrt
+from typing import Final
+
+from dissectors.findings import Tally
+from dissectors.n2.record import Damages
+
+OUTSTANDING: Final = 4
+"""So many times the damage that noise at the rate of all others would have done make it a sender's own."""
+
+
+def blamed(senders: Mapping[str, Damages]) -> dict[str, Tally]:
+    """Subject → damaged frames. Noise falls on each sender as long as it sends; who has several times more than that
+    is named, and so is the only one that has any. What is left is the bus's."""
+    left = {name: sent for name, sent in senders.items() if sent.octets}
+    named: dict[str, Tally] = {}
+    while worst := _outstanding(left):
+        named[worst] = left.pop(worst).bad
+    struck = {name: sent.bad for name, sent in left.items() if sent.bad.count}
+    if len(struck) == 1:
+        return named | struck
+    return named | ({"bus": _together(struck)} if struck else {})
+
+
+def _outstanding(senders: Mapping[str, Damages]) -> str | None:
+    """The sender with the most damage beyond what the others' rate explains, where that cannot be chance."""
+    bad, octets = sum(one.bad.count for one in senders.values()), sum(one.octets for one in senders.values())
+    worst: tuple[float, str] | None = None
+    for name, sent in senders.items():
+        mine, rest = sent.bad.count, octets - sent.octets
+        if mine < 3 or not rest:
+            continue
+        due = (bad - mine + 0.5) / rest * sent.octets
+        if mine > OUTSTANDING * due and mine > due + 3 * sqrt(due):
+            worst = max(worst or (0.0, ""), (mine / due, name))
+    return worst[1] if worst is not None else None
+
+
+def _together(tallies: Mapping[str, Tally]) -> Tally:
+    """Several tallies as one."""
+    both = Tally(
+        sum(one.count for one in tallies.values()),
+        min(one.first for one in tallies.values()),
+        max(one.last for one in tallies.values()),
+    )
+    both.evidence = sorted({frame for one in tallies.values() for frame in one.evidence})
+    return both

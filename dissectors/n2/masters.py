@@ -1,0 +1,82 @@
+"""Whether a second master speaks: what no single one would do.
+
+A command that no answer followed says little: a master may be impatient, its answer may not have been heard here. So
+only this counts:
+
+- a command that begins in the middle of another one, without the silence of a master that gave up
+- a command that follows another one sooner than the station asked ever answered, and than any master gives up
+- an answer that came in its usual time, and yet after the next command
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Final
+
+from dissectors.findings import Tally
+from dissectors.frame import Damage, Frame
+from dissectors.n2.commands import Command
+from dissectors.n2.header import BROADCAST
+from dissectors.n2.record import Station
+from dissectors.tracker import Transaction
+
+HASTE: Final = 100_000_000
+"""No master gives up sooner, ns (the shortest timeout of an NAE is 250 ms)."""
+
+KNOWN: Final = 8
+"""Answers of a station after which its shortest time says something."""
+
+_SAME = 6  # octets of two commands: start, address, command and what it asks
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """The command of an open transaction."""
+
+    row: int
+    frame: Frame
+    command: Command
+
+
+@dataclass(slots=True)
+class Masters:
+    """Fed the commands; `seen` counts what one master would not do."""
+
+    seen: Tally = field(default_factory=Tally)
+    _last: Asked | None = None  # the newest command, while nothing has come after it
+
+    def see_other(self) -> None:
+        """Something that is no command came, or may have come."""
+        self._last = None
+
+    def see_command(self, asked: Asked, station: Station | None) -> None:
+        """Take a command; `station`: that of the command before."""
+        last, self._last = self._last, asked
+        if last is None:
+            return
+        frame = last.frame
+        longest = asked.frame.start - (frame.end - frame.slack)
+        if longest >= HASTE:
+            return
+        if frame.damage is Damage.RESTARTED and asked.frame.ok and frame.repair is None:
+            self.seen.add(asked.frame.start, last.row, asked.row)  # one flipped bit makes a `6` a `>`: it must be good
+            return
+        if not frame.ok or last.command.address == BROADCAST:
+            return
+        if frame.octets[:_SAME] == asked.frame.octets[:_SAME]:  # a repeat, or an echo that something ran into
+            return
+        if station is None or station.quickest is None or station.answered < KNOWN:
+            return
+        if longest < station.quickest:
+            self.seen.add(asked.frame.start, last.row, asked.row)
+
+    def see_late(self, transaction: Transaction, station: Station) -> None:
+        """Take an answer that came after the next command."""
+        latency = transaction.latency
+        if latency is not None and latency.high < HASTE and station.answered >= KNOWN:
+            self.seen.add(transaction.start, transaction.response)
+
+    @property
+    def last_station(self) -> int | None:
+        """Whom the newest command asked, while nothing has come after it."""
+        return self._last.command.address if self._last is not None else None

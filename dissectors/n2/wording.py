@@ -1,0 +1,223 @@
+"""What was gathered of an N2 bus, as findings in words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+
+from dissectors.findings import Finding, Severity, Tally, counted, times
+from dissectors.frame import Flaw
+from dissectors.line import NS_PER_S
+from dissectors.n2.blame import blamed
+from dissectors.n2.commands import error_name
+from dissectors.n2.objects import attribute_name, number, object_name
+from dissectors.n2.record import Damages, Station
+from dissectors.n2.rules import RULES
+
+MS = 1_000_000
+SLOW = 250 * MS
+"""Shortest message timeout that an NAE can be given, ns (JCI help, N2 trunk)."""
+
+OVERRIDE_AGE = 600 * NS_PER_S
+"""After 10 minutes an override should have been renewed or released; the F510's do not expire (its manual, 1.2.2)."""
+
+ALIKE = 3
+"""So many frames of one sender damaged in the same way are no chance, where 4 in 5 of its damaged ones are."""
+
+TRIES = 11
+"""Most commands of one turn to a station: a first one and the most retries that an NAE can be given (3 to 10)."""
+
+SCAN = 8
+"""So many addresses that are only asked who they are, and are not there, are a scan."""
+
+
+@dataclass(frozen=True, slots=True)
+class Heard:
+    """All that was gathered up to `now` (ns) in `seconds`."""
+
+    now: int
+    seconds: float
+    master: Damages
+    stations: Mapping[int, Station]
+    masters: Tally
+    stray: Tally
+
+    def is_rare(self, tally: Tally, of: int) -> bool:
+        """Whether so few are not worth a warning: one, or under 1 in 100 and at most two a minute."""
+        minutes = max(1, -(-int(self.seconds) // 60))
+        return tally.count == 1 or (tally.count <= 2 * minutes and 100 * tally.count < of)
+
+    def noted_if(self, rare: bool, finding: Finding) -> Finding:
+        """The finding, only as a note where it is rare."""
+        return replace(finding, severity=Severity.NOTE) if rare else finding
+
+
+def worded(heard: Heard) -> Iterator[Finding]:
+    """All findings: the bus first, then station by station."""
+    if heard.masters.count >= 2:
+        seen = f"{heard.masters.count} times what one master would not do: a command in the middle of another one, "
+        seen += "or before its answer can have come"
+        yield heard.masters.found(RULES["N2007"], "bus", seen)
+    if heard.stray.count:
+        seen = f"{counted(heard.stray.count, 'answer')} came unasked"
+        finding = heard.stray.found(RULES["N2011"], "bus", seen)
+        yield heard.noted_if(heard.is_rare(heard.stray, heard.master.frames), finding)
+    yield from _alike(heard)
+    yield from _damaged(heard)
+    scanned = _scanned(heard)
+    yield from _scan(heard, scanned)
+    for address in sorted(heard.stations):
+        yield from _of_station(heard, f"station {address}", heard.stations[address], address in scanned)
+
+
+# --- damage ---
+
+
+def _senders(heard: Heard) -> dict[str, Damages]:
+    return {"master": heard.master} | {f"station {a}": heard.stations[a].sent for a in sorted(heard.stations)}
+
+
+def _damaged(heard: Heard) -> Iterator[Finding]:
+    """Damaged frames, at their sender or at the bus."""
+    senders = _senders(heard)
+    frames = sum(sent.frames for sent in senders.values())
+    for subject, tally in blamed(senders).items():
+        of = senders[subject].frames if subject in senders else frames
+        what = {"bus": "frame", "master": "command"}.get(subject, "answer")
+        seen = f"{counted(tally.count, f'damaged {what}')} of {of}"
+        if subject == "bus":
+            seen += ", of all senders as long as they send"
+        yield heard.noted_if(heard.is_rare(tally, of), tally.found(RULES["N2004"], subject, seen))
+
+
+def _alike(heard: Heard) -> Iterator[Finding]:
+    """Senders whose frames are damaged in one and the same way."""
+    senders = {name: sent for name, sent in _senders(heard).items() if sent.frames}
+    found = {name: flaw for name, sent in senders.items() if (flaw := _flaw(sent)) is not None}
+    stations = [name for name in senders if name != "master" and senders[name].frames >= ALIKE]
+    flaws = {found.get(name) for name in stations}
+    if len(stations) > 1 and len(flaws) == 1 and (flaw := flaws.pop()) is not None:
+        tallies = [senders[name].flaws[flaw] for name in stations]
+        tally = Tally(sum(one.count for one in tallies), min(one.first for one in tallies))
+        tally.last = max(one.last for one in tallies)
+        tally.evidence = sorted(frame for one in tallies for frame in one.evidence)
+        seen = f"{_flaw_words(flaw)} in {counted(tally.count, 'answer')} of all stations"
+        yield tally.found(RULES["N2012"], "bus", seen)
+        found = {name: flaw for name, flaw in found.items() if name not in stations}
+    for name, flaw in found.items():
+        sent, tally = senders[name], senders[name].flaws[flaw]
+        what = "command" if name == "master" else "answer"
+        seen = f"{_flaw_words(flaw)} in {tally.count} of {counted(sent.frames, what)}"
+        severity = Severity.ERROR if 2 * tally.count >= sent.frames else Severity.WARNING
+        yield tally.found(RULES["N2012"], name, seen, severity)
+
+
+def _flaw(sent: Damages) -> Flaw | None:
+    """The flaw that nearly all damaged frames of a sender have."""
+    for flaw, tally in sent.flaws.items():
+        if tally.count >= ALIKE and 5 * tally.count >= 4 * sent.bad.count:
+            return flaw
+    return None
+
+
+def _flaw_words(flaw: Flaw) -> str:
+    return f"always the same: {flaw.value}"
+
+
+# --- who is not there ---
+
+
+def _scanned(heard: Heard) -> frozenset[int]:
+    """Addresses that are only asked who they are, and are not there, where they are many."""
+    absent = [address for address, one in heard.stations.items() if one.asked and not one.answered]
+    scanned = frozenset(a for a in absent if heard.stations[a].only_identify and heard.stations[a].missing.count)
+    return scanned if len(scanned) >= SCAN else frozenset()
+
+
+def _scan(heard: Heard, scanned: frozenset[int]) -> Iterator[Finding]:
+    if not scanned:
+        return
+    tally = Tally()
+    for address in sorted(scanned):
+        one = heard.stations[address].missing.tally()
+        tally.add(one.first, *one.evidence[:1])
+        tally.last = max(tally.last, one.last)
+    seen = f"{len(scanned)} addresses were asked who they are, and did not answer"
+    yield tally.found(RULES["N2005"], "master", seen, Severity.NOTE)
+
+
+def _missing(heard: Heard, name: str, station: Station) -> Finding:
+    tally, rule = station.missing.tally(), RULES["N2005"]
+    if not station.answered and not station.late.count:
+        if station.turns <= 1 and station.asked <= TRIES:
+            tries = "the only command" if station.asked == 1 else f"the {station.asked} commands of one turn"
+            return tally.found(rule, name, f"no answer to {tries}", Severity.NOTE)
+        return tally.found(rule, name, f"no answer to any of {station.asked} commands", Severity.ERROR)
+    finding = tally.found(rule, name, f"no answer to {tally.count} of {counted(station.asked, 'command')}")
+    return heard.noted_if(heard.is_rare(tally, station.asked), finding)
+
+
+# --- stations ---
+
+
+def _of_station(heard: Heard, name: str, station: Station, scanned: bool) -> Iterable[Finding]:
+    if station.resets.count:
+        seen = f"answered N00 {times(station.refused_while_reset)}: {times(station.resets.count)} reset"
+        yield station.resets.found(RULES["N2001"], name, seen)
+    yield from _points(name, station)
+    if station.slow.count:
+        yield _slow(heard, name, station)
+    if station.missing.count and not scanned:
+        yield _missing(heard, name, station)
+    yield from _overrides(heard, name, station)
+    yield from _again(heard, name, station)
+    for (code, title), tally in sorted(station.refused.items()):
+        words = f"N{code} {error_name(code)}".rstrip()
+        yield tally.found(RULES["N2009"], name, f"{title} refused {times(tally.count)}: {words}")
+    if station.again.count:
+        yield station.again.found(RULES["N2010"], name, f"identified again {times(station.again.count)}")
+
+
+def _points(name: str, station: Station) -> Iterator[Finding]:
+    for (region, point, attribute), tally in sorted(station.points.items(), key=lambda item: str(item[0])):
+        what = object_name(region, point)
+        if attribute is not None:
+            known = attribute_name(region, attribute)
+            what += f" attribute {attribute}" + (f" ({known})" if known else "")
+        seen = f"{what}: N11 {times(tally.count)}"
+        yield tally.found(RULES["N2002"], f"{name}, {object_name(region, point)}", seen)
+
+
+def _slow(heard: Heard, name: str, station: Station) -> Finding:
+    """Slow answers; a warning only where they cost something, and are more than a busy computer makes."""
+    seen = (
+        f"{station.slow.count} of {counted(station.answered, 'answer')} took over {SLOW // MS} ms, "
+        f"the longest at least {station.slowest // MS} ms"
+    )
+    harmless = not station.late.count or heard.is_rare(station.slow, station.answered)
+    return heard.noted_if(harmless, station.slow.found(RULES["N2003"], name, seen))
+
+
+def _overrides(heard: Heard, name: str, station: Station) -> Iterator[Finding]:
+    for (region, point), override in sorted(station.overrides.items()):
+        age = heard.now - override.time
+        if age > OVERRIDE_AGE:
+            value = "" if override.value is None else f" to {number(override.value)}"
+            seen = f"{object_name(region, point)} overridden{value} for {age // (60 * NS_PER_S)} minutes"
+            tally = Tally(1, override.time, heard.now, [override.row])
+            yield tally.found(RULES["N2006"], f"{name}, {object_name(region, point)}", seen)
+
+
+def _again(heard: Heard, name: str, station: Station) -> Iterator[Finding]:
+    """Answers that came a second time, or late."""
+    if station.twice.count:
+        seen = f"a second, different answer came to {counted(station.twice.count, 'command')}"
+        finding = station.twice.found(RULES["N2008"], name, seen)
+        yield heard.noted_if(station.twice.count == 1, finding)
+    if station.repeated.count:
+        seen = f"the same answer came again to {counted(station.repeated.count, 'command')}"
+        finding = station.repeated.found(RULES["N2013"], name, seen)
+        yield heard.noted_if(heard.is_rare(station.repeated, station.answered), finding)
+    if station.late.count:
+        seen = f"{counted(station.late.count, 'answer')} came after the master had gone on"
+        yield station.late.found(RULES["N2011"], name, seen)

@@ -1,0 +1,98 @@
+"""Who uses the line: how near a bus is to its limit, and what share broadcasts take; in every protocol. Pure."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator
+
+from dissectors.findings import Finding, Severity, Tally, found
+from dissectors.frame import Event, Frame, Role
+from dissectors.line import NS_PER_S, LineSettings
+from sniff.analysis.line_rules import LINE_RULES as RULES
+
+SHORT, LONG = 10, 30
+"""Seconds over which a load is looked at: the first for a note, the second for a warning."""
+
+BUSY, FULL = 0.80, 0.92
+"""Of that time with octets on the line, from which on it is noted, and warned of."""
+
+BROADCASTS_LEAST = 30
+BROADCASTS_NOTED, BROADCASTS_TOO_MANY = 0.20, 0.40
+
+
+class LineUse:
+    """Fed every row of one bus; `findings` may be asked at any time."""
+
+    def __init__(self, line: LineSettings) -> None:
+        self._char = line.char
+        self._busy = 0  # ns of octets in all
+        self._second: int | None = None
+        self._first_second = 0
+        self._seconds: deque[int] = deque([0], maxlen=LONG)  # ns busy in the last seconds, the present one last
+        self._most = {SHORT: 0.0, LONG: 0.0}
+        self._when = {SHORT: 0, LONG: 0}
+        self._broadcast = Tally()
+        self._broadcast_busy = 0
+        self._first: int | None = None
+        self._last = 0
+
+    def see(self, no: int, event: Event, role: Role) -> None:
+        """Take the next row."""
+        self._first = event.start if self._first is None else self._first
+        self._last = max(self._last, event.end)
+        busy = len(event.octets) * self._char
+        self._busy += busy
+        second = event.end // NS_PER_S
+        if self._second is None:
+            self._second = self._first_second = second
+        while self._second < second:
+            if second - self._second > LONG:  # nothing for so long: begin anew
+                self._seconds.clear()
+                self._second = self._first_second = second
+                self._seconds.append(0)
+                break
+            self._close_second()
+        late = min(busy, event.end - second * NS_PER_S)
+        self._seconds[-1] += late
+        if late < busy and len(self._seconds) > 1:
+            self._seconds[-2] += busy - late
+        if role is Role.BROADCAST and isinstance(event, Frame) and event.ok:
+            self._broadcast.add(event.start, no)
+            self._broadcast_busy += busy
+
+    def _close_second(self) -> None:
+        assert self._second is not None
+        held = list(self._seconds)
+        whole = self._second - self._first_second  # seconds before the present one that were heard from their begin
+        for span, most in self._most.items():
+            if len(held) >= span and whole >= span:
+                share = sum(held[-span:]) / (span * NS_PER_S)
+                if share > most:
+                    self._most[span], self._when[span] = share, (self._second + 1 - span) * NS_PER_S
+        self._seconds.append(0)
+        self._second += 1
+
+    def findings(self) -> Iterator[Finding]:
+        """What there is to say so far."""
+        noted, full = self._most[SHORT], self._most[LONG]
+        if noted >= BUSY or full >= FULL:
+            span = LONG if full >= FULL else SHORT
+            average = self._busy / max(1, self._last - (self._first or 0))
+            seen = f"octets on the line in {self._most[span]:.0%} of {span} s at the busiest, {average:.0%} of all time"
+            yield found(
+                RULES["LN401"],
+                "bus",
+                seen,
+                first=self._when[span],
+                last=self._when[span] + span * NS_PER_S,
+                severity=Severity.WARNING if full >= FULL else Severity.NOTE,
+            )
+        share = self._broadcast_busy / self._busy if self._busy else 0.0
+        if self._broadcast.count >= BROADCASTS_LEAST and share >= BROADCASTS_NOTED:
+            seconds = max(1, (self._last - (self._first or 0)) // NS_PER_S)
+            seen = (
+                f"{self._broadcast.count} broadcasts, {share:.0%} of all octets, "
+                f"{self._broadcast.count / seconds:.1f} a second"
+            )
+            severity = Severity.WARNING if share >= BROADCASTS_TOO_MANY else Severity.NOTE
+            yield self._broadcast.found(RULES["LN402"], "bus", seen, severity)

@@ -1,0 +1,95 @@
+"""Several stations that stop answering at one moment: they share what failed. Pure, bounded."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+
+from dissectors.findings import Finding, Severity, Tally, counted
+from dissectors.line import NS_PER_S
+from dissectors.tracker import Transaction, Verdict
+from sniff.analysis.line_rules import LINE_RULES as RULES
+
+LOST_IN_A_ROW = 3
+ANSWERED_BEFORE = 5
+MOST_STATIONS = 300
+
+
+@dataclass(slots=True)
+class _Station:
+    """How a station answers. `gone`: between which moments it stopped, while it does not answer."""
+
+    answered: int = 0
+    last_answer: int = 0
+    missed: int = 0
+    first_missed: int = 0
+    rows: list[int] = field(default_factory=list)
+    losses: deque[tuple[int, int, int]] = field(default_factory=lambda: deque(maxlen=16))  # last answer, miss, back (0)
+
+
+class LostTogether:
+    """Fed the transactions of one bus; `findings` may be asked at any time."""
+
+    def __init__(self) -> None:
+        self._stations: dict[int, _Station] = {}
+
+    def settle(self, transaction: Transaction) -> None:
+        """Take a transaction that closed."""
+        number = transaction.station
+        if number is None or transaction.is_passing or transaction.request is None:
+            return
+        station = self._stations.get(number)
+        if station is None:
+            if len(self._stations) >= MOST_STATIONS:
+                return
+            station = self._stations[number] = _Station()
+        if transaction.verdict is Verdict.NO_RESPONSE:
+            if not station.missed:
+                station.first_missed, station.rows = transaction.start, []
+            station.missed += 1
+            station.rows = [*station.rows[:3], transaction.request]
+        elif transaction.response is not None:
+            self._back(station, transaction.start)
+            station.answered += 1
+            station.last_answer = transaction.end
+
+    def _back(self, station: _Station, time: int) -> None:
+        if station.missed >= LOST_IN_A_ROW and station.answered >= ANSWERED_BEFORE:
+            station.losses.append((station.last_answer, station.first_missed, time))
+        station.missed = 0
+
+    def findings(self, first: int, now: int) -> Iterator[Finding]:
+        """What there is to say so far. `first`, `now`: ns, of the first octet of the capture and the newest."""
+        losses: list[tuple[int, int, int, int]] = []  # last answer, first miss, back, station
+        for number, station in self._stations.items():
+            losses += [(*loss, number) for loss in station.losses]
+            if station.missed >= LOST_IN_A_ROW and station.answered >= ANSWERED_BEFORE:
+                losses.append((station.last_answer, station.first_missed, 0, number))
+        losses.sort(key=lambda loss: loss[1])
+        span = now - first
+        while losses:
+            moment = losses[0][1]  # the first miss: who answered after it was not lost then
+            together = [loss for loss in losses if loss[0] <= moment]
+            names = sorted({loss[3] for loss in together})
+            window = max(loss[1] for loss in together) - min(loss[0] for loss in together)
+            losses = [loss for loss in losses if loss not in together]
+            if len(names) >= 2 and 10 * window <= span:
+                yield self._lost(together, names, moment, first)
+
+    def _lost(self, together: list[tuple[int, int, int, int]], names: list[int], moment: int, first: int) -> Finding:
+        tally = Tally()
+        for number in names:
+            tally.add(moment, *self._stations[number].rows[:2])
+        others = [one for number, one in self._stations.items() if number not in names and one.last_answer > moment]
+        who = "all of them" if not others else f"{counted(len(others), 'other station')} went on"
+        seen = (
+            f"{len(names)} stations ({', '.join(map(str, names))}) stopped answering at the same moment, "
+            f"{(moment - first) / NS_PER_S:.1f} s after the begin: {who}"
+        )
+        back = [loss[2] for loss in together if loss[2]]
+        if len(back) == len(together):
+            seen += f"; they were back after {(max(back) - moment) / NS_PER_S:.1f} s"
+        severity = Severity.WARNING if back else Severity.ERROR
+        finding = tally.found(RULES["LN305"], "bus", seen, severity)
+        return replace(finding, count=len(names), stations=tuple(names))

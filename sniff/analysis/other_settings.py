@@ -1,0 +1,162 @@
+"""What octets are that make no frames with the settings of a capture: which other settings fit them. Pure, bounded.
+
+Asked is, of a sample: another protocol (every one that the registry knows); seven bits read as eight; fewer data bits
+than the bus has; every bit inverted; a bus that is slower or faster. What fits is named with its evidence; where
+nothing does, nothing is named.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+from dissectors import registry
+from dissectors.frame import Chunk
+from dissectors.line import LineSettings
+from sniff.analysis.detecting import COVERED_LEAST, FOUND_FRAMES, LIKELY_BITS, Evidence, Reading
+from sniff.analysis.slower_bus import slower_by
+
+SAMPLE_OCTETS = 3000
+"""Octets of a capture that are asked."""
+
+LEAST_OCTETS = 24
+BURSTS = 16
+"""Stretches between two silences that are asked whether the bus is slower."""
+
+SHORT_SILENCE, LONG_SILENCE = 4, 20
+"""Characters after which a stretch ends; on a bus that is much slower there is silence within characters."""
+
+_TEXT = frozenset(b"\r\n\t") | frozenset(range(0x20, 0x7F))
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """Settings that fit: what was seen, what it is consistent with, what to do."""
+
+    seen: str
+    means: str
+    next: str
+
+
+def what_fits(sample: Sequence[Chunk], line: LineSettings, latency: int, protocol: str) -> Fit | None:
+    """What these octets are; None where nothing can be said. `protocol`: the one that they are not."""
+    if sum(len(chunk.octets) for chunk in sample) < LEAST_OCTETS:
+        return None
+    return next(_fits(sample, line, latency, protocol), None)
+
+
+def _fits(sample: Sequence[Chunk], line: LineSettings, latency: int, protocol: str) -> Iterator[Fit]:
+    """The surest first: what reads with good checks, then what the octets themselves exclude."""
+    evidence = _evidence(sample, line, latency)
+    if (hint := evidence.hint()) is not None and hint.data_bits == 7 and line.data_bits == 8:
+        masked = _changed(sample, 0x7F, 0)
+        if (found := _convincing(_evidence(masked, hint, latency))) is not None:
+            how = f"with 7 data bits and {'even' if hint.parity == 'E' else 'odd'} parity these octets read"
+            yield _as_protocol(found, how, f"the bus has {hint}", f"read it with -s {hint} -p {found.protocol}")
+    if (found := _convincing(evidence)) is not None and found.protocol != protocol:
+        yield _as_protocol(
+            found, "these octets read", f"the bus runs {found.protocol}", f"read it with -p {found.protocol}"
+        )
+    inverted = _changed(sample, 0xFF, 0xFF)
+    if (found := _convincing(_evidence(inverted, line, latency))) is not None:
+        yield _as_protocol(
+            found,
+            "inverted, these octets read",
+            "A and B are swapped, or a converter inverts",
+            "change A and B at the tap",
+        )
+    yield from _by_values(sample, line)
+    yield from _by_rate(sample, line)
+
+
+def _as_protocol(found: Reading, how: str, means: str, settle: str) -> Fit:
+    checks = f"{found.frames} frames hold {found.covered:.0%} of {found.octets} octets"
+    return Fit(f"{how} as {found.protocol} with good checks ({checks})", means, settle)
+
+
+def _evidence(sample: Sequence[Chunk], line: LineSettings, latency: int) -> Evidence:
+    """All protocols over the sample."""
+    evidence = Evidence(line, registry.names(), latency)
+    for chunk in sample:
+        evidence.feed(chunk)
+    if sample:
+        evidence.advance(sample[-1].time + 10_000_000_000)
+    return evidence
+
+
+def _convincing(evidence: Evidence) -> Reading | None:
+    reading = evidence.best()
+    enough = reading.frames >= FOUND_FRAMES and reading.covered >= COVERED_LEAST and reading.bits >= LIKELY_BITS
+    return reading if enough else None
+
+
+def _changed(sample: Sequence[Chunk], keep: int, flip: int) -> list[Chunk]:
+    table = bytes((value ^ flip) & keep for value in range(256))
+    return [replace(chunk, octets=chunk.octets.translate(table)) for chunk in sample]
+
+
+def _by_values(sample: Sequence[Chunk], line: LineSettings) -> Iterator[Fit]:
+    """Octets that never have their upper bits."""
+    values: Counter[int] = Counter()
+    for chunk in sample:
+        values.update(chunk.octets)
+    total, top = values.total(), max(values)
+    if total < 2 * LEAST_OCTETS or len(values) < 8 or top > 0x7F:
+        return
+    bits = 5 if top <= 0x1F else 6 if top <= 0x3F else 7
+    text = sum(count for value, count in values.items() if value in _TEXT)
+    if bits == 7 and text >= 0.95 * total:
+        return  # a protocol of text that nobody here knows
+    seen = f"no octet of {total} is above {(1 << bits) - 1:02X}"
+    port = f"the port is set to {line}" if line.data_bits < 8 else "the octets went through something that has no more"
+    yield Fit(
+        f"{seen}: they were received with {bits} data bits",
+        f"{bits} data bits where the bus has 8, so that no check can agree; {port}",
+        f"set 8 data bits (-s {LineSettings(line.baud, 8, line.parity, line.stop_bits)}) and record again",
+    )
+
+
+def _by_rate(sample: Sequence[Chunk], line: LineSettings) -> Iterator[Fit]:
+    """A bus that is slower, or faster, than the port listens."""
+    factor = slower_by(_bursts(sample, line, LONG_SILENCE)[:BURSTS], line)
+    bursts = _bursts(sample, line, SHORT_SILENCE)
+    if factor:
+        about = f"{factor} times slower, about {line.baud // factor} Bd" if factor < 12 else "over 10 times slower"
+        yield Fit(
+            f"wrong baud rate: every level lasts a multiple of {factor} bits, so the bus is {about}",
+            f"the bus is slower than the {line.baud} Bd of the port",
+            f"listen with -s {line.baud // factor}" if factor < 12 else "`detect`, or -s with the rate of the bus",
+        )
+    elif _too_short(bursts):
+        often = ", ".join(burst.hex(" ").upper() for burst, _ in Counter(bursts).most_common(2))
+        yield Fit(
+            f"wrong baud rate: the bus is faster than {line.baud} Bd; the same few octets come again and again "
+            f"({often}), too few for a frame",
+            f"the bus is faster than the {line.baud} Bd of the port, which takes some levels of a frame for octets",
+            "listen with the next higher rates (-s), or `detect`",
+        )
+
+
+def _too_short(bursts: Sequence[bytes]) -> bool:
+    """Whether the same bursts come again and again, and nearly all are too short for a frame.
+
+    Noise does not repeat itself, and an octet that is always the same may be the ringing of a driver: so there must be
+    two octets or more, and two kinds of bursts.
+    """
+    often = {burst: count for burst, count in Counter(bursts).items() if count >= 3 and len(burst) >= 2}
+    short = sum(len(burst) < 4 for burst in bursts)
+    return len(bursts) >= 8 and len(often) >= 2 and sum(often.values()) >= 0.7 * len(bursts) <= short
+
+
+def _bursts(sample: Sequence[Chunk], line: LineSettings, silence: int) -> list[bytes]:
+    """The octets between two silences of so many characters."""
+    bursts: list[bytes] = []
+    end: int | None = None
+    for chunk in sample:
+        start = chunk.time - len(chunk.octets) * line.char
+        if end is None or start - end > silence * line.char:
+            bursts.append(b"")
+        bursts[-1] += chunk.octets
+        end = chunk.time
+    return bursts

@@ -1,0 +1,305 @@
+"""Line errors, breaks and stray octets, counted at whoever sent beside them: whose they are. Pure.
+
+What strikes one sender clearly more often than its share of the line explains is that sender's; what falls anywhere is
+the bus's, and told once (`shares.py`).
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field, replace
+
+from dissectors.findings import Finding, Severity, Tally, counted, times
+from dissectors.frame import Frame, LineError, Mark, Noise
+from dissectors.line import Timing
+from sniff.analysis.line_rules import LINE_RULES as RULES
+from sniff.analysis.shares import UNLIKELY, at_least, standing_out
+
+WRONG = LineError.PARITY | LineError.FRAMING
+MOST_SENDERS = 600
+BREAKS_LEAST = 4
+NEAR = 12
+"""Characters behind a frame within which a break belongs to whoever sent it."""
+
+PACKETS_LEAST = 4
+BUS, MASTER = "bus", "master"
+
+NoteIf = Callable[[int, int], Severity | None]
+"""(count, of) → NOTE where so few are not worth a warning."""
+
+
+@dataclass(slots=True)
+class Sender:
+    """Frames of one sender, and what went wrong with them. `flagged`: in a packet with an error flag."""
+
+    frames: int = 0
+    octets: int = 0
+    flagged: int = 0
+    wrong: Tally = field(default_factory=Tally)
+    at: Counter[str] = field(default_factory=Counter)  # place of the wrong octets in the frame
+    stray: dict[str, Tally] = field(default_factory=dict)  # by rule
+    values: Counter[tuple[str, int]] = field(default_factory=Counter)  # of those octets, by rule
+    breaks: Tally = field(default_factory=Tally)  # in its frames, or directly after one
+
+
+class Senders:
+    """All senders of a bus. `packets`: an error flag is somewhere among the octets marked (USB packets)."""
+
+    def __init__(self, timing: Timing, packets: bool) -> None:
+        self.packets = packets
+        self.beside = timing.latency <= timing.t35  # else octets beside a frame may be far from it
+        self._near = timing.latency + NEAR * timing.char
+        self._end = 0  # of the frame before
+        self.by_name: dict[str, Sender] = {}
+        self.frames = 0
+        self.breaks = Tally()
+        self.before: str | None = None  # who sent the frame before
+        self._packet: set[str] = set()  # who sent in the packet with a flag that may go on
+        self._goes_on = False
+        self._flagged: Counter[frozenset[str]] = Counter()
+        self._flags = Tally()
+
+    def of(self, name: str) -> Sender:
+        """A sender; one beyond the limit is not kept."""
+        found = self.by_name.get(name)
+        if found is None:
+            found = Sender()
+            if len(self.by_name) < MOST_SENDERS:
+                self.by_name[name] = found
+        return found
+
+    def see(self, name: str, no: int, frame: Frame) -> Sender:
+        """Take a frame."""
+        sender = self.of(name)
+        sender.frames += 1
+        sender.octets += len(frame.octets)
+        self.frames += 1
+        wrong = [mark for mark in frame.marks if mark.error & WRONG]
+        if self.packets:
+            self._see_packet(name, no, frame, wrong)
+        if wrong and not (self.packets and frame.ok):
+            sender.wrong.add(frame.start, no)
+            if not self.packets:
+                sender.at.update(_place(frame, mark) for mark in wrong)
+        breaks = sum(bool(mark.error & LineError.BREAK) for mark in frame.marks)
+        for _ in range(min(breaks, 1) if self.packets else breaks):
+            sender.breaks.add(frame.start, no)
+        self.before, self._end = name, frame.end
+        return sender
+
+    def see_break(self, no: int, time: int, inside: bool) -> None:
+        """Take a break; those inside a frame were counted with it."""
+        self.breaks.add(time, no)
+        if not inside and self.before is not None and time - self._end <= self._near:
+            self.of(self.before).breaks.add(time, no)
+
+    def stray(self, name: str, code: str, no: int, noise: Noise) -> None:
+        """Take a few octets that are no frame."""
+        sender = self.of(name)
+        sender.stray.setdefault(code, Tally()).add(noise.start, no)
+        sender.values.update((code, octet) for octet in noise.octets)
+
+    def _see_packet(self, name: str, no: int, frame: Frame, wrong: list[Mark]) -> None:
+        """Gather who sent in one packet with a flag: its marks run from octet to octet, over frames."""
+        if not wrong:
+            self._close_packet()
+            return
+        self.of(name).flagged += 1
+        if not (self._goes_on and wrong[0].offset == 0):
+            self._close_packet()
+            self._flags.add(frame.start, no)
+        self._packet.add(name)
+        self._goes_on = wrong[-1].offset == len(frame.octets) - 1
+
+    def _close_packet(self) -> None:
+        if self._packet and len(self._flagged) < MOST_SENDERS:
+            self._flagged[frozenset(self._packet)] += 1
+        self._packet = set()
+        self._goes_on = False
+
+    # ---- judging
+
+    def wrong_octets(self, note_if: NoteIf) -> Iterator[Finding]:
+        """Line errors at the senders that have more than their share, the rest at the bus."""
+        struck = {name: record for name, record in sorted(self.by_name.items()) if record.wrong.count}
+        known = {name: one for name, one in self.by_name.items() if name != BUS}
+        out = standing_out({name: (one.wrong.count, float(one.octets)) for name, one in known.items()}, MASTER)
+        rest = {name: record for name, record in struck.items() if name not in out}
+        if len(rest) > 1:
+            yield self._wrong_everywhere(rest, note_if)
+            struck = {name: record for name, record in struck.items() if name in out}
+        for name, record in struck.items():
+            yield self._wrong_of(name, record, note_if)
+        if self.packets and (found := self._of_packets(note_if)) is not None:
+            if found.subject == BUS and (struck or rest):
+                return
+            if found.subject not in struck:
+                yield found
+
+    def _wrong_of(self, name: str, record: Sender, note_if: NoteIf) -> Finding:
+        kinds = "line errors somewhere in" if self.packets else "parity or framing errors in"
+        words = f"{kinds} {record.wrong.count} of {counted(record.frames, 'frame')}"
+        if record.at:
+            words += f" ({', '.join(f'{count} {place}' for place, count in record.at.most_common())})"
+        finding = record.wrong.found(RULES["LN101"], name, words, note_if(record.wrong.count, record.frames))
+        if 4 * record.at["at the last octet"] >= 3 * sum(record.at.values()) > 8:
+            finding = replace(
+                finding,
+                means="the station releases its driver before the last octet is out",
+                next="its turnaround or transmit-delay setting; its converter's direction control",
+            )
+        return finding
+
+    def _wrong_everywhere(self, struck: dict[str, Sender], note_if: NoteIf) -> Finding:
+        """One finding in place of one for each sender."""
+        tally = together(record.wrong for record in struck.values())
+        each = ", ".join(f"{'unknown' if name == BUS else name} {one.wrong.count}" for name, one in struck.items())
+        words = f"parity or framing errors in {tally.count} of {self.frames} frames, whoever sends ({each})"
+        return replace(
+            tally.found(RULES["LN101"], BUS, words, note_if(tally.count, self.frames)),
+            means="a cause common to all: termination, bias, ground, cable, or noise at the tap",
+            next="120 Ω at both ends only, one bias, the shield grounded once; the tap's own wires",
+        )
+
+    def _of_packets(self, note_if: NoteIf) -> Finding | None:
+        """The sender that is in every packet with a flag, where others are mostly in packets without one."""
+        packets = self._flagged + Counter([frozenset(self._packet)] if self._packet else [])
+        total = packets.total()
+        if total < 2:
+            return None
+        words = f"line errors are flagged on {counted(total, 'packet')}"
+        everybody = f"{words}, whoever sends; the frames in them may be good"
+        of_bus = self._flags.found(RULES["LN101"], BUS, everybody, note_if(total, self.frames))
+        rates = {name: one.flagged / one.frames for name, one in self.by_name.items() if one.frames >= 3}
+        if total < PACKETS_LEAST or not rates:
+            return of_bus
+        name = max(rates, key=lambda one: rates[one])
+        within = sum(count for senders, count in packets.items() if name in senders)
+        size = sum(len(senders) * count for senders, count in packets.items()) / total
+        usual = min(1.0, size * self.by_name[name].frames / self.frames)  # of any packets
+        others = max((rate for other, rate in rates.items() if other != name), default=0.0)
+        if within < 0.9 * total or rates[name] < 2 * others or at_least(within, total, usual) > UNLIKELY:
+            return of_bus
+        record = self.by_name[name]
+        words += f", {within} of them with its frames: {record.flagged} of {counted(record.frames, 'frame')}, "
+        words += "though their checks may agree"
+        return self._flags.found(RULES["LN101"], name, words, note_if(total, record.frames))
+
+    def breaks_found(self, note_if: NoteIf) -> Iterator[Finding]:
+        """Breaks: of a sender where nearly all are in or after its frames, else of the bus."""
+        count = self.breaks.count
+        if not count:
+            return
+        own = {name: (one.breaks.count, float(one.frames)) for name, one in self.by_name.items()}
+        for name in standing_out(own):
+            struck = own[name][0]
+            if struck >= max(BREAKS_LEAST, 0.8 * count) and name not in (BUS, MASTER):
+                words = f"the line was held low {times(count)}, {struck} of them in or directly after its frames"
+                finding = self.breaks.found(RULES["LN103"], name, words, note_if(count, self.frames))
+                yield replace(
+                    finding,
+                    means="this station's driver holds the line, or lets go so late or so hard that it falls",
+                    next="its turnaround, its converter's direction control, A and B at this station; then bias",
+                )
+                return
+        words = f"the line was held low {times(count)}"
+        yield self.breaks.found(RULES["LN103"], BUS, words, note_if(count, self.frames))
+
+    def strays_found(self, note_if: NoteIf) -> Iterator[Finding]:
+        """Stray octets: of a sender that has more than its share of them, else of the bus, told once."""
+        own: list[tuple[str, str]] = []
+        common: dict[str, list[str]] = {"LN201": [], "LN202": []}
+        for code, names in common.items():
+            counts = {
+                name: (one.stray[code].count if code in one.stray else 0, float(one.frames))
+                for name, one in self.by_name.items()
+                if name != BUS
+            }
+            out = standing_out(counts, MASTER)
+            if not self.beside:  # what lies in the silence before it asks is no sign of the master
+                out.discard(MASTER)
+            own += [(name, code) for name in sorted(out)]
+            names += sorted(name for name, (count, _) in counts.items() if count and name not in out)
+            if BUS in self.by_name and code in self.by_name[BUS].stray:  # beside a frame of nobody knows whom
+                names.append(BUS)
+        silence = self.by_name[BUS].stray.get("LN203") if BUS in self.by_name else None
+        among = {code: together(self.by_name[name].stray[code] for name in names) for code, names in common.items()}
+        total = sum(tally.count for tally in among.values()) + (silence.count if silence is not None else 0)
+        for code, names in common.items():
+            if len(names) == 1 and names[0] != BUS and 2 * among[code].count > total:  # nobody else is struck
+                own += [(names[0], code)]
+                total -= among.pop(code).count
+        of_own = 0
+        for name, code in own:
+            record = self.by_name[name]
+            of_own += record.stray[code].count
+            yield self._stray_finding(code, name, record.values, record.stray[code], record.frames, note_if)
+        if total:
+            found = self._of_all(among, silence, common, note_if)
+            yield replace(found, severity=Severity.NOTE) if 3 * total <= of_own else found  # most likely theirs too
+
+    def _of_all(
+        self, among: dict[str, Tally], silence: Tally | None, names: dict[str, list[str]], note_if: NoteIf
+    ) -> Finding:
+        """One finding about noise that no sender stands out by."""
+        values: Counter[tuple[str, int]] = Counter()
+        for code in among:
+            for name in names[code]:
+                values.update({key: n for key, n in self.by_name[name].values.items() if key[0] == code})
+        if silence is not None:
+            values.update({key: n for key, n in self.by_name[BUS].values.items() if key[0] == "LN203"})
+            among = {**among, "LN203": silence}
+        tally = together(among.values())
+        code = max(among, key=lambda one: among[one].count)
+        if among[code].count < 0.85 * tally.count:
+            code = "LN203"
+        values = Counter({(code, value): count for (_, value), count in values.items()})
+        parts = {"LN201": "before", "LN202": "after", "LN203": "away from"}
+        spread = ", ".join(
+            f"{among[one].count} {word}" for one, word in parts.items() if one in among and among[one].count
+        )
+        finding = self._stray_finding(code, BUS, values, tally, self.frames, note_if)
+        if sum(one.count > 0 for one in among.values()) > 1:
+            finding = replace(finding, seen=f"{finding.seen}: {spread} frames, whoever sends")
+        elif code != "LN203":
+            finding = replace(finding, seen=f"{finding.seen}, whoever sends")
+        return finding
+
+    def _stray_finding(
+        self, code: str, name: str, values: Counter[tuple[str, int]], tally: Tally, frames: int, note_if: NoteIf
+    ) -> Finding:
+        where = {"LN201": "before", "LN202": "after"}.get(code)
+        if where is None:
+            words = f"stray octets {times(tally.count)} in the silence between {counted(frames, 'frame')}"
+        elif tally.count > frames:
+            words = f"stray octets {times(tally.count)} {where} {counted(frames, 'frame')}"
+        else:
+            words = f"stray octets {where} {tally.count} of {counted(frames, 'frame')}"
+        counts = [(value, count) for (rule, value), count in values.most_common() if rule == code]
+        most = counts[:4]
+        if 2 * sum(count for _, count in most) > sum(count for _, count in counts):
+            mostly = "" if len(counts) == len(most) else "mostly "
+            words += f" ({mostly}{', '.join(f'{value:02X}' for value, _ in most)})"
+        return tally.found(RULES[code], name, words, note_if(tally.count, frames))
+
+
+def together(tallies: Iterable[Tally]) -> Tally:
+    """All of them as one."""
+    whole = Tally()
+    for tally in tallies:
+        if not tally.count:
+            continue
+        count = whole.count + tally.count
+        for no in tally.evidence:
+            whole.add(tally.first, no)
+        whole.first = min(whole.first, tally.first) if whole.count else tally.first
+        whole.last = max(whole.last, tally.last)
+        whole.count = count
+    return whole
+
+
+def _place(frame: Frame, mark: Mark) -> str:
+    if mark.offset >= len(frame.octets) - 1:
+        return "at the last octet"
+    return "at the first octet" if mark.offset == 0 else "inside"

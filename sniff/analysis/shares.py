@@ -1,0 +1,58 @@
+"""Whose trouble it is: whether one sender is struck more often than its share of the line explains. Pure.
+
+Noise that falls anywhere strikes everybody by the share of the time that he sends; only who is struck clearly more
+often than the others is a case of its own. The rest is the bus's. A station is compared with other stations: what all
+of them have and the master has not is common to them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+UNLIKELY = 1e-3
+"""Chance below which a share is no chance."""
+
+CLEARLY = 2.5
+"""Times the rate of all others."""
+
+
+Struck = Mapping[str, tuple[int, float]]
+"""For each sender how often he was struck, and his share: octets, frames … sent."""
+
+
+def standing_out(struck: Struck, master: str = "") -> set[str]:
+    """Who is struck more often than by chance. `master`: who is no station; it is compared with all of them."""
+    stations = {name: pair for name, pair in struck.items() if name != master}
+    if not 1 < len(stations) < len(struck):
+        return _standing_out(struck)
+    out = _standing_out(stations)
+    counts = [sum(pair[at] for pair in stations.values()) for at in (0, 1)]
+    all_of_them = {"": (int(counts[0]), counts[1]), master: struck[master]}
+    return out | (_standing_out(all_of_them) & {master})
+
+
+def _standing_out(struck: Struck) -> set[str]:
+    out: set[str] = set()
+    left = {name: pair for name, pair in struck.items() if pair[1] > 0}
+    while len(left) > 1:
+        name = max(left, key=lambda one: left[one][0] / left[one][1])
+        count, share = left.pop(name)
+        others = sum(pair[0] for pair in left.values())
+        shares = sum(pair[1] for pair in left.values())
+        is_clear = count * shares >= CLEARLY * others * share
+        if not count or not is_clear or at_least(count, count + others, share / (share + shares)) > UNLIKELY:
+            break
+        out.add(name)
+    return out
+
+
+def at_least(count: int, of: int, chance: float) -> float:
+    """Chance that `count` or more of `of` fall where each falls with `chance`; the normal law where they are many."""
+    if count <= 0:
+        return 1.0
+    if of > 400:
+        deviation = math.sqrt(of * chance * (1 - chance)) or 1e-9
+        return 0.5 * math.erfc((count - 0.5 - of * chance) / deviation / math.sqrt(2))
+    below = sum(math.comb(of, n) * chance**n * (1 - chance) ** (of - n) for n in range(count))
+    return max(0.0, 1 - below)

@@ -1,0 +1,375 @@
+"""When trouble comes: in step with the mains, in bursts at a steady interval, for a while, all at once. Pure, bounded.
+
+Each pattern is told once, about the bus, and only where the bus's own rhythm does not explain it: a master that polls
+every 100 ms is in step with 50 Hz by itself, and what is asked every 5 s fails every 5 s.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+
+from dissectors.findings import Finding, Tally, counted, found
+from dissectors.frame import Chunk, Event, Frame, LineError
+from dissectors.histogram import Histogram
+from dissectors.line import NS_PER_S
+from dissectors.tracker import Transaction
+from sniff.analysis.line_rules import LINE_RULES as RULES
+from sniff.analysis.lost_together import LostTogether
+from sniff.analysis.other_settings import Fit, what_fits
+from sniff.analysis.wording import milliseconds
+from sniff.session import LineEvent, Session
+
+MS = 1_000_000
+MAINS = {20 * MS: "50 Hz", 10 * MS: "twice 50 Hz", 50 * MS // 3: "60 Hz", 25 * MS // 3: "twice 60 Hz"}
+"""Periods, ns: once a wave, and twice (each half wave, as of a dimmer)."""
+
+HUM_LEAST = 15
+HUM_LOCKED = 0.7
+HUM_OWN = 0.35
+HUM_SPAN = 2 * NS_PER_S  # over longer the mains drift
+SAME = 4 * MS  # what follows sooner is the same disturbance
+
+QUIET = NS_PER_S // 2
+"""Without trouble for so long, the next trouble begins another burst."""
+
+BURSTS_LEAST = 6
+BURSTS_KEPT = 500
+MOST_ROUNDS = 300
+STEADY = 0.08
+
+UNREADABLE_OCTETS = 40
+UNREADABLE_ROWS = 6
+UNREADABLE_KEPT = 8
+STRETCH_OCTETS = 800
+
+SILENT_LEAST = 5 * NS_PER_S
+SILENT_TIMES = 30
+SILENT_KEPT = 8
+ROWS_AROUND = 50
+
+_MARKS = LineError.PARITY | LineError.FRAMING | LineError.BREAK
+
+
+@dataclass(slots=True)
+class _Lock:
+    """How well moments keep in step with one period: sums of unit vectors, of trouble and of all else."""
+
+    trouble: complex = 0j
+    others: complex = 0j
+
+
+@dataclass(slots=True)
+class _Burst:
+    first: int
+    last: int
+    senders: set[str]
+    rows: list[int]
+    good_before: int  # good frames since the burst before
+
+
+@dataclass(slots=True)
+class _Round:
+    """One frame that comes again and again: when first and last, and how often after the first time."""
+
+    first: int
+    last: int
+    count: int = 0
+
+
+@dataclass(slots=True)
+class _Stretch:
+    """Octets without a good frame among them."""
+
+    first: int
+    last: int
+    octets: int = 0
+    marked: int = 0
+    rows: list[int] = field(default_factory=list)
+    count: int = 0
+    sample: list[Chunk] = field(default_factory=list)
+    sampled: int = 0
+    fit: Fit | None = None
+    asked: bool = False
+
+
+class TimePatterns:
+    """Fed rows, transactions and line events of one bus; `findings` may be asked at any time."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self._char = session.line.char
+        self._latency = session.adapter.latency
+        self._first: int | None = None
+        self._now = 0
+        self._rows = self._good = self._good_since = 0
+        # hum
+        self._locks = {period: _Lock() for period in MAINS}
+        self._trouble_at: int | None = None
+        self._steps = self._other_steps = 0
+        self._hum = Tally()
+        self._struck: Counter[str] = Counter()  # senders of what is disturbed
+        self._apart: Counter[int] = Counter()  # ms from disturbance to disturbance
+        # bursts
+        self._bursts: list[_Burst] = []
+        self._rounds: dict[bytes, _Round] = {}
+        # stretches that cannot be read
+        self._stretch: _Stretch | None = None
+        self._stretches: list[_Stretch] = []
+        # silence
+        self._gaps = Histogram()
+        self._silences: list[tuple[int, int, int]] = []  # begin, end, rows before
+        self._hole = False
+        self._lost = LostTogether()
+
+    # ---- taking in
+
+    def see(self, no: int, event: Event, sender: str) -> None:
+        """Take the next row."""
+        self._see_silence(event)
+        self._rows += 1
+        is_good = isinstance(event, Frame) and event.ok
+        wrong = next((mark for mark in event.marks if mark.error & _MARKS), None)
+        if is_good and wrong is None:
+            self._good += 1
+            self._good_since += 1
+            self._see_round(event)
+            self._end_stretch()
+            self._step(event.end, False)
+            return
+        if wrong is not None:
+            moment: int | None = event.start + (wrong.offset + 1) * self._char
+        elif len(event.octets) * self._char <= SAME:
+            moment = event.start
+        else:
+            moment = None  # somewhere in a long frame
+        if moment is not None and self._step(moment, True):
+            self._hum.add(moment, no)
+            self._struck[sender] += 1
+        self._see_trouble(no, event, sender)
+        if is_good:
+            self._end_stretch()
+        else:
+            self._see_unreadable(no, event)
+
+    def settle(self, transaction: Transaction) -> None:
+        """Take a transaction that closed."""
+        self._lost.settle(transaction)
+
+    def add_line_event(self, event: LineEvent) -> None:
+        """Take something that happened to the line: over a hole nothing is known."""
+        if event.kind.is_hole:
+            self._hole = True
+
+    def _see_silence(self, event: Event) -> None:
+        if self._first is None:
+            self._first = event.start
+        else:
+            gap = max(0, event.start - self._now)
+            self._gaps.add(gap)
+            if gap >= SILENT_LEAST and not self._hole and len(self._silences) < 20 * SILENT_KEPT:
+                self._silences.append((self._now, event.start, self._rows))
+        self._hole = False
+        self._now = max(self._now, event.end)
+
+    def _step(self, moment: int, is_trouble: bool) -> bool:
+        """Measure a moment against the trouble before it; whether it is one of its own."""
+        before = self._trouble_at
+        if is_trouble and (before is None or moment - before > HUM_SPAN or moment < before):
+            self._trouble_at = moment
+            return True
+        if before is None or not SAME < moment - before <= HUM_SPAN:
+            return False
+        for period, lock in self._locks.items():
+            vector = cmath.exp(2j * math.pi * ((moment - before) % period) / period)
+            if is_trouble:
+                lock.trouble += vector
+            else:
+                lock.others += vector
+        if is_trouble:
+            self._steps += 1
+            self._apart[(moment - before) // MS] += 1
+            self._trouble_at = moment
+        else:
+            self._other_steps += 1
+        return is_trouble
+
+    def _see_trouble(self, no: int, event: Event, sender: str) -> None:
+        bursts = self._bursts
+        if bursts and event.start - bursts[-1].last < QUIET:
+            burst = bursts[-1]
+            burst.last = max(burst.last, event.end)
+            if len(burst.senders) < 8:
+                burst.senders.add(sender)
+        elif len(bursts) < BURSTS_KEPT:
+            bursts.append(_Burst(event.start, event.end, {sender}, [no], self._good_since))
+            self._good_since = 0
+
+    def _see_round(self, event: Event) -> None:
+        """Measure how often the same frame comes: the bus's own rhythm."""
+        rounds = self._rounds
+        known = rounds.get(event.octets)
+        if known is not None:
+            known.count += 1
+            known.last = event.start
+        elif len(rounds) < MOST_ROUNDS:
+            rounds[event.octets] = _Round(event.start, event.start)
+
+    def _is_own_rhythm(self, interval: int) -> bool:
+        """Whether something on this bus comes at that interval anyhow, or at a half or a third of it."""
+        for one in self._rounds.values():
+            if one.count >= 4:
+                every = (one.last - one.first) / one.count
+                if any(abs(interval - times * every) <= 0.1 * interval for times in (1, 2, 3)):
+                    return True
+        return False
+
+    def _see_unreadable(self, no: int, event: Event) -> None:
+        stretch = self._stretch
+        if stretch is None:
+            stretch = self._stretch = _Stretch(event.start, event.end)
+        stretch.last = event.end
+        stretch.count += 1
+        stretch.octets += len(event.octets)
+        stretch.marked += sum(bool(mark.error & _MARKS) for mark in event.marks)
+        if len(stretch.rows) < 8:
+            stretch.rows.append(no)
+        if stretch.sampled < STRETCH_OCTETS:
+            stretch.sample.append(Chunk(event.end, event.octets[:STRETCH_OCTETS], event.marks))
+            stretch.sampled += len(event.octets)
+
+    def _end_stretch(self) -> None:
+        stretch, self._stretch = self._stretch, None
+        if stretch is not None and _is_unreadable(stretch) and len(self._stretches) < UNREADABLE_KEPT:
+            self._stretches.append(stretch)
+
+    # ---- judging
+
+    def findings(self) -> Iterator[Finding]:
+        """All patterns so far."""
+        yield from self._in_step_with_mains()
+        yield from self._in_bursts()
+        yield from self._unreadable()
+        yield from self._silent()
+        yield from self._lost.findings(self._first or 0, self._now)
+
+    def _in_step_with_mains(self) -> Iterator[Finding]:
+        if self._steps < HUM_LEAST:
+            return
+        if 3 * max(self._apart.values()) > self._steps or 10 * max(self._struck.values()) > 9 * self._struck.total():
+            return  # one rhythm of the bus, or one sender's
+        for period, words in MAINS.items():
+            if 6 * self._latency > period:
+                continue
+            lock = self._locks[period]
+            locked = abs(lock.trouble) / self._steps
+            own = abs(lock.others) / self._other_steps if self._other_steps else 0.0
+            chance = math.exp(-self._steps * locked * locked)  # Rayleigh
+            angle = cmath.phase(lock.trouble) * period / (2 * math.pi)
+            if locked < HUM_LOCKED or own > HUM_OWN or chance > 1e-6 or abs(angle) > 0.15 * period:
+                continue
+            seen = (
+                f"{self._steps + 1} disturbances come in step with {words}: {locked:.0%} locked to "
+                f"{milliseconds(period)}, what is undisturbed {own:.0%}"
+            )
+            yield self._hum.found(RULES["LN301"], "bus", seen)
+            return
+
+    def _in_bursts(self) -> Iterator[Finding]:
+        bursts = [burst for at, burst in enumerate(self._bursts) if not at or burst.good_before]
+        if len(bursts) < BURSTS_LEAST or len(self._bursts) >= BURSTS_KEPT:
+            return
+        intervals = [after.first - before.first for before, after in pairwise(bursts)]
+        usual = sorted(intervals)[len(intervals) // 2]
+        steady = sum(abs(interval - usual) <= STEADY * usual for interval in intervals)
+        known = Counter(name for burst in bursts for name in burst.senders if name != "bus")
+        struck = sorted(known.values(), reverse=True)
+        elsewhere = struck[1] if len(struck) > 1 else sum("bus" in burst.senders for burst in bursts)
+        between = sorted(burst.good_before for burst in bursts[1:])[len(intervals) // 2]
+        if usual < NS_PER_S or steady < 0.75 * len(intervals) or between < 10:
+            return
+        if self._is_own_rhythm(usual):
+            return
+        if not struck or (10 * struck[0] >= 9 * len(bursts) and 10 * elsewhere < 3 * len(bursts)):
+            return  # one sender's own rhythm, or somebody who speaks at that interval
+        tally = Tally()
+        for burst in bursts:
+            tally.add(burst.first, *burst.rows)
+        longest = max(burst.last - burst.first for burst in bursts)
+        seen = (
+            f"{counted(len(bursts), 'burst')} of damage or noise, {steady} of {len(intervals)} intervals within "
+            f"{STEADY:.0%} of {usual / NS_PER_S:.1f} s, each {milliseconds(longest)} at most; it strikes whoever sends"
+        )
+        yield tally.found(RULES["LN302"], "bus", seen)
+
+    def _unreadable(self) -> Iterator[Finding]:
+        told: list[tuple[_Stretch, str]] = []
+        last = [self._stretch] if self._stretch is not None and _is_unreadable(self._stretch) else []
+        for stretch in [*self._stretches, *last]:
+            words = self._words_of(stretch)
+            if words and self._good >= 20:
+                told.append((stretch, words))
+        if not told:
+            return
+        first = told[0][0]
+        spans = ", ".join(
+            f"{(one.first - (self._first or 0)) / NS_PER_S:.1f} … {(one.last - (self._first or 0)) / NS_PER_S:.1f} s"
+            for one, _ in told
+        )
+        octets = sum(one.octets for one, _ in told)
+        seen = f"{octets} octets and not one good frame at {spans}, good frames otherwise; {told[0][1]}"
+        finding = found(
+            RULES["LN303"],
+            "bus",
+            seen,
+            first=first.first,
+            last=told[-1][0].last,
+            count=len(told),
+            evidence=tuple(no for one, _ in told for no in one.rows),
+        )
+        yield replace(finding, means=f"{finding.means}; {first.fit.means}") if first.fit is not None else finding
+
+    def _words_of(self, stretch: _Stretch) -> str:
+        """Why the octets of a stretch are no noise; empty where they may be."""
+        if not stretch.asked:
+            session, stretch.asked = self._session, True
+            stretch.fit = what_fits(stretch.sample, session.line, session.adapter.latency, session.protocol)
+        if stretch.fit is not None:
+            return stretch.fit.seen
+        if 3 * stretch.marked >= stretch.octets and stretch.count >= 10:
+            return f"{stretch.marked / stretch.octets:.0%} of them have line errors: another baud rate or format"
+        return ""
+
+    def _silent(self) -> Iterator[Finding]:
+        usual = self._gaps.quantile(0.98)
+        if usual is None or not self._silences:
+            return
+        limit = max(SILENT_LEAST, SILENT_TIMES * usual)
+        long = [one for one in self._silences if one[1] - one[0] >= limit]
+        whole = [one for one in long if one[2] >= ROWS_AROUND and self._rows - one[2] >= ROWS_AROUND // 2]
+        if not whole or len(long) > SILENT_KEPT or _is_regular([end - begin for begin, end, _ in long]):
+            return
+        tally = Tally()
+        for begin, _, row in whole:
+            tally.add(begin, row, row + 1)
+        longest = max(end - begin for begin, end, _ in whole)
+        at = ", ".join(f"{(begin - (self._first or 0)) / NS_PER_S:.1f} s" for begin, _, _ in whole)
+        seen = (
+            f"not one octet for {longest / NS_PER_S:.1f} s, {longest // max(usual, MS)} times as long as pauses are "
+            f"here; from {at} on, and everything went on as before"
+        )
+        yield tally.found(RULES["LN304"], "bus", seen)
+
+
+def _is_unreadable(stretch: _Stretch) -> bool:
+    return stretch.octets >= UNREADABLE_OCTETS and stretch.count >= UNREADABLE_ROWS
+
+
+def _is_regular(spans: list[int]) -> bool:
+    """Whether pauses belong to the bus's own rhythm: three or more that are alike."""
+    middle = sorted(spans)[len(spans) // 2]
+    return len(spans) >= 3 and sum(abs(span - middle) <= 0.25 * middle for span in spans) >= 0.7 * len(spans)

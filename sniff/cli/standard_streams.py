@@ -1,0 +1,112 @@
+"""Standard input, output and error as somebody may have left them: closed, full, in an encoding of few characters."""
+
+from __future__ import annotations
+
+import codecs
+import contextlib
+import errno
+import io
+import json
+import os
+import sys
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from _typeshed import ReadableBuffer as Buffer
+
+ESCAPE = "sniff485.escape"
+OUTPUT = "standard output"
+
+
+def prepare() -> None:
+    """Make all three usable, or fail with an OSError when they are used."""
+    if None in (sys.stdin, sys.stdout, sys.stderr):
+        _hold_descriptors()
+    if sys.stdin is None:
+        sys.stdin = io.TextIOWrapper(io.BufferedReader(_Closed()))
+    if sys.stdout is None:
+        sys.stdout = io.TextIOWrapper(io.BufferedWriter(_Closed()), encoding="utf-8")
+    if sys.stderr is None:  # nobody listens to it: print() would take standard output instead
+        sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
+    if type(sys.stdout) is io.TextIOWrapper and sys.stdout is sys.__stdout__ and not sys.stdout.isatty():
+        before = sys.stdout
+        named = io.BufferedWriter(_Output(before.fileno(), "wb", closefd=False))
+        sys.stdout = io.TextIOWrapper(
+            named, before.encoding, line_buffering=before.line_buffering, write_through=before.write_through
+        )
+    codecs.register_error(ESCAPE, _escape)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors=ESCAPE)
+
+
+def say(text: str) -> None:
+    """A line on standard error, if that takes it."""
+    with contextlib.suppress(OSError, ValueError):
+        print(f"sniff485: {text}", file=sys.stderr, flush=True)
+
+
+def output_error() -> OSError | None:
+    """Why standard output does not take what was printed; None when it does. It is given up then, for a quiet end."""
+    try:
+        sys.stdout.flush()
+    except OSError as error:
+        give_output_up()
+        return error
+    except ValueError:  # closed by ourselves
+        return None
+    return None
+
+
+def give_output_up() -> None:
+    """Print to nowhere from here on: what the interpreter still holds is written when it ends."""
+    with contextlib.suppress(OSError, ValueError, AttributeError):
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, sys.stdout.fileno())
+        os.close(nowhere)
+
+
+def _hold_descriptors() -> None:
+    """Keep 0, 1 and 2 from being given to files: what is printed somewhere would end in them."""
+    while (descriptor := os.open(os.devnull, os.O_RDWR)) <= 2:
+        pass
+    os.close(descriptor)
+
+
+class _Output(io.FileIO):
+    """Standard output whose errors say that they are of it."""
+
+    def write(self, octets: Buffer) -> int:
+        try:
+            return super().write(octets) or 0
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, OUTPUT) from None
+
+
+class _Closed(io.RawIOBase):
+    """A stream that was closed before we came."""
+
+    def readable(self) -> bool:
+        return True
+
+    def writable(self) -> bool:
+        return True
+
+    def readinto(self, _: Buffer) -> int:
+        raise OSError(errno.EBADF, "it is closed", "standard input")
+
+    def write(self, octets: Buffer) -> int:
+        if self._given_up:
+            return memoryview(octets).nbytes
+        self._given_up = True  # the interpreter tries again at its end
+        raise OSError(errno.EBADF, "it is closed", OUTPUT)
+
+    _given_up = False
+
+
+def _escape(error: UnicodeError) -> tuple[str, int]:
+    """\\u2190 and such, as JSON has it, so that JSON stays JSON; where the output has no such character (Windows writes
+    files as cp1252)."""
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    return json.dumps(error.object[error.start : error.end])[1:-1], error.end

@@ -1,0 +1,92 @@
+"""Reads that came late: frames in them have no times of their own. Pure.
+
+A busy computer does not come round to reading, and then gets all at once what came meanwhile: several frames in one
+read, back to back as far as anybody knows, behind a silence that there never was. That a frame ended longer before the
+read than the adapter may hold octets back, with room for another frame behind it, proves it. The octets of such a read
+came at any time since the reads before, so its frames get that much slack (`Frame.slack`), and no rule takes a bound
+from them that the computer may have made.
+
+Where reads hold more octets than can have come again and again, the adapter is slower than it says: from then on every
+frame has the slack that they prove. So a live bus follows what comes; a saved one has looked ahead (`read_times.py`).
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import replace
+
+from dissectors.frame import Chunk, Frame
+from dissectors.line import Timing
+from sniff.read_times import Backlog
+
+ANOTHER = 4
+"""Octets that a frame has at least: fewer behind a frame are no second one."""
+
+TOGETHER = 10_000_000
+"""Reads that follow so soon, ns, may all be late: what a computer missed comes in several reads."""
+
+OFTEN, RARELY = 3, 500
+"""Stretches of reads that hold more than can have come, from which on the adapter is that slow: so many, and in so many
+reads at most one fewer; else the computer was busy."""
+
+MOST = 250_000_000
+"""ns; no computer that is worth listening with is away for longer."""
+
+KEPT = 16
+"""Reads that may still hold the end of a frame to come."""
+
+
+class _Read:
+    """A long read: from when on its octets were on the line at the latest, when it came, how long after the one before.
+
+    `is_late`: a frame ended in it too long ago.
+    """
+
+    __slots__ = ("is_late", "pause", "start", "time")
+
+    def __init__(self, start: int, time: int, pause: int) -> None:
+        self.start, self.time, self.pause = start, time, pause
+        self.is_late = False
+
+
+class LateReads:
+    """Fed every read, it gives frames the slack that the reads leave."""
+
+    def __init__(self, timing: Timing) -> None:
+        self._char = timing.char
+        self._least = timing.latency + ANOTHER * timing.char
+        self._together = timing.latency + TOGETHER
+        self._allowed = self._latency = timing.latency
+        self._backlog = Backlog(timing.char, timing.latency + timing.char)
+        self._seen = 0
+        self._before: int | None = None
+        self._before_run = 0  # when the read came after which reads follow one another
+        self._reads: deque[_Read] = deque(maxlen=KEPT)
+
+    def see(self, chunk: Chunk) -> None:
+        """Take the next read."""
+        lasted = len(chunk.octets) * self._char
+        if not lasted:
+            return
+        self._seen += 1
+        if self._before is not None and self._backlog.add(chunk.time - self._before, len(chunk.octets)):
+            stretches = self._backlog.stretches
+            if stretches >= OFTEN and RARELY * stretches >= self._seen:
+                self._latency = min(MOST, max(self._latency, int(self._backlog.worst)))
+        if self._before is None or chunk.time - lasted - self._before > self._together:
+            self._before_run = chunk.time - lasted if self._before is None else self._before
+        if lasted > self._least and self._before is not None:
+            start = max(chunk.time - lasted, self._before)
+            self._reads.append(_Read(start, chunk.time, min(start - self._before_run, MOST)))
+        self._before = chunk.time
+
+    def with_slack(self, frame: Frame) -> Frame:
+        """The frame; with more slack where it ended in a read that was late, or where many are."""
+        slack = frame.slack if self._latency <= self._allowed else max(frame.slack, self._latency)
+        for read in reversed(self._reads):
+            if read.start < frame.end <= read.time:
+                read.is_late = read.is_late or read.time - frame.end >= self._least
+                if read.is_late:
+                    slack = max(slack, read.pause)
+                break
+        return frame if slack == frame.slack else replace(frame, slack=slack)

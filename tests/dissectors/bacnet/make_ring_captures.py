@@ -1,0 +1,148 @@
+"""Makes captures of rings by hand, each after one fault or one thing that looks like a fault and is none.
+
+python -m tests.dissectors.bacnet.make_ring_captures captures/findings && pytest --sniff-update captures
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from dissectors.bacnet.frame_making import frame
+from tests.dissectors.bacnet.ring_script import Step, data, found, poll, rounds, spoil, token
+
+READ = "0104000301 0c0c020004d2194d".replace(" ", "")
+VALUE = "010030010c0c020004d2194d3e75020041313f"
+I_AM = "01001000c4020000c82201e09100225d"
+_HEAD = "#!sniff-capture 1\n# line: 38400,8N1\n# protocol: mstp\n# start: 2026-03-01T10:00:00Z\n"
+
+
+def used_late() -> list[Step]:
+    """11 begins when 4 has already taken its token back."""
+    steps = rounds(6, 4, 11, 30)
+    for _ in range(3):
+        steps += [(2, token(4, 11)), (28, token(4, 11)), (28, poll(4, 12)), (6, token(11, 30)), (2, token(30, 4))]
+        steps += rounds(6, 4, 11, 30)
+    return steps
+
+
+def shut_out() -> list[Step]:
+    """40 joins, polls 41 alone, and passes to 6 past 90."""
+    joins: list[Step] = [(2, poll(6, 40)), (3, found(40, 6)), (2, token(6, 40)), (2, poll(40, 41)), (25, token(40, 6))]
+    return [*rounds(8, 6, 90), *joins, *rounds(40, 6, 40)]
+
+
+def slave_speaks() -> list[Step]:
+    """150 answers Who-Is by itself."""
+    steps: list[Step] = []
+    for _ in range(3):
+        steps += [*rounds(3, 7, 22), (2, data(7, 255)), (4, data(150, 255, I_AM)), (2, token(7, 22)), (2, token(22, 7))]
+    return steps
+
+
+def last_octet_missing() -> list[Step]:
+    """12 asks 31, whose answers end one octet early."""
+    steps: list[Step] = []
+    for _ in range(5):
+        steps += [*rounds(4, 12, 31), (2, data(12, 31, READ, expects=True)), (18, data(31, 12, VALUE)[:-1])]
+    return steps + rounds(4, 12, 31)
+
+
+def number_is_free() -> list[Step]:
+    """70 asks whether its number is taken; nobody answers."""
+    ask = frame(3, 70, 70, bytes(range(0x40, 0x50)))
+    joins: list[Step] = [(2, poll(9, 70)), (3, found(70, 9)), (2, token(9, 70)), (2, ask), (257, token(70, 2))]
+    return [*rounds(3, 2, 9), (2, token(2, 9)), *joins, *rounds(3, 2, 9, 70)]
+
+
+def number_is_taken() -> list[Step]:
+    """70 asks whether its number is taken; another one answers with octets of its own."""
+    ask, other = frame(3, 70, 70, bytes(range(0x40, 0x50))), frame(4, 70, 70, bytes(range(0x60, 0x70)))
+    joins: list[Step] = [(2, token(9, 70)), (2, ask), (6, other), (2, token(70, 2))]
+    return [*rounds(3, 2, 9), (2, token(2, 9)), *joins, *rounds(3, 2, 9, 70)]
+
+
+def slow_polls() -> list[Step]:
+    """3 polls two or three times in a second, and there is no token."""
+    return [(400 + no * 37 % 300, poll(3, 4 + no)) for no in range(40)]
+
+
+def impatient() -> list[Step]:
+    """8 does not wait for the answer to its polls."""
+    steps: list[Step] = []
+    for no in range(6):
+        steps += [*rounds(12, 8, 25), (2, poll(8, 9 + no)), (3, token(8, 25)), (2, token(25, 8))]
+    return steps
+
+
+def storm() -> list[Step]:
+    """5 sends Who-Is without pause."""
+    steps: list[Step] = []
+    for _ in range(460):
+        steps += [(2, data(5, 255)), (2, data(5, 255)), (2, token(5, 60)), (14, token(60, 5))]
+    return steps
+
+
+def one_hog() -> list[Step]:
+    """2 sends ten frames with each token."""
+    steps: list[Step] = []
+    for _ in range(75):
+        many = [(2.0, data(2, 14, "0100100a" + "5a" * 40)) for _ in range(10)]
+        steps += [*many, (2, token(2, 14)), (2, token(14, 2))]
+    return steps
+
+
+def held_read() -> list[Step]:
+    """A busy computer: now and then three frames of three stations come in one late read."""
+    steps = rounds(20, 3, 17, 52)
+    for _ in range(4):
+        steps += [(2, token(3, 17)), (47, token(17, 52)), (0, token(52, 3)), (0, token(3, 17)), *rounds(5, 17, 52, 3)]
+    return steps
+
+
+def request_damaged() -> list[Step]:
+    """A request that only the listener got damaged, and its answer."""
+    asked: list[Step] = [(2, spoil(data(12, 31, READ, expects=True), 14)), (18, data(31, 12, VALUE))]
+    return [*rounds(4, 12, 31), *asked, *rounds(4, 12, 31)]
+
+
+def after_an_empty_poll() -> list[Step]:
+    """Damage after polls to an address that nobody has."""
+    steps: list[Step] = []
+    for at in (2, 4):
+        steps += [*rounds(3, 12, 31), (2, poll(12, 20)), (25, spoil(token(12, 31), at)), (2, token(31, 12))]
+    return steps + rounds(3, 12, 31)
+
+
+MADE = {
+    "ms-tp-token-used-after-it-was-given-up": used_late,
+    "ms-tp-shut-out-of-the-ring": shut_out,
+    "ms-tp-slave-speaks-unasked": slave_speaks,
+    "ms-tp-last-octet-missing": last_octet_missing,
+    "ms-tp-number-is-free": number_is_free,
+    "ms-tp-number-is-taken": number_is_taken,
+    "ms-tp-slow-between-polls": slow_polls,
+    "ms-tp-does-not-wait-for-answers-to-polls": impatient,
+    "ms-tp-broadcast-storm": storm,
+    "ms-tp-one-uses-most-of-the-line": one_hog,
+    "ms-tp-reads-held-back": held_read,
+    "ms-tp-request-heard-damaged": request_damaged,
+    "ms-tp-damage-after-a-poll-to-nobody": after_an_empty_poll,
+}
+
+
+def text(steps: Sequence[Step]) -> str:
+    """The capture file; steps without silence come in the read before."""
+    lines: list[tuple[float, bytes]] = []
+    for silence, octets in steps:
+        if not silence and lines:
+            lines[-1] = lines[-1][0], lines[-1][1] + octets
+        else:
+            lines.append((silence, octets))
+    return _HEAD + "".join(f"~{f'{silence:g}':<8} {octets.hex(' ').upper()}\n" for silence, octets in lines)
+
+
+if __name__ == "__main__":
+    for name, make in MADE.items():
+        (Path(sys.argv[1]) / f"{name}.cap.txt").write_text(text(make()), encoding="utf-8")

@@ -1,0 +1,250 @@
+"""Who is at fault on a ring, and who is not: each with the alternative that must be excluded."""
+
+from __future__ import annotations
+
+import pytest
+
+from dissectors.bacnet.frame_making import frame
+from dissectors.bacnet.frame_types import FrameType
+from dissectors.bacnet.ring import What
+from dissectors.findings import Severity
+from dissectors.frame import Flaw, Frame
+from dissectors.tracker import Verdict
+from tests.dissectors.bacnet.ring_script import Step, data, found, poll, rounds, script, spoil, token
+
+READ = "010400030 10c0c020004d2194d".replace(" ", "")
+VALUE = "01003 0010c0c020004d2194d3e75020041313f".replace(" ", "")
+
+
+def test_a_token_used_late_accuses_the_slow_station_alone():
+    """5 begins when 1 has already looked for another one: for a moment both have a token."""
+    steps: list[Step] = []
+    for _ in range(6):
+        steps += rounds(10, 1, 5, 8)
+        steps += [(2, token(1, 5)), (30, token(1, 5)), (30, poll(1, 6)), (5, token(5, 8)), (2, token(8, 1))]
+    read = script(steps)
+    assert read.graves() == {("MS103", "MAC 5")}
+    assert "two tokens for a moment" in read.of("MS103").seen
+    assert read.of("MS102").cause == ("MS103", "MAC 5")
+    assert read.ring.nodes[1].use.most < 3_000_000
+    assert not any(what is What.TWO_TOKENS for what, _ in read.ring.happened)
+
+
+def test_a_poll_after_a_token_that_failed_is_no_use_of_it():
+    steps = rounds(10, 1, 5, 8)
+    for _ in range(5):
+        steps += [(2, token(1, 5)), (30, token(1, 5)), (30, poll(1, 6)), (25, poll(1, 7)), (25, poll(1, 8))]
+        steps += [(2, found(8, 1)), (2, token(1, 8)), (2, token(8, 1)), *rounds(5, 1, 8)]
+    assert script(steps).ring.nodes[1].use.most < 3_000_000
+
+
+def test_a_second_token_names_only_who_made_it():
+    """9 passes a token that it does not have; the station that gets it, and the one that polls, are innocent."""
+    steps = rounds(5, 1, 5, 9)
+    for _ in range(5):
+        steps += [(2, poll(1, 2)), (4, token(9, 5)), (2, token(5, 9)), (2, token(9, 1)), *rounds(3, 1, 5, 9)]
+    read = script(steps)
+    assert {code for code, _ in read.graves()} == {"MS104"}
+    assert read.of("MS104").seen.startswith("MAC 9 sent")
+    assert {mac for what, mac in read.ring.happened if what is What.TWO_TOKENS} == {9}
+
+
+@pytest.mark.parametrize("mac", [200, 77])
+def test_a_slave_that_speaks_unasked(mac: int):
+    steps = rounds(3, 1, 3)
+    for _ in range(3):
+        steps += [(2, data(1, 255)), (3, data(mac, 255, "01001000c4020000c822 01e09100225d95".replace(" ", "")))]
+        steps += rounds(3, 1, 3)
+    assert script(steps).graves() == {("MS111", f"MAC {mac}")}
+
+
+def test_no_token_seen_none_lost():
+    read = script([(700, poll(1, 2 + no % 100)) for no in range(60)])
+    assert read.graves() == {("MS203", "MAC 1")}
+
+
+def joined(first: int, steps_of_joining: list[Step], *ring: int) -> list[Step]:
+    return [
+        *rounds(10, 0, 7),
+        (2, poll(0, first)),
+        (2, found(first, 0)),
+        (2, token(0, first)),
+        *steps_of_joining,
+        *rounds(60, *ring),
+    ]
+
+
+def test_a_station_past_which_the_token_goes():
+    read = script(joined(3, [(2, token(3, 0))], 0, 3))
+    assert read.graves() == {("MS110", "MAC 7")}
+    assert "MAC 3 passes the token on to MAC 0 and polls nobody, never 4 … 127" in read.of("MS110").seen
+
+
+def test_a_station_that_was_looked_for_is_not_shut_out():
+    """It may have been switched off just then; or its poll was damaged."""
+    search: list[Step] = [(2 if address == 4 else 25, poll(3, address)) for address in (*range(4, 11), 0)]
+    read = script(joined(3, [*search, (2, found(0, 3)), (2, token(3, 0))], 0, 3))
+    assert read.graves() == set()
+
+
+def test_a_station_that_missed_its_token_is_not_shut_out():
+    lost: list[Step] = [(2, token(0, 7)), (30, token(0, 7)), (30, poll(0, 8)), (25, poll(0, 9)), (25, poll(0, 3))]
+    read = script(
+        [*rounds(10, 0, 3, 7), (2, token(0, 3)), (2, token(3, 0)), *lost, (2, found(3, 0)), *rounds(60, 0, 3)]
+    )
+    assert "MS110" not in {code for code, _ in read.graves()}
+
+
+def test_a_test_of_the_own_address_that_nobody_answers():
+    ask = frame(FrameType.TEST_REQUEST, 64, 64, bytes(range(16)))
+    read = script([*rounds(3, 1, 3), (2, token(1, 64)), (2, ask), (256, token(64, 1)), *rounds(3, 1, 3)])
+    assert read.findings == ()
+    (tested,) = (one for one in read.transactions if one.kind == "test-request")
+    assert tested.verdict is Verdict.DATA
+
+
+@pytest.mark.parametrize(("echo", "graves"), [(range(16), set()), (range(16, 32), {("MS501", "MAC 64")})])
+def test_a_test_of_the_own_address_that_is_answered(echo: range, graves: set[tuple[str, str]]):
+    """The same octets: the number is taken, the newcomer leaves it. Others: somebody else has it and talks over it."""
+    ask, answer = (frame(kind, 64, 64, bytes(octets)) for kind, octets in ((3, range(16)), (4, echo)))
+    read = script([*rounds(3, 1, 3), (2, token(1, 64)), (2, ask), (5, answer), (2, token(64, 1)), *rounds(3, 1, 3)])
+    assert read.graves() == graves
+
+
+def test_an_answer_to_a_request_that_was_heard_damaged():
+    ask, answer = data(2, 5, READ, expects=True), data(5, 2, VALUE)
+    read = script([(10, token(5, 2)), (2, spoil(ask, 12)), (20, answer), (2, token(2, 5)), (2, token(5, 2))])
+    (asked,) = (one for one in read.transactions if one.request == 1)
+    assert (asked.verdict, asked.response, asked.station) == (Verdict.ANSWERED, 2, 5)
+    assert read.ring.nodes[5].replies == 1
+    assert read.graves() == set()
+    alone = script([(10, token(5, 2)), (2, spoil(ask, 12)), (260, token(2, 5)), (2, token(5, 2))])
+    assert [one.verdict for one in alone.transactions if one.request == 1] == [Verdict.DAMAGED_REQUEST]
+    assert alone.graves() == set()
+
+
+def test_damage_after_a_poll_to_an_empty_address_is_nobodys_answer():
+    steps = rounds(3, 1, 5)
+    for _ in range(5):
+        steps += [(2, poll(1, 3)), (25, spoil(token(1, 5), 3)), (2, token(5, 1)), *rounds(2, 1, 5)]
+    read = script(steps)
+    assert {one.verdict for one in read.transactions if one.station == 3 and one.kind == "poll-for-master"} == {
+        Verdict.DATA
+    }
+    assert 3 not in {place.source for place in read.placements if place is not None}
+    assert not any(subject == "MAC 3" for _, subject in read.graves())
+
+
+def test_repeated_damage_proves_no_second_station():
+    """Whatever it is that spoils 5's answers, its address is not taken twice."""
+    steps = rounds(5, 2, 5)
+    for _ in range(10):
+        answer = spoil(data(5, 2, VALUE), 9)
+        steps += [(2, data(2, 5, READ, expects=True)), (20, answer), *rounds(2, 2, 5)]
+    read = script(steps)
+    assert read.graves() == {("MS402", "MAC 5")}
+    assert "10 of them answers" in read.of("MS402").seen
+
+
+@pytest.mark.parametrize("cut", [1, 2])
+@pytest.mark.parametrize("extended", [False, True])
+def test_answers_that_lack_their_end(cut: int, extended: bool):
+    answer = frame(33, 2, 5, bytes.fromhex(VALUE)) if extended else data(5, 2, VALUE)
+    steps = rounds(5, 2, 5)
+    for _ in range(5):
+        steps += [(2, data(2, 5, READ, expects=True)), (20, answer[:-cut]), *rounds(2, 2, 5)]
+    read = script(steps)
+    damaged = [event for event in read.events if isinstance(event, Frame) and not event.ok]
+    assert len(damaged) == 5
+    if cut == 2 and not extended:  # nothing is left of its check
+        assert read.graves() == {("MS402", "MAC 5")}
+        return
+    assert {event.repair.flaw for event in damaged if event.repair} == {
+        [Flaw.LAST_MISSING, Flaw.LAST_TWO_MISSING][cut - 1]
+    }
+    assert all(event.repair and event.repair.octets == answer for event in damaged)
+    assert read.graves() == {("MS405", "MAC 5")}
+
+
+def test_noise_that_hits_everybody_is_the_bus():
+    steps: list[Step] = []
+    for no in range(300):
+        pair = rounds(1, 1, 5, 9)
+        if no % 4 == 0:
+            at = no // 4 % 3
+            pair[at] = (2, spoil(pair[at][1], no % 8, 1 << no % 7))
+        steps += pair
+    assert script(steps).graves() == {("MS401", "bus")}
+
+
+@pytest.mark.parametrize(("latency", "judged"), [(17.5, True), (50, False)])
+def test_a_limit_that_is_passed_whatever_the_adapter_hides(latency: float, judged: bool):
+    """60 ms − 17.5 ms is more than 15 ms; 60 ms − 50 ms is not."""
+    steps = rounds(30, 1, 5)
+    for _ in range(6):
+        steps += [(2, token(1, 5)), (60, token(5, 1)), *rounds(4, 1, 5)]
+    assert script(steps, latency).graves() == ({("MS103", "MAC 5")} if judged else set())
+
+
+def test_reads_that_a_busy_computer_held_back_are_nobodys_lateness():
+    """Several stations are late at once, and their frames come in one read."""
+    steps = rounds(30, 1, 5, 9)
+    for _ in range(10):
+        steps += [(2, token(1, 5)), (50, token(5, 9)), (0, token(9, 1)), (0, token(1, 5)), *rounds(3, 5, 9, 1)]
+    assert script(steps).graves() == set()
+
+
+def test_an_answer_that_comes_late_is_not_lost_as_well():
+    steps = rounds(5, 2, 5, 9)
+    for _ in range(5):
+        steps += [(2, data(2, 5, READ, expects=True)), (260, token(2, 5)), (2, token(5, 9))]
+        steps += [(2, data(5, 2, VALUE)), (2, token(9, 2)), *rounds(3, 2, 5, 9)]
+    read = script(steps)
+    assert {code for code, _ in read.graves()} == {"MS302"}
+
+
+def test_what_a_loss_costs_is_said():
+    """After each lost token 1 polls up to 127 before it finds 0: seconds without a token."""
+    steps = rounds(20, 0, 1)
+    for _ in range(3):
+        steps += [(2, token(0, 1)), (510, poll(1, 2)), *((25.0, poll(1, address)) for address in range(3, 128))]
+        steps += [(25, poll(1, 0)), (2, found(0, 1)), (2, token(1, 0)), *rounds(30, 0, 1)]
+    read = script(steps)
+    assert {code for code, _ in read.graves()} == {"MS101"}
+    assert "polled up to 127 for a successor after a loss" in read.of("MS201").seen
+    assert "stood still for up to 3.4" in read.of("MS201").seen
+
+
+def test_an_impatient_station_is_not_two():
+    """It never waits for the answer to its polls: one rhythm, one station."""
+    steps: list[Step] = []
+    for no in range(60):
+        steps += [*rounds(2, 1, 5), (2, poll(1, 10 + no % 50)), (3, token(1, 5)), (2, token(5, 1))]
+    read = script(steps)
+    assert ("MS204", "MAC 1") in read.graves()
+    assert "MS501" not in {code for code, _ in read.graves()}
+
+
+def test_two_rhythms_are_two_stations():
+    steps: list[Step] = []
+    for no in range(60):
+        wait = 3 if no % 2 else 25
+        steps += [*rounds(2, 1, 5), (2, poll(1, 10 + no % 50)), (wait, token(1, 5)), (2, token(5, 1))]
+    assert ("MS501", "MAC 1") in script(steps).graves()
+
+
+def test_a_storm_of_broadcasts():
+    steps: list[Step] = []
+    for _ in range(400):
+        steps += [(2, data(1, 255)), (2, data(1, 255)), *rounds(4, 1, 5)]
+    assert script(steps).graves() == {("MS602", "MAC 1")}
+
+
+def test_a_station_that_has_the_line_most_of_the_time_is_a_fact():
+    steps: list[Step] = []
+    for _ in range(100):
+        steps += [*((2.0, data(1, 5, "01000001" + "00" * 40)) for _ in range(10)), *rounds(3, 1, 5, 9)]
+    read = script(steps)
+    assert read.graves() == set()
+    assert read.of("MS601").severity is Severity.INFO
+    assert "up to 10 frames" in read.of("MS601").seen

@@ -1,0 +1,223 @@
+"""What is always the same is said as what it is; nobody is accused of what something else explains."""
+
+from __future__ import annotations
+
+import pytest
+
+from dissectors.findings import Severity
+from dissectors.frame import Flaw
+from dissectors.modbus.damage_shares import chance
+from dissectors.modbus.garbage import Garbage, slower_by, whole_runs
+from dissectors.modbus.header import peek_rtu
+from dissectors.modbus.rules import RULES
+from dissectors.modbus.text import text
+from tests.dissectors.modbus.judged import findings_of, graves_of, say_damaged
+
+READ, VALUES = "010300000001", "0103020007"
+OTHER, OTHER_VALUES = "020300000001", "0203020007"
+SLOW = bytes.fromhex("80f8007880f878807800f880")  # characters whose bits are four long
+
+
+@pytest.fixture
+def bus(paper_bus):
+    return paper_bus()
+
+
+def quiet(bus, count=8):
+    """Another station that is well."""
+    for _ in range(count):
+        bus.exchange(OTHER, OTHER_VALUES)
+    return bus
+
+
+@pytest.mark.parametrize(
+    ("flaw", "code"),
+    [
+        (Flaw.CHECK_SWAPPED, "MB011"),
+        (Flaw.FIRST_MISSING, "MB012"),
+        (Flaw.FIRST_SPOILT, "MB012"),
+        (Flaw.LAST_MISSING, "MB006"),
+        (Flaw.LAST_TWO_MISSING, "MB006"),
+    ],
+)
+def test_damage_that_is_always_the_same_is_a_finding_of_its_own(bus, flaw, code):
+    quiet(bus)
+    for value in range(6):
+        say_damaged(bus.say(READ, 200), f"01030200{value:02x}", flaw)
+    bus.say(OTHER, 200)
+    assert graves_of(bus) == {(code, "station 1")}
+    assert any(flaw.value in one.seen for one in findings_of(bus) if one.code == code) or code == "MB006"
+
+
+def test_the_values_of_a_repaired_frame_are_shown_and_marked(bus):
+    frame = say_damaged(bus.say(READ), VALUES, Flaw.CHECK_SWAPPED).events[-1]
+    header = peek_rtu(frame)
+    assert (header.ok, header.source, header.error) == (False, 1, "check octets swapped")
+    line = text(frame, header, header.role)
+    assert "1 register: 7" in line
+    assert "[repaired: check octets swapped]" in line
+
+
+def test_damage_without_a_system_stays_damage(bus):
+    quiet(bus)
+    for value in range(8):
+        bus.say(READ, 200).damage(f"01030200{value:02x}", at=3 + value % 4)
+    assert {code for code, _ in graves_of(bus)} == {"MB005"}
+
+
+def test_the_same_octets_every_time_are_no_second_station(bus):
+    quiet(bus)
+    for _ in range(5):
+        bus.say(READ, 200).noise(b"\xa1\x0c\x5e\x77\x12\x90\x33\x08")
+    assert graves_of(bus) == {("MB014", "station 1")}
+
+
+def test_long_bits_name_the_baud_rate(bus):
+    quiet(bus)
+    for turn in range(4):
+        bus.say(READ, 200).noise(SLOW[turn:] + SLOW[:turn])
+    (finding,) = (one for one in findings_of(bus) if one.code == "MB014")
+    assert finding.severity is Severity.ERROR
+    assert "about 4800 Bd, not 19200" in finding.seen
+
+
+def test_noise_that_differs_is_no_other_baud_rate():
+    garbage = Garbage()
+    for turn in range(8):
+        garbage.add(bytes((turn * 37 + k * 59) & 0xFF for k in range(12)), False, turn)
+    assert garbage.always() is None
+    assert garbage.slower_by() is None
+
+
+def test_runs_of_equal_bits():
+    assert whole_runs(0x78) == [4, 4]
+    assert slower_by([SLOW]) == 4
+    assert slower_by([b"\0\0\0\0\0\0\0\0"]) is None
+    assert slower_by([bytes(range(64))]) is None
+
+
+def test_an_answer_of_another_function_is_the_stations(bus):
+    for _ in range(3):
+        bus.exchange(READ, "01ff01")
+    assert graves_of(bus) == {("MB010", "station 1")}
+
+
+def test_a_read_of_address_0_is_the_masters(bus):
+    for _ in range(3):
+        bus.exchange("000300000001", "0903020007")
+    assert graves_of(bus) == {("MB017", "master")}
+    assert any(one.next == "set the unit number in the master to 9" for one in findings_of(bus))
+
+
+def test_a_byte_count_that_does_not_fit_is_the_masters(bus):
+    quiet(bus)
+    for _ in range(2):
+        bus.exchange("01100090000202 06c4", "019003")
+    assert graves_of(bus) == {("MB016", "master")}
+
+
+def test_an_echo_cut_short_explains_the_silence(bus):
+    for _ in range(4):
+        bus.say(READ, 2000).cut(READ, 7, 0.7)
+    assert {code for code, _ in graves_of(bus)} == {"MB013"}
+    assert [one.cause for one in findings_of(bus) if one.code == "MB001"] == [("MB013", "bus")]
+
+
+def test_requests_that_one_station_gives_back(bus):
+    for _ in range(5):
+        bus.exchange(OTHER, OTHER_VALUES).say(READ, 40).say(READ, 0.8).say(VALUES, 6)
+    assert ("MB018", "station 1") in graves_of(bus)
+
+
+def test_a_late_answer_is_not_lost_as_well(bus):
+    for _ in range(4):
+        bus.say(READ, 900).say(OTHER, 1000).say(VALUES, 15).say(OTHER_VALUES, 5)
+    assert graves_of(bus) == {("MB103", "station 1")}
+
+
+def test_a_second_answer_with_the_same_octets_may_be_a_converters(bus):
+    for _ in range(4):
+        bus.exchange(READ, VALUES).say(VALUES, 5)
+    (finding,) = (one for one in findings_of(bus) if one.code == "MB201")
+    assert finding.severity is Severity.WARNING
+    assert "octet for octet" in finding.seen
+
+
+def test_a_second_answer_with_other_octets_is_a_second_station(bus):
+    for _ in range(4):
+        bus.exchange(READ, VALUES).say("0103020008", 5)
+    (finding,) = (one for one in findings_of(bus) if one.code == "MB201")
+    assert finding.severity is Severity.ERROR
+
+
+def test_noise_that_falls_anywhere_is_the_buses(bus):
+    for turn in range(60):
+        bus.exchange(OTHER, OTHER_VALUES)
+        if turn % 10 == 3:
+            bus.say(READ, 40).damage(VALUES, at=turn // 10).say(READ, 300).say(VALUES)
+        elif turn % 10 == 7:
+            bus.say(OTHER, 40).damage(OTHER_VALUES, at=turn // 10).say(OTHER, 300).say(OTHER_VALUES)
+        else:
+            bus.exchange(READ, VALUES)
+    assert {code for code, _ in graves_of(bus)} == {"MB007"}
+
+
+def test_who_has_more_than_its_share_is_blamed(bus):
+    for turn in range(60):
+        bus.exchange(OTHER, OTHER_VALUES)
+        if turn % 4 == 3:
+            bus.say(READ, 40).damage(VALUES, at=turn // 4 % 6).say(READ, 300).say(VALUES)
+        else:
+            bus.exchange(READ, VALUES)
+    assert {code for code, _ in graves_of(bus)} == {"MB005"}
+
+
+def test_chance_is_the_tail_of_a_binomial():
+    assert chance(0, 10, 0.3) == 1
+    assert chance(3, 3, 0.5) == pytest.approx(0.125)
+    assert chance(1, 2, 0.5) == pytest.approx(0.75)
+    assert chance(300, 500, 0.5) < 1e-5
+    assert chance(5, 5, 1.0) == 1
+
+
+def test_a_search_for_stations_is_one_fact(bus):
+    bus.exchange(OTHER, OTHER_VALUES, pause=200)
+    for unit in range(3, 30):
+        bus.say(f"{unit:02x}0300000001", 200).say(f"{unit:02x}0300000001", 200)
+    bus.exchange(OTHER, OTHER_VALUES, pause=200)
+    assert graves_of(bus) == set()
+    assert [one.code for one in findings_of(bus) if one.severity is not Severity.NOTE and "MB4" in one.code] == [
+        "MB402"
+    ]
+
+
+def test_a_master_that_asks_two_at_once_is_one_master(bus):
+    quiet(bus)
+    for _ in range(8):
+        bus.exchange(READ, VALUES)
+    for _ in range(8):
+        bus.say(READ, 40).say(OTHER, 3).say(VALUES, 6).say(OTHER_VALUES, 3)
+    assert not any(one.code in ("MB203", "MB103") for one in findings_of(bus) if one.severity >= Severity.WARNING)
+
+
+def test_two_masters_ask_sooner_than_anybody_can_answer(bus):
+    for _ in range(12):
+        bus.exchange(READ, VALUES, answer=20).exchange(OTHER, OTHER_VALUES, answer=20)
+    for gap in (2, 5, 9, 13, 16):
+        bus.say(READ, 40).say(OTHER, gap).say(VALUES, 20).say(OTHER_VALUES, 20)
+    assert ("MB203", "bus") in graves_of(bus)
+
+
+def test_reads_that_came_late_are_not_slow(bus):
+    for turn in range(60):
+        late = turn % 10 == 5
+        bus.exchange(READ, VALUES, answer=900 if late else 10, pause=0 if turn % 10 == 6 else 100)
+    assert not any(one.code == "MB101" for one in findings_of(bus))
+
+
+def test_every_code_that_a_rule_explains_can_exist():
+    prefixes = ("MB", "LN")
+    for rule in RULES.values():
+        assert all(code.startswith(prefixes) for code in rule.explains)
+        assert all(code in RULES for code in rule.explains if code.startswith("MB"))
+        assert rule.code not in rule.explains

@@ -1,0 +1,114 @@
+"""Octets that make no frames: the settings that fit them are named, and none where none fits."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Iterable
+
+import pytest
+
+from dissectors.frame import Chunk
+from dissectors.line import LineSettings
+from dissectors.modbus.adu import seal_ascii, seal_rtu
+from sniff.analysis.other_settings import Fit, what_fits
+from sniff.analysis.slower_bus import slower_by
+from sniff.simulation.line_mix import low_times, receive
+
+LINE = LineSettings.parse("9600,8N1")
+MS = 1_000_000
+
+
+def chunks(bursts: Iterable[bytes], line: LineSettings = LINE, gap: int = 50 * MS) -> list[Chunk]:
+    made, now = [], 0
+    for burst in bursts:
+        now += gap + len(burst) * line.char
+        made.append(Chunk(now, burst))
+    return made
+
+
+def fit(bursts: Iterable[bytes], protocol: str = "n2", line: LineSettings = LINE) -> Fit | None:
+    return what_fits(chunks(bursts, line), line, 0, protocol)
+
+
+def polls(count: int = 12, seed: int = 1) -> list[bytes]:
+    dice = random.Random(seed)
+    made = []
+    for number in range(count):
+        made.append(seal_rtu(bytes((number % 3 + 1, 3, 0, number, 0, 4))))
+        made.append(seal_rtu(bytes((number % 3 + 1, 3, 8)) + dice.randbytes(8)))
+    return made
+
+
+def heard(frames: Iterable[bytes], sent: str, listening: str) -> list[bytes]:
+    """The same frames by a UART with other settings."""
+    lines = LineSettings.parse(sent), LineSettings.parse(listening)
+    return [receive(lines[1], low_times(lines[0], 0, frame, {})).octets for frame in frames]
+
+
+def test_another_protocol_is_named() -> None:
+    told = fit(polls())
+    assert told is not None
+    assert "these octets read as modbus-rtu with good checks (24 frames hold 100%" in told.seen
+    assert told.next == "read it with -p modbus-rtu"
+    assert fit(polls(), "modbus-rtu") is None  # it is this one, whatever is wrong
+
+
+def test_seven_bits_and_parity_read_as_eight() -> None:
+    frames = [seal_ascii(frame[:-2]) for frame in polls()]
+    told = fit(heard(frames, "9600,7E1", "9600,8N1"), "modbus-rtu")
+    assert told is not None
+    assert "with 7 data bits and even parity these octets read as modbus-ascii" in told.seen
+    assert told.means == "the bus has 9600,7E1"
+
+
+def test_inverted_octets() -> None:
+    told = fit([bytes(octet ^ 0xFF for octet in frame) for frame in polls()], "modbus-rtu")
+    assert told is not None
+    assert told.seen.startswith("inverted, these octets read as modbus-rtu")
+    assert "A and B are swapped" in told.means
+
+
+@pytest.mark.parametrize(("mask", "words"), [(0x7F, "7 data bits"), (0x3F, "6 data bits"), (0x1F, "5 data bits")])
+def test_data_bits_that_the_port_lacks(mask: int, words: str) -> None:
+    told = fit([bytes(octet & mask for octet in frame) for frame in polls()], "modbus-rtu")
+    assert told is not None
+    assert f"is above {mask:02X}" in told.seen
+    assert words in told.seen
+
+
+def test_text_of_an_unknown_protocol_has_no_eighth_bit_and_that_is_all() -> None:
+    assert fit([b"*IDN?\r\n", b"ACME,4711,1.0\r\n", b"READ:VOLT?\r\n", b"+1.2345E+01\r\n"] * 4) is None
+
+
+@pytest.mark.parametrize("data", ["8N1", "8E1", "8N2"])
+@pytest.mark.parametrize("factor", [2, 3, 4, 6, 8])
+def test_a_slower_bus(factor: int, data: str) -> None:
+    sent, listening = f"2400,{data}", f"{2400 * factor},{data}"
+    bursts = heard(polls(4), sent, listening)
+    assert slower_by(bursts, LineSettings.parse(listening)) == factor
+    told = what_fits(chunks(bursts, gap=200 * MS), LineSettings.parse(listening), 0, "modbus-rtu")
+    assert told is not None
+    assert f"the bus is {factor} times slower, about 2400 Bd" in told.seen
+
+
+def test_a_much_faster_bus() -> None:
+    bursts = heard([polls(1)[0], seal_rtu(bytes.fromhex("010306000102030405"))] * 12, "57600,8N1", "9600,8N1")
+    told = fit(bursts, "modbus-rtu")
+    assert told is not None
+    assert "wrong baud rate: the bus is faster than 9600 Bd" in told.seen
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_of_noise_nothing_is_said(seed: int) -> None:
+    dice = random.Random(seed)
+    assert fit([dice.randbytes(dice.randrange(1, 12)) for _ in range(40)], "modbus-rtu") is None
+
+
+@pytest.mark.parametrize("ringing", [b"\x00", b"\xff", b"\xfe\xff", b"\x00\x00"])
+def test_ringing_is_no_faster_bus(ringing: bytes) -> None:
+    assert fit([ringing] * 60, "modbus-rtu") is None
+
+
+def test_the_bus_itself_is_not_slower() -> None:
+    assert slower_by(polls(), LINE) == 0
+    assert slower_by([b"\x00" * 3], LINE) == 0

@@ -1,0 +1,45 @@
+"""Results that go back into a recording: all of them while there are few, in turn when there are many."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+from sniff.thinning import Budget
+
+S = 1_000_000_000
+
+
+def test_everything_as_long_as_there_is_little() -> None:
+    budget = Budget(2, 100)
+    assert all(budget.take(f"point {number % 4}", number * S) for number in range(1000))
+
+
+def test_in_the_long_run_the_rate_holds_and_every_channel_has_its_turn() -> None:
+    budget = Budget(2, 100)
+    taken: dict[int, list[int]] = {}
+    for number in range(50 * 3600):
+        point, now = number % 30, number * S // 50
+        if budget.take(str(point), now):
+            taken.setdefault(point, []).append(now)
+    assert sum(map(len, taken.values())) <= 2 * 3600 + 100
+    late = [[time for time in times if time > 600 * S] for times in taken.values()]
+    assert len(late) == 30
+    assert min(map(len, late)) > 0.8 * max(map(len, late)), "one channel starves another"
+    for times in late:
+        assert max(b - a for a, b in pairwise(times)) <= 20 * S
+
+
+def test_a_quiet_time_gives_the_burst_back() -> None:
+    budget = Budget(1, 50)
+    while budget.take("a", 0) or budget.take("b", 0):
+        pass
+    assert all(budget.take("a", 1000 * S + number) for number in range(20))
+
+
+def test_a_clock_that_runs_backwards() -> None:
+    budget = Budget(1, 4)
+    assert budget.take("a", 100 * S)
+    assert budget.take("a", -100 * S)
+    for number in range(100):
+        budget.take("a", -100 * S - number)
+    assert budget.take("a", 1000 * S)
