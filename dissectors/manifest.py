@@ -18,6 +18,7 @@ from dissectors.framer import Framer
 from dissectors.line import Timing
 from dissectors.pseudonyms import Renamer
 from dissectors.readings import Readings, Refusal
+from dissectors.token_ring import TokenRing
 from dissectors.tracker import Tracker
 
 RARE_BITS = 8.0
@@ -58,7 +59,7 @@ class Dissector:
     `noun`: what its people call a place on the bus. `family`: under which name device profiles speak of it.
     `bits(frame)`: how much a good frame speaks for this protocol: log2 of how seldom random octets hold one like it.
     `judge`: makes the rules at work on a bus; `rules`: their catalogue, by code.
-    `ring`: makes the observer of a token ring; `ring_window`: what changed between two looks at it.
+    `ring`: how its token ring is watched and shown, if it passes a token.
     `readings`: what exchanges say of the things inside a station; `refusal`: the code with which one refuses.
     `packet_file`: how its frames lie in packet files.
     `renamer`: makes what gives stations other numbers and blanks texts, checks made right again.
@@ -80,8 +81,7 @@ class Dissector:
     bits: Callable[[Frame], float] = lambda frame: RARE_BITS
     judge: Callable[[Timing], Judge] | None = None
     rules: Mapping[str, Rule] = field(default_factory=dict)
-    ring: Callable[[Timing], Any] | None = None
-    ring_window: Callable[[Any, Any], Any] | None = None
+    ring: TokenRing | None = None
     readings: Readings | None = None
     refusal: Refusal | None = None
     packet_file: PacketFile | None = None

@@ -223,7 +223,7 @@ class LineEvent:
 
 @dataclass(frozen=True, slots=True)
 class SettingsChange:
-    """What a SETTINGS event says, as words with spaces between: "line=19200,8E1 protocol=modbus-rtu found".
+    """What a SETTINGS event says, as words with spaces between: "line=19200,8E1 protocol=NAME found".
 
     `line`, `protocol`: in force from here on; None: as before. `searching`: here a search for them begins, and every
     later change is one of its attempts. `found`: here it ends with these.

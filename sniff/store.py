@@ -58,7 +58,7 @@ class Store:
         self.dissector = dissector
         self.load = Load(session.line)
         self.reader = PointReader(dissector, self.devices)
-        self.ring = dissector.ring(session.timing) if dissector.ring is not None else None
+        self.ring = dissector.ring.observer(session.timing) if dissector.ring is not None else None
 
     def settle(self, session: Session, dissector: Dissector) -> None:
         """Go on with settings that were found; the rows so far are what their search heard."""

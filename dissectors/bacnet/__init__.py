@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dissectors.bacnet import ring_words
 from dissectors.bacnet.fields import fields
 from dissectors.bacnet.findings import MstpFindings, judge
 from dissectors.bacnet.frame_making import frame
@@ -18,6 +19,7 @@ from dissectors.bacnet.summary import text
 from dissectors.bacnet.tracker import MstpTracker
 from dissectors.frame import Frame
 from dissectors.manifest import Dissector, PacketFile, on_first_use
+from dissectors.token_ring import TokenRing
 
 __all__ = [
     "MSTP",
@@ -43,6 +45,15 @@ def bits(frame: Frame) -> float:
     return 24.0
 
 
+RING = TokenRing(
+    observer=RingObserver,
+    window=ring_window,
+    order=lambda ring: ring.order,
+    headings=ring_words.HEADINGS,
+    rows=ring_words.rows,
+    sentences=ring_words.sentences,
+)
+
 MSTP = Dissector(
     name="mstp",
     title="BACnet MS/TP",
@@ -59,8 +70,7 @@ MSTP = Dissector(
     bits=bits,
     judge=MstpFindings,
     rules=RULES,
-    ring=RingObserver,
-    ring_window=ring_window,
+    ring=RING,
     readings=readings,
     packet_file=PacketFile((165, 252), "mstp", least=8, longer=True),
     renamer=MstpRenamer,

@@ -62,7 +62,7 @@ class BusChannels:
         self._session = session
         self._bus = re.sub(r"[^A-Za-z0-9_.-]+", "-", session.bus).strip("-") or "bus"
         self._judging = Judging(session, dissector, devices)
-        self._compare = dissector.ring_window
+        self._compare = dissector.ring.window if dissector.ring is not None else None
         self._ring = self._look_at_ring()
         self._window = Summary(session.line)
         self._begin: int | None = None

@@ -1,7 +1,7 @@
 """The filter language of `show -Y` and of the terminal UI's `/`: Wireshark's grammar over our columns and fields.
 
     dst == 3 && kind contains "write"          src in {1, 2, 5}        latency_ms > 50
-    !ok or verdict == "no answer"              modbus.func_code == 0x10   error matches "CRC|LRC"
+    !ok or verdict == "no answer"              func == 0x10   error matches "CRC|LRC"
 
 Names without a dot are columns (COLUMNS below), dotted names are fields as `show -T fields` lists them. A comparison
 with something that a frame does not have is false, also `!=`. A name alone is true when the frame has it and it is
@@ -225,7 +225,7 @@ class _Parser:
             self.at += 1
             return _contains(self._getter("text", token.column), _unquote(token.text))
         if token.kind != "word":
-            raise FilterError("expected a name such as dst, kind or modbus.func_code", token.column)
+            raise FilterError("expected a name such as dst, kind or latency_ms", token.column)
         get = self._getter(token.text, token.column)
         self.at += 1
         if self._now.kind == "op" and self._now.text in _COMPARE:
@@ -284,7 +284,10 @@ class _Parser:
         if not is_field(name, dissector):
             close = difflib.get_close_matches(name, FIELDS, 1, 0.5)
             hint = f"did you mean {close[0]!r}?" if close else f"columns: {' '.join((*COLUMNS, 'text'))}"
-            raise FilterError(f"unknown name {name!r} ({hint} fields: modbus.func_code …)", column)
+            raise FilterError(
+                f"unknown name {name!r} ({hint}; fields of this protocol begin with {', '.join(dissector.prefixes)})",
+                column,
+            )
 
         def get(row: Row, _: Transaction | None) -> tuple[Value, ...]:
             if not isinstance(row.event, Frame):

@@ -10,13 +10,14 @@ from dissectors.findings import Finding, Severity, Tally, counted, found, times
 from dissectors.frame import Chunk, Damage, Event, Frame, LineError, Noise, Place, Reason, Role
 from dissectors.line import NS_PER_S
 from dissectors.tracker import Transaction, Verdict
+from dissectors.words import milliseconds
 from sniff.analysis.line_rules import LINE_RULES as RULES
 from sniff.analysis.line_use import LineUse
 from sniff.analysis.other_settings import SAMPLE_OCTETS, Fit, what_fits
 from sniff.analysis.sender_findings import BUS, WRONG, Senders
 from sniff.analysis.slower_bus import slower_by
 from sniff.analysis.time_patterns import TimePatterns
-from sniff.analysis.wording import milliseconds, station_word
+from sniff.analysis.wording import station_word
 from sniff.engine import Row
 from sniff.session import LineEvent, LineEventKind, Session
 

@@ -63,7 +63,7 @@ def _placed(field: Field) -> bool:
 
 
 def _spelled(fields: tuple[Field, ...], shift: int) -> tuple[Field, ...]:
-    """The same for a packet that was read from octets written as pairs of hex digits (Modbus ASCII)."""
+    """The same for a packet that was read from octets written as pairs of hex digits."""
     return tuple(
         replace(
             field,

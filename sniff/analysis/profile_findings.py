@@ -19,8 +19,8 @@ from dissectors.profiles.decoding import Value, bit_words, decode, in_range, num
 from dissectors.readings import How, Reading
 from dissectors.subject import About, Subject, station
 from dissectors.tracker import Placement, Transaction
+from dissectors.words import milliseconds
 from sniff.analysis.points import ALL, PointReader, Sample
-from sniff.analysis.wording import milliseconds
 from sniff.engine import Output, Row
 
 MOST_TOLD = 2_000
@@ -76,8 +76,8 @@ PROFILE_RULES: dict[str, Rule] = {
             "PR006",
             Severity.WARNING,
             "frame longer than the device takes",
-            "A frame to or from a station has more octets on the line than its manual allows (TECO E510 and F510 on "
-            "Modbus: 80, 1.0.1).",
+            "A frame to or from a station has more octets on the line than its manual allows (TECO E510 and F510 over "
+            "registers: 80, manual 1.0.1).",
             "a master that reads or writes too much at once",
             "have the master read fewer registers in one request",
         ),
@@ -85,7 +85,7 @@ PROFILE_RULES: dict[str, Rule] = {
             "PR007",
             Severity.NOTE,
             "slower than the device promises",
-            "Answers came later than the response time that the manual gives (TECO E510 and F510 on Modbus: 10 ms, "
+            "Answers came later than the response time that the manual gives (TECO E510 and F510 over registers: 10 ms, "
             "1.0.1), even when all that the adapter may have added is taken off.",
             "a response delay that is set in the device, a device busy with other work, or a gateway in between",
             "allow for it in the master's timeout; look at the device's response delay setting",

@@ -6,6 +6,7 @@ from dissectors import registry
 from dissectors.frame import Event, Frame, LineError, Noise, Place, Role
 from dissectors.manifest import Dissector
 from dissectors.tracker import Interval
+from dissectors.words import milliseconds
 from sniff.engine import Row
 
 
@@ -43,12 +44,6 @@ def mark_names(error: LineError) -> str:
     names = ["parity or framing"] if both in error else []
     names += [flag.name.lower() for flag in error if flag.name and not (both in error and flag in both)]
     return ", ".join(names)
-
-
-def milliseconds(value: int) -> str:
-    """A duration in ns as milliseconds with the precision that is worth reading: "8.2 ms", "0.31 ms", "1250 ms"."""
-    ms = value / 1e6
-    return f"{ms:.0f} ms" if abs(ms) >= 100 else f"{ms:.1f} ms" if abs(ms) >= 1 else f"{ms:.2f} ms"
 
 
 def duration(interval: Interval) -> str:

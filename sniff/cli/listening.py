@@ -16,9 +16,9 @@ from pathlib import Path
 from dissectors import registry
 from dissectors.line import LineSettings
 from dissectors.profiles import Devices
+from dissectors.words import milliseconds
 from sniff.analysis.plain import plain
 from sniff.analysis.summary import Summary
-from sniff.analysis.wording import milliseconds
 from sniff.capture.config import RecordSpec, SourceSpec
 from sniff.capture.link import CaptureLink
 from sniff.capture.wire import NOTHING_MORE, Ended, Status

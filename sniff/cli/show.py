@@ -1,4 +1,4 @@
-"""Filters (-Y) use columns and Wireshark's field names: `dst == 3 && kind contains "write"`, `modbus.func_code == 16`,
+"""Filters (-Y) use columns and Wireshark's field names: `dst == 3 && kind contains "write"`, `latency_ms > 50`,
 `verdict in {no-response, late}`. Columns: no src dst addr role kind func register count ok error noise found damage
 len marks tx verdict latency_ms attempt text hex. Dotted names: see --fields.
 """
@@ -40,7 +40,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Show every capture in turn, the parts of one recording as one."""
     if args.table and not args.names:
-        raise Failure("-T fields: say which with -e NAME (repeatable), for instance -e modbus.func_code", USAGE)
+        raise Failure(
+            "-T fields: say which with -e NAME (repeatable), such as -e kind; --json --fields lists them", USAGE
+        )
     of_protocols = tuple(prefix for dissector in registry.usable() for prefix in dissector.prefixes)
     for name in args.names:
         if name not in rows.JSON_KEYS and not name.startswith((*of_protocols, "frame.", "tx.", "line.")):

@@ -1,7 +1,7 @@
 """What a pcap record holds, by link type: how a frame is written into it and read out of it. Pure.
 
-165  BACnet MS/TP: the frame from its preamble; Wireshark reads it without set-up.
-147  User 0: by convention the bare Modbus RTU frame; Wireshark needs a DLT_USER entry.
+165  A link type of a protocol's own: the frame as it is; Wireshark reads it without set-up.
+147  User 0: the bare frame; Wireshark needs a DLT_USER entry.
 250  RTAC Serial: a 12-octet header with an event, then the frame; line errors are events without octets.
 252  Exported PDU: tags that name the dissector and synthetic addresses, then the frame; no set-up.
 148  User 1: here, octets that are no frame (noise, damaged pieces), so that a file keeps every octet.
@@ -18,7 +18,7 @@ from dissectors import registry
 from dissectors.frame import Frame, LineError, Role
 from dissectors.manifest import Dissector, PacketFile
 
-MSTP, USER0, USER1, RTAC, EXPORTED = 165, 147, 148, 250, 252
+OWN, USER0, USER1, RTAC, EXPORTED = 165, 147, 148, 250, 252
 
 RTAC_HEADER = struct.Struct(">IIBBH")
 RTAC_TX_START, RTAC_RX_START = 1, 2
@@ -27,7 +27,7 @@ RTAC_ERRORS = {LineError.FRAMING: 7, LineError.PARITY: 8, LineError.BREAK: 9, Li
 RTAC_ERROR_NAMES = {7: "framing", 8: "parity", 9: "break", 10: "overrun"}
 
 TAG_END, TAG_NAME, TAG_SRC4, TAG_DST4, TAG_PORT_TYPE, TAG_SRC_PORT, TAG_DST_PORT = 0, 12, 20, 21, 24, 25, 26
-MODBUS_PORT, CLIENT_PORT, PORT_TYPE_TCP = 502, 40000, 2
+SERVER_PORT, CLIENT_PORT, PORT_TYPE_TCP = 502, 40000, 2
 CLIENT_HOST = 254
 
 
@@ -102,7 +102,7 @@ def _write_exported(frame: Frame, role: Role, station: int | None, _time: int) -
     unit, client = bytes((10, 0, 0, (station or 0) & 0xFF)), bytes((10, 0, 0, CLIENT_HOST))
     answer = role is Role.RESPONSE
     source, destination = (unit, client) if answer else (client, unit)
-    ports = (MODBUS_PORT, CLIENT_PORT) if answer else (CLIENT_PORT, MODBUS_PORT)
+    ports = (SERVER_PORT, CLIENT_PORT) if answer else (CLIENT_PORT, SERVER_PORT)
     return b"".join(
         (
             _tag(TAG_NAME, name),
@@ -118,7 +118,7 @@ def _write_exported(frame: Frame, role: Role, station: int | None, _time: int) -
 
 
 LINK_TYPES: dict[int, LinkType] = {
-    MSTP: LinkType(MSTP, _plain, _write_plain),
+    OWN: LinkType(OWN, _plain, _write_plain),
     USER0: LinkType(USER0, _plain, _write_plain),
     USER1: LinkType(USER1, _plain, _write_plain),
     RTAC: LinkType(RTAC, _read_rtac, _write_rtac),
@@ -153,3 +153,8 @@ def link_type_for(protocol: str, wanted: int | None = None) -> int:
     if wanted is not None and wanted not in allowed:
         raise ValueError(f"link type {wanted} cannot hold {protocol}; possible: {', '.join(map(str, allowed))}")
     return wanted if wanted is not None else allowed[0]
+
+
+def held_by_protocols() -> str:
+    """Which link types can hold which protocol, in words, the one written by default first."""
+    return "; ".join(f"{one.name}: {', '.join(map(str, held.link_types))}" for one, held in _held())

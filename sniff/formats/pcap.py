@@ -13,7 +13,7 @@ from typing import BinaryIO
 from dissectors.frame import Chunk
 from sniff.formats import CaptureError
 from sniff.formats.files import NewFile, open_capture
-from sniff.formats.linktypes import LINK_TYPES, MSTP, USER1
+from sniff.formats.linktypes import LINK_TYPES, OWN, USER1
 from sniff.formats.linktypes import protocol_of as protocol_of_link
 from sniff.formats.records import Record, RecordMaker, foreign_session, items_of, protocol_of
 from sniff.session import Completeness, Item, Session
@@ -68,7 +68,7 @@ class PcapCapture:
         with open_capture(self.path) as stream:
             stream.seek(FILE_HEADER)
             protocol = self.session.protocol
-            if self._link_type == MSTP and protocol == protocol_of_link(MSTP):  # the record is the frame
+            if self._link_type == OWN and protocol == protocol_of_link(OWN):  # the record is the frame
                 for record in self._records(stream):
                     if record.data:
                         yield Chunk(record.time, record.data)

@@ -125,7 +125,7 @@ def capture(request: pytest.FixtureRequest) -> Callable[[str], CaptureReading]:
 
 @pytest.fixture
 def virtual_bus() -> Iterator[Callable[..., VirtualBus]]:
-    """`virtual_bus("modbus-rtu", faults=False)` runs a simulated bus; its ports are pseudo-terminals.
+    """`virtual_bus(NAME, faults=False)` runs a simulated bus; its ports are pseudo-terminals.
 
     Arguments as for `sniff.simulation.scenarios.scenario`. Closed at the end of the test.
     """
@@ -162,7 +162,7 @@ def replay() -> Iterator[Callable[..., str]]:
 
 @pytest.fixture
 def craft() -> Callable[..., bytes]:
-    """`craft("modbus-rtu", unit=1, pdu=bytes.fromhex("030000 0002"))`: a whole frame with its check."""
+    """`craft(KIND, unit=1, pdu=bytes.fromhex("030000 0002"))`: a whole frame with its check."""
     from sniff.testing.crafting import craft as make
 
     return make
