@@ -3,8 +3,8 @@
 A rule is catalogued once (`Rule`); a finding is one frozen value that names its rule by code. The codes carry the
 protocol: MB… Modbus, N2… Metasys N2, MS… MS/TP, LN… the line itself.
 
-A protocol brings its rules as `Dissector.extras["findings"]`, a function Timing → `Judge`, and their catalogue as
-`Dissector.extras["rules"]`, a mapping code → `Rule`.
+A protocol brings its rules as `Dissector.judge`, a function Timing → `Judge`, and their catalogue as
+`Dissector.rules`, a mapping code → `Rule`.
 """
 
 from __future__ import annotations

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from dissectors.frame import Frame, Header, Role
-
-if TYPE_CHECKING:
-    from dissectors.registry import Dissector
+from dissectors.manifest import Dissector
 
 LONGEST = 120
 """Characters of an error that are shown."""

@@ -1,6 +1,6 @@
 """What an exchange says of the things inside a station: readings, before anybody knows which device that is.
 
-Each protocol takes its own exchanges apart (`extras["readings"]` of its Dissector); profiles give the readings names
+Each protocol takes its own exchanges apart (`Dissector.readings`); profiles give the readings names
 and units. A reading is what was on the wire, no more.
 """
 
@@ -46,4 +46,4 @@ Readings = Callable[[Frame | None, Frame | None], tuple[Reading, ...]]
 with it, what is confirmed: nothing after an exception."""
 
 Refusal = Callable[[Frame], tuple[str, int] | None]
-"""frame → the family of its codes ("modbus", "n2") and the code, when it refuses a request (`extras["refusal"]`)."""
+"""frame → the family of its codes ("modbus", "n2") and the code, when it refuses a request (`Dissector.refusal`)."""

@@ -6,17 +6,13 @@ functions raise is shown at the frame it was about (`plugin_guard.py`).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping
 from functools import cache
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
-from typing import Any
 
-from dissectors.frame import Frame, Header, Role
-from dissectors.framer import Framer
-from dissectors.line import Timing
-from dissectors.tracker import Tracker
+from dissectors.manifest import Dissector
+from dissectors.plugin_guard import guarded
 
 GROUP = "sniff485.dissectors"
 
@@ -27,47 +23,8 @@ BUILT_IN: Mapping[str, str] = {
     "mstp": "dissectors.bacnet:MSTP",
 }
 
-
-@dataclass(frozen=True, slots=True)
-class Dissector:
-    """Everything the application needs to know of one protocol.
-
-    `name`: as on the command line ("modbus-rtu"); `title`: for people.
-    `framer`, `tracker`: make a new one for a bus with the given timing.
-    `peek(frame)`: the quick look, total, a few µs.
-    `text(frame, header, role)`: one line for the frame list, without control characters, role as the tracker gave it.
-    `fields(frame, role)`: Wireshark field names (ours where it has none) to int, float or str, in frame order.
-    `packet(frame, role)`: the scapy packet, imported on first use; never raises, keeps what does not parse as Raw.
-    `default_line`: what such a bus normally runs ("19200,8E1").
-    `extras`: what only some protocols have: "findings", a function Timing → `dissectors.findings.Judge`, and "rules",
-    its catalogue, code → `dissectors.findings.Rule`.
-    """
-
-    name: str
-    title: str
-    framer: Callable[[Timing], Framer]
-    peek: Callable[[Frame], Header]
-    tracker: Callable[[Timing], Tracker]
-    text: Callable[[Frame, Header, Role], str]
-    fields: Callable[[Frame, Role], dict[str, int | float | str]]
-    packet: Callable[[Frame, Role], Any]
-    default_line: str = "9600,8N1"
-    extras: Mapping[str, Any] = field(default_factory=dict)
-
-
-def on_first_use(target: str) -> Callable[..., Any]:
-    """The function "module:name", whose module is imported when it is first called; for `packet`, which needs scapy."""
-
-    def call(*arguments: Any) -> Any:
-        return _load(target)(*arguments)
-
-    return call
-
-
-@cache
-def _load(target: str) -> Any:
-    module, _, name = target.partition(":")
-    return getattr(import_module(module), name)
+DEFAULT = next(iter(BUILT_IN))
+"""What is taken for the protocol of a bus of which nobody says it."""
 
 
 class UnknownProtocol(LookupError):
@@ -88,15 +45,33 @@ def get(name: str) -> Dissector:
     """The protocol of that name. Raises UnknownProtocol."""
     target = BUILT_IN.get(name)
     if target is not None:
-        found = _load(target)
+        found = _built_in(target)
     else:
         for point in entry_points(group=GROUP):
             if point.name == name:
                 return _plugged(point)
         else:
-            raise UnknownProtocol(f"protocol {name!r}: expected one of {', '.join(names())}")
+            raise UnknownProtocol(f"protocol {name!r} is not installed: expected one of {', '.join(names())}")
+    return found
+
+
+@cache
+def _built_in(target: str) -> Dissector:
+    module, _, name = target.partition(":")
+    found = getattr(import_module(module), name)
     assert isinstance(found, Dissector)
     return found
+
+
+def usable() -> tuple[Dissector, ...]:
+    """All protocols, built-in first; plug-ins that cannot be used are left out."""
+    found = []
+    for name in names():
+        try:
+            found.append(get(name))
+        except BrokenPlugin:
+            continue
+    return tuple(found)
 
 
 _guarded: dict[str, tuple[Dissector, Dissector]] = {}
@@ -115,7 +90,5 @@ def _plugged(point: EntryPoint) -> Dissector:
         raise BrokenPlugin(f"{where}: {point.value} is no Dissector")
     known = _guarded.get(point.name)
     if known is None or known[0] is not found:
-        from dissectors.plugin_guard import guarded
-
         known = _guarded[point.name] = (found, guarded(found))
     return known[1]

@@ -12,6 +12,7 @@ from enum import Enum
 from typing import Protocol
 
 from dissectors.frame import Assembly, Event, Header, Role
+from dissectors.line import Timing
 
 
 class Verdict(Enum):
@@ -121,6 +122,29 @@ class Unpaired:
 
     def close(self) -> tuple[Transaction, ...]:
         """Nothing to close."""
+        return ()
+
+
+class Announcements:
+    """A tracker for protocols whose frames are told to everybody and answered by nobody."""
+
+    def __init__(self, timing: Timing) -> None:
+        self._tx = 0
+
+    def track(self, no: int, event: Event, header: Header | None) -> Tracked:
+        """Each frame is a transaction of its own, and closed at once."""
+        if header is None:
+            return NOTHING_TRACKED
+        self._tx += 1
+        closed = Transaction(self._tx, header.source, header.kind, no, None, Verdict.DATA, event.start, event.end)
+        return Tracked(Placement(no, self._tx, Role.DATA, header.source), (closed,))
+
+    def advance(self, now: int) -> tuple[Transaction, ...]:
+        """Nothing waits."""
+        return ()
+
+    def close(self) -> tuple[Transaction, ...]:
+        """Nothing is open."""
         return ()
 
 

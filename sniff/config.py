@@ -3,7 +3,7 @@
     [bus.boiler-room]
     port = "/dev/ttyUSB0"
     line = "19200,8E1"
-    protocol = "modbus-rtu"
+    protocol = "auto"
     record = "captures/boiler.mcap"
 
     [bus.boiler-room.devices]

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 from dissectors.frame import Chunk, Event, Frame, Header
 from dissectors.line import LineSettings, Timing
-from dissectors.registry import Dissector
+from dissectors.manifest import Dissector
 from dissectors.tracker import Placement, Tracker, Transaction, Unpaired
 from sniff.late_reads import LateReads
 

@@ -11,8 +11,8 @@ from collections import deque
 from collections.abc import Callable
 
 from dissectors.frame import Chunk, Mark
+from dissectors.manifest import Dissector
 from dissectors.profiles import Devices
-from dissectors.registry import Dissector
 from sniff.analysis.channels import BusChannels, DerivedMessage
 from sniff.analysis.detecting import Detecting
 from sniff.analysis.points import PointReader, Sample

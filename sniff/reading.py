@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 
 from dissectors import registry
 from dissectors.line import LineSettings
+from dissectors.manifest import Dissector
 from dissectors.profiles import Devices
-from dissectors.registry import Dissector
 from dissectors.tracker import Transaction
 from sniff.analysis.points import PointReader
 from sniff.engine import Output, Row

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
 
+from dissectors import registry
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings, Timing
 from sniff.read_times import MS, ReadTimes, held_back
@@ -164,7 +165,7 @@ class Session:
         return cls(
             port=record.get("port", ""),
             line=line,
-            protocol=record.get("protocol", "modbus-rtu"),
+            protocol=record.get("protocol", registry.DEFAULT),
             started=_integer(record.get("started_ns")),
             bus=record.get("bus", "bus"),
             adapter=Adapter(
@@ -222,7 +223,7 @@ class LineEvent:
 
 @dataclass(frozen=True, slots=True)
 class SettingsChange:
-    """What a SETTINGS event says, as words with spaces between: "line=19200,8E1 protocol=modbus-rtu found".
+    """What a SETTINGS event says, as words with spaces between: "line=19200,8E1 protocol=NAME found".
 
     `line`, `protocol`: in force from here on; None: as before. `searching`: here a search for them begins, and every
     later change is one of its attempts. `found`: here it ends with these.

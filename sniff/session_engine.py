@@ -8,7 +8,7 @@ is known what became of it:
       octets                                                  held …
     settings  line=19200,8E1                                … rows that only say what was heard; the next attempt
       octets                                                  held …
-    settings  line=19200,8E1 protocol=modbus-rtu found      … frames: they were heard with what was found
+    settings  line=19200,8E1 protocol=NAME found      … frames: they were heard with what was found
       octets                                                frames
 
 So a search costs no frame that was heard right, and a saved capture gives the same rows as the live bus. Where settings
@@ -22,7 +22,7 @@ from dataclasses import replace
 from dissectors import registry
 from dissectors.frame import Chunk, Noise, Place, Reason
 from dissectors.line import LineSettings, Timing
-from dissectors.registry import Dissector
+from dissectors.manifest import Dissector
 from sniff.engine import NOTHING, Engine, Output, Row
 from sniff.session import Item, Session, SettingsChange, settings_change
 

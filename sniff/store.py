@@ -11,8 +11,8 @@ from collections import Counter
 
 from dissectors.frame import Frame, LineError
 from dissectors.histogram import Histogram
+from dissectors.manifest import Dissector
 from dissectors.profiles import Devices
-from dissectors.registry import Dissector
 from dissectors.tracker import Transaction, Verdict
 from sniff.analysis.load import Load
 from sniff.analysis.nodes import NodeTable
@@ -58,8 +58,7 @@ class Store:
         self.dissector = dissector
         self.load = Load(session.line)
         self.reader = PointReader(dissector, self.devices)
-        observe = dissector.extras.get("ring")
-        self.ring = observe(session.timing) if observe is not None else None  # of a protocol that passes a token
+        self.ring = dissector.ring.observer(session.timing) if dissector.ring is not None else None
 
     def settle(self, session: Session, dissector: Dissector) -> None:
         """Go on with settings that were found; the rows so far are what their search heard."""

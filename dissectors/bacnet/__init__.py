@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dissectors.bacnet import ring_words
 from dissectors.bacnet.fields import fields
 from dissectors.bacnet.findings import MstpFindings, judge
+from dissectors.bacnet.frame_making import frame
 from dissectors.bacnet.framing import MstpFramer
 from dissectors.bacnet.header import peek
 from dissectors.bacnet.readings import readings
+from dissectors.bacnet.renamer import MstpRenamer
 from dissectors.bacnet.ring import Ring
 from dissectors.bacnet.ring_observer import RingObserver
 from dissectors.bacnet.ring_window import ring_window
@@ -14,7 +17,9 @@ from dissectors.bacnet.rules import RULES
 from dissectors.bacnet.segmentation import Reassembler
 from dissectors.bacnet.summary import text
 from dissectors.bacnet.tracker import MstpTracker
-from dissectors.registry import Dissector, on_first_use
+from dissectors.frame import Frame
+from dissectors.manifest import Dissector, PacketFile, on_first_use
+from dissectors.token_ring import TokenRing
 
 __all__ = [
     "MSTP",
@@ -34,6 +39,21 @@ __all__ = [
 
 packet = on_first_use("dissectors.bacnet.packets:packet")
 
+
+def bits(frame: Frame) -> float:
+    """Evidence of a good frame: preamble and header check, 24 bits."""
+    return 24.0
+
+
+RING = TokenRing(
+    observer=RingObserver,
+    window=ring_window,
+    order=lambda ring: ring.order,
+    headings=ring_words.HEADINGS,
+    rows=ring_words.rows,
+    sentences=ring_words.sentences,
+)
+
 MSTP = Dissector(
     name="mstp",
     title="BACnet MS/TP",
@@ -44,12 +64,15 @@ MSTP = Dissector(
     fields=fields,
     packet=packet,
     default_line="38400,8N1",
-    extras={
-        "findings": MstpFindings,  # (timing): see(no, event, header, placement), settle(tx), findings(), ring()
-        "rules": RULES,  # code → Rule
-        "ring": RingObserver,  # (timing): see(no, event, header), ring()
-        "ring_window": ring_window,  # two of its Rings → RingWindow
-        "judge": judge,  # Ring → findings
-        "readings": readings,
-    },
+    field_prefixes=("mstp.", "bacnet.", "bacapp."),
+    noun="MAC",
+    family="bacnet",
+    bits=bits,
+    judge=MstpFindings,
+    rules=RULES,
+    ring=RING,
+    readings=readings,
+    packet_file=PacketFile((165, 252), "mstp", least=8, longer=True),
+    renamer=MstpRenamer,
+    makers={"mstp": frame},
 )

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from dissectors.frame import Frame
 from dissectors.line import Timing
-from dissectors.modbus.adu import ASCII_NAME, RTU_NAME
+from dissectors.manifest import Dissector, PacketFile, on_first_use
+from dissectors.modbus.adu import ASCII_NAME, RTU_NAME, make_ascii, make_rtu
 from dissectors.modbus.ascii_framing import AsciiFramer
 from dissectors.modbus.fields import fields
 from dissectors.modbus.findings import ModbusFindings
 from dissectors.modbus.framing import RtuFramer
 from dissectors.modbus.header import peek_ascii, peek_rtu
 from dissectors.modbus.readings import readings, refusal
+from dissectors.modbus.renamer import AsciiRenamer, RtuRenamer
 from dissectors.modbus.rules import RULES
 from dissectors.modbus.text import text
 from dissectors.modbus.tracker import ModbusTracker
-from dissectors.registry import Dissector, on_first_use
 
 __all__ = [
     "ASCII",
@@ -30,7 +32,17 @@ __all__ = [
 
 
 packet = on_first_use("dissectors.modbus.packets:dissect")
-_EXTRAS = {"findings": ModbusFindings, "rules": RULES, "readings": readings, "refusal": refusal}
+
+
+def rtu_bits(frame: Frame) -> float:
+    """Evidence of a good RTU frame: among random octets one in 2.8e-6 octets was measured (18 bits), nearly half of
+    them frames of five octets."""
+    return 18.0 if len(frame.octets) >= 6 else 6.0
+
+
+def ascii_bits(frame: Frame) -> float:
+    """Evidence of a good ASCII frame: each character comes from a small alphabet, 3 bits."""
+    return 3.0 * len(frame.octets)
 
 
 def ascii_tracker(timing: Timing) -> ModbusTracker:
@@ -48,7 +60,16 @@ RTU = Dissector(
     fields=fields,
     packet=packet,
     default_line="19200,8E1",
-    extras=_EXTRAS,
+    field_prefixes=("mbrtu.", "modbus."),
+    bits=rtu_bits,
+    packet_file=PacketFile((252, 147, 250), "mbrtu"),
+    renamer=RtuRenamer,
+    makers={RTU_NAME: make_rtu},
+    family="modbus",
+    judge=ModbusFindings,
+    rules=RULES,
+    readings=readings,
+    refusal=refusal,
 )
 
 ASCII = Dissector(
@@ -61,5 +82,13 @@ ASCII = Dissector(
     fields=fields,
     packet=packet,
     default_line="19200,7E1",
-    extras=_EXTRAS,
+    field_prefixes=("mbascii.", "modbus."),
+    bits=ascii_bits,
+    renamer=AsciiRenamer,
+    makers={ASCII_NAME: make_ascii},
+    family="modbus",
+    judge=ModbusFindings,
+    rules=RULES,
+    readings=readings,
+    refusal=refusal,
 )

@@ -118,3 +118,13 @@ def unseal(octets: bytes, is_ascii: bool) -> bytes | None:
     inside = unhexlify(pairs.translate(_PARITY_BIT))
     whole = start and end.startswith(b"\r") and len(end) == 2 and len(inside) >= 3
     return inside[:-1] if whole and lrc(inside) == 0 else None
+
+
+def make_rtu(unit: int, pdu: bytes) -> bytes:
+    """The RTU frame of a unit and a PDU (function code and data)."""
+    return seal_rtu(bytes([unit]) + pdu)
+
+
+def make_ascii(unit: int, pdu: bytes, delimiter: bytes = b"\n") -> bytes:
+    """The ASCII frame of a unit and a PDU, closed by CR and a delimiter."""
+    return seal_ascii(bytes([unit]) + pdu)[:-1] + delimiter

@@ -22,7 +22,7 @@ from dissectors.profiles import packaged
 from dissectors.simulated import Send
 
 DATA_SETTING, WRITE_MODE = 4, 5  # exception codes of the manual's table beside the standard's 01 … 03
-_LIMITS = packaged("teco-e510").limits_on("modbus-rtu")
+_LIMITS = packaged("teco-e510").limits_on("modbus")
 LONGEST_FRAME = _LIMITS.frame or MAX_FRAME
 RESPONSE_TIME = _LIMITS.response or 0
 

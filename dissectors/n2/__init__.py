@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from dissectors.frame import Frame
+from dissectors.manifest import Dissector, on_first_use
+from dissectors.n2.envelope import make_answer, make_command
 from dissectors.n2.fields import fields
 from dissectors.n2.findings import N2Findings
 from dissectors.n2.framing import N2Framer
 from dissectors.n2.header import peek
 from dissectors.n2.interpretation import Interpretation, interpret
 from dissectors.n2.readings import readings, refusal
+from dissectors.n2.renamer import N2Renamer
 from dissectors.n2.rules import RULES
 from dissectors.n2.text import text
 from dissectors.n2.tracker import N2Tracker
-from dissectors.registry import Dissector, on_first_use
 
 __all__ = [
     "N2",
@@ -30,6 +33,12 @@ __all__ = [
 
 packet = on_first_use("dissectors.n2.packets:packet")
 
+
+def bits(frame: Frame) -> float:
+    """Evidence of a good frame: each character comes from a small alphabet, 3 bits."""
+    return 3.0 * len(frame.octets)
+
+
 N2 = Dissector(
     name="n2",
     title="Metasys N2",
@@ -40,5 +49,11 @@ N2 = Dissector(
     fields=fields,
     packet=packet,
     default_line="9600,8N1",
-    extras={"findings": N2Findings, "rules": RULES, "interpret": interpret, "readings": readings, "refusal": refusal},
+    bits=bits,
+    judge=N2Findings,
+    rules=RULES,
+    readings=readings,
+    refusal=refusal,
+    renamer=N2Renamer,
+    makers={"n2": make_command, "n2-answer": make_answer},
 )

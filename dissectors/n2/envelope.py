@@ -135,3 +135,15 @@ def _ends_repaired(octets: bytes, least: int) -> list[tuple[Flaw, bytes]]:
         if check[:1] == digit:
             made.append((Flaw.LAST_TWO_MISSING, octets[:1] + data + check + b"\r"))
     return made
+
+
+def make_command(text: str) -> bytes:
+    """`>`, the characters (address, command, data), their sum, CR."""
+    body = text.encode("ascii")
+    return b">%s%02X\r" % (body, sum8(body))
+
+
+def make_answer(text: str = "") -> bytes:
+    """`A`, the characters and their sum, CR; without characters the short acknowledgement."""
+    body = text.encode("ascii")
+    return b"A%s%02X\r" % (body, sum8(body)) if body else b"A\r"

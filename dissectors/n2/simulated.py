@@ -12,10 +12,10 @@ from collections import deque
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from dissectors.checksums import sum8
 from dissectors.frame import Check
 from dissectors.line import LineSettings
 from dissectors.n2.commands import VENDOR_DEVICE, Command, fields_of, parse_command
+from dissectors.n2.envelope import make_answer, make_command
 from dissectors.n2.f510 import POINTS, Point
 from dissectors.n2.framing import MAX_LENGTH, judge
 from dissectors.n2.objects import ATTRIBUTES, REGIONS, Encoding, decode, encode, holds_current_value
@@ -31,14 +31,7 @@ _NAMELESS = frozenset(("poll", "poll-acknowledge", "warm-reset", "identify"))
 
 def command(address: int, body: str) -> bytes:
     """A command frame: `body` begins with the command character."""
-    text = f"{address:02X}{body}".encode("ascii")
-    return b">%s%02X\r" % (text, sum8(text))
-
-
-def answer(data: str = "") -> bytes:
-    """An acknowledgement, with checksum only when it carries data."""
-    text = data.encode("ascii")
-    return b"A%s%02X\r" % (text, sum8(text)) if text else b"A\r"
+    return make_command(f"{address:02X}{body}")
 
 
 def refusal(code: str) -> bytes:
@@ -131,7 +124,7 @@ class Follower:
             return refusal("05")
         if asked.type.kind == "identify":
             self._identified = True
-            return answer(f"{VENDOR_DEVICE:02X}")
+            return make_answer(f"{VENDOR_DEVICE:02X}")
         return self._obey(asked) if self._identified else refusal("00")
 
     def _obey(self, asked: Command) -> bytes:
@@ -146,9 +139,9 @@ class Follower:
             return self._override(asked)
         if kind == "warm-reset":
             self.reset()
-            return answer()
+            return make_answer()
         if kind in ("synchronise-time", "release-override"):  # answered without action
-            return answer()
+            return make_answer()
         return refusal("01")
 
     def _held(self, asked: Command) -> _Object | None:
@@ -161,14 +154,14 @@ class Follower:
         if held is None:
             return refusal("11")
         if asked.attribute == 1:
-            return answer(encode(held.configuration, Encoding.BYTE))
+            return make_answer(encode(held.configuration, Encoding.BYTE))
         if asked.attribute == 2:
-            return answer(encode(self._status(held), Encoding.BYTE))
+            return make_answer(encode(self._status(held), Encoding.BYTE))
         if holds_current_value(region, asked.attribute):
             front = encode(self._status(held), Encoding.BYTE) if self._status_in_front else ""
-            return answer(front + encode(held.value, Encoding.FLOAT))
+            return make_answer(front + encode(held.value, Encoding.FLOAT))
         if region == 4 and 3 <= asked.attribute <= 5:
-            return answer(encode(held.times[asked.attribute - 3], Encoding.INTEGER))
+            return make_answer(encode(held.times[asked.attribute - 3], Encoding.INTEGER))
         return refusal("11")
 
     def _write(self, asked: Command) -> bytes:
@@ -182,7 +175,7 @@ class Follower:
             if value is None:
                 return refusal("05")
             held.configuration = int(value)
-            return answer()
+            return make_answer()
         if asked.region == 4 and 3 <= asked.attribute <= 5:
             value = decode(asked.data, Encoding.INTEGER)
             if value is None:
@@ -190,13 +183,13 @@ class Follower:
             times = list(held.times)
             times[asked.attribute - 3] = int(value)
             held.times = (times[0], times[1], times[2])
-            return answer()
+            return make_answer()
         return refusal("12" if asked.attribute <= 3 else "11")
 
     def _override(self, asked: Command) -> bytes:
         held = self._held(asked)
         if asked.region in (1, 2):  # answered without action
-            return answer()
+            return make_answer()
         if held is None:
             return refusal("11")
         value = asked.value
@@ -208,7 +201,7 @@ class Follower:
             return refusal("10")
         held.value = value
         self._run()
-        return answer()
+        return make_answer()
 
     def _run(self) -> None:
         """Let the drive follow its commands: run, direction and frequency."""
@@ -237,7 +230,7 @@ class Follower:
                 if held.value != held.reported and len(self._record(held)) <= room:
                     room -= len(self._record(held))
                     self._report.append(held)
-        return answer("".join(map(self._record, self._report)))
+        return make_answer("".join(map(self._record, self._report)))
 
     def _record(self, held: _Object) -> str:
         point = held.point

@@ -10,9 +10,6 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 
-FAMILIES = {"modbus-rtu": "modbus", "modbus-ascii": "modbus", "n2": "n2", "mstp": "bacnet"}
-"""Registry name of a protocol → the family under which a profile speaks of it."""
-
 
 class Kind(Enum):
     """How the bits of an entry are read. `size`: bits, 0 for what carries its own size."""
@@ -195,9 +192,9 @@ class Profile:
         """The entries of some tables, in the order of the profile."""
         return (entry for entry in self.entries if entry.space in spaces)
 
-    def limits_on(self, protocol: str) -> Limits:
-        """What the device promises on a protocol, by its registry name."""
-        return self.limits.get(FAMILIES.get(protocol, protocol), Limits())
+    def limits_on(self, family: str) -> Limits:
+        """What the device promises on the protocols of a family (`Dissector.profile_family`)."""
+        return self.limits.get(family, Limits())
 
     def exception(self, family: str, code: int) -> str:
         """The maker's words for an exception code; empty when there are none."""

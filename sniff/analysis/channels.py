@@ -15,8 +15,8 @@ from typing import Any, cast
 from dissectors.findings import Finding, Severity
 from dissectors.histogram import Histogram
 from dissectors.line import NS_PER_S
+from dissectors.manifest import Dissector
 from dissectors.profiles import Devices
-from dissectors.registry import Dissector
 from dissectors.tracker import Verdict
 from sniff.analysis.health import health_of, station_health
 from sniff.analysis.judging import Judging
@@ -62,7 +62,7 @@ class BusChannels:
         self._session = session
         self._bus = re.sub(r"[^A-Za-z0-9_.-]+", "-", session.bus).strip("-") or "bus"
         self._judging = Judging(session, dissector, devices)
-        self._compare = dissector.extras.get("ring_window")
+        self._compare = dissector.ring.window if dissector.ring is not None else None
         self._ring = self._look_at_ring()
         self._window = Summary(session.line)
         self._begin: int | None = None

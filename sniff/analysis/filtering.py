@@ -1,7 +1,7 @@
 """The filter language of `show -Y` and of the terminal UI's `/`: Wireshark's grammar over our columns and fields.
 
     dst == 3 && kind contains "write"          src in {1, 2, 5}        latency_ms > 50
-    !ok or verdict == "no answer"              modbus.func_code == 0x10   error matches "CRC|LRC"
+    !ok or verdict == "no answer"              func == 0x10   error matches "CRC|LRC"
 
 Names without a dot are columns (COLUMNS below), dotted names are fields as `show -T fields` lists them. A comparison
 with something that a frame does not have is false, also `!=`. A name alone is true when the frame has it and it is
@@ -18,8 +18,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from dissectors import registry
 from dissectors.frame import Damage, Found, Frame, Role
-from dissectors.registry import Dissector
+from dissectors.manifest import Dissector
 from dissectors.tracker import Transaction, Verdict
 from sniff.analysis.wording import describe
 from sniff.engine import Row
@@ -37,7 +38,9 @@ class FilterError(ValueError):
         self.column = column
 
 
-PREFIXES = ("mbrtu.", "mbascii.", "modbus.", "n2.", "mstp.", "bacnet.", "bacapp.", "profibus.")
+def is_field(name: str, dissector: Dissector) -> bool:
+    """Whether a name can be a field: of this protocol, or of another one (a filter may be for several captures)."""
+    return name.startswith(dissector.prefixes) or any(name.startswith(other.prefixes) for other in registry.usable())
 
 
 def _source(row: Row, _: Transaction | None) -> tuple[Value, ...]:
@@ -222,7 +225,7 @@ class _Parser:
             self.at += 1
             return _contains(self._getter("text", token.column), _unquote(token.text))
         if token.kind != "word":
-            raise FilterError("expected a name such as dst, kind or modbus.func_code", token.column)
+            raise FilterError("expected a name such as dst, kind or latency_ms", token.column)
         get = self._getter(token.text, token.column)
         self.at += 1
         if self._now.kind == "op" and self._now.text in _COMPARE:
@@ -278,10 +281,13 @@ class _Parser:
             return lambda row, _: (describe(dissector, row),)
         if name in COLUMNS:
             return COLUMNS[name]
-        if not name.startswith(PREFIXES):
+        if not is_field(name, dissector):
             close = difflib.get_close_matches(name, FIELDS, 1, 0.5)
             hint = f"did you mean {close[0]!r}?" if close else f"columns: {' '.join((*COLUMNS, 'text'))}"
-            raise FilterError(f"unknown name {name!r} ({hint} fields: modbus.func_code …)", column)
+            raise FilterError(
+                f"unknown name {name!r} ({hint}; fields of this protocol begin with {', '.join(dissector.prefixes)})",
+                column,
+            )
 
         def get(row: Row, _: Transaction | None) -> tuple[Value, ...]:
             if not isinstance(row.event, Frame):

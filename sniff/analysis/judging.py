@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import cast
 
 from dissectors import registry
-from dissectors.findings import Finding, Judge, Rule, WordsExceptions, with_consequences
+from dissectors.findings import Finding, Rule, WordsExceptions, with_consequences
 from dissectors.frame import Noise, Place, Reason
-from dissectors.line import Timing
+from dissectors.manifest import Dissector
 from dissectors.profiles import Devices
-from dissectors.profiles.model import FAMILIES
-from dissectors.registry import Dissector
 from dissectors.tracker import Transaction, Verdict
 from sniff.analysis.line_findings import LineFindings
 from sniff.analysis.line_rules import LINE_RULES
@@ -30,13 +27,12 @@ class Judging:
     """Fed what the engine gives; `findings` may be asked at any time."""
 
     def __init__(self, session: Session, dissector: Dissector, devices: Devices | None = None) -> None:
-        make = cast("Callable[[Timing], Judge] | None", dissector.extras.get("findings"))
-        self.judge = make(session.timing) if make is not None else None
+        self.judge = dissector.judge(session.timing) if dissector.judge is not None else None
         self.line = LineFindings(session)
         self._rules = rules_over(dissector)
         self.devices = ProfileFindings(session.timing, dissector, devices) if devices else None
         if devices and isinstance(self.judge, WordsExceptions):
-            family = FAMILIES.get(dissector.name, dissector.name)
+            family = dissector.profile_family
             self.judge.word_exceptions(lambda station, code: devices.exception(station, family, code))
         self._searching = False
         self._hole: int | None = None  # when octets were lost, by the newest line event that says so
@@ -118,7 +114,7 @@ def _harmless(finding: Finding) -> Finding:
 
 def rules_of(dissector: Dissector) -> Mapping[str, Rule]:
     """The catalogue of one protocol; empty where it has no rules."""
-    return cast("Mapping[str, Rule]", dissector.extras.get("rules", {}))
+    return dissector.rules
 
 
 def rules_over(dissector: Dissector) -> dict[str, Rule]:

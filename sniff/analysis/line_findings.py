@@ -10,13 +10,14 @@ from dissectors.findings import Finding, Severity, Tally, counted, found, times
 from dissectors.frame import Chunk, Damage, Event, Frame, LineError, Noise, Place, Reason, Role
 from dissectors.line import NS_PER_S
 from dissectors.tracker import Transaction, Verdict
+from dissectors.words import milliseconds
 from sniff.analysis.line_rules import LINE_RULES as RULES
 from sniff.analysis.line_use import LineUse
 from sniff.analysis.other_settings import SAMPLE_OCTETS, Fit, what_fits
 from sniff.analysis.sender_findings import BUS, WRONG, Senders
 from sniff.analysis.slower_bus import slower_by
 from sniff.analysis.time_patterns import TimePatterns
-from sniff.analysis.wording import milliseconds
+from sniff.analysis.wording import station_word
 from sniff.engine import Row
 from sniff.session import LineEvent, LineEventKind, Session
 
@@ -310,6 +311,6 @@ def _sender(row: Row) -> str:
     placement, header = row.placement, row.header
     source = placement.source if placement is not None else header.source if header is not None else None
     if source is not None:
-        return f"MAC {source}" if header is not None and header.protocol == "mstp" else f"station {source}"
+        return f"{station_word(header.protocol) if header is not None else 'station'} {source}"
     role = placement.role if placement is not None else header.role if header is not None else Role.UNKNOWN
     return "master" if role in (Role.REQUEST, Role.BROADCAST) else "bus"

@@ -129,7 +129,7 @@ class NodeTable:
         return NodeTable(merged)
 
     def present(self) -> list[Node]:
-        """Stations of which there is more than a poll for a possible new one (MS/TP polls all free addresses)."""
+        """Stations of which there is more than a poll for a possible new one: free addresses are polled too."""
         return [node for node in self if node.seen]
 
     def absent(self) -> list[int]:

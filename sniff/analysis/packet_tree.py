@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from dissectors.frame import Frame, Role
-from dissectors.registry import Dissector
+from dissectors.manifest import Dissector
 from sniff.analysis.plain import plain
 
 DEEPEST = 20
@@ -63,7 +63,7 @@ def _placed(field: Field) -> bool:
 
 
 def _spelled(fields: tuple[Field, ...], shift: int) -> tuple[Field, ...]:
-    """The same for a packet that was read from octets written as pairs of hex digits (Modbus ASCII)."""
+    """The same for a packet that was read from octets written as pairs of hex digits."""
     return tuple(
         replace(
             field,

@@ -10,13 +10,12 @@ import math
 from collections import OrderedDict, deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
-from typing import cast
 
 from dissectors.frame import Frame, Role
+from dissectors.manifest import Dissector
 from dissectors.profiles import Devices, Entry
 from dissectors.profiles.decoding import Quality, Value, decode, say
-from dissectors.readings import How, Readings, Refusal
-from dissectors.registry import Dissector
+from dissectors.readings import How
 from dissectors.tracker import Transaction, Verdict
 from sniff.engine import Output, Row
 
@@ -85,7 +84,7 @@ class PointReader:
     def __init__(self, dissector: Dissector, devices: Devices | None = None) -> None:
         self.devices = devices or Devices()
         self._dissector = dissector
-        self._readings = cast("Readings | None", dissector.extras.get("readings"))
+        self._readings = dissector.readings
         self._frames: OrderedDict[int, Frame] = OrderedDict()
         self._asked: OrderedDict[int, _Remembered] = OrderedDict()
 
@@ -163,7 +162,7 @@ def words(dissector: Dissector, devices: Devices, row: Row, request: Frame | Non
     """What a row says of its device: "drive 1: run, reverse"; empty when no profile knows. An answer needs its
     `request`."""
     event, placement = row.event, row.placement
-    take = cast("Readings | None", dissector.extras.get("readings"))
+    take = dissector.readings
     if not devices or take is None or placement is None or not isinstance(event, Frame) or not event.ok:
         return ""
     if placement.role is Role.RESPONSE:
@@ -177,7 +176,7 @@ def words(dissector: Dissector, devices: Devices, row: Row, request: Frame | Non
     profile = devices.at(station)
     if profile is None:
         return ""
-    refusal = cast("Refusal | None", dissector.extras.get("refusal"))
+    refusal = dissector.refusal
     refused = refusal(event) if refusal is not None and not readings else None
     said = say(profile, readings) if refused is None else profile.exception(*refused)
     who = f"all {profile.noun}s" if station is None else f"{profile.noun} {station}"

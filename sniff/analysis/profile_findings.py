@@ -8,20 +8,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import cast
 
 from dissectors.findings import Finding, Rule, Severity, Tally
 from dissectors.frame import Event, Frame, Header, Role
 from dissectors.line import Timing
+from dissectors.manifest import Dissector
 from dissectors.profiles import Devices, Entry, Profile
 from dissectors.profiles import Role as EntryRole
 from dissectors.profiles.decoding import Value, bit_words, decode, in_range, number, plain_name, state_words
-from dissectors.readings import How, Reading, Readings
-from dissectors.registry import Dissector
+from dissectors.readings import How, Reading
 from dissectors.subject import About, Subject, station
 from dissectors.tracker import Placement, Transaction
+from dissectors.words import milliseconds
 from sniff.analysis.points import ALL, PointReader, Sample
-from sniff.analysis.wording import milliseconds
 from sniff.engine import Output, Row
 
 MOST_TOLD = 2_000
@@ -77,8 +76,8 @@ PROFILE_RULES: dict[str, Rule] = {
             "PR006",
             Severity.WARNING,
             "frame longer than the device takes",
-            "A frame to or from a station has more octets on the line than its manual allows (TECO E510 and F510 on "
-            "Modbus: 80, 1.0.1).",
+            "A frame to or from a station has more octets on the line than its manual allows (TECO E510 and F510 over "
+            "registers: 80, manual 1.0.1).",
             "a master that reads or writes too much at once",
             "have the master read fewer registers in one request",
         ),
@@ -86,8 +85,8 @@ PROFILE_RULES: dict[str, Rule] = {
             "PR007",
             Severity.NOTE,
             "slower than the device promises",
-            "Answers came later than the response time that the manual gives (TECO E510 and F510 on Modbus: 10 ms, "
-            "1.0.1), even when all that the adapter may have added is taken off.",
+            "Answers came later than the response time that the manual gives (TECO E510 and F510 over registers: "
+            "10 ms, 1.0.1), even when all that the adapter may have added is taken off.",
             "a response delay that is set in the device, a device busy with other work, or a gateway in between",
             "allow for it in the master's timeout; look at the device's response delay setting",
         ),
@@ -117,10 +116,10 @@ class ProfileFindings:
     """Fed every row and every closed transaction of one bus (`dissectors.findings.Judge`)."""
 
     def __init__(self, timing: Timing, dissector: Dissector, devices: Devices) -> None:
-        self._protocol = dissector.name
+        self._family = dissector.profile_family
         self._devices = devices
         self._reader = PointReader(dissector, devices)
-        self._readings = cast("Readings | None", dissector.extras.get("readings"))
+        self._readings = dissector.readings
         self._told: dict[Key, _Told] = {}
         self._answers: dict[Subject, int] = {}
 
@@ -173,7 +172,7 @@ class ProfileFindings:
     def _judge_length(self, no: int, frame: Frame, placement: Placement) -> None:
         station = placement.source if placement.role is Role.RESPONSE else placement.destination
         profile = self._devices.at(station)
-        longest = profile.limits_on(self._protocol).frame if profile is not None else None
+        longest = profile.limits_on(self._family).frame if profile is not None else None
         if profile is not None and longest is not None and len(frame.octets) > longest:
             way = "from" if placement.role is Role.RESPONSE else "to"
             seen = f"frames of {len(frame.octets)} octets {way} it, {longest} allowed"
@@ -234,7 +233,7 @@ class ProfileFindings:
             return
         who = _subject(profile, transaction.station)
         self._answers[who] = self._answers.get(who, 0) + 1
-        limit = profile.limits_on(self._protocol).response
+        limit = profile.limits_on(self._family).response
         if limit is not None and latency.low > limit:
             seen = f"took over {milliseconds(limit)}"
             told = self._add("PR007", who, "", seen, transaction.end, transaction.response)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
+from dissectors.manifest import Dissector
 from dissectors.profiles import Profile, Sign
 from dissectors.profiles.decoding import decode, in_range
 from dissectors.readings import Reading
-from dissectors.registry import Dissector
 from dissectors.tracker import Verdict
 from sniff.analysis.points import PointReader
 from sniff.engine import Output

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from dissectors.frame import Frame
-from dissectors.registry import Dissector
+from dissectors.manifest import Dissector
 from dissectors.tracker import Transaction
+from dissectors.words import milliseconds
 from sniff.analysis.packet_tree import Field, fields_of
 from sniff.analysis.plain import plain
-from sniff.analysis.wording import duration, mark_names, milliseconds
+from sniff.analysis.wording import duration, mark_names
 from sniff.engine import Row
 
 

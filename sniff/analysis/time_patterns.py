@@ -18,10 +18,10 @@ from dissectors.frame import Chunk, Event, Frame, LineError
 from dissectors.histogram import Histogram
 from dissectors.line import NS_PER_S
 from dissectors.tracker import Transaction
+from dissectors.words import milliseconds
 from sniff.analysis.line_rules import LINE_RULES as RULES
 from sniff.analysis.lost_together import LostTogether
 from sniff.analysis.other_settings import Fit, what_fits
-from sniff.analysis.wording import milliseconds
 from sniff.session import LineEvent, Session
 
 MS = 1_000_000

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from dissectors import registry
 from dissectors.frame import Event, Frame, LineError, Noise, Place, Role
-from dissectors.registry import Dissector
+from dissectors.manifest import Dissector
 from dissectors.tracker import Interval
+from dissectors.words import milliseconds
 from sniff.engine import Row
 
 
@@ -32,8 +34,8 @@ def _octets(event: Event) -> str:
 
 
 def station_word(protocol: str) -> str:
-    """What the people of that protocol call a place on the bus."""
-    return "MAC" if protocol == "mstp" else "station"
+    """What the people of that protocol call a place on the bus; "station" where it is not known here."""
+    return registry.get(protocol).noun if protocol in registry.names() else "station"
 
 
 def mark_names(error: LineError) -> str:
@@ -42,12 +44,6 @@ def mark_names(error: LineError) -> str:
     names = ["parity or framing"] if both in error else []
     names += [flag.name.lower() for flag in error if flag.name and not (both in error and flag in both)]
     return ", ".join(names)
-
-
-def milliseconds(value: int) -> str:
-    """A duration in ns as milliseconds with the precision that is worth reading: "8.2 ms", "0.31 ms", "1250 ms"."""
-    ms = value / 1e6
-    return f"{ms:.0f} ms" if abs(ms) >= 100 else f"{ms:.1f} ms" if abs(ms) >= 1 else f"{ms:.2f} ms"
 
 
 def duration(interval: Interval) -> str:

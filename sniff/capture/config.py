@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+from dissectors import registry
 from dissectors.line import LineSettings
 
 
@@ -21,7 +22,7 @@ class SourceSpec:
 
     spec: str
     line: LineSettings = field(default_factory=LineSettings)
-    protocol: str = "modbus-rtu"
+    protocol: str = registry.DEFAULT
     bus: str = "bus"
     notes: Mapping[str, str] = field(default_factory=dict)
     unknown: tuple[str, ...] = ()

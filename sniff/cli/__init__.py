@@ -15,7 +15,7 @@ from importlib import import_module
 from types import ModuleType
 from typing import cast
 
-from dissectors.registry import BrokenPlugin
+from dissectors import registry
 from sniff import __version__
 from sniff.cli import standard_streams
 from sniff.formats import CaptureError
@@ -49,10 +49,9 @@ COMMANDS: dict[str, str] = {
 }
 """Name → what it does, in the order of the help. Each is `sniff/cli/<name>.py`: `configure(parser)`, `run(args)`."""
 
-DESCRIPTION = """Passive RS-485 fieldbus sniffer and protocol analyzer: Modbus RTU and ASCII, Metasys N2, BACnet MS/TP.
-It listens; it never writes to a port."""
+DESCRIPTION = """Passive RS-485 fieldbus sniffer and protocol analyzer. It listens; it never writes to a port."""
 
-EPILOG = """Start with `sniff485 demo`, then `sniff485 ports` and `sniff485 live PORT -s 19200,8E1 -p modbus-rtu`.
+EPILOG = """Start with `sniff485 demo`, then `sniff485 ports` and `sniff485 live PORT -s 19200,8E1 -p PROTOCOL`.
 Exit codes: 0 fine, 1 findings, 2 usage, 3 unreadable input or output not written, 4 port trouble, 70 internal error
 (--traceback says where), 130 interrupted."""
 
@@ -102,9 +101,11 @@ def _failed(error: Exception, traced: bool) -> int:
     from sniff.formats.files import explain
 
     broken = standard_streams.output_error()
-    if isinstance(error, Failure | CaptureError | BrokenPlugin):  # a damaged file is found out while it is read
+    if isinstance(
+        error, Failure | CaptureError | registry.UnknownProtocol
+    ):  # a damaged file is found out while it is read
         standard_streams.say(_plain(error))
-        return getattr(error, "code", USAGE if isinstance(error, BrokenPlugin) else UNREADABLE)
+        return getattr(error, "code", USAGE if isinstance(error, registry.UnknownProtocol) else UNREADABLE)
     if broken is not None or (isinstance(error, OSError) and error.filename is not None):
         cause = broken or cast("OSError", error)
         where = "standard output" if cause.filename is None else os.fsdecode(cause.filename)
@@ -133,10 +134,11 @@ def _place(error: Exception) -> str:
 
 def _run(arguments: list[str]) -> int:
     name = next((word for word in arguments if not word.startswith("-")), None)
+    asked = name is None and {"-h", "--help"} & {*arguments}  # all protocols are imported only then
     parser = argparse.ArgumentParser(
         prog="sniff485",
         description=DESCRIPTION,
-        epilog=EPILOG,
+        epilog=f"{_protocols()}\n\n{EPILOG}" if asked else EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"sniff485 {__version__}")
@@ -161,6 +163,13 @@ def _run(arguments: list[str]) -> int:
         args = parser.parse_args(arguments)
     assert chosen is not None  # argparse has refused anything else
     return int(chosen.run(args))
+
+
+def _protocols() -> str:
+    """The protocols that there are, plug-ins too: what `-p` takes, and what it is."""
+    known = registry.usable()
+    width = max(len(one.name) for one in known)
+    return "\n".join(("protocols:", *(f"  {one.name:<{width}}  {one.title}" for one in known)))
 
 
 def _no_such_command(word: str) -> str:

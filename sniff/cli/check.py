@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dissectors.findings import Finding, Severity
+from dissectors.manifest import Dissector
 from dissectors.profiles import Devices
-from dissectors.registry import Dissector
 from sniff.analysis.health import health_of
 from sniff.analysis.judging import Judging
 from sniff.analysis.summary import Summary

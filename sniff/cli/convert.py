@@ -11,6 +11,7 @@ from sniff.analysis.judging import Judging
 from sniff.cli import arguments, writing
 from sniff.engine import Output
 from sniff.formats import Capture
+from sniff.formats.linktypes import held_by_protocols
 from sniff.profile_files import with_devices
 from sniff.reading import dissector_for, outputs
 from sniff.session import Session
@@ -26,9 +27,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--link-type",
         type=int,
         choices=[147, 165, 250, 252],
-        help="pcap, pcapng: 252 exported PDU (default for Modbus RTU; opens in Wireshark as it is), 147 bare RTU "
-        "(needs a DLT_USER entry for mbrtu), 250 RTAC serial with line errors (Decode As: RTAC Serial → Modbus RTU), "
-        "165 MS/TP",
+        help="pcap, pcapng: 252 exported PDU and 165 open in Wireshark as they are, 147 is the bare frame (needs a "
+        "DLT_USER entry), 250 RTAC serial with line errors (needs Decode As). "
+        f"What can hold what, the default first: {held_by_protocols()}",
     )
     parser.add_argument("-f", "--force", action="store_true", help="overwrite OUT")
 

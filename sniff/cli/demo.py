@@ -7,6 +7,7 @@ from __future__ import annotations
 import argparse
 import sys
 
+from dissectors import registry
 from sniff.capture.config import RecordSpec, SourceSpec
 from sniff.cli import PORT_TROUBLE, USAGE, Failure, arguments, listening
 from sniff.cli.live import show
@@ -34,7 +35,7 @@ def run(args: argparse.Namespace) -> int:
     from sniff.simulation.scenarios import UnknownScenario, scenario
 
     try:
-        plan = scenario(args.protocol or "modbus-rtu", args.seed, not args.clean, args.line)
+        plan = scenario(args.protocol or registry.DEFAULT, args.seed, not args.clean, args.line)
     except UnknownScenario as error:
         raise Failure(f"demo: {error}", USAGE) from None
     on_terminal = arguments.on_terminal() and not args.json and not args.lines

@@ -83,11 +83,11 @@ def _interfaces() -> int:
 def _bus(args: argparse.Namespace) -> _Bus:
     name = args.extcap_interface.removeprefix(PREFIX)
     known = _load().buses.get(name)
-    protocol = args.protocol or (known.protocol if known is not None else None) or "modbus-rtu"
+    protocol = args.protocol or (known.protocol if known is not None else None) or registry.DEFAULT
     said = args.line or (known.line if known is not None else None)
     line = said if isinstance(said, LineSettings) else None
     if protocol == AUTO:  # Wireshark asks for a link type before anything is heard
-        protocol = "modbus-rtu"
+        protocol = registry.DEFAULT
     port = known.port if known is not None and known.port else name
     return _Bus(port, line or LineSettings.parse(registry.get(protocol).default_line), protocol)
 

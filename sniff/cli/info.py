@@ -7,10 +7,10 @@ import sys
 from typing import Any
 
 from dissectors.tracker import Verdict
+from dissectors.words import milliseconds
 from sniff.analysis.nodes import Node
 from sniff.analysis.plain import plain
 from sniff.analysis.summary import Summary
-from sniff.analysis.wording import milliseconds
 from sniff.cli import arguments, json_output
 from sniff.cli.rows import iso
 from sniff.engine import Output

@@ -16,9 +16,9 @@ from pathlib import Path
 from dissectors import registry
 from dissectors.line import LineSettings
 from dissectors.profiles import Devices
+from dissectors.words import milliseconds
 from sniff.analysis.plain import plain
 from sniff.analysis.summary import Summary
-from sniff.analysis.wording import milliseconds
 from sniff.capture.config import RecordSpec, SourceSpec
 from sniff.capture.link import CaptureLink
 from sniff.capture.wire import NOTHING_MORE, Ended, Status
@@ -61,7 +61,7 @@ def target_of(args: argparse.Namespace) -> Target:
     said: LineSettings | str | None = args.line or (bus.line if bus is not None else None)
     auto = AUTO in (said, configured)
     line = said if isinstance(said, LineSettings) else None
-    protocol = configured or (AUTO if auto else "modbus-rtu")
+    protocol = configured or (AUTO if auto else registry.DEFAULT)
     search = None
     if auto:
         search = Unknowns(line, None if protocol == AUTO else protocol)

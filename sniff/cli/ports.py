@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 
+from dissectors.words import milliseconds
 from sniff.analysis.plain import plain
-from sniff.analysis.wording import milliseconds
 from sniff.cli import json_output
 
 

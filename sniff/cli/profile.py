@@ -77,8 +77,7 @@ def _show(args: argparse.Namespace) -> int:
             print(f"{family} answers within: {limits.response / 1e6:g} ms")
     for family, codes in profile.exceptions.items():
         for code, words in codes.items():
-            number = f"{code:02X}h" if family == "modbus" else f"{code:02d}"
-            print(f"{family} error {number}: {words}")
+            print(f"{family} error {code:02d} ({code:02X}h): {words}")
     for key, value in profile.constants.items():
         print(f"{key}: {value}")
     for first, last in profile.reserved:

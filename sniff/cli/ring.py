@@ -1,21 +1,20 @@
-"""`stats FILE ring`: the MS/TP token ring."""
+"""`stats FILE ring`: the token ring."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 
-from dissectors.bacnet import RingObserver
-from dissectors.bacnet.ring import Ring
-from sniff.analysis import ring_words
+from dissectors.token_ring import TokenRing
 from sniff.cli import tables
 from sniff.engine import Output
 from sniff.reading import outputs
 from sniff.session import Item, Session
 
 
-def ring_of(items: Iterable[Item], session: Session) -> Ring:
+def ring_of(items: Iterable[Item], session: Session, shown: TokenRing) -> Any:
     """The ring that items show."""
-    observer = RingObserver(session.timing)
+    observer = shown.observer(session.timing)
     for output in outputs(items, session, pairing=False):
         if isinstance(output, Output):
             for row in output.rows:
@@ -26,12 +25,12 @@ def ring_of(items: Iterable[Item], session: Session) -> Ring:
     return observer.ring()
 
 
-def show(items: Iterable[Item], session: Session, style: str) -> int:
+def show(items: Iterable[Item], session: Session, shown: TokenRing, style: str) -> int:
     """Print the ring; the sentences only as text."""
-    ring = ring_of(items, session)
-    tables.write(ring_words.HEADINGS, ring_words.rows(ring), style)
+    ring = ring_of(items, session, shown)
+    tables.write(shown.headings, shown.rows(ring), style)
     if style == "text":
         print()
-        for sentence in ring_words.sentences(ring):
+        for sentence in shown.sentences(ring):
             print(sentence)
     return 0

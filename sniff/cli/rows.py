@@ -7,7 +7,7 @@ from typing import Any
 
 from dissectors.frame import Frame, Role
 from dissectors.line import NS_PER_S
-from dissectors.registry import Dissector
+from dissectors.manifest import Dissector
 from sniff.analysis.plain import ascii_of
 from sniff.analysis.wording import describe, duration, is_error
 from sniff.cli import json_output

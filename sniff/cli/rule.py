@@ -1,4 +1,4 @@
-"""Without CODE: all rules. LN… the line, MB… Modbus, N2… Metasys N2, MS… MS/TP, PR… device profiles."""
+"""Without CODE: all rules: of every protocol, LN… of the line, PR… of device profiles."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Filters (-Y) use columns and Wireshark's field names: `dst == 3 && kind contains "write"`, `modbus.func_code == 16`,
+"""Filters (-Y) use columns and Wireshark's field names: `dst == 3 && kind contains "write"`, `latency_ms > 50`,
 `verdict in {no-response, late}`. Columns: no src dst addr role kind func register count ok error noise found damage
 len marks tx verdict latency_ms attempt text hex. Dotted names: see --fields.
 """
@@ -10,8 +10,9 @@ import csv
 import sys
 from collections.abc import Iterable, Iterator
 
-from dissectors.registry import Dissector
-from sniff.analysis.filtering import PREFIXES, FilterError, Predicate, compile_filter
+from dissectors import registry
+from dissectors.manifest import Dissector
+from sniff.analysis.filtering import FilterError, Predicate, compile_filter
 from sniff.analysis.packet_tree import Field
 from sniff.analysis.row_tree import tree_of
 from sniff.cli import USAGE, Failure, arguments, rows, writing
@@ -39,9 +40,12 @@ def configure(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Show every capture in turn, the parts of one recording as one."""
     if args.table and not args.names:
-        raise Failure("-T fields: say which with -e NAME (repeatable), for instance -e modbus.func_code", USAGE)
+        raise Failure(
+            "-T fields: say which with -e NAME (repeatable), such as -e kind; --json --fields lists them", USAGE
+        )
+    of_protocols = tuple(prefix for dissector in registry.usable() for prefix in dissector.prefixes)
     for name in args.names:
-        if name not in rows.JSON_KEYS and not name.startswith((*PREFIXES, "frame.", "tx.", "line.")):
+        if name not in rows.JSON_KEYS and not name.startswith((*of_protocols, "frame.", "tx.", "line.")):
             raise Failure(f"-e {name}: unknown field{nearest(name, rows.JSON_KEYS)}; --fields lists a capture's", USAGE)
     left = args.count
     for path, capture in arguments.open_captures(args.files):

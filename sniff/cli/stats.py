@@ -1,6 +1,6 @@
 """Tables: nodes (each station), health (bus and stations, and why), transactions (by kind and verdict), latency (each
-station's response times), load (by second or --every), ring (MS/TP). Response times are uncertain by what the adapter
-may hold back: see `info`.
+station's response times), load (by second or --every), ring (of a protocol that passes a token). Response times are
+uncertain by what the adapter may hold back: see `info`.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ import argparse
 from collections import Counter
 from pathlib import Path
 
+from dissectors import registry
 from dissectors.histogram import Histogram
 from dissectors.line import NS_PER_S
 from dissectors.tracker import Transaction
@@ -56,11 +57,13 @@ def run(args: argparse.Namespace) -> int:
     session = arguments.settings_of(args, merged_session(captures, names), names[0])
     items = merged(captures) if len(captures) > 1 else captures[0].items()
     if table == "ring":
-        if "ring" not in dissector_for(session).extras:
-            raise Failure(f"ring: {session.protocol} passes no token; this table is for mstp", USAGE)
+        shown = dissector_for(session).ring
+        if shown is None:
+            passing = ", ".join(one.name for one in registry.usable() if one.ring is not None)
+            raise Failure(f"ring: {session.protocol} passes no token; this table is for {passing}", USAGE)
         from sniff.cli import ring
 
-        return ring.show(items, session, args.style)
+        return ring.show(items, session, shown, args.style)
     summary = Summary(session.line)
     kinds: Counter[tuple[str, str]] = Counter()
     judging = Judging(session, dissector_for(session), noted_devices(session)) if table == "health" else None

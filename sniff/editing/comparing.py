@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from dissectors.findings import Finding, Severity
 from dissectors.profiles.decoding import number
 from dissectors.tracker import Verdict
+from dissectors.words import milliseconds
 from sniff.analysis.nodes import Node
 from sniff.analysis.points import ALL, Point
 from sniff.analysis.summary import Summary
-from sniff.analysis.wording import milliseconds
 
 NOTICEABLE = 0.02
 """A share has changed when it moved by as much; a time when it moved by a tenth and more than the adapters allow."""

@@ -1,7 +1,7 @@
 """What a pcap record holds, by link type: how a frame is written into it and read out of it. Pure.
 
-165  BACnet MS/TP: the frame from its preamble; Wireshark reads it without set-up.
-147  User 0: by convention the bare Modbus RTU frame; Wireshark needs a DLT_USER entry.
+165  A link type of a protocol's own: the frame as it is; Wireshark reads it without set-up.
+147  User 0: the bare frame; Wireshark needs a DLT_USER entry.
 250  RTAC Serial: a 12-octet header with an event, then the frame; line errors are events without octets.
 252  Exported PDU: tags that name the dissector and synthetic addresses, then the frame; no set-up.
 148  User 1: here, octets that are no frame (noise, damaged pieces), so that a file keeps every octet.
@@ -12,10 +12,13 @@ from __future__ import annotations
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 
+from dissectors import registry
 from dissectors.frame import Frame, LineError, Role
+from dissectors.manifest import Dissector, PacketFile
 
-MSTP, USER0, USER1, RTAC, EXPORTED = 165, 147, 148, 250, 252
+OWN, USER0, USER1, RTAC, EXPORTED = 165, 147, 148, 250, 252
 
 RTAC_HEADER = struct.Struct(">IIBBH")
 RTAC_TX_START, RTAC_RX_START = 1, 2
@@ -24,10 +27,8 @@ RTAC_ERRORS = {LineError.FRAMING: 7, LineError.PARITY: 8, LineError.BREAK: 9, Li
 RTAC_ERROR_NAMES = {7: "framing", 8: "parity", 9: "break", 10: "overrun"}
 
 TAG_END, TAG_NAME, TAG_SRC4, TAG_DST4, TAG_PORT_TYPE, TAG_SRC_PORT, TAG_DST_PORT = 0, 12, 20, 21, 24, 25, 26
-MODBUS_PORT, CLIENT_PORT, PORT_TYPE_TCP = 502, 40000, 2
+SERVER_PORT, CLIENT_PORT, PORT_TYPE_TCP = 502, 40000, 2
 CLIENT_HOST = 254
-PDU_NAMES = {"modbus-rtu": "mbrtu", "mstp": "mstp"}
-PROTOCOL_OF_PDU = {name: protocol for protocol, name in PDU_NAMES.items()}
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +45,6 @@ class LinkType:
     """One link type: how to write (None where we only read) and read a record."""
 
     number: int
-    protocol: str | None
     read: Callable[[bytes], Decoded | None]
     write: Callable[[Frame, Role, int | None, int], bytes]
 
@@ -62,8 +62,8 @@ def _read_rtac(record: bytes) -> Decoded | None:
         return None
     event = record[8]
     if event in RTAC_ERROR_NAMES:
-        return Decoded(record[RTAC_HEADER.size :], "modbus-rtu", RTAC_ERROR_NAMES[event])
-    return Decoded(record[RTAC_HEADER.size :], "modbus-rtu", "dropped" if event == RTAC_LOST else "")
+        return Decoded(record[RTAC_HEADER.size :], protocol_of(RTAC), RTAC_ERROR_NAMES[event])
+    return Decoded(record[RTAC_HEADER.size :], protocol_of(RTAC), "dropped" if event == RTAC_LOST else "")
 
 
 def rtac_record(time: int, event: int, octets: bytes) -> bytes:
@@ -82,7 +82,7 @@ def _read_exported(record: bytes) -> Decoded | None:
         tag, length = struct.unpack_from(">HH", record, at)
         at += 4
         if tag == TAG_END:
-            protocol = PROTOCOL_OF_PDU.get(name)
+            protocol = _by_pdu_name().get(name)
             return Decoded(record[at:], protocol) if protocol is not None else None
         if tag == TAG_NAME:
             name = record[at : at + length].split(b"\0")[0].decode("ascii", "replace")
@@ -97,11 +97,12 @@ def _tag(number: int, value: bytes) -> bytes:
 
 def _write_exported(frame: Frame, role: Role, station: int | None, _time: int) -> bytes:
     """Addresses are synthetic: the client is 10.0.0.254, unit n is 10.0.0.n; the ports say the direction."""
-    name = PDU_NAMES[frame.protocol].encode() + b"\0"
+    held = registry.get(frame.protocol).packet_file
+    name = (held.pdu_name if held is not None else "").encode() + b"\0"
     unit, client = bytes((10, 0, 0, (station or 0) & 0xFF)), bytes((10, 0, 0, CLIENT_HOST))
     answer = role is Role.RESPONSE
     source, destination = (unit, client) if answer else (client, unit)
-    ports = (MODBUS_PORT, CLIENT_PORT) if answer else (CLIENT_PORT, MODBUS_PORT)
+    ports = (SERVER_PORT, CLIENT_PORT) if answer else (CLIENT_PORT, SERVER_PORT)
     return b"".join(
         (
             _tag(TAG_NAME, name),
@@ -117,22 +118,43 @@ def _write_exported(frame: Frame, role: Role, station: int | None, _time: int) -
 
 
 LINK_TYPES: dict[int, LinkType] = {
-    MSTP: LinkType(MSTP, "mstp", _plain, _write_plain),
-    USER0: LinkType(USER0, None, _plain, _write_plain),
-    USER1: LinkType(USER1, None, _plain, _write_plain),
-    RTAC: LinkType(RTAC, "modbus-rtu", _read_rtac, _write_rtac),
-    EXPORTED: LinkType(EXPORTED, None, _read_exported, _write_exported),
+    OWN: LinkType(OWN, _plain, _write_plain),
+    USER0: LinkType(USER0, _plain, _write_plain),
+    USER1: LinkType(USER1, _plain, _write_plain),
+    RTAC: LinkType(RTAC, _read_rtac, _write_rtac),
+    EXPORTED: LinkType(EXPORTED, _read_exported, _write_exported),
 }
+ANYBODYS = frozenset((USER0, USER1, EXPORTED))
+"""Link types that do not name a protocol."""
 
-DEFAULT = {"mstp": MSTP, "modbus-rtu": EXPORTED}
-"""Link type to write by protocol; others go bare into USER0, which no Wireshark dissector reads."""
 
-ALLOWED = {"mstp": (MSTP, EXPORTED), "modbus-rtu": (EXPORTED, USER0, RTAC)}
+@cache
+def protocol_of(link_type: int) -> str | None:
+    """The one protocol whose frames lie in records of this link type; None where that may be any."""
+    if link_type in ANYBODYS:
+        return None
+    return next((protocol.name for protocol, held in _held() if link_type in held.link_types), None)
+
+
+@cache
+def _by_pdu_name() -> dict[str, str]:
+    return {held.pdu_name: protocol.name for protocol, held in _held() if held.pdu_name}
+
+
+def _held() -> list[tuple[Dissector, PacketFile]]:
+    return [(one, one.packet_file) for one in registry.usable() if one.packet_file is not None]
 
 
 def link_type_for(protocol: str, wanted: int | None = None) -> int:
-    """The link type to write a protocol with. Raises ValueError, saying what is possible."""
-    allowed = ALLOWED.get(protocol, (USER0,))
+    """The link type to write a protocol with: by default the first that its manifest names, else bare into USER0, which
+    no Wireshark dissector reads. Raises ValueError, saying what is possible."""
+    held = registry.get(protocol).packet_file
+    allowed = held.link_types if held is not None else (USER0,)
     if wanted is not None and wanted not in allowed:
         raise ValueError(f"link type {wanted} cannot hold {protocol}; possible: {', '.join(map(str, allowed))}")
-    return wanted if wanted is not None else DEFAULT.get(protocol, USER0)
+    return wanted if wanted is not None else allowed[0]
+
+
+def held_by_protocols() -> str:
+    """Which link types can hold which protocol, in words, the one written by default first."""
+    return "; ".join(f"{one.name}: {', '.join(map(str, held.link_types))}" for one, held in _held())

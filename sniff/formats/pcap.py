@@ -13,7 +13,8 @@ from typing import BinaryIO
 from dissectors.frame import Chunk
 from sniff.formats import CaptureError
 from sniff.formats.files import NewFile, open_capture
-from sniff.formats.linktypes import LINK_TYPES, MSTP, USER1
+from sniff.formats.linktypes import LINK_TYPES, OWN, USER1
+from sniff.formats.linktypes import protocol_of as protocol_of_link
 from sniff.formats.records import Record, RecordMaker, foreign_session, items_of, protocol_of
 from sniff.session import Completeness, Item, Session
 
@@ -50,7 +51,7 @@ class PcapCapture:
                     f"this program reads {known}"
                 )
             first = next(self._records(stream), None)
-        protocol = protocol_of(first) if first is not None else LINK_TYPES[self._link_type].protocol
+        protocol = protocol_of(first) if first is not None else protocol_of_link(self._link_type)
         self.session: Session = foreign_session(str(path), protocol, first.time if first is not None else 0, "pcap")
         self._complete = Completeness(True)
 
@@ -67,7 +68,7 @@ class PcapCapture:
         with open_capture(self.path) as stream:
             stream.seek(FILE_HEADER)
             protocol = self.session.protocol
-            if self._link_type == MSTP and protocol == "mstp":  # the record is the frame
+            if self._link_type == OWN and protocol == protocol_of_link(OWN):  # the record is the frame
                 for record in self._records(stream):
                     if record.data:
                         yield Chunk(record.time, record.data)

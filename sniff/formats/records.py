@@ -14,9 +14,11 @@ from pathlib import Path
 from dissectors import registry
 from dissectors.frame import Chunk, Frame
 from dissectors.line import LineSettings
+from dissectors.manifest import PacketFile
 from sniff.analysis.wording import describe, duration
 from sniff.engine import Output
 from sniff.formats.linktypes import LINK_TYPES, RTAC, RTAC_ERRORS, USER1, link_type_for, rtac_record
+from sniff.formats.linktypes import protocol_of as protocol_of_link
 from sniff.reading import Settled, Settling, engine_for
 from sniff.session import ASSUMED, LINE_NOTE, Adapter, Item, LineEvent, LineEventKind, Session, SettingsChange
 
@@ -37,7 +39,7 @@ class Record:
 
 def foreign_session(path: str, protocol: str | None, started: int, kind: str) -> Session:
     """What is known of a packet file that we did not write; its folder is nobody else's business."""
-    name = protocol or "modbus-rtu"
+    name = protocol or registry.DEFAULT
     return Session(
         port=Path(path).name.encode("utf-8", "backslashreplace").decode(),  # a name need not be text
         line=LineSettings.parse(registry.get(name).default_line),
@@ -81,7 +83,7 @@ def items_of(record: Record, protocol: str) -> Iterator[Item]:
     decoded = kind.read(record.data) if kind is not None else None
     if decoded is None or decoded.protocol not in (None, protocol):
         return
-    if kind is not None and kind.protocol not in (None, protocol):
+    if kind is not None and protocol_of_link(kind.number) not in (None, protocol):
         return
     if decoded.event:
         dropped = decoded.event == "dropped"
@@ -96,7 +98,7 @@ def protocol_of(record: Record) -> str | None:
     if kind is None:
         return None
     decoded = kind.read(record.data)
-    return kind.protocol or (decoded.protocol if decoded is not None else None)
+    return protocol_of_link(kind.number) or (decoded.protocol if decoded is not None else None)
 
 
 class RecordMaker:
@@ -179,6 +181,8 @@ def _readable(frame: Frame) -> bool:
     """Whether Wireshark's dissector gets all the octets it expects: cut frames would be shown as malformed."""
     if frame.ok:
         return True
-    if frame.protocol == "mstp":
-        return frame.expected is not None and len(frame.octets) >= frame.expected >= 8
-    return len(frame.octets) >= 4 and frame.expected is not None and len(frame.octets) == frame.expected
+    held = registry.get(frame.protocol).packet_file or PacketFile(())
+    count = len(frame.octets)
+    if frame.expected is None or min(count, frame.expected) < held.least:
+        return False
+    return count == frame.expected or (held.longer and count > frame.expected)

@@ -4,7 +4,7 @@
 
     #!sniff-capture 1
     # line: 19200,8E1
-    # protocol: modbus-rtu
+    # protocol: NAME
     # start: 2026-03-01T10:00:00Z
     +0        01 03 00 00 00 02 C4 0B       # poll unit 1
     +8.2      01 03 04 00 D7 00!P 1A CB C0  # parity error marked on one octet

@@ -5,14 +5,17 @@ from __future__ import annotations
 from collections import Counter
 
 from dissectors.findings import Finding, Severity, under_causes
+from dissectors.line import Timing
+from dissectors.manifest import Dissector
 from dissectors.profiles import Devices
-from dissectors.registry import Dissector
+from dissectors.token_ring import TokenRing
 from dissectors.tracker import Transaction, Verdict
+from dissectors.words import milliseconds
 from sniff.analysis.health import Health, health_of
 from sniff.analysis.judging import Judging, rules_over
 from sniff.analysis.nodes import Node
 from sniff.analysis.summary import Summary
-from sniff.analysis.wording import describe, milliseconds
+from sniff.analysis.wording import describe
 from sniff.engine import Output, Row
 from sniff.formats import Capture
 from sniff.formats.text import iso
@@ -44,7 +47,7 @@ def collect(source: str, capture: Capture, session: Session, devices: Devices) -
     dissector = dissector_for(session)
     summary = Summary(session.line)
     judging = Judging(session, dissector, devices)
-    ring = _Ring(session) if "ring" in dissector.extras else None
+    ring = _Ring(dissector.ring, session.timing) if dissector.ring is not None else None
     timeline: Timeline | None = None
     happenings: list[Happening] = []
     trouble: dict[int, Counter[str]] = {}
@@ -291,10 +294,9 @@ def _measurement(session: Session, dissector: Dissector) -> Measurement:
 class _Ring:
     """The token ring of one capture."""
 
-    def __init__(self, session: Session) -> None:
-        from dissectors.bacnet import RingObserver
-
-        self._observer = RingObserver(session.timing)
+    def __init__(self, shown: TokenRing, timing: Timing) -> None:
+        self._shown = shown
+        self._observer = shown.observer(timing)
 
     def add(self, row: Row) -> None:
         """Take the next row."""
@@ -307,8 +309,5 @@ class _Ring:
 
     def numbers(self) -> RingNumbers:
         """What it came to."""
-        from sniff.analysis import ring_words
-
-        ring = self._observer.ring()
-        rows = tuple(ring_words.rows(ring))
-        return RingNumbers(ring.order, ring_words.HEADINGS, rows, tuple(ring_words.sentences(ring)))
+        shown, ring = self._shown, self._observer.ring()
+        return RingNumbers(shown.order(ring), shown.headings, tuple(shown.rows(ring)), tuple(shown.sentences(ring)))

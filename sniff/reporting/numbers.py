@@ -124,7 +124,7 @@ class Happening:
 
 @dataclass(frozen=True, slots=True)
 class RingNumbers:
-    """The MS/TP token ring: masters in the order of the token, a table, and what it comes to in sentences."""
+    """The token ring: masters in the order of the token, a table, and what it comes to in sentences."""
 
     order: tuple[int, ...]
     headings: tuple[str, ...]

@@ -9,8 +9,8 @@ from typing import Any
 
 from dissectors.findings import Finding
 from dissectors.frame import Frame
+from dissectors.manifest import Dissector
 from dissectors.profiles import Devices
-from dissectors.registry import Dissector
 from dissectors.tracker import Transaction
 from sniff.analysis.points import Point, PointReader, PointTable
 from sniff.analysis.summary import Summary

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from dissectors import registry
+
 if TYPE_CHECKING:
     from sniff.simulation.bus import VirtualBus
     from sniff.testing.capture_reading import CaptureReading
@@ -123,7 +125,7 @@ def capture(request: pytest.FixtureRequest) -> Callable[[str], CaptureReading]:
 
 @pytest.fixture
 def virtual_bus() -> Iterator[Callable[..., VirtualBus]]:
-    """`virtual_bus("modbus-rtu", faults=False)` runs a simulated bus; its ports are pseudo-terminals.
+    """`virtual_bus(NAME, faults=False)` runs a simulated bus; its ports are pseudo-terminals.
 
     Arguments as for `sniff.simulation.scenarios.scenario`. Closed at the end of the test.
     """
@@ -131,7 +133,7 @@ def virtual_bus() -> Iterator[Callable[..., VirtualBus]]:
 
     with ExitStack() as stack:
 
-        def make(name: str = "modbus-rtu", **options: Any) -> VirtualBus:
+        def make(name: str = registry.DEFAULT, **options: Any) -> VirtualBus:
             from sniff.simulation.bus import VirtualBus
             from sniff.simulation.scenarios import scenario
 
@@ -160,7 +162,7 @@ def replay() -> Iterator[Callable[..., str]]:
 
 @pytest.fixture
 def craft() -> Callable[..., bytes]:
-    """`craft("modbus-rtu", unit=1, pdu=bytes.fromhex("030000 0002"))`: a whole frame with its check."""
+    """`craft(KIND, unit=1, pdu=bytes.fromhex("030000 0002"))`: a whole frame with its check."""
     from sniff.testing.crafting import craft as make
 
     return make

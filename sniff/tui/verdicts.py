@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dissectors.tracker import Interval, Transaction, Verdict
-from sniff.analysis.wording import milliseconds
+from dissectors.words import milliseconds
 from sniff.tui.columns import Cell
 
 SHORT: dict[Verdict, str] = {

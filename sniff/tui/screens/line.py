@@ -13,7 +13,7 @@ from textual.widgets import Static
 
 from dissectors.frame import LineError
 from dissectors.line import NS_PER_S
-from sniff.analysis.wording import milliseconds
+from dissectors.words import milliseconds
 from sniff.session import LineEvent
 from sniff.store import Store
 from sniff.tui.analyzer import analyzer

@@ -19,7 +19,7 @@ SLICE_SECONDS = 0.012
 """How long one piece of searching may take: short enough that a key never waits for it."""
 SLICE_ROWS = 128
 DATA_ONLY = "!(role in {token, poll})"
-"""On an idle MS/TP ring more than nine rows of ten are tokens."""
+"""On an idle token ring more than nine rows of ten are tokens."""
 
 
 class ListingScreen(ViewScreen):

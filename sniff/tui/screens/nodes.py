@@ -11,8 +11,8 @@ from textual.binding import Binding, BindingType
 from textual.widgets import DataTable, Static
 
 from dissectors.tracker import Verdict
+from dissectors.words import milliseconds
 from sniff.analysis.nodes import Node
-from sniff.analysis.wording import milliseconds
 from sniff.tui.analyzer import analyzer
 from sniff.tui.screens.base import ViewScreen
 from sniff.tui.tables import StationTable

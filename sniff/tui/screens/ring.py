@@ -1,4 +1,4 @@
-"""Screen 7: the token ring of an MS/TP bus: its order, its times, what went wrong in it."""
+"""Screen 7: the token ring of a bus that has one: its order, its times, what went wrong in it."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from textual.app import ComposeResult
 from textual.containers import VerticalScroll
 from textual.widgets import DataTable, Static
 
-from sniff.analysis import ring_words
+from dissectors.token_ring import Cell
 from sniff.tui.analyzer import analyzer
 from sniff.tui.screens.base import ViewScreen
 from sniff.tui.tables import StationTable
@@ -31,7 +31,7 @@ COLUMNS: tuple[tuple[str, str], ...] = (
     ("polls unanswered", "poll-"),
     ("damaged", "dam."),
 )
-"""Columns of `ring_words.HEADINGS` that fit into 80, with their short titles."""
+"""Columns of a ring's table (`TokenRing.headings`) that fit into 80, with their short titles."""
 TROUBLE = {"retries", "lost", "damaged"}
 
 
@@ -78,16 +78,16 @@ class RingScreen(ViewScreen):
             return
         self._drawn = (self.store.version, monotonic())
         words = self.query_one("#words", Static)
-        observer = self.store.ring
-        if observer is None:
+        observer, shown = self.store.ring, self.store.dissector.ring
+        if observer is None or shown is None:
             session = self.store.session
             unknown = "protocol" in session.unknown
             why = "the protocol is not known" if unknown else f"{session.protocol} passes no token"
             words.update(f"{why}: there is no ring to show")
             return
         ring = observer.ring()
-        places = [ring_words.HEADINGS.index(name) for name, _ in COLUMNS]
-        rows = ring_words.rows(ring)
+        places = [shown.headings.index(name) for name, _ in COLUMNS if name in shown.headings]
+        rows = shown.rows(ring)
         self.query_one(StationTable).fill(
             (str(row[0]), [_cell(COLUMNS[at][0], row[place]) for at, place in enumerate(places)]) for row in rows
         )
@@ -96,7 +96,7 @@ class RingScreen(ViewScreen):
             "token · use: from token to first frame · repl: answers · post: postponed · poll-: unanswered polls for "
             "masters · dam.: damaged frames"
         )
-        words.update("\n".join((*ring_words.sentences(ring), "", legend)))
+        words.update("\n".join((*shown.sentences(ring), "", legend)))
 
     def on_data_table_row_selected(self, event: DataTable.RowSelected) -> None:
         """Enter or click on a master: its frames."""
@@ -107,7 +107,7 @@ class RingScreen(ViewScreen):
             analyzer(self).action_switch("frames")
 
 
-def _cell(name: str, value: ring_words.Cell) -> Text:
+def _cell(name: str, value: Cell) -> Text:
     if value is None:
         return Text("–", justify="right")
     text = (f"{value:.1f}" if abs(value) < 100 else f"{value:.0f}") if isinstance(value, float) else str(value)

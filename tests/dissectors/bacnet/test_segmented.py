@@ -180,7 +180,7 @@ def test_segments_and_acknowledgements_may_expect_a_reply(names: tuple[str, ...]
 
 
 def found_by_rules(output: Output) -> tuple[Finding, ...]:
-    findings = MSTP.extras["findings"](SESSION.timing)
+    findings = MSTP.judge(SESSION.timing)
     for row in output.rows:
         findings.see(row.no, row.event, row.header, row.placement)
     for one in output.transactions:

@@ -9,8 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dissectors.frame import Check, Damage, Found, Frame
+from dissectors.n2.envelope import make_answer as answer
 from dissectors.n2.readings import readings, refusal
-from dissectors.n2.simulated import answer, command
+from dissectors.n2.simulated import command
 from dissectors.n2.simulated import refusal as refuse
 
 

@@ -149,7 +149,7 @@ units = ["analog-value"]
 max-master = 127
 vendor-name = "X"
 """)
-    assert profile.limits_on("modbus-ascii") == profile.limits_on("modbus-rtu") == Limits(80, 2_500_000)
+    assert profile.limits_on("modbus") == Limits(80, 2_500_000)
     assert profile.limits_on("n2") == profile.limits_on("whatever") == Limits()
     assert [(s.space, s.address, s.part, s.value) for s in profile.signs] == [
         ("holding", 4, "", 7),

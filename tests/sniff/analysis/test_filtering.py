@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dissectors.frame import Check, Found, Frame, Header, Noise, Place, Reason, Role
-from dissectors.registry import Dissector
+from dissectors.manifest import Dissector
 from dissectors.tracker import Interval, Placement, Transaction, Verdict
 from sniff.analysis.filtering import FilterError, compile_filter
 from sniff.engine import Row

@@ -162,6 +162,6 @@ def test_memory_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_protocol_without_readings_has_no_points() -> None:
     from dataclasses import replace
 
-    dissector = replace(dissector_for(Session("x", bus.LINE, "modbus-rtu")), extras={})
+    dissector = replace(dissector_for(Session("x", bus.LINE, "modbus-rtu")), readings=None)
     reader = PointReader(dissector, ALL_E510)
     assert [s for output in bus.run(bus.chunks(READ)) for s in reader.add(output)] == []

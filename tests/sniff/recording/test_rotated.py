@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from dissectors.bacnet import MSTP
 from dissectors.bacnet.ring import Ring, What
 from dissectors.frame import Chunk, Frame
 from sniff.cli import main
@@ -64,7 +65,7 @@ def as_one(paths: list[Path]) -> Capture:
 
 
 def ring(capture: Capture) -> Ring:
-    return ring_of(capture.items(), capture.session)
+    return ring_of(capture.items(), capture.session, MSTP.ring)
 
 
 def test_parts_give_the_items_of_the_whole(files: tuple[Path, list[Path]]) -> None:

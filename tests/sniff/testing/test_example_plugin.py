@@ -82,8 +82,26 @@ def test_commands_know_the_protocol(run: Run, installed: Path) -> None:
     shown = run("sniff", "show", "boat.cap.txt")
     assert shown.returncode == 0, shown.stderr
     assert shown.stdout.count("$SDDBT,12.0*74") == 2
+    fields = ("-T", "fields", "-e", "nmea.sentence", "-Y", 'nmea.sentence == "sddbt"')
+    named = run("sniff", "show", "boat.cap.txt", *fields)
+    assert named.stdout.split() == ["sddbt"] * 3, named.stderr
+    assert "NMEA 0183" in run("sniff", "--help").stdout
     assert run("sniff", "check", "boat.cap.txt").returncode == 0
     written = run("sniff", "snapshot", "boat.cap.txt")
     assert written.returncode == 0, written.stderr
     assert "DAMAGED check" in (installed / "boat.expect.txt").read_text()
     assert "nmea" in run("sniff", "show", "-p", "no-such", "boat.cap.txt").stderr
+
+
+@pytest.mark.parametrize("command", ["show", "info", "stats", "check", "points", "snapshot", "diff", "anonymise"])
+def test_a_capture_of_a_protocol_that_is_not_installed_is_one_clear_line(command: str, tmp_path: Path) -> None:
+    capture = tmp_path / "boat.cap.txt"
+    capture.write_text(CAPTURE)
+    files = [capture, capture] if command == "diff" else [capture]
+    options = {"snapshot": ["--check"], "anonymise": ["-o", tmp_path / "out.cap.txt"]}.get(command, [])
+    line = [sys.executable, "-m", "sniff", command, *map(str, (*files, *options))]
+    ran = subprocess.run(line, capture_output=True, text=True, timeout=100)
+    assert ran.returncode in (2, 3), ran
+    assert ran.stderr.count("\n") == 1, ran.stderr
+    assert "nmea" in ran.stderr
+    assert "modbus-rtu" in ran.stderr

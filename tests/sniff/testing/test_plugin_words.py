@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from sniff.testing.crafting import MAKERS, craft
+from sniff.testing.crafting import craft, makers
 
 CAPTURE = "#!sniff-capture 1\n# line: 19200,8E1\n# protocol: modbus-rtu\n+0 01 03 00 00 00 02 C4 0B\n"
 
@@ -63,4 +63,4 @@ def test_the_readme_shows_every_kind_as_it_works() -> None:
     shown = [part.split("`")[0] for part in readme.split("`craft(")[1:]]
     examples = [f"craft({one}" for one in shown if "…" not in one]
     assert all(eval(one, {"craft": craft}) for one in examples)
-    assert {one.split('"')[1] for one in examples} == {*MAKERS}
+    assert {one.split('"')[1] for one in examples} == {*makers()}

@@ -18,7 +18,7 @@ from textual.keys import _character_to_key, key_to_character
 
 from dissectors.frame import Check, Damage, Found, Frame, Header, LineError, Mark, Noise, Place, Reason, Role
 from dissectors.line import LineSettings
-from dissectors.registry import Dissector
+from dissectors.manifest import Dissector
 from dissectors.tracker import Interval, Placement, Transaction, Verdict
 from sniff.engine import Output, Row
 from sniff.session import Adapter, Session

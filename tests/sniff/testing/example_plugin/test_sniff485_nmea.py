@@ -1,7 +1,7 @@
 """The framer of NMEA 0183 is a framer."""
 
 from hypothesis import strategies as st
-from sniff485_nmea import NmeaFramer, check_of
+from sniff485_nmea import check_of, framer
 
 from sniff.testing.framer_contract import framer_contract
 
@@ -14,4 +14,4 @@ def sentence(name: str, fields: list[str]) -> bytes:
 FIELDS = st.lists(st.text("0123456789.NSEW", max_size=9), max_size=6)
 SENTENCES = st.builds(sentence, st.sampled_from(["GPGGA", "GPRMC", "WIMWV", "SDDBT"]), FIELDS)
 
-TestNmeaContract = framer_contract(NmeaFramer, SENTENCES, examples=10)
+TestNmeaContract = framer_contract(framer, SENTENCES, examples=10)

@@ -1,10 +1,11 @@
-"""The MS/TP ring in words and table rows, for the command line and the terminal UI. Pure."""
+"""The MS/TP ring in words and table rows, one row a master."""
 
 from __future__ import annotations
 
 from dissectors.bacnet.ring import Ring, What
 from dissectors.histogram import Histogram
-from sniff.analysis.wording import milliseconds
+from dissectors.token_ring import Cell
+from dissectors.words import milliseconds
 
 HEADINGS = (
     "MAC",
@@ -26,7 +27,6 @@ HEADINGS = (
     "polled to",
     "damaged",
 )
-Cell = str | int | float | None
 
 
 def rows(ring: Ring) -> list[tuple[Cell, ...]]:

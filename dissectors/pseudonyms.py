@@ -1,0 +1,58 @@
+"""Numbers and texts that name nobody, for captures that are given away."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Protocol
+
+from dissectors.frame import Frame
+
+BLANK = ord("x")
+
+SHORTEST_TEXT = 4
+"""Printable octets in a row that are taken for a text where nothing says what they are."""
+
+
+class Pseudonyms:
+    """Numbers instead of numbers, one for one, in the order of their appearance. `kept` ones stay as they are."""
+
+    def __init__(self, numbers: Iterable[int], kept: Iterable[int]) -> None:
+        self._known = {number: number for number in kept}
+        self._free = iter([number for number in numbers if number not in self._known])
+
+    def of(self, number: int) -> int:
+        """The pseudonym of a number; itself when all are used up."""
+        if number not in self._known:
+            self._known[number] = next(self._free, number)
+        return self._known[number]
+
+
+class Renamer(Protocol):
+    """What renames the frames of one protocol; each keeps its length, and its damage if it has one."""
+
+    stations: Pseudonyms
+
+    def __call__(self, frame: Frame) -> bytes:
+        """The octets of the frame under another name."""
+        ...
+
+
+def without_text(octets: bytes) -> bytes:
+    """Runs of printable octets blanked."""
+    result = bytearray(octets)
+    begin = 0
+    for at in range(len(octets) + 1):
+        if at < len(octets) and 32 <= octets[at] < 127:
+            continue
+        if at - begin >= SHORTEST_TEXT:
+            result[begin:at] = bytes([BLANK]) * (at - begin)
+        begin = at + 1
+    return bytes(result)
+
+
+def hex_octet(digits: bytes) -> int | None:
+    """The value of two hexadecimal digits; None where they are none."""
+    try:
+        return int(digits, 16) if len(digits) == 2 and digits.isalnum() else None
+    except ValueError:
+        return None

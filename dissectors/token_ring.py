@@ -1,0 +1,59 @@
+"""What token rings of all protocols show: an observer of frames, and the ring as a value, a table and sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from dissectors.frame import Event, Header
+from dissectors.line import Timing
+
+Cell = str | int | float | None
+
+
+class RingWindow(Protocol):
+    """What changed in a ring between two looks: numbers of the bus, and of each station by address."""
+
+    @property
+    def bus(self) -> Mapping[str, object]:
+        """Numbers of the whole ring, by name."""
+        ...
+
+    @property
+    def nodes(self) -> Mapping[int, Mapping[str, object]]:
+        """Numbers of its stations."""
+        ...
+
+
+class RingObserver(Protocol):
+    """Watches a ring. Total: any events, any times; memory is bounded."""
+
+    def see(self, no: int, event: Event, header: Header | None) -> None:
+        """Take the next row."""
+        ...
+
+    def miss(self, time: int) -> None:
+        """Octets were lost at this time (ns): what is missing there says nothing."""
+        ...
+
+    def ring(self) -> Any:
+        """The ring so far, a value of the protocol's own."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class TokenRing:
+    """How a protocol's ring is watched and shown; `ring` is what its observer gives.
+
+    `observer(timing)`: watches a bus. `window(before, after)`: what changed between two looks.
+    `order(ring)`: its masters in the order of the token; empty when no closed ring was seen.
+    `headings`, `rows(ring)`: a table, one row a master. `sentences(ring)`: what it comes to.
+    """
+
+    observer: Callable[[Timing], RingObserver]
+    window: Callable[[Any, Any], RingWindow]
+    order: Callable[[Any], tuple[int, ...]]
+    headings: tuple[str, ...]
+    rows: Callable[[Any], list[tuple[Cell, ...]]]
+    sentences: Callable[[Any], list[str]]

@@ -1,0 +1,9 @@
+"""Durations in words, the same everywhere."""
+
+from __future__ import annotations
+
+
+def milliseconds(value: int) -> str:
+    """A duration in ns as milliseconds with the precision that is worth reading: "8.2 ms", "0.31 ms", "1250 ms"."""
+    ms = value / 1e6
+    return f"{ms:.0f} ms" if abs(ms) >= 100 else f"{ms:.1f} ms" if abs(ms) >= 1 else f"{ms:.2f} ms"
