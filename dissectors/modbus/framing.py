@@ -57,7 +57,7 @@ WINDOW: Final = 2 * MAX_FRAME
 """Most octets held without silence: then all but the last MAX_FRAME are given out."""
 
 _FIRST = 24  # a first look at a window: on a bus with silences most frames need none
-_FIRST_OPEN = 56  # the same where nothing predicts the length of what the window begins with
+_FIRST_OPEN = 96  # the same where nothing predicts the length of what the window begins with
 _STEP = 32  # fewest octets between looks at a window that does not begin with a frame
 _PATIENT_STEP = 64  # the same while its begin may still become one
 _MOST_CUTS = 3  # silences over which a frame is pieced together
