@@ -35,7 +35,7 @@ def shares_of_damage(seen: Evidence) -> Damage:
     requests = seen.damaged_requests.count
     if len(hits) == 1:
         hits["master"] = requests
-    blamed = _to_blame(hits, octets)
+    blamed = to_blame(hits, octets)
     hits["master"] = requests
     if requests and "master" not in blamed:
         share = octets["master"] / sum(octets.values())
@@ -46,7 +46,7 @@ def shares_of_damage(seen: Evidence) -> Damage:
     return Damage(frozenset(blamed), common)
 
 
-def _to_blame(hits: dict[str, int], octets: dict[str, int]) -> set[str]:
+def to_blame(hits: dict[str, int], octets: dict[str, int]) -> set[str]:
     """Those with more than their share, the worst one first, then the others among themselves."""
     left, blamed = dict(hits), set[str]()
     while len(left) > 1:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from dissectors.findings import Finding, Severity, Tally, counted, found, times
-from dissectors.modbus.damage_shares import Damage, shares_of_damage
+from dissectors.modbus.damage_shares import Damage, shares_of_damage, to_blame
 from dissectors.modbus.evidence import Evidence
 from dissectors.modbus.judgement_words import MS, ms, note_if, request_words, seconds, units
 from dissectors.modbus.rules import RULES
@@ -15,7 +15,7 @@ from dissectors.modbus.station_judgement import FLAWS, is_absent, of_station
 _WASTE = 0.05
 _HABIT = 10  # a sender that is too quick is so once in so many frames at least; what a computer holds up is rarer
 _HABIT_LEAST = 6
-_EVERYBODY = 3  # senders with the same pauses: no three of them fail alike
+_PAUSES_LEAST = 3
 _CUT_LEAST = 3
 _COMMON_LEAST = 3
 
@@ -169,15 +169,18 @@ def _of_gaps(seen: Evidence) -> Iterator[Finding]:
         if tally.count >= 3 and _HABIT * tally.count >= seen.frames[sender]:
             words = f"{tally.count} frames began less than {ms(timing.t35)} after the frame before"
             yield tally.found(RULES["MB301"], sender, words)
-    paused = {sender: tally for sender, tally in seen.paused.items() if tally.count >= 3 and seen.judges_pauses}
-    if len(paused) >= _EVERYBODY and 2 * len(paused) >= len(seen.frames):
-        count = sum(tally.count for tally in paused.values())
-        words = f"{count} frames of {len(paused)} senders with over {ms(timing.t15)} of silence inside"
-        evidence = tuple(sorted(no for tally in paused.values() for no in tally.evidence))
+    paused = seen.paused if seen.judges_pauses else {}
+    hits = {sender: tally.count for sender, tally in paused.items()}
+    blamed = to_blame(hits, {sender: max(1, seen.frames[sender]) for sender in hits}) if len(hits) > 1 else set(hits)
+    common = [paused[sender] for sender in sorted(hits) if sender not in blamed]
+    if len(common) > 1 and sum(tally.count for tally in common) >= _PAUSES_LEAST:
+        count = sum(tally.count for tally in common)
+        words = f"{count} frames of {len(common)} senders with over {ms(timing.t15)} of silence inside"
+        evidence = tuple(sorted(no for tally in common for no in tally.evidence))
         yield found(
             RULES["MB304"], "adapter", words, first=seen.first or 0, last=seen.now, count=count, evidence=evidence
         )
-        paused = {}
+    paused = {sender: paused[sender] for sender in blamed if paused[sender].count >= _PAUSES_LEAST}
     for sender, tally in sorted(paused.items()):
         words = f"{tally.count} frames with over {ms(timing.t15)} of silence inside"
         yield tally.found(RULES["MB302"], sender, words)

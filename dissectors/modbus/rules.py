@@ -364,7 +364,8 @@ _ALL = (
         "MB304",
         Severity.NOTE,
         "pauses in everybody's frames",
-        "Pauses of over 1.5 characters inside the frames of three senders or more, and of half of all.",
+        "Pauses of over 1.5 characters inside the frames of several senders, of none much more than its part of all "
+        "frames explains.",
         "the adapter or the computer hands octets over late, though this capture says nothing of it",
         "the adapter's latency timer; what else the computer does; whether the capture names its adapter",
         explains=("MB302",),
