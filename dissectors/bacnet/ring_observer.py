@@ -216,7 +216,9 @@ class RingObserver:
 
     def _poll(self, no: int, frame: Frame, source: int, destination: int, node: NodeTally) -> None:
         node.polls_sent += 1
-        if node.searches or node.after_search or not node.tokens_sent:
+        before = self._before
+        again = before is not None and before.octets[2] == _POLL and before.octets[4] == source
+        if again or node.searches or node.after_search or not node.tokens_sent:  # maintenance polls once in a turn
             node.polls_of_search += 1
         if node.highest_polled < destination <= MAX_MASTER:
             node.highest_polled = destination

@@ -13,7 +13,7 @@ from dissectors.bacnet.frame_making import frame
 from tests.dissectors.bacnet.ring_script import Step, data, found, poll, rounds, spoil, token
 
 READ = "0104000301 0c0c020004d2194d".replace(" ", "")
-VALUE = "010030010c0c020004d2194d3e75020041313f"
+VALUE = "010030010c0c020004d2194d3e75030041313f"
 I_AM = "01001000c4020000c82201e09100225d"
 _HEAD = "#!sniff-capture 1\n# line: 38400,8N1\n# protocol: mstp\n# start: 2026-03-01T10:00:00Z\n"
 

@@ -13,7 +13,7 @@ from dissectors.tracker import Verdict
 from tests.dissectors.bacnet.ring_script import Step, data, found, poll, rounds, script, spoil, token
 
 READ = "010400030 10c0c020004d2194d".replace(" ", "")
-VALUE = "01003 0010c0c020004d2194d3e75020041313f".replace(" ", "")
+VALUE = "01003 0010c0c020004d2194d3e75030041313f".replace(" ", "")
 
 
 def test_a_token_used_late_accuses_the_slow_station_alone():

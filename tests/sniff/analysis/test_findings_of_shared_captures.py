@@ -141,8 +141,10 @@ def pcap(name: str, file: str, first: int | None = None) -> tuple[Finding, ...]:
 
 
 def test_a_ring_that_a_master_leaves() -> None:
-    """27 does not answer row 582, ignores two tokens, and is not heard again; 27 polls far beyond 27. 11 takes 38 … 45
-    ms to use five of its tokens: over 15 ms whatever the 20 ms hide that the capture's times may be late."""
+    """27 does not answer row 582, ignores two tokens, and is not heard again; 27 polls far beyond 27.
+
+    11 takes 38 … 45 ms to use five of its tokens: over 15 ms, though the capture's times may be late by 20 ms.
+    """
     findings = pcap("mstp-kargs-2009", "mstp_20090227094623.pcap")
     assert said(findings) == {
         ("error", "MS106", "MAC 27"),
