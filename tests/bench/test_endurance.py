@@ -1,8 +1,8 @@
 """Days of recording in minutes: everything bad at random, and every octet accounted for. Not in the suite.
 
 `ENDURANCE_HOURS=24 ENDURANCE_FULL_HOURS=1 make bench ARGS="-k endurance -s"` of simulated time, by default half an hour
-and six minutes; ENDURANCE_SEED (random, printed). What is injected: unplugs, a full disk, a disk that hangs, a main process that dies
-and is begun again, files that are removed.
+and six minutes; ENDURANCE_SEED (random, printed). What is injected: unplugs, a full disk, a disk that hangs, a main
+process that dies and is begun again, files that are removed.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Anything at all through framers, dissectors, trackers, judges and readers: no exception, no octet lost, linear time.
 
-`FUZZ_SECONDS=600 make bench ARGS="-k fuzz -s"`: so long for each protocol, by default 10 s; FUZZ_SEED (random, printed).
+`FUZZ_SECONDS=600 make bench ARGS="-k fuzz -s"`: each protocol so long, by default 10 s; FUZZ_SEED (random, printed).
 """
 
 from __future__ import annotations
