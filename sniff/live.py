@@ -22,7 +22,7 @@ from sniff.detection import Progress, Search
 from sniff.engine import Output
 from sniff.reading import engine_for
 from sniff.session import LineEvent, Session
-from sniff.thinning import Budget
+from sniff.thinning import Budget, Room
 from sniff.value_channels import ValueChannels
 
 AT_ONCE = 0.2
@@ -34,7 +34,7 @@ TO_THE_END = 1.0
 PIECE = 2048
 """Octets given to the engine at a time."""
 
-VALUES_A_SECOND, VALUES_AT_ONCE = 1.0, 4000
+VALUES_AT_ONCE = 4000
 NODES_A_SECOND, NODES_AT_ONCE = 0.5, 600
 """What goes back into the recording of the values of points and of the numbers of stations: `sniff/thinning.py`."""
 
@@ -69,7 +69,8 @@ class LiveBus:
         self._leave_at: float | None = None  # when what is pending is not looked at any more
         self._skipped = 0
         self._channels = ValueChannels(self.session.bus, self.devices) if link.paths else None
-        self._values_budget = Budget(VALUES_A_SECOND, VALUES_AT_ONCE)
+        self._room = Room()
+        self._values_budget = Budget(Room.LEAST, VALUES_AT_ONCE)
         self._nodes_budget = Budget(NODES_A_SECOND, NODES_AT_ONCE)
         self._settle()
 
@@ -163,11 +164,14 @@ class LiveBus:
             self.status = message
             return [message]
         if isinstance(message, Tick):
+            self._values_budget.rate = self._room.rate(message.now)
             if self._bus_channels is not None and (messages := self._bus_channels.due(message.now)):
                 self._send(messages)
             deadline = self.engine.deadline()
             due = deadline is not None and message.now >= deadline
             return self._some(self.engine.advance(message.now)) if due or deadline is None else []
+        if isinstance(message.item, Chunk):
+            self._room.add(len(message.item.octets))
         was_searching = self.engine.searching
         output = self.engine.take(message.item)
         if was_searching and not self.engine.searching:

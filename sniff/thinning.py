@@ -9,12 +9,44 @@ from __future__ import annotations
 
 from dissectors.line import NS_PER_S
 
+A_SECOND = 800.0
+"""Octets of a recording, a second, up to which values fill what the bus leaves: with the rest some 75 MB a day."""
+
+_ALWAYS, _A_READ, _AN_OCTET, _A_VALUE = 240.0, 5.0, 0.6, 36.0
+"""What a recording takes for a second, a read, an octet of the bus and a value: measured (`tests/bench`)."""
+
+
+class Room:
+    """How many values a second a recording has room for beside the octets of its bus, by what the bus says now."""
+
+    LEAST, MOST = 1.0, 20.0
+
+    def __init__(self) -> None:
+        self._reads = self._octets = 0
+        self._begin: int | None = None
+        self._size = A_SECOND
+
+    def add(self, octets: int) -> None:
+        """A read came."""
+        self._reads += 1
+        self._octets += octets
+
+    def rate(self, now: int) -> float:
+        """Values a second from now on (ns)."""
+        seconds = 0.0 if self._begin is None else (now - self._begin) / NS_PER_S
+        if self._begin is None or seconds >= 1:
+            if seconds >= 1:
+                size = _ALWAYS + (_A_READ * self._reads + _AN_OCTET * self._octets) / seconds
+                self._size += (size - self._size) / 10
+            self._begin, self._reads, self._octets = now, 0, 0
+        return min(max((A_SECOND - self._size) / _A_VALUE, self.LEAST), self.MOST)
+
 
 class Budget:
     """`rate`: messages a second in the long run. `burst`: that may come at once after a quiet time."""
 
     def __init__(self, rate: float, burst: int) -> None:
-        self._rate = rate
+        self.rate = rate
         self._burst = float(burst)
         self._left = float(burst)
         self._at: int | None = None
@@ -24,10 +56,10 @@ class Budget:
         """Whether a message of a channel is to be written at `now` (ns)."""
         passed = 0 if self._at is None else max(0, now - self._at)
         self._at = now if self._at is None else max(self._at, now)
-        self._left = min(self._burst, self._left + passed / NS_PER_S * self._rate)
+        self._left = min(self._burst, self._left + passed / NS_PER_S * self.rate)
         last = self._last.get(channel)
         if last is not None and self._left < self._burst / 2:
-            turn = len(self._last) / self._rate * NS_PER_S
+            turn = len(self._last) / self.rate * NS_PER_S
             if 0 <= now - last < turn:
                 return False
         if self._left < 1:

@@ -23,6 +23,9 @@ DAMAGES = {
     "restarted": "broken off by a new frame",
     "timeout": "broken off by silence",
 }
+NARROW = "\u202f"
+"""The space within our own numbers."""
+
 TROUBLE_MOST = 12
 """Kinds of trouble that get a column of their own."""
 
@@ -34,7 +37,9 @@ def page(reports: Sequence[Numbers]) -> str:
 
     def harmless(value: object) -> object:
         """What a capture says may be made for the terminal that the page is printed to."""
-        return plain(value) if isinstance(value, str) and not isinstance(value, Markup) else value
+        if not isinstance(value, str) or isinstance(value, Markup):
+            return value
+        return NARROW.join(plain(part) for part in value.split(NARROW))
 
     environment = Environment(
         autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True, finalize=harmless
@@ -102,7 +107,7 @@ def _number(value: object) -> str:
         return "–"
     if isinstance(value, float):
         return f"{value:.2f}" if abs(value) < 100 else f"{value:.0f}"
-    return f"{value:,}".replace(",", "\u202f") if isinstance(value, int) else str(value)
+    return f"{value:,}".replace(",", NARROW) if isinstance(value, int) else str(value)
 
 
 def _percent(share: float) -> str:

@@ -123,7 +123,8 @@ def test_killed_under_load_it_lacks_at_most_the_last_second(bus, tmp_path) -> No
 
 
 MAIN = """
-import sys, time
+import signal, sys, time
+signal.signal(signal.SIGINT, signal.default_int_handler)  # whoever runs the tests in the background ignores it
 from dissectors.line import LineSettings
 from sniff.capture.link import CaptureLink, RecordSpec, SourceSpec
 link = CaptureLink.start([SourceSpec(sys.argv[1], LineSettings.parse("115200,8N1"))], RecordSpec(sys.argv[2]))

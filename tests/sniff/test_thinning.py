@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from itertools import pairwise
 
-from sniff.thinning import Budget
+from sniff.thinning import Budget, Room
 
 S = 1_000_000_000
 
@@ -43,3 +43,20 @@ def test_a_clock_that_runs_backwards() -> None:
     for number in range(100):
         budget.take("a", -100 * S - number)
     assert budget.take("a", 1000 * S)
+
+
+def room(reads: int) -> float:
+    """After a minute with so many reads of 9 octets a second."""
+    found = Room()
+    for second in range(60):
+        for _ in range(reads):
+            found.add(9)
+        rate = found.rate(second * S)
+    return rate
+
+
+def test_a_quiet_bus_has_room_for_more_values() -> None:
+    assert room(200) == room(100) == Room.LEAST
+    assert 1 <= room(50) < 2
+    assert 8 < room(10) < 15
+    assert 12 < room(0) <= Room.MOST
