@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from dissectors.frame import Check, Damage, Frame, Header, Repair, Role
+from dissectors.frame import Check, Damage, Flaw, Frame, Header, Repair, Role
 from dissectors.modbus.adu import ASCII_NAME, RTU_NAME, ascii_check, ascii_octets, readable, rtu_check
 from dissectors.modbus.functions import (
     BROADCAST,
@@ -38,7 +38,7 @@ _COUNTERS = frozenset((0x02, *range(0x0B, 0x13)))  # diagnostics whose request c
 def peek_rtu(frame: Frame) -> Header:
     """The header of an RTU frame. Total; of a damaged frame, what its first octets or its repair say."""
     if frame.repair is not None:
-        return _repaired(peek_rtu(readable(frame)), frame.repair)
+        return _repaired(peek_rtu(readable(frame)), frame.repair, "CRC error")
     error = None if frame.ok else _damage(frame, "CRC error: 0x{:04X}, computed 0x{:04X}", rtu_check(frame))
     return _peek(RTU_NAME, frame.octets, frame, error, frame.expected)
 
@@ -46,7 +46,7 @@ def peek_rtu(frame: Frame) -> Header:
 def peek_ascii(frame: Frame) -> Header:
     """The header of an ASCII frame. Total; of a damaged frame, what its first characters or its repair say."""
     if frame.repair is not None:
-        return _repaired(peek_ascii(readable(frame)), frame.repair)
+        return _repaired(peek_ascii(readable(frame)), frame.repair, "LRC error")
     octets = ascii_octets(frame)
     error = None if frame.ok else _damage(frame, "LRC error: 0x{:02X}, computed 0x{:02X}", ascii_check(frame))
     if frame.check is not Check.ABSENT:
@@ -70,9 +70,10 @@ def kind_of(code: int, mei: int | None = None) -> str:
     return function.name
 
 
-def _repaired(header: Header, repair: Repair) -> Header:
-    """What the frame says, and that it is damaged all the same."""
-    return replace(header, ok=False, error=repair.flaw.value)
+def _repaired(header: Header, repair: Repair, wrong: str) -> Header:
+    """What the frame says, and that it is damaged all the same; `wrong`: what a spoilt octet is seen by."""
+    spoilt = repair.flaw in (Flaw.FIRST_SPOILT, Flaw.LAST_SPOILT, Flaw.ONE_SPOILT)
+    return replace(header, ok=False, error=f"{wrong}, {repair.flaw.value}" if spoilt else repair.flaw.value)
 
 
 def _peek(protocol: str, octets: bytes, frame: Frame, error: str | None, expected: int | None) -> Header:

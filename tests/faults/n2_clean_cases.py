@@ -78,7 +78,9 @@ def n2_clean_cases(seconds: float) -> Iterator[Case]:
         for delay in (300, 900, 2500):
             slow = partial(n2, delays={2: delay * MS}, timeout=3000 * MS)
             yield Case(f"N2 clean, {delay} ms, {tap.name}", slow, (), tap, seconds)
-        yield Case(f"N2 clean, brisk, {tap.name}", partial(n2, pause=2 * MS, delays={1: 2 * MS}), (), tap, seconds)
+        yield Case(
+            f"N2 clean, hardly a pause, {tap.name}", partial(n2, pause=2 * MS, delays={1: 2 * MS}), (), tap, seconds
+        )
         yield Case(f"N2 clean, uneven, {tap.name}", uneven, (), tap, seconds, never=("N2007", "N2008", "N2013"))
         yield Case(f"N2 clean, many, {tap.name}", many, (), tap, seconds)
         yield Case(f"N2 scan, {tap.name}", scan, (), tap, 120)

@@ -209,9 +209,15 @@ class Looking:
         for _ in range(300):
             await self.pilot.pause(0.005)
             shown = self.app.shown
-            if shown is not None and not shown.work_left() and getattr(shown, "_detail_timer", None) is None:
+            idle = shown is not None and not shown.work_left() and getattr(shown, "_detail_timer", None) is None
+            if idle and not self._waits_for_layout():
                 break
         await self.pilot.pause(0)
+
+    def _waits_for_layout(self) -> bool:
+        """Whether a widget has other content whose place on the screen is not worked out yet."""
+        screen = self.app.screen
+        return screen._layout_required or any(widget._layout_required for widget in screen.walk_children())
 
     async def press(self, *keys: str) -> None:
         """Press keys one after the other (the pilot's own `press` waits ten times as long)."""
