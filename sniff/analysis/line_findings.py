@@ -29,6 +29,9 @@ MOST_RESTS = 16
 """Stretches that are no frame and are asked what they may be."""
 
 RUBBISH_TOLD = 40  # the same where it is known what they are
+READ_LATE = 1_000_000
+"""ns of slack over the adapter's latency that prove a late read (`sniff.late_reads`)."""
+
 PROVED_FRAMES = 20
 """So many good frames, with 1 in 10 octets in them, prove the settings: what else there is has another cause."""
 
@@ -145,9 +148,10 @@ class LineFindings:
             self._good += 1
             self._in_frames += len(frame.octets)
         self._senders.see(sender, row.no, frame)
-        for no, noise in self._pending:
-            self._senders.stray(sender, "LN201", no, noise)
-        self._pending.clear()
+        if frame.slack <= self._session.timing.latency + READ_LATE:
+            for no, noise in self._pending:
+                self._senders.stray(sender, "LN201", no, noise)
+        self._pending.clear()  # before a frame that was read late they are the rest of one that was torn
         return sender
 
     def _see_noise(self, no: int, noise: Noise) -> None:
