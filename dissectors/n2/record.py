@@ -42,7 +42,7 @@ class Missing:
 
 @dataclass(slots=True)
 class Damages:
-    """Damaged frames of one sender beside all that it sent; the newest ones can be taken back until they are settled."""
+    """Damaged frames of one sender beside all that it sent; the newest can be taken back until they are settled."""
 
     frames: int = 0
     octets: int = 0
