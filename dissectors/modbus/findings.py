@@ -323,6 +323,7 @@ class ModbusFindings:
             station.garbled += transaction.response is None
             return
         station.answered += 1
+        station.copies += answer == asked.octets
         if transaction.latency is not None:
             station.times.add(transaction.latency)
             if asked.header.ok and transaction.attempt == 1:

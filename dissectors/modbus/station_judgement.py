@@ -103,9 +103,15 @@ def _missing(seen: Evidence, name: str, unit: int, station: Station) -> Iterator
         yield replace(finding, count=left)
 
 
+_RARELY = 20
+"""Of so many requests at most one may be answered by a copy that a late read made of its repeat."""
+
+
 def is_absent(station: Station) -> bool:
     """Whether no good frame ever came from it, and no more than stray damage in place of answers."""
-    heard = station.answered or station.late.count or station.twice.count or station.undecided.count > station.asked
+    # a late read puts the repeat of a write where its answer would be
+    answered = station.answered - (station.copies if _RARELY * station.copies <= station.asked else 0)
+    heard = answered or station.late.count or station.twice.count or station.undecided.count > station.asked
     return bool(station.missing.count) and not heard and 4 * station.damaged.count <= station.asked
 
 

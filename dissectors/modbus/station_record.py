@@ -155,6 +155,7 @@ class Station:
     waited: int = 0  # ns, that the master spent on requests that nothing followed
     last_start: int = 0  # of its newest request
     last_heard: int | None = None
+    copies: int = 0  # of the answers: those that equal the request and may be its repeat
     reserved: Tally = field(default_factory=Tally)  # frames when its address is outside the standard
     times: ResponseTimes = field(default_factory=ResponseTimes)
     requests: dict[Key, Requested] = field(default_factory=dict)

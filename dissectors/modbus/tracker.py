@@ -47,6 +47,9 @@ _CHAIN_MOST = 8  # equal requests in a row whose verdicts wait for each other
 _GARBLE = 3  # so many octets of noise in place of an answer are a damaged answer
 _QUIET_NOISE = frozenset((Reason.ZEROS, Reason.BREAK, Reason.PAD))
 
+_ECHO_VOTES = 4
+"""Answered requests with an echo, or without, that count at most against what is seen now."""
+
 
 class ModbusTracker:
     """Implements `dissectors.tracker.Tracker` for RTU and ASCII lines.
@@ -69,6 +72,7 @@ class ModbusTracker:
         self._answered: deque[Exchange] = deque(maxlen=4)  # the exchanges that were answered last
         self._given_up: deque[Exchange] = deque(maxlen=8)
         self._echoing: bool | None = None  # whether this bus repeats requests at once; None while unlearnt
+        self._echo_votes = 0  # answered requests with an echo, less those without
         self._mute: set[int] = set()  # units in listen-only mode
         self._only: bytes | None = None  # what all frames so far say; empty when they differ
         self._doubts = Doubts(self.learnt)
@@ -125,7 +129,8 @@ class ModbusTracker:
     def _request(self, seen: Seen, sure: bool = True, fault: str | None = None) -> Placement:
         """A request: an echo of the newest one, its repeat, or another."""
         if sure and self._is_echo_of_request(seen):
-            self._echoing = True
+            if self._echoing is None:
+                self._echoing = True
             return self._echo(seen)
         if self._open is not None and self._open.copies:
             self._finish_copies(self._open, seen)
@@ -425,8 +430,16 @@ class ModbusTracker:
             request.copied = gap
         elif request.sure and seen.header.role is Role.RESPONSE and not (why or request.fault):
             self.learnt.answered(request.unit, request.pace, gap)
-            if self._echoing is None or request.echoed:
-                self._echoing = request.echoed
+            self._learn_echo(request.echoed)
+
+    def _learn_echo(self, echoed: bool) -> None:
+        """One more request that a station answered, with its copy before the answer or without. One says little where
+        many were otherwise: a late read puts a repeat directly behind the request."""
+        if self._echoing is None or (echoed and not self._echo_votes):
+            self._echoing = echoed
+        self._echo_votes = max(-_ECHO_VOTES, min(_ECHO_VOTES, self._echo_votes + (1 if echoed else -1)))
+        if self._echo_votes:
+            self._echoing = self._echo_votes > 0
 
     def _note_mode(self, request: Exchange) -> None:
         """Listen-only mode begins with its command and ends with a restart, or when the unit speaks again."""

@@ -17,6 +17,7 @@ from dissectors.n2.commands import parse_command
 from dissectors.n2.header import meant
 from dissectors.n2.masters import Asked, Masters
 from dissectors.n2.record import Damages, Override, Station
+from dissectors.n2.torn import TornFrames
 from dissectors.n2.wording import SLOW, Heard, worded
 from dissectors.tracker import Placement, Transaction, Verdict
 
@@ -37,6 +38,7 @@ class N2Findings:
         self._master = Damages()
         self._asked: dict[int, Asked] = {}  # by transaction
         self._masters = Masters()
+        self._torn = TornFrames(timing)
         self._stray = Tally()
         self._codes: dict[int, str] = {}  # transaction → error code, of refusals that are still to close
         self._answers: OrderedDict[int, bytes] = OrderedDict()  # transaction → its good answer
@@ -47,6 +49,7 @@ class N2Findings:
         """Take the next row: event, its header and placement (None for noise)."""
         self._first = event.start if self._first is None else self._first
         self._now = max(self._now, event.end)
+        self._torn.see(no, event, placement.tx if placement else None, is_good_frame=header is not None and header.ok)
         if isinstance(event, Noise) or header is None or placement is None:
             if not event.octets or event.octets.strip(b"\r\n"):
                 self._masters.see_other()  # may have been an answer
@@ -67,7 +70,7 @@ class N2Findings:
                 self._station(placement.destination).turns += 1
             self._turn = placement.destination
         elif event.damage is not Damage.RESTARTED or event.repair is not None:
-            self._master.add_bad(event.end, no, event.repair.flaw if event.repair is not None else None)
+            self._add_bad(self._master, no, event)
 
     def _see_answer(self, no: int, event: Frame, header: Header, placement: Placement) -> None:
         self._masters.see_other()
@@ -86,7 +89,13 @@ class N2Findings:
         sent.frames += 1
         sent.octets += len(octets)
         if not header.ok:
-            sent.add_bad(event.end, no, event.repair.flaw if event.repair is not None else None)
+            self._add_bad(sent, no, event)
+
+    def _add_bad(self, sender: Damages, no: int, event: Frame) -> None:
+        if self._torn.is_late(event):
+            return  # its begin may have been read before
+        sender.add_bad(event.end, no, event.repair.flaw if event.repair is not None else None)
+        self._torn.struck(sender)
 
     def settle(self, transaction: Transaction) -> None:
         """Take a transaction that closed."""
@@ -101,6 +110,8 @@ class N2Findings:
             return
         station = self._station(transaction.station)
         if verdict is Verdict.ANSWERED_TWICE:
+            if self._torn.is_torn(transaction.of, transaction.response):
+                return  # to what was torn, perhaps
             same = self._answers.get(transaction.id) == self._answers.get(transaction.of or 0)
             (station.repeated if same else station.twice).add(transaction.start, transaction.response)
         elif verdict is Verdict.LATE:
@@ -117,7 +128,7 @@ class N2Findings:
         if transaction.response is None:
             if verdict is Verdict.NO_RESPONSE:
                 station.missing.add(transaction.id, transaction.end, transaction.request)
-            elif verdict is Verdict.DAMAGED_ANSWER:
+            elif verdict is Verdict.DAMAGED_ANSWER and not self._torn.is_torn(transaction.id, transaction.request):
                 station.sent.add_bad(transaction.end, transaction.request)
             return
         station.answered += 1

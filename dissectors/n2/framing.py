@@ -202,11 +202,20 @@ class N2Framer:
         self._skipped += count
         self._out.append(Noise(taken.octets, taken.start, taken.end, place, _reason(taken, place), taken.marks))
 
+    def _place_before_frame(self) -> Place:
+        """Where the noise lies that a frame follows: at the nearer one where it may touch the frame before as well."""
+        if not self._attached or not self._start:
+            return Place.BEFORE
+        before, after = self._window.gap(0), self._window.gap(self._start)
+        if before == after:
+            return Place.BETWEEN
+        return Place.AFTER if before < after else Place.BEFORE
+
     # --- frames ---
 
     def _emit(self, octets: bytes, piece: Piece, check: Check, *, joined: bool) -> None:
         """Give octets at the begin of the stretch as a frame."""
-        self._flush_noise(Place.BETWEEN if self._attached else Place.BEFORE)
+        self._flush_noise(self._place_before_frame())
         taken = self._window.take(len(octets))
         self._seams = [seam - len(octets) for seam in self._seams]
         found = Found.SPLIT if piece.split else Found.JOINED if joined else Found.DELIMITER

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from dissectors.findings import Tally
@@ -36,27 +37,58 @@ class Missing:
 
     def tally(self) -> Tally:
         """All of them."""
-        settled = self._settled
-        both = Tally(settled.count, settled.first, settled.last, list(settled.evidence))
-        for time, frame in self._recent.values():
-            both.add(time, frame)
-        return both
+        return _with(self._settled, self._recent.values())
 
 
 @dataclass(slots=True)
 class Damages:
-    """Damaged frames of one sender beside all that it sent."""
+    """Damaged frames of one sender beside all that it sent; the newest can be taken back until they are settled."""
 
     frames: int = 0
     octets: int = 0
-    bad: Tally = field(default_factory=Tally)
-    flaws: dict[Flaw, Tally] = field(default_factory=dict)
+    _settled: Tally = field(default_factory=Tally)
+    _flaws: dict[Flaw, Tally] = field(default_factory=dict)
+    _recent: list[tuple[int, int | None, Flaw | None]] = field(default_factory=list)
 
     def add_bad(self, time: int, frame: int | None, flaw: Flaw | None = None) -> None:
         """Count one; `flaw`: the one thing that is wrong with it, where that is known."""
-        self.bad.add(time, frame)
-        if flaw is not None:
-            self.flaws.setdefault(flaw, Tally()).add(time, frame)
+        self._recent.append((time, frame, flaw))
+        if len(self._recent) > _RECALLED:
+            self.settle()
+
+    def settle(self) -> None:
+        """The newest ones are damage indeed."""
+        for time, frame, flaw in self._recent:
+            self._settled.add(time, frame)
+            if flaw is not None:
+                self._flaws.setdefault(flaw, Tally()).add(time, frame)
+        self._recent.clear()
+
+    def forget(self) -> None:
+        """The newest ones were none."""
+        self._recent.clear()
+
+    @property
+    def bad(self) -> Tally:
+        """All damaged frames."""
+        return _with(self._settled, ((time, frame) for time, frame, _ in self._recent))
+
+    @property
+    def flaws(self) -> dict[Flaw, Tally]:
+        """Those whose one flaw is known, by it."""
+        flaws = dict(self._flaws)
+        for flaw in {flaw for _, _, flaw in self._recent if flaw is not None}:
+            recent = ((time, frame) for time, frame, its in self._recent if its is flaw)
+            flaws[flaw] = _with(self._flaws.get(flaw, Tally()), recent)
+        return flaws
+
+
+def _with(settled: Tally, recent: Iterable[tuple[int, int | None]]) -> Tally:
+    """A tally and what is not settled yet."""
+    both = Tally(settled.count, settled.first, settled.last, list(settled.evidence))
+    for time, frame in recent:
+        both.add(time, frame)
+    return both
 
 
 @dataclass(frozen=True, slots=True)

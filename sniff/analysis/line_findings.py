@@ -13,7 +13,7 @@ from dissectors.tracker import Transaction, Verdict
 from dissectors.words import milliseconds
 from sniff.analysis.line_rules import LINE_RULES as RULES
 from sniff.analysis.line_use import LineUse
-from sniff.analysis.other_settings import SAMPLE_OCTETS, Fit, what_fits
+from sniff.analysis.other_settings import SAMPLE_OCTETS, Fit, other_protocol, what_fits
 from sniff.analysis.sender_findings import BUS, WRONG, Senders
 from sniff.analysis.slower_bus import slower_by
 from sniff.analysis.time_patterns import TimePatterns
@@ -29,6 +29,13 @@ MOST_RESTS = 16
 """Stretches that are no frame and are asked what they may be."""
 
 RUBBISH_TOLD = 40  # the same where it is known what they are
+READ_LATE = 1_000_000
+"""ns of slack over the adapter's latency that prove a late read (`sniff.late_reads`)."""
+
+PROVED_FRAMES = 20
+"""So many good frames, with 1 in 10 octets in them, prove the settings: what else there is has another cause."""
+
+_WHO_SPEAKS_IT = "which device still speaks the other protocol: its protocol setting; it does not belong on this line"
 
 
 class LineFindings:
@@ -55,6 +62,9 @@ class LineFindings:
         self._sample: list[Chunk] = []  # what came first, to ask what else it may be
         self._sampled = 0
         self._rests: list[bytes] = []  # the first stretches that are no frame
+        self._rest_sample: list[Chunk] = []  # the same, to ask what else they may be
+        self._rests_sampled = 0
+        self._rest_fit: tuple[int, Fit | None] = (0, None)
         self._fit: tuple[int, Fit | None] = (0, None)  # asked when so many octets were sampled
 
     # ---- taking in
@@ -138,9 +148,10 @@ class LineFindings:
             self._good += 1
             self._in_frames += len(frame.octets)
         self._senders.see(sender, row.no, frame)
-        for no, noise in self._pending:
-            self._senders.stray(sender, "LN201", no, noise)
-        self._pending.clear()
+        if frame.slack <= self._session.timing.latency + READ_LATE:
+            for no, noise in self._pending:
+                self._senders.stray(sender, "LN201", no, noise)
+        self._pending.clear()  # before a frame that was read late they are the rest of one that was torn
         return sender
 
     def _see_noise(self, no: int, noise: Noise) -> None:
@@ -153,6 +164,9 @@ class LineFindings:
             self._rest_octets += len(noise.octets)
             if len(self._rests) < MOST_RESTS and len(noise.octets) <= 300:
                 self._rests.append(noise.octets)
+            if self._rests_sampled < SAMPLE_OCTETS:
+                self._rest_sample.append(Chunk(noise.end, noise.octets[:SAMPLE_OCTETS], noise.marks))
+                self._rests_sampled += len(noise.octets)
         elif noise.place is Place.BEFORE:
             self._pending.append((no, noise))
             del self._pending[:-8]
@@ -167,9 +181,13 @@ class LineFindings:
     def rubbish(self) -> bool:
         """Whether hardly anything is a frame, so that nothing else can be judged."""
         few = 10 * self._in_frames < 3 * self._octets and 10 * self._good < 3 * self._rows
-        if not few or self._octets < RUBBISH_TOLD:
+        if not few or self._octets < RUBBISH_TOLD or self._are_settings_proved:
             return False
         return self._octets >= RUBBISH_LEAST or self._other_settings() is not None
+
+    @property
+    def _are_settings_proved(self) -> bool:
+        return self._good >= PROVED_FRAMES and 10 * self._in_frames >= self._octets
 
     def findings(self) -> tuple[Finding, ...]:
         """All findings so far."""
@@ -250,6 +268,15 @@ class LineFindings:
             self._fit = self._sampled, fit
         return fit
 
+    def _other_protocol(self) -> Fit | None:
+        """What the stretches that are no frame are; asked again when there are twice as many."""
+        asked, fit = self._rest_fit
+        if self._rests_sampled >= 2 * asked or (asked < self._rests_sampled >= SAMPLE_OCTETS):
+            session = self._session
+            fit = other_protocol(self._rest_sample, session.line, session.adapter.latency, session.protocol)
+            self._rest_fit = self._rests_sampled, fit
+        return fit
+
     def _parity_setting(self) -> Finding:
         words = (
             f"{self._marked / self._octets:.0%} of the octets have parity or framing errors, "
@@ -284,6 +311,10 @@ class LineFindings:
         if often >= 3 and 2 * often >= len(rests):
             words = f"{finding.seen}; the same {len(same)} octets {often} times ({same[:8].hex(' ').upper()}"
             finding = replace(finding, seen=words + (" …)" if len(same) > 8 else ")"))
+        fit = self._other_protocol()
+        if fit is not None:
+            means = f"another protocol on the same line: {fit.means}"
+            return replace(finding, seen=f"{finding.seen}; {fit.seen}", means=means, next=_WHO_SPEAKS_IT)
         factor = slower_by(rests, line)
         if not factor:
             return finding

@@ -38,8 +38,10 @@ _ALL = (
         Severity.ERROR,
         "hardly anything is a frame",
         "Under 3 in 10 octets, and under 3 in 10 of all frames and other stretches, are good frames; of at least 60 "
-        "octets, or 40 where it is known what they are. All other rules are left out then: they would judge rubbish. "
-        "What fits is named: another protocol whose checks agree, seven bits read as eight, data bits that the port "
+        "octets, or 40 where it is known what they are. Not where 20 frames or more are good, "
+        "with 1 in 10 octets in them: they prove the settings (LN204). All other rules are left out then: they would "
+        "judge rubbish. What fits is named: another protocol whose checks agree, seven bits read as "
+        "eight, data bits that the port "
         "lacks, inverted octets, a bus that is slower (every level lasts a multiple of so many bits) or faster (the "
         "same few octets again and again, too few for a frame).",
         "wrong baud rate, wrong parity, wrong protocol, or A and B swapped",
@@ -155,7 +157,8 @@ _ALL = (
         Severity.WARNING,
         "octets that are no frame",
         "Stretches of four octets or more that are no frame, 1 in 50 octets or more of all. A smaller share is only "
-        "noted. Said is where they are always the same, and where they were sent with a slower baud rate.",
+        "noted. Said is where they are another protocol's frames with good checks, where they are always the same, and "
+        "where they were sent with a slower baud rate.",
         "damaged frames beyond recognition, another protocol on the same line, or a device with another baud rate",
         "what the stretches have in common: their place, time and first octets",
     ),
@@ -185,8 +188,8 @@ _ALL = (
         Severity.WARNING,
         "disturbances at a steady interval",
         "At least six bursts of damage or noise with 8% between their intervals, a second or more apart, that strike "
-        "several senders, with good frames between: no single station's rhythm, and none at "
-        "which anything is sent on this bus.",
+        "several senders, or of which nobody is known and that are noise (with line errors, no two alike), with good "
+        "frames between: no single station's rhythm, and none at which anything is sent on this bus.",
         "something that switches at that interval: a contactor, a pump, a heater, a compressor, a thermostat",
         "what in the plant switches at that interval, and its cable beside the bus; a suppressor at its coil",
         explains=_DAMAGE,

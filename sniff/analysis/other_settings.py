@@ -46,6 +46,16 @@ def what_fits(sample: Sequence[Chunk], line: LineSettings, latency: int, protoco
     return next(_fits(sample, line, latency, protocol), None)
 
 
+def other_protocol(sample: Sequence[Chunk], line: LineSettings, latency: int, protocol: str) -> Fit | None:
+    """The protocol, other than `protocol`, that these octets are with the same settings; None where none is sure."""
+    if sum(len(chunk.octets) for chunk in sample) < LEAST_OCTETS:
+        return None
+    found = _convincing(_evidence(sample, line, latency))
+    if found is None or found.protocol == protocol:
+        return None
+    return _as_protocol(found, "these octets read", f"somebody speaks {found.protocol}", f"-p {found.protocol}")
+
+
 def _fits(sample: Sequence[Chunk], line: LineSettings, latency: int, protocol: str) -> Iterator[Fit]:
     """The surest first: what reads with good checks, then what the octets themselves exclude."""
     evidence = _evidence(sample, line, latency)

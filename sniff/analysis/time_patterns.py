@@ -22,6 +22,7 @@ from dissectors.words import milliseconds
 from sniff.analysis.line_rules import LINE_RULES as RULES
 from sniff.analysis.lost_together import LostTogether
 from sniff.analysis.other_settings import Fit, what_fits
+from sniff.analysis.slower_bus import slower_by
 from sniff.session import LineEvent, Session
 
 MS = 1_000_000
@@ -39,6 +40,9 @@ QUIET = NS_PER_S // 2
 
 BURSTS_LEAST = 6
 BURSTS_KEPT = 500
+BURST_OCTETS = 64
+"""Octets of a burst that are compared with others."""
+
 STRONG = 3
 MOST_ROUNDS = 300
 STEADY = 0.08
@@ -75,6 +79,8 @@ class _Burst:
     rows: list[int]
     good_before: int  # good frames since the burst before
     struck: int  # octets with line errors, at least 1 a row
+    marked: bool  # whether it has any
+    octets: bytes  # of its first row
 
 
 @dataclass(slots=True)
@@ -211,15 +217,18 @@ class TimePatterns:
 
     def _see_trouble(self, no: int, event: Event, sender: str) -> None:
         bursts = self._bursts
-        struck = max(1, sum(bool(mark.error & _MARKS) for mark in event.marks))
+        marked = sum(bool(mark.error & _MARKS) for mark in event.marks)
+        struck = max(1, marked)
         if bursts and event.start - bursts[-1].last < QUIET:
             burst = bursts[-1]
             burst.last = max(burst.last, event.end)
             burst.struck += struck
+            burst.marked |= marked > 0
             if len(burst.senders) < 8:
                 burst.senders.add(sender)
         elif len(bursts) < BURSTS_KEPT:
-            bursts.append(_Burst(event.start, event.end, {sender}, [no], self._good_since, struck))
+            octets = event.octets[:BURST_OCTETS]
+            bursts.append(_Burst(event.start, event.end, {sender}, [no], self._good_since, struck, marked > 0, octets))
             self._good_since = 0
 
     def _see_round(self, event: Event) -> None:
@@ -317,17 +326,27 @@ class TimePatterns:
             return None
         if self._is_own_rhythm(usual):
             return None
-        if not struck or (10 * struck[0] >= 9 * len(bursts) and 10 * elsewhere < 3 * len(bursts)):
-            return None  # one sender's own rhythm, or somebody who speaks at that interval
+        if not struck and not self._is_noise(bursts):
+            return None  # somebody who speaks at that interval
+        if struck and 10 * struck[0] >= 9 * len(bursts) and 10 * elsewhere < 3 * len(bursts):
+            return None  # one sender's own rhythm
         tally = Tally()
         for burst in bursts:
             tally.add(burst.first, *burst.rows)
         longest = max(burst.last - burst.first for burst in bursts)
         seen = (
             f"{counted(len(bursts), 'burst')} of damage or noise, {steady} of {len(intervals)} intervals within "
-            f"{STEADY:.0%} of {usual / NS_PER_S:.1f} s, each {milliseconds(longest)} at most; it strikes whoever sends"
+            f"{STEADY:.0%} of {usual / NS_PER_S:.1f} s, each {milliseconds(longest)} at most"
         )
+        seen += "; it strikes whoever sends" if struck else "; with line errors, and no two alike"
         return tally.found(RULES["LN302"], "bus", seen)
+
+    def _is_noise(self, bursts: list[_Burst]) -> bool:
+        """Whether bursts beside which nobody is known are noise: with line errors, all different, at no lower rate."""
+        octets = [burst.octets for burst in bursts]
+        different = len(set(octets)) == len(octets)
+        mostly_marked = 2 * sum(burst.marked for burst in bursts) >= len(bursts)
+        return mostly_marked and different and not slower_by(octets, self._session.line)
 
     def _unreadable(self) -> Iterator[Finding]:
         told: list[tuple[_Stretch, str]] = []
