@@ -26,6 +26,10 @@ class Pseudonyms:
             self._known[number] = next(self._free, number)
         return self._known[number]
 
+    def if_known(self, number: int) -> int:
+        """The pseudonym of a number that has one; else itself: a number out of a damaged frame may be nobody's."""
+        return self._known.get(number, number)
+
 
 class Renamer(Protocol):
     """What renames the frames of one protocol; each keeps its length, and its damage if it has one."""
@@ -48,6 +52,26 @@ def without_text(octets: bytes) -> bytes:
             result[begin:at] = bytes([BLANK]) * (at - begin)
         begin = at + 1
     return bytes(result)
+
+
+def inflicted(damaged: bytes, whole: bytes, renamed: bytes) -> bytes:
+    """What happened to `whole`, so that `damaged` came, done to `renamed` (as long as `whole`).
+
+    Octets missing at an end are left out there, a swap of the last two is a swap again, every other error is XORed.
+    """
+    missing = len(whole) - len(damaged)
+    if missing < 0:
+        return damaged
+    if not missing and damaged[-2:] != whole[-2:] and damaged == whole[:-2] + whole[-2:][::-1]:
+        return renamed[:-2] + renamed[-2:][::-1]
+    front = min(range(missing + 1), key=lambda at: _errors(damaged, whole[at:]))
+    window = zip(damaged, whole[front:], renamed[front:], strict=False)
+    return bytes(was ^ right ^ new for was, right, new in window)
+
+
+def _errors(damaged: bytes, whole: bytes) -> int:
+    """Octets that differ, in the same places."""
+    return sum(a != b for a, b in zip(damaged, whole, strict=False))
 
 
 def hex_octet(digits: bytes) -> int | None:

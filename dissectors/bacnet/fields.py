@@ -34,11 +34,11 @@ Value = int | float | str
 def fields(frame: Frame, role: Role) -> dict[str, Value]:
     """Field names to values, in frame order. Total; a damaged frame has the fields of what is there."""
     found: dict[str, list[Value]] = {}
-    octets = frame.octets
+    octets = frame.octets if frame.repair is None else frame.repair.octets
     message = messages.read(frame)
     if message is None:
         return {}
-    _link(octets, message, found)
+    _link(octets, message, frame.repair is None, found)
     if message.npdu is not None:
         _network(message.npdu, message, found)
     if message.apdu is not None:
@@ -60,7 +60,8 @@ def _add(found: dict[str, list[Value]], name: str, value: Value | None) -> None:
         found.setdefault(name, []).append(value)
 
 
-def _link(octets: bytes, message: Message, found: dict[str, list[Value]]) -> None:
+def _link(octets: bytes, message: Message, came_so: bool, found: dict[str, list[Value]]) -> None:
+    """The header and the checks. `came_so`: whether the octets are those of the wire, not what they were before."""
     _add(found, "mstp.frame_type", message.frame_type)
     _add(found, "mstp.dst", message.destination)
     _add(found, "mstp.src", message.source)
@@ -68,7 +69,7 @@ def _link(octets: bytes, message: Message, found: dict[str, list[Value]]) -> Non
         return
     _add(found, "mstp.len", message.length)
     _add(found, "mstp.hdr_crc", octets[7])
-    good = octets[:2] == PREAMBLE and header_is_good(octets[:HEADER])
+    good = came_so and octets[:2] == PREAMBLE and header_is_good(octets[:HEADER])
     end = HEADER + message.length + 2
     if message.length:
         body = octets[HEADER:end]

@@ -10,7 +10,7 @@ from dissectors.bacnet import npdu as npdus
 from dissectors.bacnet.tags import header_at
 from dissectors.checksums import crc8_mstp, crc16_x25
 from dissectors.frame import Frame
-from dissectors.pseudonyms import BLANK, Pseudonyms, without_text
+from dissectors.pseudonyms import BLANK, Pseudonyms, inflicted, without_text
 
 CHARACTER_STRING, OBJECT_IDENTIFIER = 7, 12
 DEVICE = 8
@@ -24,22 +24,29 @@ class MstpRenamer:
         self.devices = Pseudonyms(range(1, 4_194_303), kept=(4_194_303,))
 
     def __call__(self, frame: Frame) -> bytes:
-        """The frame under another name."""
-        octets = frame.octets
+        """The frame under another name, with the same damage."""
+        if frame.repair is not None:
+            whole = frame.repair.octets
+            return inflicted(frame.octets, whole, self._renamed(whole, intact=True))
+        return self._renamed(frame.octets, intact=frame.ok)
+
+    def _renamed(self, octets: bytes, *, intact: bool) -> bytes:
         if len(octets) < 8:
             return octets
-        header = bytes([octets[2], self.stations.of(octets[3]), self.stations.of(octets[4]), octets[5], octets[6]])
-        good_header = crc8_mstp(octets[2:7]) == octets[7]
-        head = octets[:2] + header + (bytes([crc8_mstp(header)]) if good_header else octets[7:8])
+        good = crc8_mstp(octets[2:7]) == octets[7]
+        address = self.stations.of if good else self.stations.if_known
+        header = bytes([octets[2], address(octets[3]), address(octets[4]), octets[5], octets[6]])
+        check = octets[7] ^ crc8_mstp(octets[2:7]) ^ crc8_mstp(header)  # linear: the error in it stays what it was
+        head = octets[:2] + header + bytes([check])
         length = octets[5] << 8 | octets[6]
-        if not frame.ok or not length:
+        if not intact or not length:
             return head + octets[8:]
-        data, check, rest = octets[8 : 8 + length], octets[8 + length : 10 + length], octets[10 + length :]
         if octets[2] >= 32:  # encoded: its length would not survive a change of its content; the frame reads damaged
             return head + bytes([BLANK]) * (len(octets) - 8)
+        data, end = octets[8 : 8 + length], octets[8 + length :]
         renamed = self._npdu(data) if octets[2] in (5, 6) else without_text(data)
-        good = crc16_x25(data).to_bytes(2, "little") == check
-        return head + renamed + (crc16_x25(renamed).to_bytes(2, "little") if good else check) + rest
+        error = int.from_bytes(end[:2], "little") ^ crc16_x25(data)
+        return head + renamed + (crc16_x25(renamed) ^ error).to_bytes(2, "little") + end[2:]
 
     def _npdu(self, data: bytes) -> bytes:
         header = npdus.decode(data)

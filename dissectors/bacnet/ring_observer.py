@@ -186,7 +186,7 @@ class RingObserver:
         if before is not None:
             if not self._doubt and max(0, frame.start - before.end) + before.slack < self._least_gap:
                 tally.impossible += 1
-            if self._silence(frame) - frame.slack >= T_NO_TOKEN:  # lost even by the smallest reading of the silence
+            if self._is_new_token(frame, source):
                 self._lose_token(no, frame, source)
         self._questions.holder = self._holder
         answers = self._questions.is_answer(no, frame, frame_type, source, destination, node)
@@ -279,6 +279,19 @@ class RingObserver:
             self._tally.note(What.OTHER_DEVICE, frame.start, no, source, None, instance)
 
     # Who may send
+
+    def _is_new_token(self, frame: Frame, source: int) -> bool:
+        """Whether the silence before a frame was so long that its sender made the token anew.
+
+        By its smallest reading, whoever sends; by its largest one, where the sender neither had the token nor passed
+        it: no other cause of so long a silence leaves a token to anybody, while a second one is not proved by it.
+        """
+        silence = self._silence(frame)
+        if silence - frame.slack >= T_NO_TOKEN:
+            return True
+        if self._holder is None or source in (self._holder, self._passed_by):
+            return False
+        return silence + self._quiet_slack >= T_NO_TOKEN
 
     def _lose_token(self, no: int, frame: Frame, source: int) -> None:
         tally = self._tally

@@ -217,8 +217,10 @@ class MstpTracker:
             if waiting.damaged:
                 waiting.key = key
             apdu = message.apdu if message is not None else None
-            if apdu is not None and key is not None and apdu.type == PduType.SEGMENT_ACK and key != waiting.key:
-                key = mirrored(key)
+            if apdu is not None and key is not None and apdu.type == PduType.SEGMENT_ACK:
+                waiting.damaged = False  # acknowledged: the segment got there whole, the listener alone had it damaged
+                if key != waiting.key:
+                    key = mirrored(key)
             if key == waiting.key and (apdu is None or apdu.type != PduType.CONFIRMED_REQUEST):
                 return self._answered(waiting, no, frame, header, apdu, closed)
             if waiting.key is not None:  # another answer went first: this one can only come later

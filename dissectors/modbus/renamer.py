@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dissectors.checksums import lrc
-from dissectors.frame import Frame
+from dissectors.checksums import crc16_modbus, lrc
+from dissectors.frame import Damage, Frame
 from dissectors.modbus.adu import seal_rtu
-from dissectors.pseudonyms import Pseudonyms, hex_octet, without_text
+from dissectors.pseudonyms import Pseudonyms, hex_octet, inflicted, without_text
 
 
 class RtuRenamer:
@@ -15,12 +15,18 @@ class RtuRenamer:
         self.stations = Pseudonyms([*range(1, 248), *range(248, 256)], kept=(0,))
 
     def __call__(self, frame: Frame) -> bytes:
-        """The frame under another name."""
+        """The frame under another name, with the same damage."""
         octets = frame.octets
-        if not frame.ok:
-            return bytes([self.stations.of(octets[0])]) + octets[1:] if octets else octets
-        body = self.pdu(octets[:-2])
-        return seal_rtu(body)
+        if frame.repair is not None:
+            whole = frame.repair.octets
+            return inflicted(octets, whole, seal_rtu(self.pdu(whole[:-2])))
+        if frame.ok:
+            return seal_rtu(self.pdu(octets[:-2]))
+        renamed = bytes([self.stations.if_known(octets[0])]) + octets[1:] if octets else octets
+        if frame.damage is not Damage.CHECK or len(octets) < 4:
+            return renamed
+        moved = crc16_modbus(octets[:-2]) ^ crc16_modbus(renamed[:-2])  # linear: the error in it stays what it was
+        return renamed[:-2] + (int.from_bytes(octets[-2:], "little") ^ moved).to_bytes(2, "little")
 
     def pdu(self, body: bytes) -> bytes:
         """Unit and PDU, renamed."""
@@ -38,13 +44,29 @@ class AsciiRenamer:
         self.stations = self.rtu.stations
 
     def __call__(self, frame: Frame) -> bytes:
-        """The frame under another name; what is after the hexadecimal digits stays."""
-        octets = frame.octets
+        """The frame under another name, with the same damage; what is after the hexadecimal digits stays."""
+        if frame.repair is not None:
+            whole = frame.repair.octets
+            return inflicted(frame.octets, whole, self._renamed(whole, intact=True))
+        return self._renamed(frame.octets, intact=frame.ok, check=frame.damage is Damage.CHECK)
+
+    def _renamed(self, octets: bytes, *, intact: bool, check: bool = False) -> bytes:
         text = bytes(octet & 0x7F for octet in octets)
         end = text.find(b"\r") if b"\r" in text else len(text)
-        if not frame.ok:
+        if not intact:
             address = hex_octet(text[1:3])
-            renamed = b"" if address is None else b"%02X" % self.stations.of(address)
-            return octets[:1] + renamed + octets[1 + len(renamed) :]
+            new = address if address is None else self.stations.if_known(address)
+            if address is None or new is None or new == address:
+                return octets
+            sent = hex_octet(text[end - 2 : end])
+            if not check or sent is None or end < 7:
+                return octets[:1] + b"%02X" % new + octets[3:]
+            return (
+                octets[:1]
+                + b"%02X" % new
+                + octets[3 : end - 2]
+                + b"%02X" % (sent + address - new & 0xFF)
+                + octets[end:]
+            )
         body = self.rtu.pdu(bytes.fromhex(text[1:end].decode())[:-1])
         return octets[:1] + (body + bytes([lrc(body)])).hex().upper().encode() + octets[end:]
