@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from dissectors.bacnet.content_findings import ContentFindings
 from dissectors.bacnet.findings_of_damage import damage, duplicates
 from dissectors.bacnet.findings_of_use import polls, use
-from dissectors.bacnet.limits import MAX_MASTER, T_REPLY_DELAY, T_USAGE_DELAY
+from dissectors.bacnet.limits import MAX_MASTER, N_POLL, T_REPLY_DELAY, T_USAGE_DELAY
 from dissectors.bacnet.ring import COARSE_LIMIT, Node, Ring, What
 from dissectors.bacnet.ring_observer import RingObserver
 from dissectors.bacnet.ring_remarks import Remark, listed, milliseconds, of, plain
@@ -104,12 +104,14 @@ def _tokens(ring: Ring) -> Iterable[Remark]:
         if what is What.LOST_TOKEN:
             longest = max((event.value or 0 for event in happened.events), default=0)
             makers = sorted({event.other for event in happened.events if event.other is not None})
-            held = "the holder is not known" if mac is None else f"MAC {mac} had it"
+            disturbed = "who had it is not known, or octets that are no good frame came first"
+            held = disturbed if mac is None else f"MAC {mac} had it"
+            grave = None if mac is not None else Severity.WARNING if happened.count > 1 else Severity.NOTE
             seen = (
                 f"the token was lost {times(happened.count)}; {held}; silence up to {milliseconds(longest)}; "
                 f"begun anew by MAC {listed(makers)}"
             )
-            yield of("MS101", mac, seen, happened)
+            yield of("MS101", mac, seen, happened, grave)
         elif what is What.LEFT and mac is not None and ring.of(What.REJOINED, mac).last <= happened.last:
             node = ring.nodes.get(mac)
             if node is not None and node.last <= happened.last:
@@ -138,7 +140,7 @@ def _holders(ring: Ring) -> Iterable[Remark]:
             polled = sorted(address for source, address in ring.polled if source == by)
             first = "" if ring.first is None else f" {(node.last_token - ring.first) / 1e9:.2f} s into the capture"
             seen = (
-                f"got its last token{first} and used it; since then {rounds} rounds without a token or a poll for it: "
+                f"got its last token{first}; since then {rounds} rounds without a token or a poll for it: "
                 f"MAC {by} passes the token on to MAC {following} and polls "
                 f"{f'only {listed(polled)}' if polled else 'nobody'}, never {_between(by, following)}"
             )
@@ -152,7 +154,10 @@ def _holders(ring: Ring) -> Iterable[Remark]:
 
 
 def _skipped_by(ring: Ring, mac: int, node: Node) -> tuple[int, int, int] | None:
-    """Who passes the token past a station that was in the ring and missed no token: (who, to whom, how often)."""
+    """Who passes the token past a station that was in the ring: (who, to whom, how often).
+
+    It missed no token, or is heard while the token goes past it and nobody polls it.
+    """
     used = node.tokens_sent and node.tokens_received and node.last > node.last_token > ring.hole
     if not used or node.last_polled > node.last_token or mac > MAX_MASTER:
         return None
@@ -164,7 +169,10 @@ def _skipped_by(ring: Ring, mac: int, node: Node) -> tuple[int, int, int] | None
             source == by and time > node.last_token and (_lies_between(address, mac, following) or address == following)
             for (source, address), time in ring.polled.items()
         )
-        if not beyond:  # else it looked for a successor, and may have lost this one before
+        alive = node.last > edge.since  # heard, while the token goes past it
+        polled = sum(source == by and time > node.last_token for (source, _), time in ring.polled.items())
+        went_round = edge.streak >= N_POLL * (polled + 2)  # by now it has polled all that it ever polls, this one not
+        if (alive and went_round) or not beyond:  # else it looked for a successor, and may have lost this one before
             return by, following, edge.streak
     return None
 

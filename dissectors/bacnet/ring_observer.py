@@ -297,10 +297,19 @@ class RingObserver:
         tally = self._tally
         self._questions.give_up(no, frame, source)
         if tally.edges:  # where no token was ever seen, none can be lost
-            tally.note(What.LOST_TOKEN, frame.start, no, self._holder, source, self._silence(frame))
+            holder = None if self._doubt or self._was_interrupted() else self._holder
+            tally.note(What.LOST_TOKEN, frame.start, no, holder, source, self._silence(frame))
             tally.node(source).searches = True
             tally.node(source).searching_since = frame.start
         self._forget()
+
+    def _was_interrupted(self) -> bool:
+        """Whether the last good frame was neither by nor for the holder of the token, who may have let go of it then.
+
+        Damage in between (`_doubt`) may have been the token, or its use.
+        """
+        before = self._before
+        return before is not None and self._holder is not None and self._holder not in (*before.octets[3:5],)
 
     def _take_turn(self, no: int, frame: Frame, source: int, node: NodeTally) -> None:
         """A frame that only the holder of the token may send."""

@@ -118,7 +118,7 @@ _ALL = (
         "asked it for. The station that has the token is not at fault. A single one is only noted.",
         "a slave that answers broadcasts or reports by itself; it runs into the frames of whoever has the token",
         "the slave's settings (unsolicited I-Am, COV), or make it a master",
-        explains=("MS401", "MS402"),
+        explains=("MS101", "MS401", "MS402"),
     ),
     Rule(
         "MS201",
