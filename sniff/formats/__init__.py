@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -86,15 +86,15 @@ def _with_reads(capture: Capture) -> Capture:
     session = capture.session
     if session.unknown or session.reads is not None:
         return capture
-    capture.session = replace(session, reads=ReadTimes.of(_first_reads(capture))).with_latency_of_reads()
+    capture.session = with_first_reads(session, capture.items())
     return capture
 
 
-def _first_reads(capture: Capture) -> list[tuple[int, int]]:
-    """Time and octets of the first reads, none after a change of settings; (time, 0) for a hole."""
-    reads: list[tuple[int, int]] = []
+def with_first_reads(session: Session, items: Iterable[Item]) -> Session:
+    """The session with when its first reads came, and a latency that these allow; no reads after other settings."""
+    reads: list[tuple[int, int]] = []  # time and octets; 0 octets for a hole
     try:
-        for item in capture.items():
+        for item in items:
             if isinstance(item, Chunk):
                 reads.append((item.time, len(item.octets)))
             elif item.kind is LineEventKind.SETTINGS:
@@ -105,7 +105,7 @@ def _first_reads(capture: Capture) -> list[tuple[int, int]]:
                 break
     except CaptureError:
         pass  # whoever reads on is told
-    return reads
+    return replace(session, reads=ReadTimes.of(reads)).with_latency_of_reads()
 
 
 def create(path: str | Path, session: Session, options: Mapping[str, str] | None = None) -> CaptureWriter:

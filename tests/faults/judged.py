@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from dissectors.findings import Finding, Severity
 from sniff.analysis.judging import Judging, rules_over
 from sniff.engine import Output
+from sniff.formats import with_first_reads
 from sniff.profile_files import noted_devices
 from sniff.reading import dissector_for, outputs
 from sniff.session import Item, Session
@@ -69,7 +70,9 @@ def findings_of(session: Session, items: Iterable[Item]) -> tuple[Finding, ...]:
 
 def run(case: Case, seed: int = 1) -> Outcome:
     """Simulate, listen, judge."""
-    session, items = case.hear(case.make(seed=seed), case.seconds, case.tap)
+    session, heard = case.hear(case.make(seed=seed), case.seconds, case.tap)
+    items = list(heard)
+    session = with_first_reads(session, items)  # as whoever opens a file of it does
     findings = findings_of(session, items)
     rules = rules_over(dissector_for(session))
     missed = tuple(
