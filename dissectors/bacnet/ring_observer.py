@@ -309,7 +309,7 @@ class RingObserver:
         Damage in between (`_doubt`) may have been the token, or its use.
         """
         before = self._before
-        return before is not None and self._holder is not None and self._holder not in (*before.octets[3:5],)
+        return before is not None and self._holder is not None and self._holder not in before.octets[3:5]
 
     def _take_turn(self, no: int, frame: Frame, source: int, node: NodeTally) -> None:
         """A frame that only the holder of the token may send."""

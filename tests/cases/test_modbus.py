@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-from importlib.util import find_spec
-
 import pytest
 
 from dissectors.findings import Severity
 from dissectors.frame import Role
 from dissectors.tracker import Verdict
 from tests.cases.reading import CaseReading, case, reading
-
-NEEDS_REPAIR = pytest.mark.skipif(
-    find_spec("dissectors.modbus.repair") is None, reason="needs the framer's repair of damaged frames"
-)
 
 
 def read(name: str) -> CaseReading:
@@ -40,7 +34,6 @@ def test_an_answer_with_another_function_code_is_an_answer_that_does_not_fit() -
     }
 
 
-@NEEDS_REPAIR
 def test_swapped_check_octets_are_no_noise() -> None:
     made = read("d1-crc-octets-swapped")
     assert made.graves() == {("MB011", "station 1")}
@@ -55,7 +48,6 @@ def test_reads_of_address_0_name_the_station_that_answers() -> None:
     assert "set the unit number in the master to 10" in made.said("MB017")
 
 
-@NEEDS_REPAIR
 def test_vendor_functions_in_one_read_are_pairs() -> None:
     made = read("f1-vendor-function-glued")
     assert made.verdicts() == [Verdict.ANSWERED] * 5
