@@ -23,7 +23,7 @@ from dissectors.frame import Damage, Found, Frame, Role
 from dissectors.manifest import Dissector
 from dissectors.tracker import Transaction, Verdict
 from sniff.analysis.wording import describe
-from sniff.engine import Row
+from sniff.engine.engine import Row
 
 Value = int | float | str
 Predicate = Callable[[Row, Transaction | None], bool]

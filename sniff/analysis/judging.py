@@ -15,8 +15,8 @@ from sniff.analysis.line_findings import LineFindings
 from sniff.analysis.line_rules import LINE_RULES
 from sniff.analysis.plain import plain
 from sniff.analysis.profile_findings import PROFILE_RULES, ProfileFindings
-from sniff.engine import Output
-from sniff.session import LineEvent, LineEventKind, Session, settings_change
+from sniff.engine.engine import Output
+from sniff.engine.session import LineEvent, LineEventKind, Session, settings_change
 
 _DOUBTFUL = frozenset(
     (Verdict.NO_RESPONSE, Verdict.UNSOLICITED, Verdict.LATE, Verdict.DAMAGED_ANSWER, Verdict.DAMAGED_REQUEST)

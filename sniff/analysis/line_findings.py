@@ -18,8 +18,8 @@ from sniff.analysis.sender_findings import BUS, WRONG, Senders
 from sniff.analysis.slower_bus import slower_by
 from sniff.analysis.time_patterns import TimePatterns
 from sniff.analysis.wording import station_word
-from sniff.engine import Row
-from sniff.session import LineEvent, LineEventKind, Session
+from sniff.engine.engine import Row
+from sniff.engine.session import LineEvent, LineEventKind, Session
 
 STRAY_MOST = 3
 """So many octets that are no frame are stray ones; more are the remains of something."""
@@ -30,7 +30,7 @@ MOST_RESTS = 16
 
 RUBBISH_TOLD = 40  # the same where it is known what they are
 READ_LATE = 1_000_000
-"""ns of slack over the adapter's latency that prove a late read (`sniff.late_reads`)."""
+"""ns of slack over the adapter's latency that prove a late read (`sniff.engine.late_reads`)."""
 
 PROVED_FRAMES = 20
 """So many good frames, with 1 in 10 octets in them, prove the settings: what else there is has another cause."""

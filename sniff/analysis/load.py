@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from dissectors.frame import Frame
 from dissectors.line import NS_PER_S, LineSettings
-from sniff.engine import Row
+from sniff.engine.engine import Row
 
 KEPT_SECONDS = 86_400
 """Seconds that are known one by one; a day of them takes some 20 MB."""

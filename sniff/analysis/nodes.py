@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from dissectors.frame import Frame
 from dissectors.histogram import Histogram
 from dissectors.tracker import Transaction, Verdict
-from sniff.engine import Row
+from sniff.engine.engine import Row
 
 
 @dataclass(slots=True)

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from dissectors import registry
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
-from sniff.analysis.detecting import COVERED_LEAST, FOUND_FRAMES, LIKELY_BITS, Evidence, Reading
+from sniff.analysis.autodetect import COVERED_LEAST, FOUND_FRAMES, LIKELY_BITS, Evidence, Reading
 from sniff.analysis.slower_bus import slower_by
 
 SAMPLE_OCTETS = 3000

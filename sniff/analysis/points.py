@@ -17,7 +17,7 @@ from dissectors.profiles import Devices, Entry
 from dissectors.profiles.decoding import Quality, Value, decode, say
 from dissectors.readings import How
 from dissectors.tracker import Transaction, Verdict
-from sniff.engine import Output, Row
+from sniff.engine.engine import Output, Row
 
 MOST_OPEN = 20_000
 """Frames remembered while their transaction is open."""

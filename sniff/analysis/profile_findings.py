@@ -21,7 +21,7 @@ from dissectors.subject import About, Subject, station
 from dissectors.tracker import Placement, Transaction
 from dissectors.words import milliseconds
 from sniff.analysis.points import ALL, PointReader, Sample
-from sniff.engine import Output, Row
+from sniff.engine.engine import Output, Row
 
 MOST_TOLD = 2_000
 """Different things that are told of at most: rubbish that passes a check must not fill the memory."""

@@ -11,7 +11,7 @@ from dissectors.profiles.decoding import decode, in_range
 from dissectors.readings import Reading
 from dissectors.tracker import Verdict
 from sniff.analysis.points import PointReader
-from sniff.engine import Output
+from sniff.engine.engine import Output
 
 LEAST = 0.3
 """Score under which a profile is not proposed."""

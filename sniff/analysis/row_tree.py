@@ -11,7 +11,7 @@ from dissectors.words import milliseconds
 from sniff.analysis.packet_tree import Field, fields_of
 from sniff.analysis.plain import plain
 from sniff.analysis.wording import duration, mark_names
-from sniff.engine import Row
+from sniff.engine.engine import Row
 
 
 def tree_of(

@@ -12,8 +12,8 @@ from dissectors.tracker import Transaction, Verdict
 from sniff.analysis.load import KEPT_SECONDS, Load
 from sniff.analysis.nodes import NodeTable
 from sniff.analysis.wording import mark_names
-from sniff.engine import Output, Row
-from sniff.session import LineEvent, LineEventKind
+from sniff.engine.engine import Output, Row
+from sniff.engine.session import LineEvent, LineEventKind
 
 
 @dataclass(slots=True)

@@ -23,7 +23,7 @@ from sniff.analysis.line_rules import LINE_RULES as RULES
 from sniff.analysis.lost_together import LostTogether
 from sniff.analysis.other_settings import Fit, what_fits
 from sniff.analysis.slower_bus import slower_by
-from sniff.session import LineEvent, Session
+from sniff.engine.session import LineEvent, Session
 
 MS = 1_000_000
 MAINS = {20 * MS: "50 Hz", 10 * MS: "twice 50 Hz", 50 * MS // 3: "60 Hz", 25 * MS // 3: "twice 60 Hz"}

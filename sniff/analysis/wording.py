@@ -7,7 +7,7 @@ from dissectors.frame import Event, Frame, LineError, Noise, Place, Role
 from dissectors.manifest import Dissector
 from dissectors.tracker import Interval
 from dissectors.words import milliseconds
-from sniff.engine import Row
+from sniff.engine.engine import Row
 
 
 def describe(dissector: Dissector, row: Row) -> str:

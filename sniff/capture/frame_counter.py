@@ -10,9 +10,9 @@ import threading
 from queue import SimpleQueue
 
 from dissectors.frame import Frame
-from sniff.engine import Output
-from sniff.session import Item, Session
-from sniff.session_engine import SessionEngine
+from sniff.engine.engine import Output
+from sniff.engine.follow_settings import SessionEngine
+from sniff.engine.session import Item, Session
 
 MOST_WAITING = 4 << 20
 """Octets of the bus that wait to be looked at."""

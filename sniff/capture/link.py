@@ -30,8 +30,8 @@ from sniff.capture.wire import (
     gap_event,
     octets_of_chunk,
 )
-from sniff.formats import CaptureError
-from sniff.session import Session, SettingsChange
+from sniff.engine.capture import CaptureError
+from sniff.engine.session import Session, SettingsChange
 from sniff.sources import PortError
 from sniff.sources.clock import Clock
 

@@ -30,8 +30,8 @@ from sniff.capture.wire import (
     encode_status,
     encode_tick,
 )
+from sniff.engine.session import Item, LineEvent, LineEventKind, Session, SettingsChange
 from sniff.recording.writer import Recorder
-from sniff.session import Item, LineEvent, LineEventKind, Session, SettingsChange
 from sniff.sources import PortError, Source
 from sniff.sources.clock import NS_PER_MS, STEP, Clock
 

@@ -8,7 +8,7 @@ import time
 from collections import deque
 
 from sniff.capture.wire import encode_item, gap_event
-from sniff.session import Item
+from sniff.engine.session import Item
 
 BACKLOG = 2 * 1024 * 1024
 """Octets of messages held for a reader that is behind (9 s of ten buses at 115200 Bd); more are dropped."""

@@ -20,10 +20,10 @@ from sniff.capture.loop import CaptureLoop
 from sniff.capture.outlet import Outlet
 from sniff.capture.priority import raise_priority
 from sniff.capture.wire import Kind, MessageSplitter, WireError, decode_json, encode, encode_json
-from sniff.formats import CaptureError
+from sniff.engine.capture import CaptureError
+from sniff.engine.session import Session
 from sniff.recording.rotation import Rotation
 from sniff.recording.writer import Recorder
-from sniff.session import Session
 from sniff.sources import PortError, Source, open_source
 from sniff.sources.capture_file import CaptureFileSource
 from sniff.sources.clock import Clock

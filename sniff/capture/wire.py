@@ -15,7 +15,7 @@ from enum import IntEnum
 from typing import Any, NamedTuple
 
 from dissectors.frame import Chunk, LineError, Mark
-from sniff.session import Item, LineEvent, LineEventKind
+from sniff.engine.session import Item, LineEvent, LineEventKind
 
 LIMIT = 16 * 1024 * 1024
 """Longest message, octets."""

@@ -18,7 +18,7 @@ from typing import cast
 from dissectors import registry
 from sniff import __version__
 from sniff.cli import standard_streams
-from sniff.formats import CaptureError
+from sniff.engine.capture import CaptureError
 
 COMMANDS: dict[str, str] = {
     "ports": "serial ports: adapter, driver, latency, what line errors they can report, who holds them",

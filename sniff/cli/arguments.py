@@ -12,8 +12,9 @@ from dissectors.profiles import Devices, ProfileError
 from sniff.analysis.plain import plain
 from sniff.cli import UNREADABLE, USAGE, Failure
 from sniff.config import AUTO
-from sniff.formats import Capture, CaptureError, read
-from sniff.session import OPTIONS, Session
+from sniff.engine.capture import Capture, CaptureError
+from sniff.engine.session import OPTIONS, Session
+from sniff.formats import read
 
 
 def add_line(parser: argparse.ArgumentParser, auto: bool = False) -> None:
@@ -58,7 +59,7 @@ def add_devices(parser: argparse.ArgumentParser) -> None:
 
 def device(token: str) -> tuple[str, str]:
     """argparse type for -d."""
-    from sniff.profile_files import EVERY, address
+    from sniff.devices import EVERY, address
 
     word, equals, name = token.partition("=")
     try:
@@ -73,7 +74,7 @@ def device(token: str) -> tuple[str, str]:
 
 def devices_of(args: argparse.Namespace, configured: Mapping[str, str] | None = None) -> Devices:
     """What -d says, and behind it what is `configured`; ends with exit code 2 for a profile that cannot be used."""
-    from sniff.profile_files import EVERY, UnknownProfile, devices
+    from sniff.devices import EVERY, UnknownProfile, devices
 
     said = dict(getattr(args, "devices", ()))
     behind = {} if EVERY in said else configured or {}
@@ -85,7 +86,7 @@ def devices_of(args: argparse.Namespace, configured: Mapping[str, str] | None = 
 
 def noted_devices(args: argparse.Namespace, session: Session) -> Devices:
     """What -d says, and behind it what the capture says, as far as it holds such profiles or they are known here."""
-    from sniff.profile_files import EVERY, noted, noted_devices
+    from sniff.devices import EVERY, noted, noted_devices
 
     _, unknown = noted(session)
     if unknown and EVERY not in dict(args.devices):
@@ -163,7 +164,8 @@ def settings_of(args: argparse.Namespace, session: Session, path: str) -> Sessio
 
     Ends with exit code 2 when its protocol is unknown here.
     """
-    from sniff.reading import dissector_for, with_settings
+    from sniff.engine.follow_settings import dissector_for
+    from sniff.engine.session import with_settings
 
     try:
         session = with_settings(session, args.protocol, args.line)
@@ -178,9 +180,8 @@ def settings_of(args: argparse.Namespace, session: Session, path: str) -> Sessio
 
 def say_assumed(session: Session, path: str, way_out: str = "") -> None:
     """Say on standard error that nobody knows a file's line settings, and what stands in for them."""
-    from sniff.reading import line_is_assumed
 
-    if line_is_assumed(session):
+    if session.line_is_assumed:
         said = f"no line settings in {plain(path)}: assuming {session.line} for {session.protocol}{way_out}"
         print(f"sniff485: {said}", file=sys.stderr)
 

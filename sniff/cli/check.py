@@ -16,15 +16,17 @@ from dissectors.profiles import Devices
 from sniff.analysis.health import health_of
 from sniff.analysis.judging import Judging
 from sniff.analysis.summary import Summary
+from sniff.bus.offline import outputs
 from sniff.cli import INTERRUPTED, PORT_TROUBLE, UNREADABLE, USAGE, Failure, arguments, check_output
 from sniff.cli.check_output import Checked
-from sniff.engine import Output
-from sniff.formats import READERS, Capture
-from sniff.reading import dissector_for, outputs
-from sniff.session import LineEvent, Session
+from sniff.engine.capture import Capture
+from sniff.engine.engine import Output
+from sniff.engine.follow_settings import dissector_for
+from sniff.engine.session import LineEvent, Session
+from sniff.formats import READERS
 
 if TYPE_CHECKING:
-    from sniff.live import LiveBus
+    from sniff.bus.live import LiveBus
 
 DEFAULT_DURATION = 30.0
 _EARLIEST, _LATEST = -(1 << 63), (1 << 63) - 1

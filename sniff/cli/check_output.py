@@ -19,8 +19,8 @@ from sniff.analysis.judging import rules_over
 from sniff.analysis.plain import plain
 from sniff.analysis.wording import station_word
 from sniff.cli.rows import iso
-from sniff.reading import dissector_for
-from sniff.session import Session
+from sniff.engine.follow_settings import dissector_for
+from sniff.engine.session import Session
 
 EVIDENCE_SHOWN = 5
 _INDENT = " " * 9

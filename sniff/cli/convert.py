@@ -8,13 +8,14 @@ import argparse
 
 from dissectors.profiles import Devices
 from sniff.analysis.judging import Judging
+from sniff.bus.offline import outputs
 from sniff.cli import arguments, writing
-from sniff.engine import Output
-from sniff.formats import Capture
+from sniff.devices import with_devices
+from sniff.engine.capture import Capture
+from sniff.engine.engine import Output
+from sniff.engine.follow_settings import dissector_for
+from sniff.engine.session import Session
 from sniff.formats.linktypes import held_by_protocols
-from sniff.profile_files import with_devices
-from sniff.reading import dissector_for, outputs
-from sniff.session import Session
 
 
 def configure(parser: argparse.ArgumentParser) -> None:

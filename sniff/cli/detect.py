@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import argparse
 
-from sniff.analysis.detecting import Ending, Outcome, Reading, sureness
+from sniff.analysis.autodetect import Ending, Outcome, Reading, sureness
 from sniff.analysis.plain import plain
 from sniff.cli import PORT_TROUBLE, arguments, json_output, listening
 from sniff.cli.searching import TIMEOUT, search, sentence

@@ -109,7 +109,7 @@ def _capture(bus: _Bus, fifo: str) -> int:
     from sniff.capture.link import CaptureLink
     from sniff.capture.wire import Ended, Received, Tick
     from sniff.cli.listening import until_interrupted
-    from sniff.formats import CaptureError
+    from sniff.engine.capture import CaptureError
     from sniff.formats.pcapng import PcapngWriter
     from sniff.sources import PortError
 

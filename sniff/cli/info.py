@@ -11,12 +11,13 @@ from dissectors.words import milliseconds
 from sniff.analysis.nodes import Node
 from sniff.analysis.plain import plain
 from sniff.analysis.summary import Summary
+from sniff.bus.offline import outputs
 from sniff.cli import arguments, json_output
 from sniff.cli.rows import iso
-from sniff.engine import Output
-from sniff.formats import Capture
-from sniff.reading import dissector_for, line_is_assumed, outputs
-from sniff.session import Adapter, LineEvent, Session, settings_change
+from sniff.engine.capture import Capture
+from sniff.engine.engine import Output
+from sniff.engine.follow_settings import dissector_for
+from sniff.engine.session import Adapter, LineEvent, Session, settings_change
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -65,7 +66,7 @@ def _as_json(path: str, capture: Capture, session: Session, summary: Summary) ->
         "seconds": summary.seconds,
         "protocol": None if "protocol" in session.unknown else session.protocol,
         "line": None if "line" in session.unknown else str(session.line),
-        "line_assumed": line_is_assumed(session),
+        "line_assumed": session.line_is_assumed,
         "port": session.port,
         "adapter": session.adapter.name,
         "adapter_latency_ms": session.adapter.latency / 1e6,
@@ -185,7 +186,7 @@ def _settings(session: Session) -> str:
     title = "unknown" if "protocol" in session.unknown else dissector_for(session).title
     if "line" in session.unknown:
         return f"{title}, line settings unknown"
-    return f"{title}, {session.line}{' (assumed)' if line_is_assumed(session) else ''}"
+    return f"{title}, {session.line}{' (assumed)' if session.line_is_assumed else ''}"
 
 
 def _search(session: Session, summary: Summary, events: list[LineEvent]) -> str:

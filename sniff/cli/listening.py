@@ -19,17 +19,18 @@ from dissectors.profiles import Devices
 from dissectors.words import milliseconds
 from sniff.analysis.plain import plain
 from sniff.analysis.summary import Summary
+from sniff.bus.live import LiveBus
 from sniff.capture.config import RecordSpec, SourceSpec
 from sniff.capture.link import CaptureLink
 from sniff.capture.wire import NOTHING_MORE, Ended, Status
 from sniff.cli import INTERRUPTED, PORT_TROUBLE, UNREADABLE, USAGE, Failure, arguments, rows, searching
 from sniff.cli.searching import Unknowns
 from sniff.config import AUTO, FILE, Config, ConfigError, load
-from sniff.engine import Output
-from sniff.formats import READERS, CaptureError
-from sniff.live import LiveBus
-from sniff.reading import Settled, Settling
-from sniff.session import DEVICES_NOTE, LineEvent, LineEventKind
+from sniff.engine.capture import CaptureError
+from sniff.engine.engine import Output
+from sniff.engine.session import DEVICES_NOTE, LineEvent, LineEventKind
+from sniff.engine.verdict_join import Settled, Settling
+from sniff.formats import READERS
 from sniff.sources import PortError
 
 
@@ -312,12 +313,7 @@ def lost_something(live: LiveBus) -> bool:
         return False
     late = status.closing or status.behind  # else it lacks the last second, as a killed process may
     killed = ended is not None and not ended.clean and late and status.unwritten > 0
-    return bool(status.error or status.lost or killed or (ended is not None and ended.lossy) or not_there(live))
-
-
-def not_there(live: LiveBus) -> bool:
-    """Whether there is no file where the recording ought to be."""
-    return bool(live.link.paths) and (not live.status.path or not os.path.exists(live.status.path))
+    return bool(status.error or status.lost or killed or (ended is not None and ended.lossy) or live.file_is_gone)
 
 
 def _gone_for_good(live: LiveBus) -> bool:
@@ -381,7 +377,7 @@ def say_recorded(live: LiveBus, where: bool = True) -> None:
     elif lost:
         why = "" if status.error else ": the disk did not keep up"
         print(f"sniff485: {lost} octets NOT RECORDED{why}", file=sys.stderr)
-    if not_there(live):
+    if live.file_is_gone:
         print(f"sniff485: {plain(status.path or live.link.paths[0])} is not there any more", file=sys.stderr)
     elif status.path and where:
         cut = "" if ended is None or ended.clean else ", cut where the capture was ended"

@@ -8,9 +8,9 @@ import argparse
 import sys
 
 from sniff.analysis.plain import plain
+from sniff.bus.live import LiveBus
 from sniff.capture.config import RecordSpec
 from sniff.cli import UNREADABLE, USAGE, Failure, arguments, listening
-from sniff.live import LiveBus
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -46,10 +46,10 @@ def run(args: argparse.Namespace) -> int:
 def show(live: LiveBus, as_json: bool, as_lines: bool) -> int:
     """The terminal UI on a terminal; else frames as lines and a summary."""
     if not as_json and not as_lines and arguments.on_terminal():
-        from sniff.cli.feeds import LiveFeed
+        from sniff.bus.row_source import LiveFeed
         from sniff.tui import run as run_tui
 
-        feed = LiveFeed(live)
+        feed = LiveFeed(live, lambda status: print(f"sniff485: {listening.waiting_words(status)}", file=sys.stderr))
         run_tui(feed)
         total = feed.store.load.total
         print(

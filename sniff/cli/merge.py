@@ -9,7 +9,7 @@ from collections import Counter
 from dissectors.findings import counted
 from dissectors.frame import Chunk
 from sniff.cli import UNREADABLE, Failure, arguments, writing
-from sniff.formats import CaptureError
+from sniff.engine.capture import CaptureError
 
 
 def configure(parser: argparse.ArgumentParser) -> None:

@@ -13,14 +13,16 @@ from pathlib import Path
 from dissectors.line import NS_PER_S
 from dissectors.profiles.decoding import number
 from sniff.analysis.points import Point, PointReader, PointTable, Sample
+from sniff.bus.offline import outputs
 from sniff.cli import USAGE, Failure, arguments, tables, writing
 from sniff.cli.rows import iso
 from sniff.cli.tables import Cell
-from sniff.engine import Output
-from sniff.formats import Capture, parquet
+from sniff.engine.capture import Capture
+from sniff.engine.engine import Output
+from sniff.engine.follow_settings import dissector_for
+from sniff.engine.session import Session
+from sniff.formats import parquet
 from sniff.formats.parquet import Kind
-from sniff.reading import dissector_for, outputs
-from sniff.session import Session
 
 LATEST = ("device", "point", "value", "unit", "means", "quality", "age s", "changed s", "samples")
 SAMPLES = ("time", "device", "point", "value", "raw", "unit", "quality", "how", "frame", "means")

@@ -12,10 +12,11 @@ from typing import Any
 
 from dissectors.profiles import Entry, Profile, ProfileError
 from sniff.analysis.profile_guess import Guess, Guessing
+from sniff.bus.offline import outputs
 from sniff.cli import UNREADABLE, USAGE, Failure, arguments, json_output, tables
-from sniff.engine import Output
-from sniff.profile_files import UnknownProfile, available, find, read
-from sniff.reading import dissector_for, outputs
+from sniff.devices import UnknownProfile, available, find, read
+from sniff.engine.engine import Output
+from sniff.engine.follow_settings import dissector_for
 
 TIE = 0.1
 """Share by which a profile must fit better than another to be preferred."""

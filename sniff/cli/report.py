@@ -13,7 +13,8 @@ from pathlib import Path
 
 from sniff.analysis.plain import plain
 from sniff.cli import UNREADABLE, USAGE, Failure, arguments, json_output
-from sniff.formats import READERS, Capture
+from sniff.engine.capture import Capture
+from sniff.formats import READERS
 from sniff.reporting.collecting import collect
 from sniff.reporting.numbers import Numbers
 

@@ -6,10 +6,10 @@ from collections.abc import Iterable
 from typing import Any
 
 from dissectors.token_ring import TokenRing
+from sniff.bus.offline import outputs
 from sniff.cli import tables
-from sniff.engine import Output
-from sniff.reading import outputs
-from sniff.session import Item, Session
+from sniff.engine.engine import Output
+from sniff.engine.session import Item, Session
 
 
 def ring_of(items: Iterable[Item], session: Session, shown: TokenRing) -> Any:

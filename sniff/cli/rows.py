@@ -11,8 +11,8 @@ from dissectors.manifest import Dissector
 from sniff.analysis.plain import ascii_of
 from sniff.analysis.wording import describe, duration, is_error
 from sniff.cli import json_output
-from sniff.reading import Settled
-from sniff.session import Session
+from sniff.engine.session import Session
+from sniff.engine.verdict_join import Settled
 
 JSON_KEYS = (
     "no", "t", "start_ns", "end_ns", "proto", "src", "dst", "role", "kind", "ok", "error", "found", "noise_before",

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 from dissectors import registry
 from dissectors.line import LineSettings
-from sniff.analysis.detecting import Detecting, Ending, Outcome, candidates
+from sniff.analysis.autodetect import Detecting, Ending, Outcome, candidates
+from sniff.bus.autodetect import Progress, Search
+from sniff.bus.live import LiveBus
 from sniff.capture.link import CaptureLink
 from sniff.cli import INTERRUPTED, PORT_TROUBLE, Failure
-from sniff.detection import Progress, Search
-from sniff.live import LiveBus
-from sniff.session import UNKNOWABLE
+from sniff.engine.session import UNKNOWABLE
 
 TIMEOUT = 120.0
 """s after which a search gives up, unless told otherwise."""

@@ -15,11 +15,13 @@ from dissectors.manifest import Dissector
 from sniff.analysis.filtering import FilterError, Predicate, compile_filter
 from sniff.analysis.packet_tree import Field
 from sniff.analysis.row_tree import tree_of
+from sniff.bus.offline import settled
 from sniff.cli import USAGE, Failure, arguments, rows, writing
 from sniff.cli.tables import safe_cell
 from sniff.config import nearest
-from sniff.reading import Settled, dissector_for, settled
-from sniff.session import Session
+from sniff.engine.follow_settings import dissector_for
+from sniff.engine.session import Session
+from sniff.engine.verdict_join import Settled
 
 
 def configure(parser: argparse.ArgumentParser) -> None:

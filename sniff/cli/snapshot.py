@@ -10,7 +10,7 @@ from pathlib import Path
 
 from sniff.analysis.plain import plain
 from sniff.cli import UNREADABLE, Failure, arguments
-from sniff.formats import CaptureError
+from sniff.engine.capture import CaptureError
 
 
 def configure(parser: argparse.ArgumentParser) -> None:

@@ -19,13 +19,14 @@ from sniff.analysis.load import Second
 from sniff.analysis.nodes import Node
 from sniff.analysis.summary import Summary
 from sniff.analysis.wording import station_word
+from sniff.bus.offline import outputs
 from sniff.cli import USAGE, Failure, arguments, tables
 from sniff.cli.rows import iso
 from sniff.cli.tables import Cell
+from sniff.devices import noted_devices
 from sniff.editing.merging import merged, merged_session
-from sniff.engine import Output
-from sniff.profile_files import noted_devices
-from sniff.reading import dissector_for, outputs
+from sniff.engine.engine import Output
+from sniff.engine.follow_settings import dissector_for
 
 TABLES = ("nodes", "health", "transactions", "latency", "load", "ring")
 

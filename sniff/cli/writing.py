@@ -12,10 +12,11 @@ from dissectors.frame import Chunk
 from dissectors.profiles import Devices
 from sniff.analysis.plain import plain
 from sniff.cli import UNREADABLE, USAGE, Failure
-from sniff.engine import Output
-from sniff.formats import Capture, CaptureError, create
+from sniff.engine.capture import Capture, CaptureError
+from sniff.engine.engine import Output
+from sniff.engine.session import Item, Session
+from sniff.formats import create
 from sniff.formats.records import RecordMaker
-from sniff.session import Item, Session
 
 
 def add_output(parser: argparse.ArgumentParser) -> None:
@@ -94,7 +95,7 @@ class _Frames:
     AT_ONCE = 1000
 
     def __init__(self, writer: object, session: Session) -> None:
-        from sniff.reading import engine_for
+        from sniff.engine.follow_settings import engine_for
         from sniff.recording.frames import SCHEMA, FrameLog
         from sniff.recording.topics import FRAMES
         from sniff.recording.writer import McapWriter
@@ -129,9 +130,9 @@ class _Values:
 
     def __init__(self, writer: object, session: Session, devices: Devices) -> None:
         from sniff.analysis.points import PointReader
-        from sniff.reading import engine_for
+        from sniff.bus.value_topics import ValueChannels
+        from sniff.engine.follow_settings import engine_for
         from sniff.recording.writer import McapWriter
-        from sniff.value_channels import ValueChannels
 
         assert isinstance(writer, McapWriter)
         self._writer = writer

@@ -17,10 +17,10 @@ from dissectors import registry
 from dissectors.frame import Chunk, Frame, Noise
 from dissectors.profiles.packaged import names
 from dissectors.pseudonyms import Renamer, without_text
-from sniff.engine import Output
-from sniff.profile_files import EVERY, address, noted
-from sniff.reading import engine_for, line_is_assumed
-from sniff.session import (
+from sniff.devices import EVERY, address, noted
+from sniff.engine.engine import Output
+from sniff.engine.follow_settings import engine_for
+from sniff.engine.session import (
     ASSUMED,
     DEVICES_NOTE,
     LINE_NOTE,
@@ -54,7 +54,7 @@ def _renamed_devices(session: Session) -> dict[str, str]:
         if name in names()
     ]
     devices = {DEVICES_NOTE: ",".join(said)} if said else {}
-    return {**devices, LINE_NOTE: ASSUMED} if line_is_assumed(session) else devices
+    return {**devices, LINE_NOTE: ASSUMED} if session.line_is_assumed else devices
 
 
 def _renamer(session: Session) -> Renamer:

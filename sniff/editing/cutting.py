@@ -10,11 +10,12 @@ from datetime import UTC, datetime
 from dissectors.findings import Finding
 from dissectors.line import NS_PER_S
 from sniff.analysis.judging import Judging
-from sniff.engine import Output
-from sniff.formats import Capture
-from sniff.profile_files import noted_devices
-from sniff.reading import dissector_for, outputs
-from sniff.session import Item, LineEvent, LineEventKind, Session, SettingsChange, settings_change
+from sniff.bus.offline import outputs
+from sniff.devices import noted_devices
+from sniff.engine.capture import Capture
+from sniff.engine.engine import Output
+from sniff.engine.follow_settings import dissector_for
+from sniff.engine.session import Item, LineEvent, LineEventKind, Session, SettingsChange, settings_change
 
 _SECONDS = re.compile(r"\+?(\d+(?:\.\d{1,9})?)")
 _FRAMES = re.compile(r"(\d+)?(?:[-–:](\d+)?)?")

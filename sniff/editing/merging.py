@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import groupby, repeat
 
-from sniff.formats import Capture, CaptureError
-from sniff.session import Item, Session
+from sniff.engine.capture import Capture, CaptureError
+from sniff.engine.session import Item, Session
 
 
 def merged_session(captures: Sequence[Capture], names: Sequence[str]) -> Session:

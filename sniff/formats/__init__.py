@@ -5,50 +5,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from dissectors.frame import Chunk
-from sniff.read_times import LOOKED_AT, ReadTimes
-from sniff.session import Completeness, Item, LineEventKind, Session
-
-
-class CaptureError(Exception):
-    """A file that cannot be read or written; the message names it, what is wrong and the way out."""
-
-
-class Capture(Protocol):
-    """A capture opened for reading."""
-
-    session: Session
-
-    def items(self) -> Iterator[Item]:
-        """Chunks and line events in order of time. A cut file ends early, without an exception."""
-        ...
-
-    def completeness(self) -> Completeness:
-        """Whether the file is whole (may need to have read it)."""
-        ...
-
-
-class CaptureWriter(Protocol):
-    """A capture opened for writing; a context manager. Every item is kept, or the writer says what it cannot keep."""
-
-    def write(self, item: Item) -> None:
-        """Add a chunk or line event, in order of time."""
-        ...
-
-    def close(self) -> None:
-        """Finish the file."""
-        ...
-
-    def __enter__(self) -> CaptureWriter: ...
-
-    def __exit__(self, *exc: object) -> None: ...
-
+from sniff.engine.capture import Capture, CaptureError, CaptureWriter
+from sniff.engine.read_times import LOOKED_AT, ReadTimes
+from sniff.engine.session import Item, LineEventKind, Session
 
 READERS: dict[str, str] = {
     ".cap.txt": "sniff.formats.text:read",

@@ -28,11 +28,11 @@ from pathlib import Path
 
 from dissectors.frame import Chunk
 from dissectors.line import NS_PER_S
-from sniff.formats import CaptureError
+from sniff.engine.capture import CaptureError
+from sniff.engine.session import Adapter, Completeness, Item, Session
 from sniff.formats.files import explain, open_capture
 from sniff.formats.octet_table import columns, octets_of, seconds
 from sniff.formats.records import foreign_session
-from sniff.session import Adapter, Completeness, Item, Session
 
 LONGEST_LINE = 1 << 20
 MOST_ROWS = 5_000_000

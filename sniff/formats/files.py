@@ -10,7 +10,7 @@ from io import BufferedReader, FileIO
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
-from sniff.formats import CaptureError
+from sniff.engine.capture import CaptureError
 
 if TYPE_CHECKING:
     from _typeshed import WriteableBuffer as Buffer

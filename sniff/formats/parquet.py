@@ -12,7 +12,7 @@ from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sniff.formats import CaptureError
+from sniff.engine.capture import CaptureError
 
 if TYPE_CHECKING:
     import polars as pl

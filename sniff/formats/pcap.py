@@ -11,12 +11,12 @@ from pathlib import Path
 from typing import BinaryIO
 
 from dissectors.frame import Chunk
-from sniff.formats import CaptureError
+from sniff.engine.capture import CaptureError
+from sniff.engine.session import Completeness, Item, Session
 from sniff.formats.files import NewFile, open_capture
 from sniff.formats.linktypes import LINK_TYPES, OWN, USER1
 from sniff.formats.linktypes import protocol_of as protocol_of_link
 from sniff.formats.records import Record, RecordMaker, foreign_session, items_of, protocol_of
-from sniff.session import Completeness, Item, Session
 
 MAGICS = {  # as read little-endian: (byte order, ns a tick)
     0xA1B2C3D4: ("<", 1000),

@@ -14,11 +14,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
-from sniff.formats import CaptureError
+from sniff.engine.capture import CaptureError
+from sniff.engine.session import Completeness, Item, Session
 from sniff.formats.files import NewFile, open_capture
 from sniff.formats.linktypes import LINK_TYPES, USER1
 from sniff.formats.records import Record, RecordMaker, SearchMarks, foreign_session, items_of, protocol_of
-from sniff.session import Completeness, Item, Session
 
 SECTION, INTERFACE, SIMPLE, ENHANCED = 0x0A0D0D0A, 1, 3, 6
 BYTE_ORDER = 0x1A2B3C4D

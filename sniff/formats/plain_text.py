@@ -6,7 +6,8 @@ from collections.abc import Iterable
 from itertools import islice
 from pathlib import Path
 
-from sniff.formats import Capture, bytelog, text
+from sniff.engine.capture import Capture
+from sniff.formats import bytelog, text
 from sniff.formats.files import open_capture
 from sniff.formats.text_line import MAGIC
 

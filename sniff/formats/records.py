@@ -16,11 +16,12 @@ from dissectors.frame import Chunk, Frame
 from dissectors.line import LineSettings
 from dissectors.manifest import PacketFile
 from sniff.analysis.wording import describe, duration
-from sniff.engine import Output
+from sniff.engine.engine import Output
+from sniff.engine.follow_settings import engine_for
+from sniff.engine.session import ASSUMED, LINE_NOTE, Adapter, Item, LineEvent, LineEventKind, Session, SettingsChange
+from sniff.engine.verdict_join import Settled, Settling
 from sniff.formats.linktypes import LINK_TYPES, RTAC, RTAC_ERRORS, USER1, link_type_for, rtac_record
 from sniff.formats.linktypes import protocol_of as protocol_of_link
-from sniff.reading import Settled, Settling, engine_for
-from sniff.session import ASSUMED, LINE_NOTE, Adapter, Item, LineEvent, LineEventKind, Session, SettingsChange
 
 FOREIGN_LATENCY = 20_000_000
 """ns; a usual USB adapter's latency timer and some scheduling."""

@@ -12,7 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import BinaryIO
 
-from sniff.formats import Capture, CaptureError
+from sniff.engine.capture import Capture, CaptureError
 from sniff.formats.files import explain
 from sniff.formats.plain_text import is_text_capture
 

@@ -39,10 +39,10 @@ from typing import BinaryIO
 
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
-from sniff.formats import CaptureError
+from sniff.engine.capture import CaptureError
+from sniff.engine.session import DEVICES_NOTE, Completeness, Item, LineEvent, Session, settings_change
 from sniff.formats.files import NewFile, explain, open_capture
 from sniff.formats.text_line import DEVICE, EPOCH, HEADER, LATEST, MAGIC, MARKS, VERSION, Line, is_device
-from sniff.session import DEVICES_NOTE, Completeness, Item, LineEvent, Session, settings_change
 
 MOST_DEVICES = 256
 MOST_COUNT = 10**19 - 1

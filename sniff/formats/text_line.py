@@ -9,8 +9,8 @@ from typing import NoReturn
 
 from dissectors.frame import Chunk, LineError, Mark
 from dissectors.line import LineSettings
-from sniff.formats import CaptureError
-from sniff.session import DEVICES_NOTE, LineEvent, LineEventKind
+from sniff.engine.capture import CaptureError
+from sniff.engine.session import DEVICES_NOTE, LineEvent, LineEventKind
 
 MAGIC = "#!sniff-capture"
 VERSION = 1

@@ -18,8 +18,8 @@ from itertools import accumulate, pairwise
 from typing import TYPE_CHECKING
 
 from dissectors.frame import Chunk, LineError, Mark
+from sniff.engine.session import Item, LineEvent, LineEventKind
 from sniff.recording.topics import LINE, RAW
-from sniff.session import Item, LineEvent, LineEventKind
 
 if TYPE_CHECKING:
     import numpy as np

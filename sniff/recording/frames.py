@@ -20,7 +20,7 @@ from dissectors.frame import Check, Damage, Found, Frame, Header, LineError, Mar
 from dissectors.line import LineSettings
 from dissectors.tracker import Interval, Placement, Transaction, Verdict
 from sniff import __version__
-from sniff.engine import Output, Row
+from sniff.engine.engine import Output, Row
 from sniff.recording.topics import SchemaText
 
 if TYPE_CHECKING:

@@ -18,14 +18,14 @@ from pathlib import Path
 from queue import SimpleQueue
 from typing import BinaryIO
 
-from sniff.formats import CaptureError
+from sniff.engine.capture import CaptureError
+from sniff.engine.session import Session
 from sniff.formats.files import explain
 from sniff.recording.batch import Message
 from sniff.recording.part import PartFile
 from sniff.recording.rotation import NewestParts, Rotation, part_name, parts
 from sniff.recording.syncing import Syncer
 from sniff.recording.topics import LINE, RAW
-from sniff.session import Session
 
 MOST_WAITING = 32 << 20
 """Octets kept in memory for a disk that is slow or full: 45 min at 115200 Bd."""

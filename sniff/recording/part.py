@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import BinaryIO
 
 from sniff import __version__
+from sniff.engine.session import Session
 from sniff.recording import frames
 from sniff.recording.batch import Message
 from sniff.recording.chunk_indices import ChunkIndices
@@ -27,7 +28,6 @@ from sniff.recording.topics import (
     SESSION_RECORD,
     VERSION,
 )
-from sniff.session import Session
 
 CHUNK_SIZE = 1 << 20
 

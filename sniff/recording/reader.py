@@ -15,7 +15,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import BinaryIO
 
-from sniff.formats import CaptureError
+from sniff.engine.capture import CaptureError
+from sniff.engine.session import Completeness, Item, LineEvent, LineEventKind, Session, SettingsChange, settings_change
 from sniff.formats.files import explain, open_capture
 from sniff.formats.text import iso
 from sniff.recording import scan
@@ -33,7 +34,6 @@ from sniff.recording.topics import (
     SESSION_RECORD,
     VERSION,
 )
-from sniff.session import Completeness, Item, LineEvent, LineEventKind, Session, SettingsChange, settings_change
 
 MOST_PROFILE = 1 << 20
 """Octets of an attached device profile; a longer one is passed over."""

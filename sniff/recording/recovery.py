@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+from sniff.engine.session import Completeness
 from sniff.recording.reader import read
 from sniff.recording.writer import create
-from sniff.session import Completeness
 
 
 def recover(source: str | Path, target: str | Path) -> Completeness:

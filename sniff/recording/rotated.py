@@ -10,9 +10,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from sniff.formats import Capture
+from sniff.engine.capture import Capture
+from sniff.engine.session import Completeness, Item, Session
 from sniff.recording.reader import McapCapture
-from sniff.session import Completeness, Item, Session
 
 
 class RotatedCapture:

@@ -16,14 +16,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from dissectors.frame import Chunk
-from sniff.formats.files import NewFile, explain
-from sniff.recording import keeper
-from sniff.recording.batch import Batcher, Message, loss_message, stamp
-from sniff.recording.keeper import CHECK, CLOSE, SYNC, Flush, Keeper, Parcel
-from sniff.recording.part import PartFile
-from sniff.recording.rotation import Rotation
-from sniff.recording.topics import LINE, RAW
-from sniff.session import (
+from sniff.engine.session import (
     UNKNOWABLE,
     Item,
     LineEvent,
@@ -32,6 +25,13 @@ from sniff.session import (
     SettingsChange,
     settings_change,
 )
+from sniff.formats.files import NewFile, explain
+from sniff.recording import keeper
+from sniff.recording.batch import Batcher, Message, loss_message, stamp
+from sniff.recording.keeper import CHECK, CLOSE, SYNC, Flush, Keeper, Parcel
+from sniff.recording.part import PartFile
+from sniff.recording.rotation import Rotation
+from sniff.recording.topics import LINE, RAW
 
 FLUSH_AFTER = 900_000_000
 """ns that something may wait before it is written: with a tick when it is `due`, all is in the file within 1 s."""

@@ -16,10 +16,12 @@ from sniff.analysis.judging import Judging, rules_over
 from sniff.analysis.nodes import Node
 from sniff.analysis.summary import Summary
 from sniff.analysis.wording import describe
-from sniff.engine import Output, Row
-from sniff.formats import Capture
+from sniff.bus.offline import outputs
+from sniff.engine.capture import Capture
+from sniff.engine.engine import Output, Row
+from sniff.engine.follow_settings import dissector_for
+from sniff.engine.session import DEVICES_NOTE, LineEvent, Session
 from sniff.formats.text import iso
-from sniff.reading import dissector_for, outputs
 from sniff.reporting.numbers import (
     Distribution,
     Evidence,
@@ -34,7 +36,6 @@ from sniff.reporting.numbers import (
     seconds_since,
 )
 from sniff.reporting.timeline import Timeline
-from sniff.session import DEVICES_NOTE, LineEvent, Session
 
 EVIDENCE_SHOWN, EVIDENCE_OF_NOTES = 5, 2
 HAPPENINGS_SHOWN = 200

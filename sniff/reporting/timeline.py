@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from dissectors.frame import Frame
 from dissectors.tracker import Transaction, Verdict
-from sniff.engine import Row
+from sniff.engine.engine import Row
 
 MOST_PARTS = 240
 FIRST_WIDTH = 100_000_000

@@ -14,7 +14,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from dissectors.frame import Chunk
-from sniff.formats import Capture, read
+from sniff.engine.capture import Capture
+from sniff.formats import read
 
 PATIENCE = 0.05
 """Seconds between two looks for a listener."""

@@ -13,7 +13,7 @@ from itertools import cycle
 
 from dissectors.frame import Place
 from dissectors.line import LineSettings, Timing
-from sniff.session import DEVICES_NOTE, Item, Session
+from sniff.engine.session import DEVICES_NOTE, Item, Session
 from sniff.simulation.faults import (
     BitFlips,
     Break,

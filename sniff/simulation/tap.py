@@ -19,7 +19,7 @@ from random import Random
 
 from dissectors.frame import Chunk, LineError, Mark
 from dissectors.line import LineSettings
-from sniff.session import Adapter, Item, LineEvent, LineEventKind
+from sniff.engine.session import Adapter, Item, LineEvent, LineEventKind
 from sniff.simulation.wire import Burst
 
 MS = 1_000_000

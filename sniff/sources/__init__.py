@@ -6,7 +6,7 @@ import re
 from typing import Protocol
 
 from dissectors.line import LineSettings
-from sniff.session import Adapter, Item
+from sniff.engine.session import Adapter, Item
 from sniff.sources.clock import Clock
 
 

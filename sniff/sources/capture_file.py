@@ -6,8 +6,9 @@ from collections.abc import Iterator
 from itertools import islice
 
 from dissectors.line import LineSettings
-from sniff.formats import CaptureError, read
-from sniff.session import Adapter, Item, LineEvent, LineEventKind, Session
+from sniff.engine.capture import CaptureError
+from sniff.engine.session import Adapter, Item, LineEvent, LineEventKind, Session
+from sniff.formats import read
 from sniff.sources import PortError
 from sniff.sources.clock import Clock
 

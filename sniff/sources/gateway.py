@@ -12,7 +12,7 @@ from typing import Protocol
 from urllib.parse import urlsplit
 
 from dissectors.line import NS_PER_S, LineSettings
-from sniff.session import Adapter, Item, LineEvent, LineEventKind
+from sniff.engine.session import Adapter, Item, LineEvent, LineEventKind
 from sniff.sources import PortError
 from sniff.sources.clock import NS_PER_MS, Clock
 from sniff.sources.reconnecting import Reconnecting

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from dissectors.line import LineSettings
-from sniff.session import Adapter
+from sniff.engine.session import Adapter
 from sniff.sources.drivers import NS_PER_MS, UNKNOWN, USB_FRAME, Driver, find_driver, guess_driver
 
 CAPTURE_PROCESS = b"sniff.capture.process"

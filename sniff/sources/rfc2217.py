@@ -21,7 +21,7 @@ from serial import SerialException, rfc2217
 
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
-from sniff.session import Item, LineEvent, LineEventKind
+from sniff.engine.session import Item, LineEvent, LineEventKind
 from sniff.sources.clock import Clock
 from sniff.sources.telnet import Data, Negotiation, OutOfStep, TelnetDecoder
 from sniff.sources.tty import stop_bits

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from dissectors.frame import Chunk
 from dissectors.line import NS_PER_S, LineSettings
-from sniff.session import Adapter, Item, LineEvent, LineEventKind
+from sniff.engine.session import Adapter, Item, LineEvent, LineEventKind
 from sniff.sources import PortError
 from sniff.sources.clock import NS_PER_MS, Clock
 from sniff.sources.identity import PortIdentity

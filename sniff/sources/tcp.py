@@ -6,7 +6,7 @@ import socket
 
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
-from sniff.session import Item
+from sniff.engine.session import Item
 from sniff.sources import PortError
 from sniff.sources.clock import Clock
 

@@ -14,11 +14,13 @@ from dissectors.profiles import Devices
 from dissectors.tracker import Transaction
 from sniff.analysis.points import Point, PointReader, PointTable
 from sniff.analysis.summary import Summary
-from sniff.engine import Output, Row
+from sniff.bus.offline import outputs
+from sniff.devices import noted, noted_devices
+from sniff.engine.engine import Output, Row
+from sniff.engine.follow_settings import dissector_for
+from sniff.engine.session import Completeness, LineEvent, Session
+from sniff.engine.verdict_join import Settled
 from sniff.formats import read
-from sniff.profile_files import noted, noted_devices
-from sniff.reading import Settled, dissector_for, outputs
-from sniff.session import Completeness, LineEvent, Session
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ from dissectors.frame import Frame
 from sniff.analysis.plain import plain
 from sniff.analysis.points import Point
 from sniff.analysis.wording import describe, mark_names
-from sniff.reading import Settled
+from sniff.engine.verdict_join import Settled
 from sniff.testing.capture_reading import CaptureReading
 
 MAGIC = "#!sniff-expect 1"

@@ -90,7 +90,7 @@ class CaptureItem(pytest.Item):
 
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
         """The diff and nothing else."""
-        from sniff.formats import CaptureError
+        from sniff.engine.capture import CaptureError
 
         if isinstance(excinfo.value, (CaptureDiffers, CaptureError)):
             return f"{excinfo.value}\n(accept it with: pytest --sniff-update {self.path})"

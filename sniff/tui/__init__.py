@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 
-from sniff.tui.feed import Feed
+from sniff.bus.feed import Feed
 
 
 def run(feed: Feed, start_screen: str = "frames") -> None:

@@ -7,9 +7,9 @@ from abc import abstractmethod
 from textual.app import App
 from textual.message_pump import MessagePump
 
-from sniff.store import Store
-from sniff.tui.feed import FeedStatus
-from sniff.tui.judged import Judged
+from sniff.bus.feed import FeedStatus
+from sniff.bus.model import Store
+from sniff.bus.rules_worker import Judged
 from sniff.tui.viewing import Viewing
 
 

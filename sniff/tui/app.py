@@ -11,12 +11,12 @@ from textual.screen import Screen
 from textual.timer import Timer
 
 from sniff.analysis.filtering import FilterError
-from sniff.store import Store
+from sniff.bus.feed import Feed, FeedStatus
+from sniff.bus.model import Store
+from sniff.bus.rules_worker import Judged
 from sniff.tui.analyzer import Analyzer
-from sniff.tui.feed import Feed, FeedStatus
 from sniff.tui.header import StatusHeader, why_ended
 from sniff.tui.help import HelpScreen
-from sniff.tui.judged import Judged
 from sniff.tui.palette import ActionCommands
 from sniff.tui.plain import plain
 from sniff.tui.prompt import Prompt

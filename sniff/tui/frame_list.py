@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dissectors.frame import Event, Found, Frame, LineError
-from sniff.engine import Row
+from sniff.engine.engine import Row
 from sniff.tui.analyzer import analyzer
 from sniff.tui.columns import Cell, Column
 from sniff.tui.plain import plain

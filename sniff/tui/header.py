@@ -9,11 +9,11 @@ from rich.style import Style
 from rich.text import Text
 from textual.widget import Widget
 
-from sniff.session import LineEventKind
-from sniff.store import Store
+from sniff.bus.feed import FeedStatus
+from sniff.bus.model import Store
+from sniff.engine.session import LineEventKind
 from sniff.tui.analyzer import analyzer
 from sniff.tui.columns import fit
-from sniff.tui.feed import FeedStatus
 from sniff.tui.plain import plain
 from sniff.tui.times import size
 from sniff.tui.viewing import Viewing

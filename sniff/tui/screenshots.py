@@ -16,14 +16,15 @@ from functools import cache
 from pathlib import Path
 
 from dissectors.line import NS_PER_S
-from sniff.engine import Output
-from sniff.profile_files import devices
-from sniff.reading import dissector_for, outputs
+from sniff.bus.feed import FeedStatus, StoreFeed
+from sniff.bus.model import Store
+from sniff.bus.offline import outputs
+from sniff.devices import devices
+from sniff.engine.engine import Output
+from sniff.engine.follow_settings import dissector_for
 from sniff.simulation.scenarios import scenario, simulate
 from sniff.simulation.tap import TapModel
-from sniff.store import Store
 from sniff.tui.app import SnifferApp
-from sniff.tui.feed import FeedStatus, StoreFeed
 
 STARTED = 1_772_359_200 * NS_PER_S  # 2026-03-01T10:00:00Z
 SECONDS = 180

@@ -6,7 +6,7 @@ from bisect import bisect_right, insort
 from dataclasses import dataclass, field
 
 from sniff.analysis.filtering import Predicate, compile_filter
-from sniff.store import Store
+from sniff.bus.model import Store
 from sniff.tui.times import TimeMode
 
 

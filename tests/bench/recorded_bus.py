@@ -12,10 +12,10 @@ from fastcrc import crc16
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
 from dissectors.profiles import Devices
+from sniff.bus.live import LiveBus
 from sniff.capture.wire import Ended, Message, Received, Tick
-from sniff.live import LiveBus
+from sniff.engine.session import Adapter, Session
 from sniff.recording.writer import Recorder
-from sniff.session import Adapter, Session
 
 MS = 1_000_000
 BASE = 1_772_359_200_000_000_000

@@ -18,13 +18,13 @@ from typing import Any
 import pytest
 
 from dissectors.frame import Chunk
+from sniff.bus.live import LiveBus
 from sniff.capture.wire import Received, Tick
+from sniff.engine.session import LineEvent, LineEventKind
 from sniff.formats import read
-from sniff.live import LiveBus
 from sniff.recording import keeper
 from sniff.recording.rotation import Rotation
 from sniff.recording.writer import Recorder
-from sniff.session import LineEvent, LineEventKind
 from tests.bench.recorded_bus import BASE, BEAT, SESSION, Link, polls
 
 S = 1_000_000_000

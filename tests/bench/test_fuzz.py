@@ -18,9 +18,10 @@ from dissectors import registry
 from dissectors.frame import Chunk, LineError, Mark
 from dissectors.line import LineSettings
 from sniff.analysis.judging import Judging
-from sniff.formats import WRITERS, CaptureError, create, read
-from sniff.session import Item, LineEvent, LineEventKind, Session
-from sniff.session_engine import SessionEngine
+from sniff.engine.capture import CaptureError
+from sniff.engine.follow_settings import SessionEngine
+from sniff.engine.session import Item, LineEvent, LineEventKind, Session
+from sniff.formats import WRITERS, create, read
 from sniff.simulation.scenarios import scenario, simulate
 from sniff.simulation.tap import CH340
 

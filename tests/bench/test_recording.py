@@ -15,10 +15,10 @@ from mcap.writer import Writer
 
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
+from sniff.engine.session import Session
 from sniff.formats import create, read
 from sniff.recording.reader import McapCapture
 from sniff.recording.writer import Recorder
-from sniff.session import Session
 
 COUNT = 100_000
 BASE = 1_772_359_200_000_000_000

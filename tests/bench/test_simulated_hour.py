@@ -15,11 +15,11 @@ import pytest
 
 from dissectors import registry
 from dissectors.frame import Chunk
-from sniff.engine import Engine
+from sniff.bus.model import Store
+from sniff.engine.engine import Engine
 from sniff.recording.writer import Recorder
 from sniff.simulation.scenarios import scenario, simulate
 from sniff.simulation.tap import FTDI_LOW_LATENCY, TapModel
-from sniff.store import Store
 
 HOUR = 3600
 KEEP = 100_000

@@ -16,11 +16,12 @@ from dissectors.tracker import Transaction, Verdict
 from sniff.analysis.health import HealthReport, health_of
 from sniff.analysis.judging import Judging
 from sniff.analysis.summary import Summary
-from sniff.engine import Output, Row
+from sniff.bus.offline import outputs
+from sniff.devices import noted_devices
+from sniff.engine.engine import Output, Row
+from sniff.engine.follow_settings import dissector_for
+from sniff.engine.session import Session
 from sniff.formats import read
-from sniff.profile_files import noted_devices
-from sniff.reading import dissector_for, outputs
-from sniff.session import Session
 
 CASES = Path(__file__).parents[2] / "../shared/cases"
 

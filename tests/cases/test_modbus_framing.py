@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dissectors.frame import Damage, Flaw, Frame, Role
-from sniff.engine import Row
+from sniff.engine.engine import Row
 from tests.cases.reading import case, reading
 
 

@@ -19,7 +19,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from dissectors.frame import Chunk
-from sniff.formats import CaptureError, read
+from sniff.engine.capture import CaptureError
+from sniff.formats import read
 
 LINE = ("-s", "115200,8N1", "-p", "modbus-rtu")
 PATIENCE = 60.0

@@ -25,7 +25,7 @@ from dissectors.tracker import Transaction, Verdict
 from sniff.capture.config import SourceSpec
 from sniff.capture.link import CaptureLink
 from sniff.capture.wire import Received
-from sniff.engine import Engine, Row
+from sniff.engine.engine import Engine, Row
 from sniff.simulation.bus import WHOLE, VirtualBus
 from sniff.simulation.faults import LateResponse, LostResponse
 from sniff.simulation.ports import HAS_PTY

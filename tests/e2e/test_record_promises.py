@@ -13,8 +13,8 @@ from pathlib import Path
 
 import pytest
 
+from sniff.engine.session import LineEvent, LineEventKind
 from sniff.formats import read
-from sniff.session import LineEvent, LineEventKind
 
 pytest.importorskip("termios")
 

@@ -16,15 +16,15 @@ import pytest
 
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
+from sniff.bus.offline import outputs
 from sniff.capture import link as capture_link
 from sniff.capture.config import RecordSpec, SourceSpec
 from sniff.cli import main
 from sniff.cli.listening import start
 from sniff.cli.searching import Unknowns
-from sniff.engine import Output
+from sniff.engine.engine import Output
+from sniff.engine.session import settings_change
 from sniff.formats import read
-from sniff.reading import outputs
-from sniff.session import settings_change
 
 pytest.importorskip("termios")
 SCRIPT = Path(__file__).with_name("line_bus.py")

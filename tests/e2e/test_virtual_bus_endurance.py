@@ -13,11 +13,11 @@ import pytest
 
 from dissectors import registry
 from dissectors.frame import Chunk
-from sniff.engine import Engine
+from sniff.bus.model import Store
+from sniff.engine.engine import Engine
 from sniff.recording.writer import Recorder
 from sniff.simulation.scenarios import scenario, simulate
 from sniff.simulation.tap import FTDI_LOW_LATENCY
-from sniff.store import Store
 
 WARM, WHOLE = 10, 45  # simulated seconds
 KEEP = 500  # rows: full long before the warm-up ends

@@ -12,7 +12,7 @@ from dissectors.frame import Chunk, Frame
 from sniff.capture.config import SourceSpec
 from sniff.capture.link import CaptureLink
 from sniff.capture.wire import Received
-from sniff.engine import Engine, Row
+from sniff.engine.engine import Engine, Row
 from sniff.simulation import scenarios
 from sniff.simulation.bus import WHOLE, VirtualBus
 from sniff.simulation.ports import HAS_PTY

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 from dissectors.findings import Finding, Rule, Severity
-from sniff.session import Item, Session
+from sniff.engine.session import Item, Session
 from sniff.simulation.scenarios import Scenario, simulate
 from sniff.simulation.tap import EXACT, TapModel
 

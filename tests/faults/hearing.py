@@ -8,7 +8,7 @@ from random import Random
 
 from dissectors.frame import Chunk, LineError, Mark
 from dissectors.line import LineSettings
-from sniff.session import Adapter, Item, LineEvent, LineEventKind
+from sniff.engine.session import Adapter, Item, LineEvent, LineEventKind
 from sniff.simulation.line_mix import low_times, receive
 from sniff.simulation.scenarios import Scenario, simulate
 from sniff.simulation.tap import TapModel

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 
 from dissectors.findings import Finding, Severity
 from sniff.analysis.judging import Judging, rules_over
-from sniff.engine import Output
+from sniff.bus.offline import outputs
+from sniff.devices import noted_devices
+from sniff.engine.engine import Output
+from sniff.engine.follow_settings import dissector_for
+from sniff.engine.session import Item, Session
 from sniff.formats import with_first_reads
-from sniff.profile_files import noted_devices
-from sniff.reading import dissector_for, outputs
-from sniff.session import Item, Session
 from tests.faults.case import Case, subject_of
 
 

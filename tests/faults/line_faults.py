@@ -9,7 +9,7 @@ from typing import ClassVar
 
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
-from sniff.session import Item
+from sniff.engine.session import Item
 from sniff.simulation.faults import NOISE, Transmission
 from sniff.simulation.line_mix import low_times, receive
 from sniff.simulation.scenarios import Scenario, simulate

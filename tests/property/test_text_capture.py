@@ -12,9 +12,10 @@ from hypothesis import strategies as st
 
 from dissectors.frame import Chunk, LineError, Mark
 from dissectors.line import LineSettings
-from sniff.formats import CaptureError, read
+from sniff.engine.capture import CaptureError
+from sniff.engine.session import Adapter, Item, LineEvent, LineEventKind, Session
+from sniff.formats import read
 from sniff.formats.text import parse, render
-from sniff.session import Adapter, Item, LineEvent, LineEventKind, Session
 
 TIMES = st.integers(-(2**61), 2**61)
 PLAIN = st.text(st.characters(exclude_categories=("Cs",)), max_size=12)

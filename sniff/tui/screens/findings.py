@@ -14,8 +14,8 @@ from textual.widgets import DataTable, Static
 
 from dissectors.findings import Finding, Severity, under_causes
 from sniff.analysis.judging import rules_over
+from sniff.bus.rules_worker import Judged
 from sniff.tui.analyzer import analyzer
-from sniff.tui.judged import Judged
 from sniff.tui.plain import plain
 from sniff.tui.screens.base import ViewScreen
 from sniff.tui.tables import StationTable

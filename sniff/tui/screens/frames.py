@@ -13,7 +13,7 @@ from textual.widget import Widget
 from dissectors.frame import Frame
 from dissectors.tracker import Transaction
 from sniff.analysis.row_tree import tree_of
-from sniff.engine import Row
+from sniff.engine.engine import Row
 from sniff.tui import places
 from sniff.tui.field_tree import FieldTree
 from sniff.tui.filter_line import FilterLine

@@ -14,11 +14,11 @@ from textual.widgets import Static
 from dissectors.frame import LineError
 from dissectors.line import NS_PER_S
 from dissectors.words import milliseconds
-from sniff.session import LineEvent
-from sniff.store import Store
+from sniff.bus.feed import FeedStatus
+from sniff.bus.model import Store
+from sniff.engine.session import LineEvent
 from sniff.tui.analyzer import analyzer
 from sniff.tui.charts import bar, sparkline
-from sniff.tui.feed import FeedStatus
 from sniff.tui.plain import plain
 from sniff.tui.screens.base import ViewScreen
 from sniff.tui.times import clock, date_and_clock, size

@@ -13,7 +13,7 @@ from dissectors.bacnet.simulated import Faults, Node, Poller, f510
 from dissectors.findings import Severity
 from dissectors.frame import Chunk, Frame
 from dissectors.line import LineSettings, Timing
-from sniff.session import Item
+from sniff.engine.session import Item
 from sniff.simulation.tap import EXACT, FTDI, OCTETS, UART, Tap, TapModel
 from sniff.simulation.wire import Party, Wire
 from tests.dissectors.bacnet.ring_script import Step, data, rounds, script

@@ -22,7 +22,7 @@ from dissectors.frame import Assembly, Chunk, Frame, Role
 from dissectors.tracker import Transaction, Verdict
 from sniff.analysis.packet_tree import fields_of
 from sniff.analysis.wording import describe
-from sniff.engine import Output, Row
+from sniff.engine.engine import Output, Row
 from tests.dissectors.bacnet.segmented_bus import (
     LINE,
     READ_MULTIPLE,

@@ -17,9 +17,9 @@ from bacpypes3.pdu import PDU
 
 from dissectors.bacnet import MSTP
 from dissectors.frame import Frame, Role
-from sniff.engine import Output, Row
+from sniff.bus.offline import outputs
+from sniff.engine.engine import Output, Row
 from sniff.formats import read
-from sniff.reading import outputs
 from tests.dissectors.bacnet.segmented_bus import (
     READ_MULTIPLE,
     WRITE_MULTIPLE,

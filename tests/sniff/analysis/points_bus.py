@@ -7,9 +7,9 @@ from collections.abc import Iterable, Iterator
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
 from dissectors.modbus.adu import seal_rtu
-from sniff.engine import Output
-from sniff.reading import outputs
-from sniff.session import Session
+from sniff.bus.offline import outputs
+from sniff.engine.engine import Output
+from sniff.engine.session import Session
 
 MS = 1_000_000
 LINE = LineSettings.parse("19200,8N1")

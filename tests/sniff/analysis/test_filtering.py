@@ -10,7 +10,7 @@ from dissectors.frame import Check, Found, Frame, Header, Noise, Place, Reason, 
 from dissectors.manifest import Dissector
 from dissectors.tracker import Interval, Placement, Transaction, Verdict
 from sniff.analysis.filtering import FilterError, compile_filter
-from sniff.engine import Row
+from sniff.engine.engine import Row
 
 NO: Any = None
 DISSECTOR = Dissector(

@@ -15,10 +15,11 @@ from dissectors.findings import Finding, Severity
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
 from sniff.analysis.judging import Judging
-from sniff.engine import Output
+from sniff.bus.offline import outputs
+from sniff.engine.engine import Output
+from sniff.engine.follow_settings import dissector_for
+from sniff.engine.session import Item, Session
 from sniff.formats import read
-from sniff.reading import dissector_for, outputs
-from sniff.session import Item, Session
 from tests.captures_shared import Listed, folder, listed, timed
 
 MS = 1_000_000

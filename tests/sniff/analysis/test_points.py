@@ -12,8 +12,9 @@ from dissectors.profiles import Devices, packaged
 from dissectors.profiles.decoding import Quality
 from dissectors.readings import How
 from sniff.analysis.points import Point, PointReader, PointTable, Sample
-from sniff.reading import dissector_for, settled
-from sniff.session import Session
+from sniff.bus.offline import settled
+from sniff.engine.follow_settings import dissector_for
+from sniff.engine.session import Session
 
 E510 = packaged("teco-e510")
 ACN = packaged("automationdirect-acn")

@@ -19,8 +19,9 @@ from sniff.analysis.judging import Judging
 from sniff.analysis.points import Sample
 from sniff.analysis.profile_findings import PROFILE_RULES, ProfileFindings
 from sniff.analysis.summary import Summary
-from sniff.engine import Output
-from sniff.reading import dissector_for, outputs
+from sniff.bus.offline import outputs
+from sniff.engine.engine import Output
+from sniff.engine.follow_settings import dissector_for
 from sniff.simulation.scenarios import scenario, simulate
 
 E510 = Devices(default=packaged("teco-e510"))

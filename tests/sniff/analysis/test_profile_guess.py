@@ -8,8 +8,9 @@ from typing import Any
 
 from dissectors.profiles import packaged
 from sniff.analysis.profile_guess import Guess, Guessing
-from sniff.engine import Output
-from sniff.reading import dissector_for, outputs
+from sniff.bus.offline import outputs
+from sniff.engine.engine import Output
+from sniff.engine.follow_settings import dissector_for
 from sniff.simulation.scenarios import scenario, simulate
 
 PROFILES = [packaged(name) for name in ("teco-e510", "teco-f510", "automationdirect-acn")]

@@ -9,8 +9,9 @@ import pytest
 from dissectors.line import LineSettings, Timing
 from dissectors.profiles import Devices, packaged
 from sniff.analysis.points import PointReader, PointTable
-from sniff.engine import Output
-from sniff.reading import dissector_for, outputs
+from sniff.bus.offline import outputs
+from sniff.engine.engine import Output
+from sniff.engine.follow_settings import dissector_for
 from sniff.simulation.scenarios import Scenario, simulate
 from sniff.simulation.wire import Party
 

@@ -9,8 +9,8 @@ import pytest
 from dissectors.frame import Noise, Place, Reason
 from dissectors.line import LineSettings
 from sniff.analysis.line_findings import LineFindings
-from sniff.engine import Row
-from sniff.session import Session
+from sniff.engine.engine import Row
+from sniff.engine.session import Session
 
 
 @pytest.mark.parametrize(

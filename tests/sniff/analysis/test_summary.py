@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from dissectors.tracker import Transaction, Verdict
 from sniff.analysis.nodes import NodeTable
 from sniff.analysis.summary import Summary
-from sniff.engine import Output
-from sniff.reading import outputs
-from sniff.session import LineEvent, Session
+from sniff.bus.offline import outputs
+from sniff.engine.engine import Output
+from sniff.engine.session import LineEvent, Session
 from sniff.simulation.scenarios import scenario, simulate
 from sniff.simulation.tap import EXACT
 

@@ -5,7 +5,7 @@ import time
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
 from sniff.capture.frame_counter import FrameCounter
-from sniff.session import UNKNOWABLE, LineEvent, LineEventKind, Session, SettingsChange
+from sniff.engine.session import UNKNOWABLE, LineEvent, LineEventKind, Session, SettingsChange
 
 MS = 1_000_000
 LINE = LineSettings.parse("19200,8E1")

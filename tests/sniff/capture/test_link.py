@@ -13,8 +13,8 @@ from dissectors.line import LineSettings
 from sniff.capture.config import RecordSpec, SourceSpec
 from sniff.capture.link import CaptureLink
 from sniff.capture.wire import Ended, Received, Status, Tick
-from sniff.formats import CaptureError
-from sniff.session import LineEvent, LineEventKind
+from sniff.engine.capture import CaptureError
+from sniff.engine.session import LineEvent, LineEventKind
 from sniff.sources import PortError
 
 LINE = LineSettings.parse("19200,8E1")

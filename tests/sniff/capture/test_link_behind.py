@@ -14,7 +14,7 @@ from sniff.capture import link as link_module
 from sniff.capture.link import CaptureLink
 from sniff.capture.spawn import Spawned
 from sniff.capture.wire import LOSSY, Ended, Kind, Received, encode, encode_item
-from sniff.session import LineEventKind
+from sniff.engine.session import LineEventKind
 
 
 class Process:

@@ -7,7 +7,7 @@ import pytest
 from dissectors.frame import Chunk
 from sniff.capture.outlet import Outlet
 from sniff.capture.wire import MessageSplitter, Received, decode_message, encode_tick
-from sniff.session import LineEvent, LineEventKind
+from sniff.engine.session import LineEvent, LineEventKind
 
 
 @pytest.fixture

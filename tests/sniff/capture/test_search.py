@@ -13,8 +13,8 @@ from dissectors.line import LineSettings
 from sniff.capture.config import RecordSpec, SourceSpec
 from sniff.capture.link import CaptureLink
 from sniff.capture.wire import Received
+from sniff.engine.session import LineEvent, LineEventKind, SettingsChange
 from sniff.formats import read
-from sniff.session import LineEvent, LineEventKind, SettingsChange
 
 FIRST, SECOND = LineSettings.parse("9600,8N1"), LineSettings.parse("19200,8E1")
 UNKNOWN = ("line", "protocol")

@@ -25,7 +25,7 @@ from sniff.capture.wire import (
     encode_status,
     encode_tick,
 )
-from sniff.session import LineEvent, LineEventKind
+from sniff.engine.session import LineEvent, LineEventKind
 
 times = st.integers(-(2**63), 2**63 - 1)
 errors = st.integers(1, 15).map(LineError)

@@ -9,8 +9,8 @@ import pytest
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
 from sniff.cli import main
+from sniff.engine.session import Session
 from sniff.formats import create, read
-from sniff.session import Session
 
 TITLE = "\x1b]0;title\x07"
 POLL = bytes.fromhex("010300000002c40b")

@@ -12,8 +12,8 @@ import pytest
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
 from sniff.cli import main
+from sniff.engine.session import Session
 from sniff.formats import create
-from sniff.session import Session
 
 CAPTURE = """#!sniff-capture 1
 # line: 19200,8E1

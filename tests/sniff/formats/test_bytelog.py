@@ -10,8 +10,10 @@ from hypothesis import strategies as st
 
 from dissectors.frame import Chunk, Frame, LineError, Mark
 from dissectors.line import LineSettings
-from sniff.formats import CaptureError, bytelog, read
-from sniff.reading import settled, with_settings
+from sniff.bus.offline import settled
+from sniff.engine.capture import CaptureError
+from sniff.engine.session import with_settings
+from sniff.formats import bytelog, read
 
 REQUEST, ANSWER = bytes.fromhex("010300000002C40B"), bytes.fromhex("01030400D7001ACBC0")
 CHAR = LineSettings.parse("19200,8E1").char

@@ -7,9 +7,10 @@ from pathlib import Path
 import pytest
 
 from dissectors.line import LineSettings
-from sniff.formats import CaptureError, create
+from sniff.engine.capture import CaptureError
+from sniff.engine.session import Session
+from sniff.formats import create
 from sniff.formats.files import NewFile
-from sniff.session import Session
 
 SESSION = Session("port", LineSettings(), "modbus-rtu")
 

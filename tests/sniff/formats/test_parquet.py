@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sniff.cli import main
-from sniff.formats import CaptureError
+from sniff.engine.capture import CaptureError
 from sniff.formats.parquet import Kind, ParquetWriter
 
 CAPTURES = Path(__file__).parents[3] / "captures"

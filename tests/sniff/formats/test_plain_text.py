@@ -10,7 +10,8 @@ from types import SimpleNamespace
 import pytest
 
 from dissectors.frame import Chunk
-from sniff.formats import Capture, CaptureError, read
+from sniff.engine.capture import Capture, CaptureError
+from sniff.formats import read
 from sniff.formats.bytelog import ByteLog
 from sniff.formats.text import TextCapture
 

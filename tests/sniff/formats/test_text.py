@@ -8,9 +8,10 @@ import pytest
 
 from dissectors.frame import Chunk, LineError, Mark
 from dissectors.line import LineSettings
-from sniff.formats import CaptureError, create, read
+from sniff.engine.capture import CaptureError
+from sniff.engine.session import Adapter, Item, LineEvent, LineEventKind, Session
+from sniff.formats import create, read
 from sniff.formats.text import LONGEST_LINE, parse, render
-from sniff.session import Adapter, Item, LineEvent, LineEventKind, Session
 
 P, F, B, O = LineError.PARITY, LineError.FRAMING, LineError.BREAK, LineError.OVERRUN  # noqa: E741
 START = 1_772_359_200_000_000_000  # 2026-03-01T10:00:00Z

@@ -14,12 +14,13 @@ from mcap.writer import Writer
 
 from dissectors.frame import Chunk, LineError, Mark
 from dissectors.line import LineSettings
-from sniff.formats import CaptureError, read
+from sniff.engine.capture import CaptureError
+from sniff.engine.session import Item, LineEvent, LineEventKind, Session
+from sniff.formats import read
 from sniff.recording import scan
 from sniff.recording.batch import Batcher, Message
 from sniff.recording.part import PartFile
 from sniff.recording.reader import McapCapture
-from sniff.session import Item, LineEvent, LineEventKind, Session
 
 A_CHUNK = 6  # items a chunk of the small file
 BASE = 1_772_359_200_000_000_000

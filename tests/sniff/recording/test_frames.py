@@ -11,13 +11,13 @@ from hypothesis import strategies as st
 from dissectors.frame import Check, Chunk, Damage, Found, Frame, Header, LineError, Mark, Noise, Place, Reason, Role
 from dissectors.line import LineSettings
 from dissectors.tracker import Interval, Placement, Transaction, Verdict
-from sniff.engine import Output, Row
+from sniff.engine.engine import Output, Row
+from sniff.engine.session import Session
 from sniff.recording import frames
 from sniff.recording.frames import FrameBatch, FrameLog, encode
 from sniff.recording.reader import McapCapture, read
 from sniff.recording.topics import FRAMES
 from sniff.recording.writer import Recorder
-from sniff.session import Session
 
 I64 = st.integers(-(2**63) + 1, 2**63 - 1)
 OCTETS = st.binary(max_size=20)

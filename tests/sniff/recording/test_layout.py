@@ -11,6 +11,7 @@ from mcap.reader import NonSeekingReader, make_reader
 
 from dissectors.frame import Chunk, LineError, Mark
 from dissectors.line import LineSettings
+from sniff.engine.session import Item, LineEvent, LineEventKind, Session
 from sniff.formats import create, read
 from sniff.recording import frames
 from sniff.recording.reader import McapCapture
@@ -18,7 +19,6 @@ from sniff.recording.recovery import recover
 from sniff.recording.rotation import Rotation
 from sniff.recording.topics import LOG_SCHEMA, RAW_LAYOUT, SCHEMAS
 from sniff.recording.writer import Recorder
-from sniff.session import Item, LineEvent, LineEventKind, Session
 
 BASE = 1_772_359_200_000_000_000
 SESSION = Session("/dev/ttyUSB0", LineSettings(19200, 8, "E", 1), "modbus-rtu", BASE, "boiler")

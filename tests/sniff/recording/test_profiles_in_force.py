@@ -12,12 +12,13 @@ from mcap.reader import make_reader
 from dissectors.frame import Chunk
 from dissectors.profiles.packaged import packaged
 from sniff.cli import main
-from sniff.formats import Capture, read
-from sniff.profile_files import devices, noted, noted_devices, with_devices
+from sniff.devices import devices, noted, noted_devices, with_devices
+from sniff.engine.capture import Capture
+from sniff.engine.session import DEVICES_NOTE
+from sniff.formats import read
 from sniff.recording.reader import MOST_PROFILE
 from sniff.recording.rotation import Rotation
 from sniff.recording.writer import Recorder
-from sniff.session import DEVICES_NOTE
 
 CAPTURE = Path(__file__).parents[3] / "captures" / "rtu-clean.cap.txt"
 PUMP = """

@@ -16,13 +16,14 @@ import pytest
 
 from dissectors.frame import Chunk, LineError, Mark
 from dissectors.line import LineSettings
-from sniff.formats import CaptureError, read
+from sniff.engine.capture import CaptureError
+from sniff.engine.session import Item, LineEvent, LineEventKind, Session
+from sniff.formats import read
 from sniff.recording import keeper
 from sniff.recording.reader import McapCapture
 from sniff.recording.rotation import Rotation, part_name
 from sniff.recording.topics import VALUE_SCHEMA
 from sniff.recording.writer import Recorder
-from sniff.session import Item, LineEvent, LineEventKind, Session
 
 BASE = 1_772_359_200_000_000_000
 SESSION = Session("/dev/ttyUSB0", LineSettings(19200, 8, "E", 1), "modbus-rtu", BASE)
@@ -151,7 +152,7 @@ def test_killed_it_keeps_what_is_a_second_old(tmp_path: Path) -> None:
         from dissectors.frame import Chunk
         from dissectors.line import LineSettings
         from sniff.recording.writer import Recorder
-        from sniff.session import Session
+        from sniff.engine.session import Session
         recorder = Recorder({str(path)!r}, Session("p", LineSettings(), "modbus-rtu"))
         for number in range(10**9):
             now = time.time_ns()
@@ -270,7 +271,7 @@ def test_a_real_limit_of_the_system(tmp_path: Path) -> None:
         from dissectors.frame import Chunk
         from dissectors.line import LineSettings
         from sniff.recording.writer import Recorder
-        from sniff.session import Session
+        from sniff.engine.session import Session
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
         recorder = Recorder({str(path)!r}, Session("p", LineSettings(), "modbus-rtu"))
         resource.setrlimit(resource.RLIMIT_FSIZE, (9000, resource.RLIM_INFINITY))

@@ -11,15 +11,16 @@ import pytest
 from dissectors.bacnet import MSTP
 from dissectors.bacnet.ring import Ring, What
 from dissectors.frame import Chunk, Frame
+from sniff.bus.offline import outputs
 from sniff.cli import main
 from sniff.cli.ring import ring_of
-from sniff.formats import Capture, read
-from sniff.reading import outputs
+from sniff.engine.capture import Capture
+from sniff.engine.session import Item, LineEvent, LineEventKind, Session
+from sniff.formats import read
 from sniff.recording.reader import McapCapture
 from sniff.recording.rotated import RotatedCapture, joined
 from sniff.recording.rotation import Rotation
 from sniff.recording.writer import Recorder
-from sniff.session import Item, LineEvent, LineEventKind, Session
 from sniff.simulation.scenarios import scenario, simulate
 from sniff.simulation.tap import CH340
 

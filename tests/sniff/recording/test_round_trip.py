@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from dissectors.frame import Chunk, LineError, Mark
 from dissectors.line import LineSettings
+from sniff.engine.session import Adapter, Item, LineEvent, LineEventKind, Session
 from sniff.formats import create, read
-from sniff.session import Adapter, Item, LineEvent, LineEventKind, Session
 
 BASE = 1_772_359_200_000_000_000
 SESSION = Session(

@@ -13,11 +13,11 @@ import pytest
 
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
+from sniff.engine.session import LineEvent, LineEventKind, Session
 from sniff.formats import read
 from sniff.recording import keeper
 from sniff.recording.rotation import Rotation
 from sniff.recording.writer import Recorder
-from sniff.session import LineEvent, LineEventKind, Session
 
 BASE = 1_772_359_200_000_000_000
 SESSION = Session("/dev/ttyUSB0", LineSettings(19200, 8, "E", 1), "modbus-rtu", BASE)

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from dissectors.frame import Noise, Place, Reason
 from dissectors.tracker import Transaction, Verdict
-from sniff.engine import Row
+from sniff.engine.engine import Row
 from sniff.reporting.timeline import FIRST_WIDTH, MOST_PARTS, Timeline
 
 CHAR = 1_000_000

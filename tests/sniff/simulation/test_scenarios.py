@@ -12,8 +12,8 @@ from dissectors import registry
 from dissectors.frame import Chunk, Frame
 from dissectors.line import LineSettings
 from dissectors.tracker import Transaction, Verdict
-from sniff.engine import Engine, Row
-from sniff.session import Session
+from sniff.engine.engine import Engine, Row
+from sniff.engine.session import Session
 from sniff.simulation import scenarios
 from sniff.simulation.faults import (
     BitFlips,

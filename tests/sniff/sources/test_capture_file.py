@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from dissectors.line import LineSettings
-from sniff.session import LineEventKind
+from sniff.engine.session import LineEventKind
 from sniff.sources import PortError, open_source
 from sniff.sources.capture_file import AT_ONCE, CaptureFileSource
 from sniff.sources.clock import Clock

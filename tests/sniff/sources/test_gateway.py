@@ -11,7 +11,7 @@ from serial import rfc2217
 
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
-from sniff.session import Item, LineEvent, LineEventKind
+from sniff.engine.session import Item, LineEvent, LineEventKind
 from sniff.sources import PortError, Source, gateway, open_source
 from sniff.sources.clock import Clock
 from sniff.sources.telnet import Data, Subnegotiation, TelnetDecoder

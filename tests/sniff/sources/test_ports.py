@@ -104,7 +104,7 @@ def test_a_usb_chip_is_known_where_the_system_names_no_driver(monkeypatch) -> No
 
 def test_what_an_adapter_calls_itself_is_escaped(monkeypatch, capsys) -> None:
     from sniff.cli import main
-    from sniff.session import Adapter
+    from sniff.engine.session import Adapter
 
     adapter = Adapter("\x1b[2Jadapter\u202e", "ftdi_sio", 0, "exact", ())
     monkeypatch.setattr(ports, "list_ports", lambda: [ports.PortInfo("/dev/ttyUSB0", adapter)])

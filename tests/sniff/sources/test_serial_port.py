@@ -7,7 +7,7 @@ import pytest
 
 from dissectors.frame import Chunk, LineError, Mark
 from dissectors.line import LineSettings
-from sniff.session import Item, LineEvent, LineEventKind
+from sniff.engine.session import Item, LineEvent, LineEventKind
 from sniff.sources import PortError, open_source, serial_port, tty
 from sniff.sources.clock import Clock
 from sniff.sources.serial_port import SerialSource
@@ -263,7 +263,7 @@ def test_no_such_port_lists_those_there_are(monkeypatch) -> None:
 
 
 def serial_port_info(device: str):
-    from sniff.session import Adapter
+    from sniff.engine.session import Adapter
     from sniff.sources.ports import PortInfo
 
     return PortInfo(device, Adapter())

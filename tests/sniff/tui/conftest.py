@@ -20,11 +20,11 @@ from dissectors.frame import Check, Damage, Found, Frame, Header, LineError, Mar
 from dissectors.line import LineSettings
 from dissectors.manifest import Dissector
 from dissectors.tracker import Interval, Placement, Transaction, Verdict
-from sniff.engine import Output, Row
-from sniff.session import Adapter, Session
-from sniff.store import Store
+from sniff.bus.feed import FeedStatus, StoreFeed
+from sniff.bus.model import Store
+from sniff.engine.engine import Output, Row
+from sniff.engine.session import Adapter, Session
 from sniff.tui.app import SnifferApp
-from sniff.tui.feed import FeedStatus, StoreFeed
 
 MS = 1_000_000
 START = 1_772_359_200_000_000_000  # 2026-03-01T10:00:00Z

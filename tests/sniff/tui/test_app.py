@@ -10,9 +10,9 @@ from typing import Any
 import pytest
 from textual.widgets import Static
 
+from sniff.bus.feed import FeedStatus, StoreFeed
 from sniff.tui import run
 from sniff.tui.app import PATH, with_step
-from sniff.tui.feed import FeedStatus, StoreFeed
 from sniff.tui.help import HelpScreen
 from sniff.tui.keybar import explanation, working_keys
 from sniff.tui.palette import ActionCommands
@@ -248,7 +248,7 @@ def test_importing_the_package_loads_no_textual() -> None:
     import subprocess
 
     code = (
-        "import sys, sniff.tui, sniff.tui.feed; sys.exit(any(m in sys.modules for m in ('textual', 'scapy', 'rich')))"
+        "import sys, sniff.tui, sniff.bus.feed; sys.exit(any(m in sys.modules for m in ('textual', 'scapy', 'rich')))"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 

@@ -8,7 +8,7 @@ import pytest
 
 from dissectors.frame import Role
 from dissectors.tracker import Transaction, Verdict
-from sniff.engine import Output
+from sniff.engine.engine import Output
 from sniff.tui.prompt import Prompt
 from sniff.tui.viewing import Viewing
 

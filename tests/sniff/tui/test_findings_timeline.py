@@ -8,12 +8,12 @@ import pytest
 
 from dissectors.findings import Severity
 from dissectors.registry import get
-from sniff.engine import Output
-from sniff.reading import outputs
+from sniff.bus.model import Store
+from sniff.bus.offline import outputs
+from sniff.bus.rules_worker import Judged
+from sniff.engine.engine import Output
 from sniff.simulation.faults import LostResponse
 from sniff.simulation.scenarios import simulate
-from sniff.store import Store
-from sniff.tui.judged import Judged
 from tests.faults.buses import modbus
 
 START = 1_772_359_200_000_000_000

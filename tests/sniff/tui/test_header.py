@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 from rich.cells import cell_len
 
-from sniff.session import LineEvent, LineEventKind
-from sniff.tui.feed import FeedStatus
+from sniff.bus.feed import FeedStatus
+from sniff.engine.session import LineEvent, LineEventKind
 from sniff.tui.header import record_state, status_line, why_ended
 from sniff.tui.viewing import Viewing
 

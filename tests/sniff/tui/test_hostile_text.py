@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 
 from dissectors.tracker import Transaction, Verdict
-from sniff.engine import Output
-from sniff.session import LineEvent, LineEventKind
-from sniff.store import Store
+from sniff.bus.model import Store
+from sniff.engine.engine import Output
+from sniff.engine.session import LineEvent, LineEventKind
 
 HOSTILE = "[bold red]x[/] [@click=app.quit]y[/] \x1b[2J\x1b]0;t\x07 \u202eabc \r\n\x00\x9b31m {None} \ud800"
 

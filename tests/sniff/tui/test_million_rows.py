@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from dissectors.frame import Check, Found, Frame, Header, Role
-from sniff.engine import Row
-from sniff.store import Store
+from sniff.bus.model import Store
+from sniff.engine.engine import Row
 
 MS = 1_000_000
 
@@ -35,7 +35,7 @@ class MadeRows(Sequence[Row]):
 
 @pytest.fixture
 def store_of(make_bus: Any, monkeypatch: pytest.MonkeyPatch) -> Any:
-    monkeypatch.setattr("sniff.tui.judged.Judged.work", lambda judged, last: False)  # it reads rows for itself
+    monkeypatch.setattr("sniff.bus.rules_worker.Judged.work", lambda judged, last: False)  # it reads rows for itself
 
     def make(count: int) -> Store:
         store = make_bus().store

@@ -9,7 +9,7 @@ from textual.widgets import DataTable
 
 from dissectors.frame import LineError, Mark
 from dissectors.tracker import Verdict
-from sniff.session import LineEvent, LineEventKind
+from sniff.engine.session import LineEvent, LineEventKind
 
 MS = 1_000_000
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from sniff.session import LineEvent, LineEventKind
+from sniff.engine.session import LineEvent, LineEventKind
 
 SIZES = {"80x24": (80, 24), "160x50": (160, 50)}
 

@@ -7,10 +7,11 @@ from typing import Any
 import pytest
 
 from dissectors.profiles import Devices, packaged
-from sniff.engine import Output
-from sniff.reading import dissector_for, outputs
+from sniff.bus.model import Store
+from sniff.bus.offline import outputs
+from sniff.engine.engine import Output
+from sniff.engine.follow_settings import dissector_for
 from sniff.simulation.scenarios import scenario, simulate
-from sniff.store import Store
 from sniff.tui.screens.points import age, trend
 
 STARTED = 1_772_359_200 * 1_000_000_000

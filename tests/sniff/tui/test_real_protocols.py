@@ -10,10 +10,11 @@ import pytest
 from dissectors.frame import Frame
 from sniff.analysis.packet_tree import Field
 from sniff.analysis.row_tree import tree_of
-from sniff.engine import Output
-from sniff.reading import dissector_for, outputs
+from sniff.bus.model import Store
+from sniff.bus.offline import outputs
+from sniff.engine.engine import Output
+from sniff.engine.follow_settings import dissector_for
 from sniff.simulation.scenarios import scenario, simulate
-from sniff.store import Store
 from sniff.tui.times import date_and_clock
 
 START = 1_772_359_200_000_000_000

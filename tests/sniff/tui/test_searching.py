@@ -6,11 +6,11 @@ from typing import Any
 
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
-from sniff.session import UNKNOWABLE, LineEvent, LineEventKind, Session, SettingsChange
-from sniff.session_engine import SessionEngine
-from sniff.store import Store
-from sniff.tui.feed import FeedStatus
-from sniff.tui.judged import Judged
+from sniff.bus.feed import FeedStatus
+from sniff.bus.model import Store
+from sniff.bus.rules_worker import Judged
+from sniff.engine.follow_settings import SessionEngine
+from sniff.engine.session import UNKNOWABLE, LineEvent, LineEventKind, Session, SettingsChange
 
 MS = 1_000_000
 FIRST, RIGHT = LineSettings.parse("9600,8N1"), LineSettings.parse("38400,8N1")

@@ -6,8 +6,8 @@ import time
 
 from dissectors.findings import Finding
 from sniff.analysis.judging import Judging
-from sniff.engine import Output
-from sniff.store import Store
+from sniff.bus.model import Store
+from sniff.engine.engine import Output
 
 SLICE_SECONDS = 0.012
 SLICE_ROWS = 200

@@ -26,7 +26,7 @@ from dissectors import registry
 from dissectors.frame import Chunk, Frame, LineError
 from dissectors.line import LineSettings, Timing
 from dissectors.tracker import Verdict
-from sniff.engine import Engine, Output
+from sniff.engine.engine import Engine, Output
 
 FOUND_BITS = 60.0
 FOUND_FRAMES = 3

@@ -13,7 +13,7 @@ import pytest
 from dissectors import registry
 from dissectors.frame import Chunk, LineError, Mark
 from dissectors.line import LineSettings
-from sniff.analysis.detecting import (
+from sniff.analysis.autodetect import (
     DWELL,
     FOUND_BITS,
     FOUND_FRAMES,
@@ -249,7 +249,7 @@ def test_the_order_begins_with_the_usual() -> None:
 def frames(protocol: str) -> Iterator[float]:
     from dissectors.frame import Frame
     from dissectors.line import Timing
-    from sniff.engine import Engine
+    from sniff.engine.engine import Engine
 
     line = LineSettings.parse("9600,8N1")
     engine = Engine(registry.get(protocol), Timing(line))

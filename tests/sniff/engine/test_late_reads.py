@@ -8,7 +8,7 @@ from dissectors import registry
 from dissectors.frame import Chunk, Frame
 from dissectors.line import LineSettings, Timing
 from dissectors.modbus.adu import seal_rtu
-from sniff.engine import Engine, Output
+from sniff.engine.engine import Engine, Output
 
 MS = 1_000_000
 LINE = LineSettings.parse("19200,8N1")

@@ -12,11 +12,20 @@ from dissectors.line import LineSettings
 from dissectors.tracker import Verdict
 from sniff.analysis.judging import Judging
 from sniff.analysis.summary import Summary
+from sniff.bus.offline import outputs
 from sniff.editing.cutting import Stretch, cut
-from sniff.engine import Output, Row
-from sniff.reading import outputs, with_settings
-from sniff.session import UNKNOWABLE, Adapter, Item, LineEvent, LineEventKind, Session, SettingsChange
-from sniff.session_engine import MOST_HELD_READS, SessionEngine
+from sniff.engine.engine import Output, Row
+from sniff.engine.follow_settings import MOST_HELD_READS, SessionEngine
+from sniff.engine.session import (
+    UNKNOWABLE,
+    Adapter,
+    Item,
+    LineEvent,
+    LineEventKind,
+    Session,
+    SettingsChange,
+    with_settings,
+)
 
 MS = 1_000_000
 FIRST, RIGHT = LineSettings.parse("9600,8N1"), LineSettings.parse("19200,8E1")

@@ -17,7 +17,7 @@ from dataclasses import replace
 
 from dissectors.frame import Chunk, Frame
 from dissectors.line import Timing
-from sniff.read_times import Backlog
+from sniff.engine.read_times import Backlog
 
 ANOTHER = 4
 """Octets that a frame has at least: fewer behind a frame are no second one."""

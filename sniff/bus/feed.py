@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
-from sniff.store import Store
+from sniff.bus.model import Store
 
 
 @dataclass(frozen=True, slots=True)

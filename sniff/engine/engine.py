@@ -12,7 +12,7 @@ from dissectors.frame import Chunk, Event, Frame, Header
 from dissectors.line import LineSettings, Timing
 from dissectors.manifest import Dissector
 from dissectors.tracker import Placement, Tracker, Transaction, Unpaired
-from sniff.late_reads import LateReads
+from sniff.engine.late_reads import LateReads
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,6 +6,7 @@ whoever shows it can draw, and once the capture is over what is left gets a seco
 
 from __future__ import annotations
 
+import os
 import time
 from collections import deque
 from collections.abc import Callable
@@ -13,17 +14,17 @@ from collections.abc import Callable
 from dissectors.frame import Chunk, Mark
 from dissectors.manifest import Dissector
 from dissectors.profiles import Devices
-from sniff.analysis.channels import BusChannels, DerivedMessage
-from sniff.analysis.detecting import Detecting
+from sniff.analysis.autodetect import Detecting
 from sniff.analysis.points import PointReader, Sample
+from sniff.bus.autodetect import Progress, Search
+from sniff.bus.derived_topics import BusChannels, DerivedMessage
+from sniff.bus.thinning import Budget, Room
+from sniff.bus.value_topics import ValueChannels
 from sniff.capture.link import CaptureLink
 from sniff.capture.wire import Ended, Message, Received, Status, Tick
-from sniff.detection import Progress, Search
-from sniff.engine import Output
-from sniff.reading import engine_for
-from sniff.session import LineEvent, Session
-from sniff.thinning import Budget, Room
-from sniff.value_channels import ValueChannels
+from sniff.engine.engine import Output
+from sniff.engine.follow_settings import engine_for
+from sniff.engine.session import LineEvent, Session
 
 AT_ONCE = 0.2
 """Seconds that one `poll` may spend with the engine."""
@@ -36,7 +37,7 @@ PIECE = 2048
 
 VALUES_AT_ONCE = 4000
 NODES_A_SECOND, NODES_AT_ONCE = 0.5, 600
-"""What goes back into the recording of the values of points and of the numbers of stations: `sniff/thinning.py`."""
+"""What goes back into the recording of the values of points and of the numbers of stations: `sniff/bus/thinning.py`."""
 
 NODES = "/nodes/"
 
@@ -93,6 +94,11 @@ class LiveBus:
     def unseen(self) -> int:
         """Octets of the line that were not looked at, because this side did not keep up."""
         return self.status.dropped + self.link.dropped.get(self.bus, 0) + self._skipped
+
+    @property
+    def file_is_gone(self) -> bool:
+        """Whether there is no file where the recording ought to be."""
+        return bool(self.link.paths) and (not self.status.path or not os.path.exists(self.status.path))
 
     def poll(self, timeout: float = 0.0) -> list[LiveItem]:
         """What has come, in order; waits up to `timeout` seconds. The end closes the engine and comes last.

@@ -18,8 +18,8 @@ from sniff.analysis.load import Load
 from sniff.analysis.nodes import NodeTable
 from sniff.analysis.points import PointReader, PointTable, words
 from sniff.analysis.wording import describe, is_error
-from sniff.engine import Output, Row
-from sniff.session import LineEvent, Session
+from sniff.engine.engine import Output, Row
+from sniff.engine.session import LineEvent, Session
 
 KEPT_ROWS = 1_000_000
 """Rows kept for viewing; older ones are dropped from the view (never from a recording), with a count."""

@@ -12,7 +12,7 @@ from enum import Enum
 from dissectors import registry
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings, Timing
-from sniff.read_times import MS, ReadTimes, held_back
+from sniff.engine.read_times import MS, ReadTimes, held_back
 
 DEVICES_NOTE = "devices"
 """Note of a session: which station is which device, as on the command line: "1=teco-e510,*=teco-f510"."""
@@ -274,3 +274,24 @@ class Completeness:
 
     whole: bool
     text: str = "complete"
+
+
+def with_settings(session: Session, protocol: str | None = None, line: LineSettings | None = None) -> Session:
+    """The session with what the user says instead of what the file says.
+
+    A line that is only assumed becomes that of the protocol said. Raises registry.UnknownProtocol where it must know.
+    """
+    if line is not None:
+        notes = {name: text for name, text in session.notes.items() if name != LINE_NOTE or text != ASSUMED}
+        session = replace(session, notes=notes)
+    elif protocol is not None and session.line_is_assumed:
+        session = replace(session, line=LineSettings.parse(registry.get(protocol).default_line))
+    said = [name for name, value in (("line", line), ("protocol", protocol)) if value is not None]
+    unknown = tuple(name for name in session.unknown if name not in said)
+    return replace(
+        session,
+        protocol=protocol or session.protocol,
+        line=line or session.line,
+        unknown=unknown,
+        given=session.given or (bool(session.unknown) and not unknown),
+    ).with_latency_of_reads()

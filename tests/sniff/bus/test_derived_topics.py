@@ -11,20 +11,20 @@ import pytest
 from dissectors import registry
 from dissectors.bacnet import RingObserver
 from dissectors.bacnet.ring import What
-from sniff.analysis.channels import BUS, NODE, BusChannels
 from sniff.analysis.judging import Judging
+from sniff.bus.derived_topics import BUS, NODE, BusChannels
+from sniff.bus.model import Store
+from sniff.bus.offline import outputs
+from sniff.bus.rules_worker import Judged
+from sniff.devices import noted_devices
 from sniff.editing.cutting import around_finding
-from sniff.engine import Output
+from sniff.engine.engine import Output
+from sniff.engine.session import LineEvent, LineEventKind
 from sniff.formats import read
-from sniff.profile_files import noted_devices
-from sniff.reading import outputs
 from sniff.recording.topics import SCHEMAS
-from sniff.session import LineEvent, LineEventKind
 from sniff.simulation.faults import LostResponse
 from sniff.simulation.scenarios import scenario, simulate
 from sniff.simulation.tap import EXACT
-from sniff.store import Store
-from sniff.tui.judged import Judged
 from tests.faults.buses import modbus
 
 CAPTURES = Path(__file__).parents[3] / "captures" / "findings"

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from dissectors.profiles import ProfileError
-from sniff import profile_files
-from sniff.profile_files import UnknownProfile, available, devices, find
+from sniff import devices as profile_files
+from sniff.devices import UnknownProfile, available, devices, find
 
 PUMP = 'name = "pump"\ntitle = "{title}"\nprotocols = ["modbus-rtu"]\n'
 

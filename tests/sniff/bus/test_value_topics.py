@@ -13,10 +13,10 @@ import pytest
 from dissectors.profiles import Devices, packaged
 from dissectors.profiles.decoding import decode
 from dissectors.readings import How, Reading
-from sniff import value_channels
 from sniff.analysis.points import Sample
+from sniff.bus import value_topics as value_channels
+from sniff.bus.value_topics import ValueChannels, ValueMessage
 from sniff.recording.topics import SCHEMAS
-from sniff.value_channels import ValueChannels, ValueMessage
 
 DEVICES = Devices({5: packaged("teco-f510")})
 

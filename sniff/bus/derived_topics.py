@@ -22,8 +22,8 @@ from sniff.analysis.health import health_of, station_health
 from sniff.analysis.judging import Judging
 from sniff.analysis.nodes import Node
 from sniff.analysis.summary import Summary
-from sniff.engine import Output
-from sniff.session import LineEvent, Session
+from sniff.engine.engine import Output
+from sniff.engine.session import LineEvent, Session
 
 WINDOW = NS_PER_S
 JUDGED_EVERY = 5

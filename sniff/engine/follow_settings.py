@@ -23,8 +23,8 @@ from dissectors import registry
 from dissectors.frame import Chunk, Noise, Place, Reason
 from dissectors.line import LineSettings, Timing
 from dissectors.manifest import Dissector
-from sniff.engine import NOTHING, Engine, Output, Row
-from sniff.session import Item, Session, SettingsChange, settings_change
+from sniff.engine.engine import NOTHING, Engine, Output, Row
+from sniff.engine.session import Item, Session, SettingsChange, settings_change
 
 MOST_HELD_OCTETS = 4 << 20
 MOST_HELD_READS = 200_000
@@ -152,3 +152,13 @@ class SessionEngine:
 def _together(*outputs: Output) -> Output:
     rows = tuple(row for output in outputs for row in output.rows)
     return Output(rows, tuple(one for output in outputs for one in output.transactions))
+
+
+def dissector_for(session: Session) -> Dissector:
+    """The protocol of a session. Raises registry.UnknownProtocol."""
+    return registry.get(session.protocol)
+
+
+def engine_for(session: Session) -> SessionEngine:
+    """A new engine for a session. Raises registry.UnknownProtocol."""
+    return SessionEngine(session)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dissectors import registry
 from dissectors.frame import Chunk
-from sniff.engine import Engine
-from sniff.reading import REMEMBERED, Settled, Settling
+from sniff.engine.engine import Engine
+from sniff.engine.verdict_join import REMEMBERED, Settled, Settling
 from sniff.simulation.scenarios import scenario, simulate
 from sniff.simulation.tap import EXACT
 

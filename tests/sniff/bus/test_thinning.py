@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from itertools import pairwise
 
-from sniff.thinning import Budget, Room
+from sniff.bus.thinning import Budget, Room
 
 S = 1_000_000_000
 

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import contextlib
 import os
-import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from dissectors.profiles import Devices
-from sniff.cli import listening
-from sniff.engine import Output
-from sniff.formats import Capture, CaptureError
-from sniff.live import LiveBus
-from sniff.reading import dissector_for, outputs
-from sniff.session import LineEvent, Session
-from sniff.store import KEPT_ROWS, Store
-from sniff.tui.feed import FeedStatus
+from sniff.bus.feed import FeedStatus
+from sniff.bus.live import LiveBus
+from sniff.bus.model import KEPT_ROWS, Store
+from sniff.bus.offline import outputs
+from sniff.capture.wire import Status
+from sniff.engine.capture import Capture, CaptureError
+from sniff.engine.engine import Output
+from sniff.engine.follow_settings import dissector_for
+from sniff.engine.session import LineEvent, Session
 
 SLICE = 0.05
 """Seconds that one poll may spend on reading a file."""
@@ -37,10 +37,11 @@ def rows_that_fit() -> int:
 
 
 class LiveFeed:
-    """A running capture."""
+    """A running capture. `tell` is called once where closing it waits for a slow disk."""
 
-    def __init__(self, live: LiveBus) -> None:
+    def __init__(self, live: LiveBus, tell: Callable[[Status], None] = lambda status: None) -> None:
         self.live = live
+        self._tell = tell
         self._store = Store(live.session, live.dissector, min(KEPT_ROWS, rows_that_fit()), live.devices)
 
     @property
@@ -69,7 +70,7 @@ class LiveFeed:
             port=self.live.session.port,
             line=self.live.session.line_words,
             protocol=self.live.session.protocol_words,
-            recording=None if ended is not None and listening.not_there(self.live) else status.path or None,
+            recording=None if ended is not None and self.live.file_is_gone else status.path or None,
             file_size=status.size,
             dropped=self.live.unseen + status.lost,
             live=True,
@@ -89,7 +90,7 @@ class LiveFeed:
             status = self.live.status
             if status.closing and status.unwritten and not told:
                 told = True
-                print(f"sniff485: {listening.waiting_words(status)}", file=sys.stderr)
+                self._tell(status)
 
         while self.live.ended is None:
             with contextlib.suppress(KeyboardInterrupt):  # then it is told to stop once more

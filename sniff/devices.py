@@ -20,7 +20,7 @@ from pathlib import Path
 from dissectors.profiles import Devices, Profile, ProfileError, packaged, parse_text
 from dissectors.profiles.packaged import SUFFIX, names
 from sniff.config import nearest
-from sniff.session import DEVICES_NOTE, Session
+from sniff.engine.session import DEVICES_NOTE, Session
 
 GROUP = "sniff485.profiles"
 FOLDER = "profiles"

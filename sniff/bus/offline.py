@@ -1,0 +1,51 @@
+"""A saved capture through the engine: rows with their settled verdicts, in the order of the wire."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from dissectors.profiles import Devices
+from sniff.analysis.points import PointReader
+from sniff.engine.capture import CaptureError
+from sniff.engine.engine import Output
+from sniff.engine.follow_settings import SessionEngine, dissector_for
+from sniff.engine.session import Item, LineEvent, Session
+from sniff.engine.verdict_join import Settled, Settling, Wanted
+
+
+def outputs(items: Iterable[Item], session: Session, pairing: bool = True) -> Iterator[Output | LineEvent]:
+    """Run items through a new engine; line events pass through at their place. Raises CaptureError as `items` does,
+    when all that was whole before the damage has been given. `pairing`: else no row is placed in a transaction."""
+    engine = SessionEngine(session, pairing)
+    try:
+        for item in items:
+            output = engine.take(item)
+            if output:
+                yield output
+            if isinstance(item, LineEvent):
+                yield item
+    except CaptureError:
+        yield engine.close()
+        raise
+    yield engine.close()
+
+
+def settled(
+    items: Iterable[Item], session: Session, devices: Devices | None = None, wanted: Wanted | None = None
+) -> Iterator[Settled]:
+    """Run items through a new engine; give the rows that are `wanted` (by default all) with their verdicts.
+
+    Where the device is known, also what they mean to it. Raises CaptureError as `outputs` does.
+    """
+    points = PointReader(dissector_for(session), devices) if devices else None
+    settling = Settling(points, wanted)
+    try:
+        for output in outputs(items, session):
+            if isinstance(output, Output):
+                if points is not None:
+                    points.remember(output)
+                yield from settling.add(output)
+    except CaptureError:
+        yield from settling.flush()
+        raise
+    yield from settling.flush()

@@ -1,0 +1,1 @@
+"""The engine: items of a capture in, rows and transactions out, whatever the protocol. Pure."""

@@ -1,0 +1,42 @@
+"""A capture: what every file format gives and takes, and the error that says a file cannot be read or written."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Protocol
+
+from sniff.engine.session import Completeness, Item, Session
+
+
+class CaptureError(Exception):
+    """A file that cannot be read or written; the message names it, what is wrong and the way out."""
+
+
+class Capture(Protocol):
+    """A capture opened for reading."""
+
+    session: Session
+
+    def items(self) -> Iterator[Item]:
+        """Chunks and line events in order of time. A cut file ends early, without an exception."""
+        ...
+
+    def completeness(self) -> Completeness:
+        """Whether the file is whole (may need to have read it)."""
+        ...
+
+
+class CaptureWriter(Protocol):
+    """A capture opened for writing; a context manager. Every item is kept, or the writer says what it cannot keep."""
+
+    def write(self, item: Item) -> None:
+        """Add a chunk or line event, in order of time."""
+        ...
+
+    def close(self) -> None:
+        """Finish the file."""
+        ...
+
+    def __enter__(self) -> CaptureWriter: ...
+
+    def __exit__(self, *exc: object) -> None: ...

@@ -1,0 +1,76 @@
+"""Rows joined with the verdicts of their transactions, in the order of the wire."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Protocol
+
+from dissectors.tracker import Transaction
+from sniff.engine.engine import Output, Row
+
+HELD = 20_000
+"""Rows held back at most while waiting for the verdict of the oldest."""
+REMEMBERED = 1000
+"""Rows for which a closed transaction is still known after its last one: a row may be placed in it afterwards."""
+
+Wanted = Callable[[Row, Transaction | None], bool]
+
+
+@dataclass(frozen=True, slots=True)
+class Settled:
+    """A row with the transaction it belongs to (None: noise, or never closed), and what it says of its device."""
+
+    row: Row
+    transaction: Transaction | None
+    words: str = ""
+
+
+class Words(Protocol):
+    """Says what rows mean to their devices."""
+
+    def words(self, row: Row) -> str:
+        """What a row says, "" when nothing is known."""
+        ...
+
+
+class Settling:
+    """Holds rows until their transaction has closed, so that each can be shown with its verdict; keeps the order."""
+
+    def __init__(self, points: Words | None = None, wanted: Wanted | None = None) -> None:
+        """`points`, fed before this, says what rows mean to their devices. Only rows that are `wanted` are given."""
+        self._points = points
+        self._wanted = wanted
+        self._rows: deque[Row] = deque()
+        self._closed: dict[int, Transaction] = {}
+        self._in_order: deque[Transaction] = deque()  # the same, as they closed
+
+    def add(self, output: Output) -> Iterator[Settled]:
+        """Take what the engine gave; give the rows that are settled by it."""
+        self._rows.extend(output.rows)
+        for transaction in output.transactions:
+            self._closed[transaction.id] = transaction
+            self._in_order.append(transaction)
+        while self._rows and (len(self._rows) > HELD or self._is_settled(self._rows[0])):
+            yield from self._pop()
+
+    def flush(self) -> Iterator[Settled]:
+        """Give all that is left."""
+        while self._rows:
+            yield from self._pop()
+
+    def _is_settled(self, row: Row) -> bool:
+        return row.placement is None or row.placement.tx in self._closed
+
+    def _pop(self) -> Iterator[Settled]:
+        row = self._rows.popleft()
+        transaction = None if row.placement is None else self._closed.get(row.placement.tx)
+        self._forget(row.no - REMEMBERED)
+        if self._wanted is None or self._wanted(row, transaction):
+            yield Settled(row, transaction, "" if self._points is None else self._points.words(row))
+
+    def _forget(self, before: int) -> None:
+        """Let go of what closed and has no row left that could ask for it."""
+        while self._in_order and max(self._in_order[0].request or 0, self._in_order[0].response or 0) < before:
+            del self._closed[self._in_order.popleft().id]
