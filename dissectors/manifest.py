@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from dissectors.findings import Judge, Rule
 from dissectors.frame import Frame, Header, Role
@@ -20,6 +20,9 @@ from dissectors.pseudonyms import Renamer
 from dissectors.readings import Readings, Refusal
 from dissectors.token_ring import TokenRing
 from dissectors.tracker import Tracker
+
+if TYPE_CHECKING:  # columns need numpy, which takes longer to import than a small capture to read
+    from dissectors.columns import Kernel
 
 RARE_BITS = 8.0
 """Evidence of a good frame where its protocol does not say: one in 256 of random octets."""
@@ -63,6 +66,7 @@ class Dissector:
     `readings`: what exchanges say of the things inside a station; `refusal`: the code with which one refuses.
     `packet_file`: how its frames lie in packet files.
     `renamer`: makes what gives stations other numbers and blanks texts, checks made right again.
+    `kernel`: framer and peek for clean stretches of many frames at once (`dissectors/columns.py`).
     `makers`: whole frames from their parts, checks included, by the kind of frame; parts are keywords.
     """
 
@@ -87,6 +91,7 @@ class Dissector:
     packet_file: PacketFile | None = None
     renamer: Callable[[], Renamer] | None = None
     makers: Mapping[str, Callable[..., bytes]] = field(default_factory=dict)
+    kernel: Kernel | None = None
 
     @property
     def prefixes(self) -> tuple[str, ...]:

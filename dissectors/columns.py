@@ -1,0 +1,176 @@
+"""Columns: reads and frames of a bus as arrays, for captures of millions of frames; and the contract of a kernel.
+
+A kernel is a framer and a peek for the clean stretches of a capture, where no Python object is made for a frame. It
+gives *chains*: frames each of which begins where the one before it ends. What it says of a chain is
+
+    if the reference framer is at rest where the chain begins (it holds nothing, and its last event was a good frame
+    that ended there), it gives exactly these frames, with these times, and `peek` gives exactly these headers.
+
+So it need not be complete: what it does not give is doubtful, and goes through the reference framer. Whoever puts both
+together (`sniff/engine`) takes a chain up where the reference comes to rest inside it. A kernel is pure and total: any
+octets, any times, any lengths; it never raises.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from typing import TYPE_CHECKING, Protocol, Self
+
+import numpy as np
+
+from dissectors.frame import Check, Damage, Found, Role
+from dissectors.line import Timing
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    Octets = npt.NDArray[np.uint8]
+    Times = npt.NDArray[np.int64]
+    Numbers = npt.NDArray[np.int32]
+    Small = npt.NDArray[np.int16]
+    Codes = npt.NDArray[np.uint8]
+    Names = npt.NDArray[np.uint16]
+    Masks = npt.NDArray[np.bool_]
+
+NONE = -1
+"""An optional number that is not there."""
+
+CHECKS = tuple(Check)
+FOUNDS = tuple(Found)
+DAMAGES = (None, *Damage)
+ROLES = tuple(Role)
+"""What the codes in `check`, `found`, `damage` and `role` stand for: the member at that place."""
+
+
+@dataclass(frozen=True, slots=True)
+class Reads:
+    """Reads of one bus in the order of the wire, without line events.
+
+    `octets`: uint8[n], of all reads. `times`: int64[k], ns, when each read returned (may run backwards). `lengths`:
+    int64[k], octets of each, 1 or more, n together. `marked`: bool[k], whether line errors were reported in it: such
+    a read is doubtful. `before`: nominal end of the octet before the first, ns; None at the begin of a capture.
+    """
+
+    octets: Octets
+    times: Times
+    lengths: Times
+    marked: Masks
+    before: int | None = None
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    @property
+    def begins(self) -> Times:
+        """int64[k+1]: place in `octets` of the first octet of each read, and their number."""
+        begins: Times = np.zeros(len(self.lengths) + 1, np.int64)
+        np.cumsum(self.lengths, out=begins[1:])
+        return begins
+
+
+@dataclass(frozen=True, slots=True)
+class OctetTimes:
+    """The nominal end of every octet, as `framer.OctetWindow` has it, without an array of all of them.
+
+    Octet j of read c ends at max(floors[c], times[c] - (begins[c+1] - 1 - j) * char).
+    """
+
+    begins: Times  # int64[k+1]
+    times: Times
+    floors: Times  # nominal end of the octet before each read; that of the first read of a capture: one character early
+    char: int
+
+    @classmethod
+    def of(cls, reads: Reads, char: int) -> Self:
+        """The times of some reads."""
+        begins = reads.begins
+        if not len(reads):
+            return cls(begins, reads.times, reads.times, char)
+        first = reads.before
+        if first is None:
+            first = int(reads.times[0]) - int(reads.lengths[0]) * char
+        floors = np.empty(len(reads), np.int64)
+        floors[0] = first
+        np.maximum(np.maximum.accumulate(reads.times[:-1]), first, out=floors[1:])
+        return cls(begins, reads.times, floors, char)
+
+    def read_of(self, octets: Times) -> Times:
+        """Index of the read that holds each octet (places in the octets of all reads)."""
+        reads: Times = np.searchsorted(self.begins, octets, side="right") - 1
+        return reads
+
+    def end(self, octets: Times) -> Times:
+        """Nominal end of octets, ns."""
+        reads = self.read_of(octets)
+        return np.maximum(self.floors[reads], self.times[reads] - (self.begins[reads + 1] - 1 - octets) * self.char)
+
+    def start(self, octets: Times) -> Times:
+        """Latest possible begin of octets, ns."""
+        reads = self.read_of(octets)
+        last = self.begins[reads + 1] - 1 - octets
+        end = np.maximum(self.floors[reads], self.times[reads] - last * self.char)
+        before = np.where(
+            octets == self.begins[reads],
+            self.floors[reads],
+            np.maximum(self.floors[reads], self.times[reads] - (last + 1) * self.char),
+        )
+        start: Times = np.maximum(end - self.char, before)
+        return start
+
+    def gaps(self) -> Times:
+        """int64[k]: nominal silence before each read, ns, 0 or more."""
+        first_end = self.times - (self.begins[1:] - self.begins[:-1] - 1) * self.char
+        gaps: Times = np.maximum(first_end - self.char - self.floors, 0)
+        return gaps
+
+
+@dataclass(frozen=True, slots=True)
+class FrameColumns:
+    """Frames as columns, one entry a frame, and what `peek` says of them. `NONE` where an optional number is None.
+
+    `offset`: place of the first octet among those of all reads. `start`, `end`: ns, as in `Frame`. `slack` is the
+    adapter's latency for all, `skipped` 0, there are no marks, flags or repairs. `kind`, `error`: places in `names`;
+    error 0 is None. `expected`: `NONE` for None.
+    """
+
+    offset: Times
+    length: Numbers
+    start: Times
+    end: Times
+    check: Codes
+    found: Codes
+    damage: Codes
+    expected: Numbers
+    source: Small
+    destination: Small
+    role: Codes
+    kind: Names
+    function: Small
+    address: Numbers
+    count: Numbers
+    ok: Masks
+    error: Names
+    names: tuple[str, ...] = ("",)
+
+    def __len__(self) -> int:
+        return len(self.offset)
+
+    def take(self, which: slice | Masks | Times) -> FrameColumns:
+        """Some of them."""
+        return replace(self, **{one.name: getattr(self, one.name)[which] for one in fields(self)[:-1]})
+
+    @property
+    def chained(self) -> Masks:
+        """bool[n]: whether each begins where the one before it ends; False for the first."""
+        chained: Masks = np.zeros(len(self), bool)
+        if len(self):
+            chained[1:] = self.offset[1:] == self.offset[:-1] + self.length[:-1]
+        return chained
+
+
+class Kernel(Protocol):
+    """Framer and peek for clean stretches; see the contract above."""
+
+    def __call__(self, reads: Reads, timing: Timing) -> FrameColumns:
+        """The frames of all chains, ascending by `offset`, none overlapping another."""
+        ...
