@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 from dissectors.frame import Event, Header
 from dissectors.line import Timing
@@ -36,6 +36,15 @@ class RingObserver(Protocol):
     def miss(self, time: int) -> None:
         """Octets were lost at this time (ns): what is missing there says nothing."""
         ...
+
+    def ring(self) -> Any:
+        """The ring so far, a value of the protocol's own."""
+        ...
+
+
+@runtime_checkable
+class WatchesRing(Protocol):
+    """A judge of such a protocol: it watches the ring anyhow, and nobody need do it a second time."""
 
     def ring(self) -> Any:
         """The ring so far, a value of the protocol's own."""

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 from dissectors import registry
 from dissectors.findings import Finding, Rule, WordsExceptions, with_consequences
 from dissectors.frame import Noise, Place, Reason
 from dissectors.manifest import Dissector
 from dissectors.profiles import Devices
+from dissectors.token_ring import WatchesRing
 from dissectors.tracker import Transaction, Verdict
 from sniff.analysis.line_findings import LineFindings
 from sniff.analysis.line_rules import LINE_RULES
@@ -75,6 +77,10 @@ class Judging:
         self.line.add_line_event(event)
         if event.kind.is_hole:
             self._hole, self._first_after = event.time, None
+
+    def ring(self) -> Any:
+        """The token ring so far, a value of the protocol's own; None where no token is passed."""
+        return self.judge.ring() if isinstance(self.judge, WatchesRing) else None
 
     def _is_torn(self, transaction: Transaction) -> bool:
         """Whether octets were lost inside it, so that what is missing says nothing about the bus."""

@@ -10,20 +10,16 @@ import json
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Any, cast
 
 from dissectors.findings import Finding, Severity
 from dissectors.histogram import Histogram
 from dissectors.line import NS_PER_S
-from dissectors.manifest import Dissector
-from dissectors.profiles import Devices
 from dissectors.tracker import Verdict
 from sniff.analysis.health import health_of, station_health
-from sniff.analysis.judging import Judging
 from sniff.analysis.nodes import Node
 from sniff.analysis.summary import Summary
+from sniff.bus.model import BusModel
 from sniff.engine.engine import Output
-from sniff.engine.session import LineEvent, Session
 
 WINDOW = NS_PER_S
 JUDGED_EVERY = 5
@@ -56,27 +52,23 @@ class DerivedMessage:
 
 
 class BusChannels:
-    """Messages of one bus. Fed like `Judging`; `due` gives what is to be written by then."""
+    """Messages of one bus, of what its model knows; `due` gives what is to be written by then."""
 
-    def __init__(self, session: Session, dissector: Dissector, devices: Devices | None = None) -> None:
+    def __init__(self, model: BusModel) -> None:
+        self._model = model
+        session, ring = model.session, model.dissector.ring
         self._session = session
         self._bus = re.sub(r"[^A-Za-z0-9_.-]+", "-", session.bus).strip("-") or "bus"
-        self._judging = Judging(session, dissector, devices)
-        self._compare = dissector.ring.window if dissector.ring is not None else None
-        self._ring = self._look_at_ring()
+        self._compare = ring.window if ring is not None else None
+        self._ring = model.ring()
         self._window = Summary(session.line)
         self._begin: int | None = None
         self._windows = 0
         self._said: dict[tuple[str, str], Severity] = {}
 
     def add(self, output: Output) -> None:
-        """Take what the engine gave."""
-        self._judging.add(output)
+        """Take what the engine gave, and the model took."""
         self._window.add(output)
-
-    def add_line_event(self, event: LineEvent) -> None:
-        """Take something that happened to the line."""
-        self._judging.add_line_event(event)
 
     def due(self, now: int) -> list[DerivedMessage]:
         """What a window that has ended by `now` (ns, the capture's clock) gives; nothing in between."""
@@ -95,7 +87,7 @@ class BusChannels:
     def findings(self, now: int) -> list[DerivedMessage]:
         """Findings that are new, or graver than they were said to be."""
         messages = []
-        for finding in self._judging.findings():
+        for finding in self._model.findings():
             key = finding.code, finding.subject
             before = self._said.get(key)
             if before is None or finding.severity > before:
@@ -121,15 +113,11 @@ class BusChannels:
             told = _of_node(node) | each.get(node.address, {})
             yield DerivedMessage(f"/nodes/{self._bus}/{node.address}", NODE, end, begin, _json(told))
 
-    def _look_at_ring(self) -> Any:
-        """The token ring so far, as the rules of such a protocol see it; None for other protocols."""
-        return None if self._compare is None else cast("Any", self._judging.judge).ring()
-
     def _turn_of_ring(self) -> tuple[dict[str, object], dict[int, dict[str, object]]]:
         """Numbers of the ring and of its stations since the last call."""
         if self._compare is None:
             return {}, {}
-        before, self._ring = self._ring, self._look_at_ring()
+        before, self._ring = self._ring, self._model.ring()
         window = self._compare(before, self._ring)
         return dict(window.bus), {mac: dict(numbers) for mac, numbers in window.nodes.items()}
 

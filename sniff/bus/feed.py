@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
-from sniff.bus.model import Store
+from sniff.bus.rows import Store
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,6 +19,7 @@ class FeedStatus:
     `priority`: what the system allowed the capture process, in words ("real-time", "normal"), empty when unknown.
     `trouble`: why nothing is written any more although the capture goes on ("no space left on the disk …").
     `behind`: seconds by which the disk is late with the recording, 0 while it keeps up.
+    `reading`: whether the file is still being read.
     `searching`: with which settings a search listens at the moment, empty when there is none.
     """
 
@@ -34,6 +35,7 @@ class FeedStatus:
     searching: str = ""
     trouble: str = ""
     behind: float = 0.0
+    reading: bool = False
 
     @property
     def in_file(self) -> bool:

@@ -18,6 +18,7 @@ from sniff.analysis.autodetect import Detecting
 from sniff.analysis.points import PointReader, Sample
 from sniff.bus.autodetect import Progress, Search
 from sniff.bus.derived_topics import BusChannels, DerivedMessage
+from sniff.bus.model import BusModel
 from sniff.bus.thinning import Budget, Room
 from sniff.bus.value_topics import ValueChannels
 from sniff.capture.link import CaptureLink
@@ -47,11 +48,11 @@ LiveItem = Output | LineEvent | Status | Ended
 class LiveBus:
     """One bus of a running capture. Not thread-safe; nothing here can hold up the recording.
 
-    `session`: of the bus; `status`: the newest report; `ended`: why it is over, None while it runs. `points`: takes
-    values out of what was heard; they go back into the recording. `search`: finds what `session.unknown` names, None
-    when everything is given; its octets are recorded like all others. When it ends, `session`, `dissector` and
-    `points` become others, before the event and the outputs that this gives are handed out. `unseen`: octets that came
-    here, or were on their way, and were never looked at.
+    `session`: of the bus; `status`: the newest report; `ended`: why it is over, None while it runs. `model`: what is
+    known of the bus; its values and findings go back into the recording. `search`: finds what `session.unknown` names,
+    None when everything is given; its octets are recorded like all others. When it ends, `session`, `dissector` and
+    the model's become others, before the event and the outputs that this gives are handed out. `unseen`: octets that
+    came here, or were on their way, and were never looked at.
     """
 
     def __init__(
@@ -73,7 +74,13 @@ class LiveBus:
         self._room = Room()
         self._values_budget = Budget(Room.LEAST, VALUES_AT_ONCE)
         self._nodes_budget = Budget(NODES_A_SECOND, NODES_AT_ONCE)
+        self.model = BusModel(self.session, self.dissector, self.devices)
         self._settle()
+
+    @property
+    def points(self) -> PointReader:
+        """Takes values out of what was heard."""
+        return self.model.reader
 
     @property
     def session(self) -> Session:
@@ -153,9 +160,8 @@ class LiveBus:
 
     def _settle(self) -> None:
         """What depends on the settings, anew."""
-        self.points = PointReader(self.dissector, self.devices)
         recorded = self.link.paths and not self.engine.searching
-        self._bus_channels = BusChannels(self.session, self.dissector, self.devices) if recorded else None
+        self._bus_channels = BusChannels(self.model) if recorded else None
 
     def _take(self, message: Received | Tick | Status | Ended) -> list[LiveItem]:
         if self.search is not None and self.engine.searching:
@@ -181,20 +187,22 @@ class LiveBus:
         was_searching = self.engine.searching
         output = self.engine.take(message.item)
         if was_searching and not self.engine.searching:
+            self.model.settle(self.session, self.dissector)
             self._settle()
         if not isinstance(message.item, LineEvent):
             return self._some(output)
-        if self._bus_channels is not None:
-            self._bus_channels.add_line_event(message.item)
+        self.model.add_line_event(message.item)
         return [message.item, *self._some(output)]
 
     def _some(self, output: Output) -> list[LiveItem]:
         if not output:
             return []
+        self.model.add(output)
         if self._bus_channels is not None:
             self._bus_channels.add(output)
-        for sample in self.points.add(output):
-            self._record(sample)
+        if self._channels is not None:
+            for sample in self.model.samples:
+                self._record(sample)
         return [output]
 
     def _record(self, sample: Sample) -> None:

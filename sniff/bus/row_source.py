@@ -11,8 +11,8 @@ from pathlib import Path
 from dissectors.profiles import Devices
 from sniff.bus.feed import FeedStatus
 from sniff.bus.live import LiveBus
-from sniff.bus.model import KEPT_ROWS, Store
 from sniff.bus.offline import outputs
+from sniff.bus.rows import KEPT_ROWS, Store
 from sniff.capture.wire import Status
 from sniff.engine.capture import Capture, CaptureError
 from sniff.engine.engine import Output
@@ -42,7 +42,8 @@ class LiveFeed:
     def __init__(self, live: LiveBus, tell: Callable[[Status], None] = lambda status: None) -> None:
         self.live = live
         self._tell = tell
-        self._store = Store(live.session, live.dissector, min(KEPT_ROWS, rows_that_fit()), live.devices)
+        self._store = Store(live.session, live.dissector, min(KEPT_ROWS, rows_that_fit()), model=live.model)
+        self._session = live.session
 
     @property
     def store(self) -> Store:
@@ -53,7 +54,8 @@ class LiveFeed:
         """Take what has come."""
         before = self._store.version
         items = self.live.poll()
-        if self.live.session is not self._store.session:  # a search has ended
+        if self.live.session is not self._session:  # a search has ended
+            self._session = self.live.session
             self._store.settle(self.live.session, self.live.dissector)
         for item in items:
             if isinstance(item, Output):
@@ -139,7 +141,14 @@ class FileFeed:
     def status(self) -> FeedStatus:
         """Where the file ends, once it has been read."""
         session = self._store.session
-        return FeedStatus(self.path, session.line_words, session.protocol_words, None, self._size, ended=self._ended)
+        return FeedStatus(
+            self.path,
+            session.line_words,
+            session.protocol_words,
+            file_size=self._size,
+            ended=self._ended,
+            reading=self._outputs is not None,
+        )
 
     def close(self) -> None:
         """Nothing to stop."""

@@ -7,22 +7,21 @@ from __future__ import annotations
 import argparse
 import sys
 from array import array
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dissectors.findings import Finding, Severity
-from dissectors.manifest import Dissector
-from dissectors.profiles import Devices
-from sniff.analysis.health import health_of
-from sniff.analysis.judging import Judging
-from sniff.analysis.summary import Summary
+from sniff.bus.live import LiveItem
+from sniff.bus.model import BusModel
 from sniff.bus.offline import outputs
 from sniff.cli import INTERRUPTED, PORT_TROUBLE, UNREADABLE, USAGE, Failure, arguments, check_output
 from sniff.cli.check_output import Checked
 from sniff.engine.capture import Capture
 from sniff.engine.engine import Output
 from sniff.engine.follow_settings import dissector_for
-from sniff.engine.session import LineEvent, Session
+from sniff.engine.observer import observe
+from sniff.engine.session import LineEvent
 from sniff.formats import READERS
 
 if TYPE_CHECKING:
@@ -94,9 +93,8 @@ def _is_file(source: str) -> bool:
 def _read(source: str, capture: Capture, args: argparse.Namespace) -> Checked:
     """What was found in a capture."""
     session = arguments.settings_of(args, capture.session, source)
-    run_of = Checking(session, dissector_for(session), arguments.noted_devices(args, session))
-    for item in outputs(capture.items(), session):
-        run_of.take(item)
+    run_of = Checking(BusModel(session, dissector_for(session), arguments.noted_devices(args, session)))
+    observe(outputs(capture.items(), session), run_of.model, run_of)
     complete = capture.completeness()
     notes = [] if complete.whole else [complete.text]
     if session.unknown:
@@ -117,23 +115,26 @@ def _listen(port: str, args: argparse.Namespace) -> Checked:
     live = listening.start(target.source, None, None, target.devices, target.search)
     with listening.until_interrupted() as caught:
         early = _found_first(live, caught)
-        run_of = Checking(live.session, live.dissector, target.devices)
-        for item in early:
-            run_of.take(item)
+        run_of = Checking(live.model)
+        observe(_heard(early), run_of)
         until = time.monotonic() + duration
         while live.ended is None:
             over = caught or time.monotonic() >= until
-            for item in live.stop() if over else live.poll(0.1):
-                run_of.take(item)
+            observe(_heard(live.stop() if over else live.poll(0.1)), run_of)
     note = "" if live.ended.clean else live.ended.reason
     return run_of.result(port, note)
 
 
-def _found_first(live: LiveBus, caught: list[int]) -> list[object]:
+def _heard(items: list[LiveItem]) -> Iterator[Output | LineEvent]:
+    """What an observer is to know of what a live bus gives."""
+    return (item for item in items if isinstance(item, Output | LineEvent))
+
+
+def _found_first(live: LiveBus, caught: list[int]) -> list[LiveItem]:
     """What comes until a search for settings has ended well. Ends with exit code 4 when it does not, 130 for Ctrl-C."""
     from sniff.cli import searching
 
-    items: list[object] = []
+    items: list[LiveItem] = []
     meter = searching.Meter()
     while live.searching is not None:
         meter.show(live.searching)
@@ -152,35 +153,28 @@ def _found_first(live: LiveBus, caught: list[int]) -> list[object]:
 
 
 class Checking:
-    """One source on its way through the rules."""
+    """One source on its way through the rules; its model is fed by others."""
 
-    def __init__(self, session: Session, dissector: Dissector, devices: Devices) -> None:
-        self.session = session
-        self.dissector = dissector
-        self.judging = Judging(session, dissector, devices)
-        self.summary = Summary(session.line)
+    def __init__(self, model: BusModel) -> None:
+        self.model = model
         self._starts = array("q")  # of each row, so that evidence can be given its time
 
-    def take(self, item: object) -> None:
-        """Take what came; anything but outputs and line events is of no interest here."""
-        if isinstance(item, Output):
-            self.judging.add(item)
-            self.summary.add(item)
-            self._starts.extend(min(max(row.event.start, _EARLIEST), _LATEST) for row in item.rows)
-        elif isinstance(item, LineEvent):
-            self.judging.add_line_event(item)
-            self.summary.add_line_event(item)
+    def add(self, output: Output) -> None:
+        """Remember when rows began."""
+        self._starts.extend(min(max(row.event.start, _EARLIEST), _LATEST) for row in output.rows)
+
+    def add_line_event(self, event: LineEvent) -> None:
+        """Nothing of it is kept here."""
 
     def result(self, source: str, note: str) -> Checked:
         """What was found."""
-        findings = self.judging.findings()
-        health = health_of(self.summary, findings)
+        summary, findings, health = self.model.summary, self.model.findings(), self.model.health()
         return Checked(
             source=source,
-            session=self.session,
+            session=self.model.session,
             note=note,
-            seconds=self.summary.seconds,
-            frames=self.summary.frames,
+            seconds=summary.seconds,
+            frames=summary.frames,
             findings=findings,
             health=health.bus,
             stations=health.stations,

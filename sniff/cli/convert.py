@@ -12,8 +12,8 @@ from sniff.bus.offline import outputs
 from sniff.cli import arguments, writing
 from sniff.devices import with_devices
 from sniff.engine.capture import Capture
-from sniff.engine.engine import Output
 from sniff.engine.follow_settings import dissector_for
+from sniff.engine.observer import observe
 from sniff.engine.session import Session
 from sniff.formats.linktypes import held_by_protocols
 
@@ -52,11 +52,7 @@ def run(args: argparse.Namespace) -> int:
 def _evidence(capture: Capture, session: Session, devices: Devices) -> dict[int, str]:
     """The findings in words, by the rows that show them."""
     judging = Judging(session, dissector_for(session), devices)
-    for output in outputs(capture.items(), session):
-        if isinstance(output, Output):
-            judging.add(output)
-        else:
-            judging.add_line_event(output)
+    observe(outputs(capture.items(), session), judging)
     notes: dict[int, str] = {}
     for finding in judging.findings():
         said = f"{finding.code} {finding.subject}: {finding.seen}"

@@ -17,6 +17,7 @@ from sniff.cli.rows import iso
 from sniff.engine.capture import Capture
 from sniff.engine.engine import Output
 from sniff.engine.follow_settings import dissector_for
+from sniff.engine.observer import observe
 from sniff.engine.session import Adapter, LineEvent, Session, settings_change
 
 
@@ -43,16 +44,24 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _summarise(capture: Capture, session: Session) -> tuple[Summary, list[LineEvent]]:
-    summary = Summary(session.line)
-    events: list[LineEvent] = []
-    for output in outputs(capture.items(), session):
-        if isinstance(output, Output):
-            summary.add(output)
-        else:
-            summary.add_line_event(output)
-            if len(events) < 1000:
-                events.append(output)
-    return summary, events
+    summary, happened = Summary(session.line), _Happened()
+    observe(outputs(capture.items(), session), summary, happened)
+    return summary, happened.events
+
+
+class _Happened:
+    """The first things that happened to the line."""
+
+    def __init__(self) -> None:
+        self.events: list[LineEvent] = []
+
+    def add(self, output: Output) -> None:
+        """Nothing of it is kept here."""
+
+    def add_line_event(self, event: LineEvent) -> None:
+        """Keep it, unless there are very many."""
+        if len(self.events) < 1000:
+            self.events.append(event)
 
 
 def _as_json(path: str, capture: Capture, session: Session, summary: Summary) -> dict[str, Any]:

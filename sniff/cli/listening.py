@@ -191,11 +191,15 @@ class Printer:
         self.as_json = as_json
         self.quiet = quiet
         self.colour = colour
-        self.summary = Summary(live.session.line, kept_seconds=60)
         self._session = live.session
         self._trouble = ""
         self._waited = False
         self._settling = Settling(live.points)
+
+    @property
+    def summary(self) -> Summary:
+        """What was counted."""
+        return self.live.model.summary
 
     def take(self, items: list[Output | LineEvent | Status | Ended]) -> None:
         """Print what has come."""
@@ -205,7 +209,6 @@ class Printer:
             if isinstance(item, Output):
                 self._take_output(item)
             elif isinstance(item, LineEvent):
-                self.summary.add_line_event(item)
                 self._say_event(item)
             elif isinstance(item, Status):
                 self._say_status(item)
@@ -233,7 +236,6 @@ class Printer:
     def _settle(self) -> None:
         """A search has ended: go on with what it found."""
         self._session = self.live.session
-        self.summary.use(self._session.line)
         self._settling = Settling(self.live.points)  # what came before belongs to no transaction
 
     def finish(self) -> None:
@@ -243,7 +245,6 @@ class Printer:
         sys.stdout.flush()
 
     def _take_output(self, output: Output) -> None:
-        self.summary.add(output)
         for settled in self._settling.add(output):
             self._print(settled)
 

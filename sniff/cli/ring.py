@@ -5,24 +5,37 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from dissectors.token_ring import TokenRing
+from dissectors.token_ring import RingObserver, TokenRing
 from sniff.bus.offline import outputs
 from sniff.cli import tables
 from sniff.engine.engine import Output
-from sniff.engine.session import Item, Session
+from sniff.engine.observer import observe
+from sniff.engine.session import Item, LineEvent, Session
 
 
 def ring_of(items: Iterable[Item], session: Session, shown: TokenRing) -> Any:
     """The ring that items show."""
-    observer = shown.observer(session.timing)
-    for output in outputs(items, session, pairing=False):
-        if isinstance(output, Output):
-            for row in output.rows:
-                if row.searched is None:
-                    observer.see(row.no, row.event, row.header)
-        elif output.kind.is_hole:
-            observer.miss(output.time)
-    return observer.ring()
+    watched = _Watched(shown.observer(session.timing))
+    observe(outputs(items, session, pairing=False), watched)
+    return watched.observer.ring()
+
+
+class _Watched:
+    """The ring's observer, handed rows without their transactions."""
+
+    def __init__(self, observer: RingObserver) -> None:
+        self.observer = observer
+
+    def add(self, output: Output) -> None:
+        """Take rows but those of a search for settings."""
+        for row in output.rows:
+            if row.searched is None:
+                self.observer.see(row.no, row.event, row.header)
+
+    def add_line_event(self, event: LineEvent) -> None:
+        """Where octets were lost, what is missing says nothing."""
+        if event.kind.is_hole:
+            self.observer.miss(event.time)
 
 
 def show(items: Iterable[Item], session: Session, shown: TokenRing, style: str) -> int:

@@ -12,13 +12,13 @@ from pathlib import Path
 from dissectors import registry
 from dissectors.histogram import Histogram
 from dissectors.line import NS_PER_S
-from dissectors.tracker import Transaction
-from sniff.analysis.health import HealthReport, health_of
-from sniff.analysis.judging import Judging
+from dissectors.tracker import Verdict
+from sniff.analysis.health import HealthReport
 from sniff.analysis.load import Second
 from sniff.analysis.nodes import Node
 from sniff.analysis.summary import Summary
 from sniff.analysis.wording import station_word
+from sniff.bus.model import BusModel
 from sniff.bus.offline import outputs
 from sniff.cli import USAGE, Failure, arguments, tables
 from sniff.cli.rows import iso
@@ -27,6 +27,8 @@ from sniff.devices import noted_devices
 from sniff.editing.merging import merged, merged_session
 from sniff.engine.engine import Output
 from sniff.engine.follow_settings import dissector_for
+from sniff.engine.observer import observe
+from sniff.engine.session import LineEvent
 
 TABLES = ("nodes", "health", "transactions", "latency", "load", "ring")
 
@@ -65,30 +67,23 @@ def run(args: argparse.Namespace) -> int:
         from sniff.cli import ring
 
         return ring.show(items, session, shown, args.style)
-    summary = Summary(session.line)
-    kinds: Counter[tuple[str, str]] = Counter()
-    judging = Judging(session, dissector_for(session), noted_devices(session)) if table == "health" else None
-    for output in outputs(items, session):
-        if isinstance(output, Output):
-            summary.add(output)
-            kinds.update((transaction.kind, _verdict(transaction, args)) for transaction in output.transactions)
-            if judging is not None:
-                judging.add(output)
-        elif judging is not None:
-            judging.add_line_event(output)
-    if judging is not None:
-        tables.write(
-            HEALTH_HEADINGS, _health(health_of(summary, judging.findings()), station_word(session.protocol)), args.style
-        )
-    elif table == "nodes":
+    if table == "health":
+        model = BusModel(session, dissector_for(session), noted_devices(session))
+        observe(outputs(items, session), model)
+        tables.write(HEALTH_HEADINGS, _health(model.health(), station_word(session.protocol)), args.style)
+        return 0
+    summary, kinds = Summary(session.line), _Kinds()
+    observe(outputs(items, session), summary, kinds)
+    if table == "nodes":
         nodes = [_node(node) for node in summary.nodes.present()]
         if nodes or args.style != "text":
             tables.write(NODE_HEADINGS, nodes, args.style)
         else:
             print(f"no stations were heard in {summary.frames} frames and {summary.noise} octets of noise")
     elif table == "transactions":
-        ordered = sorted(kinds.items(), key=lambda pair: (pair[0][0], -pair[1]))
-        tables.write(("kind", "verdict", "count"), [(*key, count) for key, count in ordered], args.style)
+        ordered = sorted(kinds.counts.items(), key=lambda pair: (pair[0][0], -pair[1]))
+        words = [(kind, _verdict(verdict, args), count) for (kind, verdict), count in ordered]
+        tables.write(("kind", "verdict", "count"), words, args.style)
     elif table == "latency":
         rows = [(node.address, *_quantiles(node.latency)) for node in summary.nodes if node.latency.count]
         bound = session.adapter.latency / 1e6
@@ -118,9 +113,23 @@ LATENCY_HEADINGS = ("address", "answers", "least ms", "p50 ms", "p95 ms", "max m
 LOAD_HEADINGS = ("from", "load %", "frames", "damaged", "noise octets", "octets")
 
 
-def _verdict(transaction: Transaction, args: argparse.Namespace) -> str:
+class _Kinds:
+    """How often transactions of each kind ended how."""
+
+    def __init__(self) -> None:
+        self.counts: Counter[tuple[str, Verdict]] = Counter()
+
+    def add(self, output: Output) -> None:
+        """Count what closed."""
+        self.counts.update((transaction.kind, transaction.verdict) for transaction in output.transactions)
+
+    def add_line_event(self, event: LineEvent) -> None:
+        """Nothing of it is counted here."""
+
+
+def _verdict(verdict: Verdict, args: argparse.Namespace) -> str:
     """In words for people, as the stable value for programs."""
-    return transaction.verdict.words if args.style == "text" else transaction.verdict.value
+    return verdict.words if args.style == "text" else verdict.value
 
 
 def _health(health: HealthReport, word: str) -> list[tuple[Cell, ...]]:

@@ -15,6 +15,7 @@ from sniff.devices import noted_devices
 from sniff.engine.capture import Capture
 from sniff.engine.engine import Output
 from sniff.engine.follow_settings import dissector_for
+from sniff.engine.observer import observe
 from sniff.engine.session import Item, LineEvent, LineEventKind, Session, SettingsChange, settings_change
 
 _SECONDS = re.compile(r"\+?(\d+(?:\.\d{1,9})?)")
@@ -57,33 +58,32 @@ def of_frames(capture: Capture, session: Session, text: str) -> Stretch:
         raise ValueError(f"frames {text!r}: expected numbers as 12-40")
     low = int(match[1] or 1)
     high = int(match[2]) if match[2] else low if text.strip().isdigit() else FOREVER
-    times = [
-        (row.event.start, row.event.end)
-        for output in outputs(capture.items(), session)
-        if isinstance(output, Output)
-        for row in output.rows
-        if low <= row.no <= high
-    ]
+    times = [time for no, time in _times(capture, session).items() if low <= no <= high]
     if not times:
         raise ValueError(f"frames {text!r}: this capture has none of them")
     return Stretch(times[0][0], times[-1][1])
 
 
+def _times(capture: Capture, session: Session) -> dict[int, tuple[int, int]]:
+    """Start and end of every row, ns, by its number."""
+    return {
+        row.no: (row.event.start, row.event.end)
+        for output in outputs(capture.items(), session)
+        if isinstance(output, Output)
+        for row in output.rows
+    }
+
+
 def around_finding(capture: Capture, session: Session, code: str) -> Stretch:
     """The stretch from the first to the last evidence of the first finding with that code. Raises ValueError."""
     judging = Judging(session, dissector_for(session), noted_devices(session))
-    times: dict[int, tuple[int, int]] = {}
-    for output in outputs(capture.items(), session):
-        if isinstance(output, Output):
-            judging.add(output)
-            times.update((row.no, (row.event.start, row.event.end)) for row in output.rows)
-        else:
-            judging.add_line_event(output)
+    observe(outputs(capture.items(), session), judging)
     findings = judging.findings()
     chosen: Finding | None = next((finding for finding in findings if finding.code == code.upper()), None)
     if chosen is None:
         there = ", ".join(sorted({finding.code for finding in findings})) or "none"
         raise ValueError(f"finding {code!r}: not in this capture; there are: {there}")
+    times = _times(capture, session)
     evidence = [times[no] for no in chosen.evidence if no in times]
     if not evidence:
         return Stretch(chosen.first, chosen.last)

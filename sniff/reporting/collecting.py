@@ -3,23 +3,25 @@
 from __future__ import annotations
 
 from collections import Counter
+from typing import Any
 
 from dissectors.findings import Finding, Severity, under_causes
-from dissectors.line import Timing
 from dissectors.manifest import Dissector
 from dissectors.profiles import Devices
 from dissectors.token_ring import TokenRing
 from dissectors.tracker import Transaction, Verdict
 from dissectors.words import milliseconds
-from sniff.analysis.health import Health, health_of
-from sniff.analysis.judging import Judging, rules_over
+from sniff.analysis.health import Health
+from sniff.analysis.judging import rules_over
 from sniff.analysis.nodes import Node
 from sniff.analysis.summary import Summary
 from sniff.analysis.wording import describe
+from sniff.bus.model import BusModel
 from sniff.bus.offline import outputs
 from sniff.engine.capture import Capture
-from sniff.engine.engine import Output, Row
+from sniff.engine.engine import Output
 from sniff.engine.follow_settings import dissector_for
+from sniff.engine.observer import observe
 from sniff.engine.session import DEVICES_NOTE, LineEvent, Session
 from sniff.formats.text import iso
 from sniff.reporting.numbers import (
@@ -46,43 +48,12 @@ GOOD = frozenset((Verdict.ANSWERED, Verdict.BROADCAST, Verdict.DATA, Verdict.OPE
 def collect(source: str, capture: Capture, session: Session, devices: Devices) -> Numbers:
     """Read a capture to its end. `session`: with the settings to use. Raises CaptureError."""
     dissector = dissector_for(session)
-    summary = Summary(session.line)
-    judging = Judging(session, dissector, devices)
-    ring = _Ring(dissector.ring, session.timing) if dissector.ring is not None else None
-    timeline: Timeline | None = None
-    happenings: list[Happening] = []
-    trouble: dict[int, Counter[str]] = {}
-    for item in outputs(capture.items(), session):
-        if isinstance(item, LineEvent):
-            judging.add_line_event(item)
-            summary.add_line_event(item)
-            if ring is not None:
-                ring.add_line_event(item)
-            if len(happenings) < HAPPENINGS_SHOWN:
-                at = seconds_since(session.started, item.time)
-                happenings.append(Happening(at, item.kind.value, item.text, item.count))
-            continue
-        judging.add(item)
-        summary.add(item)
-        if timeline is None and summary.load.first is not None:
-            timeline = Timeline(summary.load.first, session.line.char)
-        for row in item.rows:
-            if row.searched is not None:
-                continue
-            if timeline is not None:
-                timeline.add_row(row)
-            if ring is not None:
-                ring.add(row)
-        for transaction in item.transactions:
-            if timeline is not None:
-                timeline.add_transaction(transaction)
-            if transaction.station is not None and transaction.verdict not in GOOD:
-                trouble.setdefault(transaction.station, Counter())[_trouble(transaction)] += 1
-    findings = judging.findings()
-    healths = health_of(summary, findings)
+    model, timeline, told = BusModel(session, dissector, devices), Timeline(session.line.char), _Told(session)
+    observe(outputs(capture.items(), session), model, timeline, told)
+    summary, findings, healths = model.summary, model.findings(), model.health()
     health = healths.bus if summary.octets else None
     stations = tuple(
-        _station(node, trouble.get(node.address, Counter()), healths.stations.get(node.address))
+        _station(node, told.trouble.get(node.address, Counter()), healths.stations.get(node.address))
         for node in summary.nodes.present()
     )
     found = _found(findings, _words(capture, session, dissector, findings), session, dissector)
@@ -111,11 +82,11 @@ def collect(source: str, capture: Capture, session: Session, devices: Devices) -
         damages=dict(summary.damages.most_common()),
         line_errors=dict(summary.marks.most_common()),
         response=Distribution.of(summary.latency),
-        part=timeline.width / 1e9 if timeline is not None else 0.0,
-        timeline=() if timeline is None else _parts(timeline, session),
-        happenings=tuple(happenings),
+        part=timeline.width / 1e9 if timeline.origin is not None else 0.0,
+        timeline=_parts(timeline, session),
+        happenings=tuple(told.happenings),
         measurement=_measurement(session, dissector),
-        ring=None if ring is None else ring.numbers(),
+        ring=None if dissector.ring is None else _ring(dissector.ring, model.ring()),
     )
 
 
@@ -188,6 +159,8 @@ def _score(health: Health) -> Score:
 
 
 def _parts(timeline: Timeline, session: Session) -> tuple[TimePart, ...]:
+    if timeline.origin is None:
+        return ()
     begin = seconds_since(session.started, timeline.origin)
     width = timeline.width / 1e9
     return tuple(
@@ -292,23 +265,27 @@ def _measurement(session: Session, dissector: Dissector) -> Measurement:
     )
 
 
-class _Ring:
-    """The token ring of one capture."""
+def _ring(shown: TokenRing, ring: Any) -> RingNumbers:
+    """What the token ring of a capture comes to."""
+    return RingNumbers(shown.order(ring), shown.headings, tuple(shown.rows(ring)), tuple(shown.sentences(ring)))
 
-    def __init__(self, shown: TokenRing, timing: Timing) -> None:
-        self._shown = shown
-        self._observer = shown.observer(timing)
 
-    def add(self, row: Row) -> None:
-        """Take the next row."""
-        self._observer.see(row.no, row.event, row.header)
+class _Told:
+    """What happened to the line, and what troubles each station."""
+
+    def __init__(self, session: Session) -> None:
+        self._started = session.started
+        self.happenings: list[Happening] = []
+        self.trouble: dict[int, Counter[str]] = {}
+
+    def add(self, output: Output) -> None:
+        """Count transactions that did not go well."""
+        for transaction in output.transactions:
+            if transaction.station is not None and transaction.verdict not in GOOD:
+                self.trouble.setdefault(transaction.station, Counter())[_trouble(transaction)] += 1
 
     def add_line_event(self, event: LineEvent) -> None:
-        """Take something that happened to the line."""
-        if event.kind.is_hole:
-            self._observer.miss(event.time)
-
-    def numbers(self) -> RingNumbers:
-        """What it came to."""
-        shown, ring = self._shown, self._observer.ring()
-        return RingNumbers(shown.order(ring), shown.headings, tuple(shown.rows(ring)), tuple(shown.sentences(ring)))
+        """Keep the first of them."""
+        if len(self.happenings) < HAPPENINGS_SHOWN:
+            at = seconds_since(self._started, event.time)
+            self.happenings.append(Happening(at, event.kind.value, event.text, event.count))

@@ -6,7 +6,8 @@ from dataclasses import dataclass, field
 
 from dissectors.frame import Frame
 from dissectors.tracker import Transaction, Verdict
-from sniff.engine.engine import Row
+from sniff.engine.engine import Output, Row
+from sniff.engine.session import LineEvent
 
 MOST_PARTS = 240
 FIRST_WIDTH = 100_000_000
@@ -38,17 +39,32 @@ class Part:
 
 @dataclass(slots=True)
 class Timeline:
-    """Parts by number, counted from `origin` (ns). `char`: ns an octet takes. Times before the origin count as it."""
+    """Parts by number, counted from `origin`, ns: where the first row began; None before there is one. `char`: ns an
+    octet takes. Times before the origin count as it."""
 
-    origin: int
     char: int
+    origin: int | None = None
     width: int = FIRST_WIDTH
     parts: dict[int, Part] = field(default_factory=dict)
     _most: int = 0
 
+    def add(self, output: Output) -> None:
+        """Take what the engine gave; what a search heard with other settings is left out."""
+        for row in output.rows:
+            if row.searched is None:
+                self.add_row(row)
+        if self.origin is not None:
+            for transaction in output.transactions:
+                self.add_transaction(transaction)
+
+    def add_line_event(self, event: LineEvent) -> None:
+        """Nothing of it is counted here."""
+
     def add_row(self, row: Row) -> None:
         """Count one row: its octets where they were on the wire, its trouble where it ended."""
         event = row.event
+        if self.origin is None:
+            self.origin = event.start
         part = self._part(event.end)
         if isinstance(event, Frame):
             part.damaged += not event.ok
@@ -69,14 +85,15 @@ class Timeline:
         return [self.parts.get(number, Part()) for number in range(self._most + 1)] if self.parts else []
 
     def _spread(self, start: int, end: int) -> None:
-        start, end = max(start, self.origin), max(end, self.origin)
+        origin = self.origin or 0
+        start, end = max(start, origin), max(end, origin)
         while start < end:
-            edge = min(end, self.origin + ((start - self.origin) // self.width + 1) * self.width)
+            edge = min(end, origin + ((start - origin) // self.width + 1) * self.width)
             self._part(start).busy += edge - start
             start = edge
 
     def _part(self, time: int) -> Part:
-        offset = max(0, time - self.origin)
+        offset = max(0, time - (self.origin or 0))
         while offset // self.width >= MOST_PARTS:
             self._halve()
         number = offset // self.width

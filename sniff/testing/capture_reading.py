@@ -12,12 +12,14 @@ from dissectors.frame import Frame
 from dissectors.manifest import Dissector
 from dissectors.profiles import Devices
 from dissectors.tracker import Transaction
-from sniff.analysis.points import Point, PointReader, PointTable
+from sniff.analysis.points import Point
 from sniff.analysis.summary import Summary
+from sniff.bus.model import BusModel
 from sniff.bus.offline import outputs
 from sniff.devices import noted, noted_devices
 from sniff.engine.engine import Output, Row
 from sniff.engine.follow_settings import dissector_for
+from sniff.engine.observer import observe
 from sniff.engine.session import Completeness, LineEvent, Session
 from sniff.engine.verdict_join import Settled
 from sniff.formats import read
@@ -59,41 +61,46 @@ class CaptureReading:
 
 def read_capture(path: str | Path, said: Devices | None = None) -> CaptureReading:
     """Read a capture whole. `said`: devices, before those that it names. Raises CaptureError, UnknownProtocol."""
-    from sniff.analysis.judging import Judging
-
     place = Path(path)
     capture = read(place)
     session = capture.session
     dissector = dissector_for(session)
-    counts = Summary(session.line)
     known, unknown = noted(session)
     devices = (said or Devices()).over(noted_devices(session))
-    judge = Judging(session, dissector, devices)
-    reader, points = PointReader(dissector, devices), PointTable()
-    rows: list[Row] = []
-    closed: dict[int, Transaction] = {}
-    events: list[LineEvent] = []
-    for output in outputs(capture.items(), session):
-        if not isinstance(output, Output):
-            events.append(output)
-            judge.add_line_event(output)
-            continue
-        counts.add(output)
-        judge.add(output)
-        points.add(reader.add(output))
-        rows.extend(output.rows)
-        closed.update((transaction.id, transaction) for transaction in output.transactions)
+    model, kept = BusModel(session, dissector, devices), _Kept()
+    observe(outputs(capture.items(), session), model, kept)
+    closed = {transaction.id: transaction for transaction in kept.transactions}
     return CaptureReading(
         path=place,
         session=session,
         dissector=dissector,
-        rows=tuple(Settled(row, closed.get(row.placement.tx) if row.placement is not None else None) for row in rows),
+        rows=tuple(
+            Settled(row, closed.get(row.placement.tx) if row.placement is not None else None) for row in kept.rows
+        ),
         transactions=tuple(closed.values()),
-        line_events=tuple(events),
-        counts=counts,
+        line_events=tuple(kept.events),
+        counts=model.summary,
         completeness=capture.completeness(),
-        findings=tuple(judge.findings()),
-        points=tuple(points),
+        findings=model.findings(),
+        points=tuple(model.points),
         devices=known,
         unknown_devices=unknown,
     )
+
+
+class _Kept:
+    """Everything that a capture gives, one after the other."""
+
+    def __init__(self) -> None:
+        self.rows: list[Row] = []
+        self.transactions: list[Transaction] = []
+        self.events: list[LineEvent] = []
+
+    def add(self, output: Output) -> None:
+        """Keep rows and transactions."""
+        self.rows.extend(output.rows)
+        self.transactions.extend(output.transactions)
+
+    def add_line_event(self, event: LineEvent) -> None:
+        """Keep it."""
+        self.events.append(event)

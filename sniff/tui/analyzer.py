@@ -8,17 +8,15 @@ from textual.app import App
 from textual.message_pump import MessagePump
 
 from sniff.bus.feed import FeedStatus
-from sniff.bus.model import Store
-from sniff.bus.rules_worker import Judged
+from sniff.bus.rows import Store
 from sniff.tui.viewing import Viewing
 
 
 class Analyzer(App[None]):
-    """`status`: of the feed, ten times a second. `judged`: the rules at work. `viewing`: how the user looks at things.
+    """`status`: of the feed, ten times a second. `viewing`: how the user looks at things.
     `tabs`: key and title of each screen."""
 
     status: FeedStatus
-    judged: Judged
     viewing: Viewing
     tabs: tuple[tuple[str, str], ...]
 

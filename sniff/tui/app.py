@@ -12,8 +12,7 @@ from textual.timer import Timer
 
 from sniff.analysis.filtering import FilterError
 from sniff.bus.feed import Feed, FeedStatus
-from sniff.bus.model import Store
-from sniff.bus.rules_worker import Judged
+from sniff.bus.rows import Store
 from sniff.tui.analyzer import Analyzer
 from sniff.tui.header import StatusHeader, why_ended
 from sniff.tui.help import HelpScreen
@@ -63,7 +62,6 @@ class SnifferApp(Analyzer):
             self.add_mode(entry.name, partial(_make, entry))
         self.feed = feed
         self.status: FeedStatus = feed.status()
-        self.judged = Judged(feed.store)  # keeps up behind every screen, so that findings are there when asked for
         self.viewing = Viewing(feed.store, follow=self.status.live)
         self.tabs = tuple((entry.key, entry.title) for entry in SCREENS)
         self.visited = [start_screen]
@@ -97,8 +95,6 @@ class SnifferApp(Analyzer):
         self._tell()
         if changed:
             self.draw_screen()
-        if self._worker is not None and self.judged.left(self.viewing.last_row) and (self.status.live or not changed):
-            self._worker.resume()  # a file is read first: judging would slow that down
         self._draw_header()
 
     def _tell(self) -> None:
@@ -146,7 +142,7 @@ class SnifferApp(Analyzer):
     def _work(self) -> None:
         screen = self.shown
         busy = screen is not None and _is_whole(screen) and screen.work_left() and screen.work()
-        if not busy and not self.judged.work(self.viewing.last_row) and self._worker is not None:
+        if not busy and self._worker is not None:
             self._worker.pause()
 
     def _draw_header(self) -> None:

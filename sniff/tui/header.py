@@ -10,7 +10,7 @@ from rich.text import Text
 from textual.widget import Widget
 
 from sniff.bus.feed import FeedStatus
-from sniff.bus.model import Store
+from sniff.bus.rows import Store
 from sniff.engine.session import LineEventKind
 from sniff.tui.analyzer import analyzer
 from sniff.tui.columns import fit

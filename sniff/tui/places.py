@@ -7,7 +7,7 @@ from bisect import bisect_left
 from datetime import datetime, timedelta
 
 from dissectors.line import NS_PER_S
-from sniff.bus.model import Store
+from sniff.bus.rows import Store
 
 EXPECTED = "expected a row number (1200), a time of day (10:32:05.5) or seconds from the start (+12.5)"
 _CLOCK = re.compile(r"(\d{1,2}):(\d{2})(?::(\d{2})(?:\.(\d{1,9}))?)?")

@@ -17,11 +17,11 @@ from pathlib import Path
 
 from dissectors.line import NS_PER_S
 from sniff.bus.feed import FeedStatus, StoreFeed
-from sniff.bus.model import Store
 from sniff.bus.offline import outputs
+from sniff.bus.rows import Store
 from sniff.devices import devices
-from sniff.engine.engine import Output
 from sniff.engine.follow_settings import dissector_for
+from sniff.engine.observer import observe
 from sniff.simulation.scenarios import scenario, simulate
 from sniff.simulation.tap import TapModel
 from sniff.tui.app import SnifferApp
@@ -74,11 +74,7 @@ def store_of(name: str) -> Store:
     store = Store(
         session, dissector_for(session), devices=devices({str(at): made for at, made in plan.devices.items()})
     )
-    for output in outputs(items, session):
-        if isinstance(output, Output):
-            store.add(output)
-        else:
-            store.add_line_event(output)
+    observe(outputs(items, session), store)
     return store
 
 

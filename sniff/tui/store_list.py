@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import ClassVar
 
-from sniff.bus.model import Store
+from sniff.bus.rows import Store
 from sniff.tui.columns import Column, lay_out
 from sniff.tui.linelist import LineList
 from sniff.tui.times import TimeMode, clock, seconds

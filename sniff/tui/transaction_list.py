@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dissectors.tracker import Transaction, Verdict
-from sniff.bus.model import BAD_VERDICTS
+from sniff.bus.rows import BAD_VERDICTS
 from sniff.tui.analyzer import analyzer
 from sniff.tui.columns import Cell, Column
 from sniff.tui.plain import plain

@@ -5,8 +5,9 @@ from __future__ import annotations
 from bisect import bisect_right, insort
 from dataclasses import dataclass, field
 
+from dissectors.findings import Finding
 from sniff.analysis.filtering import Predicate, compile_filter
-from sniff.bus.model import Store
+from sniff.bus.rows import Store
 from sniff.tui.times import TimeMode
 
 
@@ -24,6 +25,7 @@ class Viewing:
     filter_version: int = 0  # changes with the filter, so that lists know when to begin anew
     marks: list[int] = field(default_factory=list)  # row numbers, ascending
     _frozen: tuple[int, int] | None = None  # last row and last closed transaction that are shown
+    _found: tuple[Finding, ...] = ()  # when it was frozen
 
     @property
     def frozen(self) -> bool:
@@ -33,6 +35,11 @@ class Viewing:
     def freeze(self, on: bool) -> None:
         """Stand still at what is there now, or go on."""
         self._frozen = (self.store.last_no, self.store.last_closed) if on else None
+        self._found = self.store.model.findings() if on else ()
+
+    def findings(self) -> tuple[Finding, ...]:
+        """What was found in the rows to show."""
+        return self._found if self.frozen else self.store.model.findings()
 
     @property
     def came_since(self) -> int:

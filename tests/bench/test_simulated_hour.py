@@ -15,7 +15,7 @@ import pytest
 
 from dissectors import registry
 from dissectors.frame import Chunk
-from sniff.bus.model import Store
+from sniff.bus.rows import Store
 from sniff.engine.engine import Engine
 from sniff.recording.writer import Recorder
 from sniff.simulation.scenarios import scenario, simulate

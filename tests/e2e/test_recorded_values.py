@@ -16,7 +16,9 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminal
 
 
 def flat_schema() -> Any:
-    spec = importlib.util.spec_from_file_location("flat_schema", Path(__file__).parents[1] / "sniff" / "bus" / "flat_schema.py")
+    spec = importlib.util.spec_from_file_location(
+        "flat_schema", Path(__file__).parents[1] / "sniff" / "bus" / "flat_schema.py"
+    )
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)

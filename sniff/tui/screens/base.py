@@ -8,7 +8,7 @@ from textual.app import ComposeResult
 from textual.screen import Screen
 from textual.widget import Widget
 
-from sniff.bus.model import Store
+from sniff.bus.rows import Store
 from sniff.tui.analyzer import analyzer
 from sniff.tui.header import StatusHeader
 from sniff.tui.keybar import KeyBar

@@ -14,7 +14,6 @@ from textual.widgets import DataTable, Static
 
 from dissectors.findings import Finding, Severity, under_causes
 from sniff.analysis.judging import rules_over
-from sniff.bus.rules_worker import Judged
 from sniff.tui.analyzer import analyzer
 from sniff.tui.plain import plain
 from sniff.tui.screens.base import ViewScreen
@@ -68,33 +67,16 @@ class FindingsScreen(ViewScreen):
     # -- keeping up --------------------------------------------------------------------------------------------
 
     def draw(self) -> None:
-        """Look again when all rows are judged, at most once a second."""
-        if not self.work_left() and time.monotonic() - self._looked >= PERIOD:
+        """Look again, at most once a second."""
+        if time.monotonic() - self._looked >= PERIOD:
             self._look()
-
-    def work_left(self) -> bool:
-        """Whether rows are still to be judged."""
-        return self.judged.left(self.viewing.last_row) > 0
-
-    def work(self) -> bool:
-        """Judge some rows."""
-        left = self.judged.work(self.viewing.last_row)
-        if not left or time.monotonic() - self._looked >= PERIOD:
-            self._look()
-        return left
-
-    @property
-    def judged(self) -> Judged:
-        """The rules at work, on all screens."""
-        return analyzer(self).judged
 
     def _look(self) -> None:
-        judged = self.judged
         self._looked = time.monotonic()
         self._titles = {code: rule.title for code, rule in rules_over(self.store.dissector).items()}
-        if self.viewing.last_row >= self.store.last_no:
-            judged.step(0, self.viewing.last_row)  # what closed since
-        found = [f for f in judged.findings() if self._all or f.severity >= Severity.WARNING or f.cause is not None]
+        found = [
+            f for f in self.viewing.findings() if self._all or f.severity >= Severity.WARNING or f.cause is not None
+        ]
         if self._by_subject:
             found.sort(key=lambda f: (f.subject, -f.severity, f.code))
         ordered = under_causes(found)
@@ -104,7 +86,7 @@ class FindingsScreen(ViewScreen):
         table.fill((key, self._cells(f, key in self._under)) for key, f in self._found.items())
         if self._first_look:  # the cursor stays on the gravest one until all was read once
             table.move_cursor(row=0, animate=False)
-            self._first_look = self.work_left()
+            self._first_look = analyzer(self).status.reading
         self._describe()
 
     # -- showing -----------------------------------------------------------------------------------------------
@@ -119,10 +101,10 @@ class FindingsScreen(ViewScreen):
     def _describe(self) -> None:
         words = self.query_one("#words", Static)
         finding = self._here()
-        left = self.judged.left(self.viewing.last_row)
-        text = Text(f"the rules have {left} rows still to read\n" if left else "", style="dim")
+        reading = analyzer(self).status.reading
+        text = Text("the file is still being read: more may be found\n" if reading else "", style="dim")
         if finding is None:
-            words.update(text if left else "nothing was found")
+            words.update(text if reading else "nothing was found")
             return
         text.append(f"{finding.severity.label} {finding.code} ", style=_STYLES[finding.severity])
         text.append(plain(f"{finding.subject}: {finding.seen}") + "\n")

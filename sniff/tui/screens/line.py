@@ -15,7 +15,7 @@ from dissectors.frame import LineError
 from dissectors.line import NS_PER_S
 from dissectors.words import milliseconds
 from sniff.bus.feed import FeedStatus
-from sniff.bus.model import Store
+from sniff.bus.rows import Store
 from sniff.engine.session import LineEvent
 from sniff.tui.analyzer import analyzer
 from sniff.tui.charts import bar, sparkline

@@ -78,14 +78,14 @@ class RingScreen(ViewScreen):
             return
         self._drawn = (self.store.version, monotonic())
         words = self.query_one("#words", Static)
-        observer, shown = self.store.ring, self.store.dissector.ring
-        if observer is None or shown is None:
+        shown = self.store.dissector.ring
+        if shown is None:
             session = self.store.session
             unknown = "protocol" in session.unknown
             why = "the protocol is not known" if unknown else f"{session.protocol} passes no token"
             words.update(f"{why}: there is no ring to show")
             return
-        ring = observer.ring()
+        ring = self.store.model.ring()
         places = [shown.headings.index(name) for name, _ in COLUMNS if name in shown.headings]
         rows = shown.rows(ring)
         self.query_one(StationTable).fill(

@@ -13,7 +13,7 @@ from textual.widgets import Static
 from dissectors.findings import counted
 from dissectors.line import NS_PER_S
 from sniff.analysis.load import Second
-from sniff.bus.model import Store
+from sniff.bus.rows import Store
 from sniff.tui.analyzer import analyzer
 from sniff.tui.charts import sparkline
 from sniff.tui.screens.base import ViewScreen

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from textual.app import ComposeResult
 
-from sniff.bus.model import BAD_VERDICTS
+from sniff.bus.rows import BAD_VERDICTS
 from sniff.tui.analyzer import analyzer
 from sniff.tui.filter_line import FilterLine
 from sniff.tui.linelist import LineList

@@ -13,12 +13,12 @@ from dissectors.bacnet import RingObserver
 from dissectors.bacnet.ring import What
 from sniff.analysis.judging import Judging
 from sniff.bus.derived_topics import BUS, NODE, BusChannels
-from sniff.bus.model import Store
+from sniff.bus.model import BusModel
 from sniff.bus.offline import outputs
-from sniff.bus.rules_worker import Judged
 from sniff.devices import noted_devices
 from sniff.editing.cutting import around_finding
 from sniff.engine.engine import Output
+from sniff.engine.observer import observe
 from sniff.engine.session import LineEvent, LineEventKind
 from sniff.formats import read
 from sniff.recording.topics import SCHEMAS
@@ -35,16 +35,18 @@ Told = list[tuple[str, dict[str, Any]]]
 def told(session: Any, items: Any) -> tuple[Told, RingObserver, int]:
     """All messages but findings, what the ring was in all, and the number of frames."""
     dissector = registry.get(session.protocol)
-    channels, ring, frames, messages = BusChannels(session, dissector), RingObserver(session.timing), 0, []
+    model = BusModel(session, dissector)
+    channels, ring, frames, messages = BusChannels(model), RingObserver(session.timing), 0, []
     now = 0
     for item in outputs(items, session):
         if not isinstance(item, Output):
-            channels.add_line_event(item)
+            model.add_line_event(item)
             continue
         for row in item.rows:
             ring.see(row.no, row.event, row.header)
             frames += row.header is not None
             now = row.event.end
+        model.add(item)
         channels.add(item)
         messages += channels.due(now)
     messages += channels.due(now + 10 * S)
@@ -94,7 +96,7 @@ def test_a_bus_without_tokens_says_nothing_of_them() -> None:
 @pytest.mark.parametrize("name", ["modbus-rtu", "n2", "mstp"])
 def test_nothing_between_windows(name: str) -> None:
     session, _ = simulate(scenario(name, seed=1), 1, EXACT)
-    channels = BusChannels(session, registry.get(session.protocol))
+    channels = BusChannels(BusModel(session, registry.get(session.protocol)))
     assert channels.due(5 * S) == []
     assert channels.due(5 * S + S - 1) == []
     assert [one.topic for one in channels.due(6 * S)] == [f"/bus/{session.bus}"]
@@ -114,13 +116,9 @@ def test_findings_about_known_devices_are_told_everywhere() -> None:
     capture = read(CAPTURES / "drive-told-too-much.cap.txt")
     session, devices = capture.session, noted_devices(capture.session)
     dissector = registry.get(session.protocol)
-    channels, store = BusChannels(session, dissector, devices), Store(session, dissector, devices=devices)
-    for item in outputs(capture.items(), session):
-        if isinstance(item, Output):
-            channels.add(item)
-            store.add(item)
-    judged = Judged(store)
-    judged.step(len(store), store.last_no)
-    assert "PR001" in {finding.code for finding in judged.findings()}
+    model = BusModel(session, dissector, devices)
+    channels = BusChannels(model)
+    observe(outputs(capture.items(), session), model)
+    assert "PR001" in {finding.code for finding in model.findings()}
     assert any(json.loads(one.data)["name"] == "PR001" for one in channels.findings(S))
     assert around_finding(capture, session, "PR001")

@@ -19,7 +19,7 @@ def noise(end: int, octets: int) -> Row:
 
 @given(st.lists(st.tuples(st.integers(0, 10**14), st.integers(1, 500)), min_size=1, max_size=50))
 def test_every_octet_and_its_time_is_in_some_part(events: list[tuple[int, int]]) -> None:
-    timeline = Timeline(0, CHAR)
+    timeline = Timeline(CHAR, 0)
     for end, octets in events:
         timeline.add_row(noise(end, octets))
     parts = timeline.listed()
@@ -30,13 +30,13 @@ def test_every_octet_and_its_time_is_in_some_part(events: list[tuple[int, int]])
 
 
 def test_an_octet_run_over_an_edge_is_shared() -> None:
-    timeline = Timeline(0, CHAR)
+    timeline = Timeline(CHAR, 0)
     timeline.add_row(noise(FIRST_WIDTH + 30 * CHAR, 50))
     assert [part.busy for part in timeline.listed()] == [20 * CHAR, 30 * CHAR]
 
 
 def test_trouble_stands_where_the_exchange_began() -> None:
-    timeline = Timeline(1000, CHAR)
+    timeline = Timeline(CHAR, 1000)
     for verdict in Verdict:
         start = 1000 + FIRST_WIDTH
         timeline.add_transaction(Transaction(1, 1, "read", 1, None, verdict, start, start))

@@ -21,7 +21,7 @@ from dissectors.line import LineSettings
 from dissectors.manifest import Dissector
 from dissectors.tracker import Interval, Placement, Transaction, Verdict
 from sniff.bus.feed import FeedStatus, StoreFeed
-from sniff.bus.model import Store
+from sniff.bus.rows import Store
 from sniff.engine.engine import Output, Row
 from sniff.engine.session import Adapter, Session
 from sniff.tui.app import SnifferApp

@@ -8,12 +8,13 @@ import pytest
 
 from dissectors.findings import Severity
 from dissectors.registry import get
-from sniff.bus.model import Store
 from sniff.bus.offline import outputs
-from sniff.bus.rules_worker import Judged
-from sniff.engine.engine import Output
+from sniff.bus.rows import Store
+from sniff.engine.observer import observe
+from sniff.engine.session import LineEvent, LineEventKind
 from sniff.simulation.faults import LostResponse
 from sniff.simulation.scenarios import simulate
+from sniff.tui.viewing import Viewing
 from tests.faults.buses import modbus
 
 START = 1_772_359_200_000_000_000
@@ -24,21 +25,18 @@ def store() -> Store:
     plan = modbus((LostResponse(0.1, ("unit 2",)),), absent=(4,), seed=3)
     session, items = simulate(plan, 30, started=START)
     made = Store(session, get(plan.protocol))
-    for output in outputs(items, session):
-        if isinstance(output, Output):
-            made.add(output)
-        else:
-            made.add_line_event(output)
+    observe(outputs(items, session), made)
     return made
 
 
-def test_judging_in_pieces_gives_what_judging_at_once_gives(store):
-    pieces, whole = Judged(store), Judged(store)
-    while pieces.left(store.last_no):
-        pieces.step(7, store.last_no)
-    whole.step(store.last_no, store.last_no)
-    assert pieces.findings() == whole.findings()
-    assert {"MB001", "MB002"} <= {finding.code for finding in whole.findings()}
+def test_a_frozen_view_keeps_its_findings(store):
+    viewing = Viewing(store)
+    before = viewing.findings()
+    viewing.freeze(True)
+    store.add_line_event(LineEvent(START, LineEventKind.DROPPED, count=5))
+    assert viewing.findings() == before
+    viewing.freeze(False)
+    assert {finding.code for finding in viewing.findings()} - {finding.code for finding in before} == {"LN005"}
 
 
 def test_the_gravest_finding_stands_first_and_says_what_to_do(look, store):
@@ -55,9 +53,7 @@ def test_the_gravest_finding_stands_first_and_says_what_to_do(look, store):
 
 
 def test_enter_goes_to_the_frame_that_shows_it(look, store):
-    judged = Judged(store)
-    judged.step(store.last_no, store.last_no)
-    evidence = next(finding for finding in judged.findings() if finding.code == "MB001").evidence
+    evidence = next(finding for finding in store.model.findings() if finding.code == "MB001").evidence
 
     async def script(looking):
         await looking.press("5", "enter")
@@ -125,27 +121,13 @@ def test_an_empty_store_is_said_to_be_empty(look, make_bus, key):
     look(make_bus().store, script)
 
 
-def test_the_rules_read_on_behind_every_screen(look, store):
-    async def script(see):
-        for _ in range(500):
-            if not see.app.judged.left(store.last_no):
-                break
-            await see.pilot.pause(0.01)
-        assert see.app.current_mode == "frames"
-        assert not see.app.judged.left(store.last_no)
-        assert {finding.code for finding in see.app.judged.findings()} >= {"MB001"}
-
-    look(store, script)
-
-
-def test_two_findings_of_one_code_about_one_station_stand_in_their_places(look, store):
+def test_two_findings_of_one_code_about_one_station_stand_in_their_places(look, store, monkeypatch):
     """As one line the lesser of them would show in the place of the graver one."""
 
     async def script(see):
-        see.app.judged.step(store.last_no, store.last_no)
-        found = see.app.judged.findings()
+        found = see.app.viewing.findings()
         worst, least = found[0], replace(found[0], severity=Severity.NOTE, seen="the lesser one")
-        see.app.judged.findings = lambda: (*found, least)
+        monkeypatch.setattr(store.model, "findings", lambda: (*found, least))
         await see.press("5")
         rows = [[cell.plain for cell in see.main.get_row_at(at)] for at in range(see.main.row_count)]
         assert len(rows) == len(found) + 1

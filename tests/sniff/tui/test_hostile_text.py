@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from dissectors.tracker import Transaction, Verdict
-from sniff.bus.model import Store
+from sniff.bus.rows import Store
 from sniff.engine.engine import Output
 from sniff.engine.session import LineEvent, LineEventKind
 
@@ -24,8 +24,8 @@ def hostile(busy_bus: Any) -> Store:
         fields=lambda frame, role: {HOSTILE: HOSTILE},
         packet=lambda frame, role: (_ for _ in ()).throw(ValueError(HOSTILE)),
     )
-    store.dissector = dissector
-    store.session = replace(
+    store.model.dissector = dissector
+    store.model.session = replace(
         store.session,
         port=HOSTILE,
         adapter=replace(store.session.adapter, name=HOSTILE, driver=HOSTILE, detail=HOSTILE, reports=(HOSTILE,)),

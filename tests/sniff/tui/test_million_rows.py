@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from dissectors.frame import Check, Found, Frame, Header, Role
-from sniff.bus.model import Store
+from sniff.bus.rows import Store
 from sniff.engine.engine import Row
 
 MS = 1_000_000
@@ -35,8 +35,6 @@ class MadeRows(Sequence[Row]):
 
 @pytest.fixture
 def store_of(make_bus: Any, monkeypatch: pytest.MonkeyPatch) -> Any:
-    monkeypatch.setattr("sniff.bus.rules_worker.Judged.work", lambda judged, last: False)  # it reads rows for itself
-
     def make(count: int) -> Store:
         store = make_bus().store
         store.rows = MadeRows(count)

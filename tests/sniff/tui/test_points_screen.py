@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 from dissectors.profiles import Devices, packaged
-from sniff.bus.model import Store
 from sniff.bus.offline import outputs
+from sniff.bus.rows import Store
 from sniff.engine.engine import Output
 from sniff.engine.follow_settings import dissector_for
 from sniff.simulation.scenarios import scenario, simulate

@@ -10,8 +10,8 @@ import pytest
 from dissectors.frame import Frame
 from sniff.analysis.packet_tree import Field
 from sniff.analysis.row_tree import tree_of
-from sniff.bus.model import Store
 from sniff.bus.offline import outputs
+from sniff.bus.rows import Store
 from sniff.engine.engine import Output
 from sniff.engine.follow_settings import dissector_for
 from sniff.simulation.scenarios import scenario, simulate

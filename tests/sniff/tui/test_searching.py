@@ -7,8 +7,9 @@ from typing import Any
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
 from sniff.bus.feed import FeedStatus
-from sniff.bus.model import Store
-from sniff.bus.rules_worker import Judged
+from sniff.bus.model import BusModel
+from sniff.bus.rows import Store
+from sniff.engine.engine import Output
 from sniff.engine.follow_settings import SessionEngine
 from sniff.engine.session import UNKNOWABLE, LineEvent, LineEventKind, Session, SettingsChange
 
@@ -91,12 +92,10 @@ def test_the_header_says_so_and_then_what_was_found(look: Any, monkeypatch: Any)
 def test_findings_are_those_of_what_was_found() -> None:
     searched = Searched()
     searched.search()
-    judged = Judged(searched.store)
-    judged.step(100, searched.store.last_no)
+    searched.store.model.findings()
     searched.find()
-    judged.step(100, searched.store.last_no)
-    whole = Judged(searched.store)
-    whole.step(100, searched.store.last_no)
-    assert judged.findings() == whole.findings()
+    whole = BusModel(searched.engine.session, searched.engine.dissector)
+    whole.add(Output(tuple(searched.store.rows), tuple(searched.store.transactions.values())))
+    assert searched.store.model.findings() == whole.findings()
     assert not searched.store.errors
     assert searched.store.load.total.frames == searched.store.last_no - 1
