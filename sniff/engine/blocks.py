@@ -13,6 +13,7 @@ import numpy as np
 
 from dissectors.columns import Reads
 from dissectors.frame import Chunk, Mark
+from sniff.engine.capture import CaptureError
 from sniff.engine.session import Item, LineEvent
 
 BLOCK_OCTETS = 1 << 19
@@ -60,8 +61,8 @@ def block_of(chunks: list[Chunk]) -> Block:
 
 
 def blocks_of(items: Iterable[Item]) -> Iterator[Block | LineEvent]:
-    """Any items as blocks; empty chunks, which only say that time passed, are left out. Raises what `items` raises,
-    when all before it was given."""
+    """Any items as blocks; empty chunks, which only say that time passed, are left out. Raises CaptureError as
+    `items` does, when all before it was given."""
     held: list[Chunk] = []
     octets = 0
     try:
@@ -77,7 +78,7 @@ def blocks_of(items: Iterable[Item]) -> Iterator[Block | LineEvent]:
                 if octets >= BLOCK_OCTETS or len(held) >= BLOCK_READS:
                     yield block_of(held)
                     held, octets = [], 0
-    except Exception:
+    except CaptureError:
         if held:
             yield block_of(held)
         raise
