@@ -3,10 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
 
 from dissectors.frame import Frame
 from dissectors.line import NS_PER_S, LineSettings
 from sniff.engine.engine import Row
+
+if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
+
+    from sniff.engine.table import Table
+
+MOST_AT_ONCE = 100_000
+"""Seconds that a table may span to be counted in one go."""
 
 KEPT_SECONDS = 86_400
 """Seconds that are known one by one; a day of them takes some 20 MB."""
@@ -67,6 +77,47 @@ class Load:
                 part.damaged += not event.ok
             else:
                 part.noise += octets
+
+    def add_table(self, table: Table) -> None:
+        """Count rows; the same as one after the other."""
+        import numpy as np
+
+        heard = table.heard
+        starts, ends = table.frames.start[heard], table.frames.end[heard]
+        if not len(ends):
+            return
+        octets, is_frame, ok = table.frames.length[heard], table.is_frame[heard], table.good[heard]
+        self.first = int(starts.min()) if self.first is None else min(self.first, int(starts.min()))
+        self.last = int(ends.max()) if self.last is None else max(self.last, int(ends.max()))
+        busy = octets.astype(np.int64) * self.line.char
+        numbers = ends // NS_PER_S
+        late = np.minimum(busy, ends - numbers * NS_PER_S)
+        base = int(numbers.min()) - 1
+        if int(numbers.max()) - base > MOST_AT_ONCE:  # times that jump: second by second
+            for output in table.outputs():
+                for row in output.rows:
+                    self.add(row)
+            return
+        places, least = numbers - base, int(numbers.max()) - base + 1
+
+        def summed(values: npt.NDArray[Any], at: npt.NDArray[np.int64] = places) -> list[int]:
+            whole = np.zeros(least, np.int64)
+            np.add.at(whole, at, values)
+            return whole.tolist()
+
+        parts = zip(
+            (a + b for a, b in zip(summed(late), summed(busy - late, places - 1), strict=True)),
+            summed(octets),
+            summed(is_frame),
+            summed(is_frame & ~ok),
+            summed(np.where(is_frame, 0, octets)),
+            strict=True,
+        )
+        for number, (of_line, *counts) in enumerate(parts, base):
+            if of_line or any(counts):
+                more = Second(of_line, *counts)
+                self.seconds[number] = self._second(number).merge(more)
+                self.total = self.total.merge(more)
 
     def merge(self, other: Load) -> Load:
         """Both together, as a new value; of the seconds the newest are kept."""

@@ -5,11 +5,16 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from dissectors.frame import Frame
 from dissectors.histogram import Histogram
-from dissectors.tracker import Transaction, Verdict
+from dissectors.tracker import PASSING, Transaction, Verdict
 from sniff.engine.engine import Row
+
+if TYPE_CHECKING:
+    from dissectors.columns import TransactionColumns
+    from sniff.engine.table import Table
 
 
 @dataclass(slots=True)
@@ -120,6 +125,66 @@ class NodeTable:
             node.errors[transaction.error] += 1
         if transaction.latency is not None and transaction.verdict is not Verdict.DATA:  # the use of a token is none
             node.latency.add(transaction.latency.nominal)
+
+    def add_table(self, table: Table) -> None:
+        """Count frames and transactions; the same as one after the other."""
+        self._add_frames(table)
+        self._add_transactions(table.transactions)
+
+    def _add_frames(self, table: Table) -> None:
+        import numpy as np
+
+        from dissectors.columns import NONE
+
+        frames, has_place, known = table.frames, table.placed.tx != 0, table.is_frame & table.heard
+        source = np.where(has_place, table.placed.source, frames.source)
+        destination = np.where(has_place, table.placed.destination, frames.destination)
+        good = table.good
+        whole, anonymous = good | table.repaired, source == NONE
+        seen: dict[int, list[int]] = {}
+        for addresses, sends in ((source, True), (destination, False)):
+            rows = np.flatnonzero(known & (addresses != NONE))
+            held = addresses[rows]
+            damaged = ~good[rows] if sends else ~good[rows] & anonymous[rows]
+            counts, bad, heard = (np.bincount(of).tolist() for of in (held, held[damaged], held[whole[rows]]))
+            for address, first in zip(*(one.tolist() for one in np.unique(held, return_index=True)), strict=True):
+                node = self._node(address)
+                node.sent += counts[address] * sends
+                node.received += counts[address] * (not sends)
+                node.damaged += bad[address] if address < len(bad) else 0
+                node.heard += heard[address] if sends and address < len(heard) else 0
+                seen.setdefault(address, []).append(int(rows[first]))
+            for address, last in zip(*(one.tolist() for one in np.unique(held[::-1], return_index=True)), strict=True):
+                seen[address].append(int(rows[len(rows) - 1 - last]))
+        for address, places in seen.items():
+            node = self._node(address)
+            node.first = int(frames.start[min(places)]) if node.first is None else node.first
+            node.last = int(frames.end[max(places)])
+
+    def _add_transactions(self, closed: TransactionColumns) -> None:
+        import numpy as np
+
+        from dissectors.columns import NONE, VERDICTS
+
+        of_station = closed.station != NONE
+        if not of_station.any():
+            return
+        stations = closed.station[of_station]
+        keys = np.stack((stations, closed.kind[of_station], closed.verdict[of_station], closed.error[of_station]))
+        distinct, counts = np.unique(keys, axis=1, return_counts=True)
+        for (address, kind, verdict, error), count in zip(distinct.T.tolist(), counts.tolist(), strict=True):
+            node, name = self._node(address), closed.names[kind]
+            if name in PASSING:
+                node.passed += count
+                node.unused += count * (VERDICTS[verdict] is Verdict.NO_RESPONSE)
+            else:
+                node.verdicts[VERDICTS[verdict]] += count
+            node.kinds[name] += count
+            if error:
+                node.errors[closed.names[error]] += count
+        timed = of_station & (closed.latency != NONE) & (closed.verdict != VERDICTS.index(Verdict.DATA))
+        for address in np.unique(closed.station[timed]).tolist():
+            self._node(address).latency.add_many(closed.latency[timed & (closed.station == address)])
 
     def merge(self, other: NodeTable) -> NodeTable:
         """Both together, as a new value."""

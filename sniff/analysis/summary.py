@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from dissectors.frame import Frame, LineError
 from dissectors.histogram import Histogram
@@ -14,6 +16,15 @@ from sniff.analysis.nodes import NodeTable
 from sniff.analysis.wording import mark_names
 from sniff.engine.engine import Output, Row
 from sniff.engine.session import LineEvent, LineEventKind
+
+if TYPE_CHECKING:
+    from dissectors.columns import TransactionColumns
+    from sniff.engine.table import Table
+
+
+def ranked(counts: Mapping[str, int]) -> dict[str, int]:
+    """Counts by name, the largest first, equal ones by name."""
+    return dict(sorted(((name, count) for name, count in counts.items() if count), key=lambda one: (-one[1], one[0])))
 
 
 @dataclass(slots=True)
@@ -73,6 +84,52 @@ class Summary:
         for transaction in output.transactions:
             self._add_transaction(transaction)
 
+    def add_table(self, table: Table) -> None:
+        """Count rows and transactions; the same as one after the other."""
+        self._add_rows(table)
+        self._add_transactions(table.transactions)
+
+    def _add_rows(self, table: Table) -> None:
+        import numpy as np
+
+        from dissectors.columns import CHECKS, DAMAGES, FOUNDS
+
+        frames, heard = table.frames, table.heard
+        octets, is_frame = frames.length, table.is_frame & heard
+        self.searched += int(octets[~heard].sum())
+        self.octets += int(octets[heard].sum())
+        self.noise += int(octets[heard & ~table.is_frame].sum())
+        self.frames += int(is_frame.sum())
+        self.load.add_table(table)
+        self.nodes.add_table(table)
+        for row in table.odd.values():
+            if row.searched is None:
+                self._add_marks(row)
+        bad = is_frame & ~table.good
+        self.damaged += int(bad.sum())
+        for code, count in enumerate(np.bincount(frames.found[is_frame]).tolist()):
+            self.found[FOUNDS[code].value] += count
+        for code, count in enumerate(np.bincount(frames.kind[is_frame]).tolist()):
+            self.kinds[frames.names[code]] += count
+        pairs = np.unique(np.stack((frames.damage[bad], frames.check[bad])), axis=1, return_counts=True)
+        for (damage, check), count in zip(pairs[0].T.tolist(), pairs[1].tolist(), strict=True):
+            said = DAMAGES[damage]
+            self.damages[said.value if said is not None else CHECKS[check].value] += count
+        for counter in (self.found, self.kinds):
+            for name in [name for name, count in counter.items() if not count]:
+                del counter[name]
+
+    def _add_transactions(self, closed: TransactionColumns) -> None:
+        import numpy as np
+
+        from dissectors.columns import NONE, VERDICTS
+
+        for code, count in enumerate(np.bincount(closed.verdict).tolist()):
+            if count:
+                self.verdicts[VERDICTS[code]] += count
+        timed = (closed.latency != NONE) & (closed.verdict != VERDICTS.index(Verdict.DATA))
+        self.latency.add_many(closed.latency[timed])
+
     def add_line_event(self, event: LineEvent) -> None:
         """Count something that happened to the line."""
         self.events[event.kind] += 1
@@ -85,8 +142,7 @@ class Summary:
         self.octets += len(event.octets)
         self.load.add(row)
         self.nodes.add_row(row)
-        for mark in event.marks:
-            self.marks[mark_names(mark.error & ~LineError.OVERRUN) or "overrun"] += 1
+        self._add_marks(row)
         if not isinstance(event, Frame):
             self.noise += len(event.octets)
             return
@@ -97,6 +153,10 @@ class Summary:
         if not event.ok:
             self.damaged += 1
             self.damages[event.damage.value if event.damage is not None else event.check.value] += 1
+
+    def _add_marks(self, row: Row) -> None:
+        for mark in row.event.marks:
+            self.marks[mark_names(mark.error & ~LineError.OVERRUN) or "overrun"] += 1
 
     def _add_transaction(self, transaction: Transaction) -> None:
         self.verdicts[transaction.verdict] += 1

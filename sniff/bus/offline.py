@@ -9,6 +9,7 @@ from sniff.analysis.points import PointReader
 from sniff.engine.capture import CaptureError
 from sniff.engine.engine import Output
 from sniff.engine.follow_settings import SessionEngine, dissector_for
+from sniff.engine.observer import Observer, TableObserver, observe, observe_tables
 from sniff.engine.session import Item, LineEvent, Session
 from sniff.engine.verdict_join import Settled, Settling, Wanted
 
@@ -28,6 +29,18 @@ def outputs(items: Iterable[Item], session: Session, pairing: bool = True) -> It
         yield engine.close()
         raise
     yield engine.close()
+
+
+def survey(items: Iterable[Item], session: Session, *observers: Observer, reference: bool = False) -> None:
+    """Hand a whole capture to observers, many rows at a time. `reference`: one by one, for comparison; the same comes
+    of it. Raises CaptureError as `items` does, when all before the damage was handed on."""
+    if reference or not all(isinstance(one, TableObserver) for one in observers):
+        observe(outputs(items, session), *observers)
+        return
+    from sniff.engine.blocks import blocks_of
+    from sniff.engine.bulk import tables
+
+    observe_tables(tables(blocks_of(items), session), *observers)
 
 
 def settled(

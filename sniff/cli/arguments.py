@@ -33,6 +33,11 @@ def _or_auto(kind: Callable[[str], object]) -> Callable[[str], object]:
     return lambda token: AUTO if token == AUTO else kind(token)
 
 
+def add_reference(parser: argparse.ArgumentParser) -> None:
+    """For those who compare: the same result, row by row and much slower."""
+    parser.add_argument("--reference", action="store_true", help=argparse.SUPPRESS)
+
+
 def add_files(parser: argparse.ArgumentParser) -> None:
     """One or more captures."""
     parser.add_argument(

@@ -4,27 +4,34 @@ from __future__ import annotations
 
 import argparse
 import sys
-from typing import Any
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 from dissectors.tracker import Verdict
 from dissectors.words import milliseconds
 from sniff.analysis.nodes import Node
 from sniff.analysis.plain import plain
-from sniff.analysis.summary import Summary
-from sniff.bus.offline import outputs
+from sniff.analysis.summary import Summary, ranked
+from sniff.bus.offline import survey
 from sniff.cli import arguments, json_output
 from sniff.cli.rows import iso
 from sniff.engine.capture import Capture
 from sniff.engine.engine import Output
 from sniff.engine.follow_settings import dissector_for
-from sniff.engine.observer import observe
 from sniff.engine.session import Adapter, LineEvent, Session, settings_change
+
+if TYPE_CHECKING:
+    from sniff.engine.table import Table
+
+MOST_LISTED = 10
+"""Kinds, errors and the like that are named in a line."""
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Options of `info`."""
     arguments.add_files(parser)
     arguments.add_line(parser)
+    arguments.add_reference(parser)
     parser.add_argument("--json", action="store_true", help="one JSON object a file")
 
 
@@ -33,7 +40,7 @@ def run(args: argparse.Namespace) -> int:
     for number, path in enumerate(args.files):
         capture = arguments.open_capture(path)
         session = arguments.settings_of(args, capture.session, path)
-        summary, events = _summarise(capture, session)
+        summary, events = _summarise(capture, session, args.reference)
         if args.json:
             print(json_output.dumps(_as_json(path, capture, session, summary)))
             continue
@@ -43,9 +50,9 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _summarise(capture: Capture, session: Session) -> tuple[Summary, list[LineEvent]]:
+def _summarise(capture: Capture, session: Session, reference: bool) -> tuple[Summary, list[LineEvent]]:
     summary, happened = Summary(session.line), _Happened()
-    observe(outputs(capture.items(), session), summary, happened)
+    survey(capture.items(), session, summary, happened, reference=reference)
     return summary, happened.events
 
 
@@ -56,6 +63,9 @@ class _Happened:
         self.events: list[LineEvent] = []
 
     def add(self, output: Output) -> None:
+        """Nothing of it is kept here."""
+
+    def add_table(self, table: Table) -> None:
         """Nothing of it is kept here."""
 
     def add_line_event(self, event: LineEvent) -> None:
@@ -86,12 +96,12 @@ def _as_json(path: str, capture: Capture, session: Session, summary: Summary) ->
         "damaged": summary.damaged,
         "noise_octets": summary.noise,
         "load": summary.load.overall(),
-        "damages": dict(summary.damages),
-        "kinds": dict(summary.kinds),
-        "found": dict(summary.found),
-        "line_errors": dict(summary.marks),
+        "damages": ranked(summary.damages),
+        "kinds": ranked(summary.kinds),
+        "found": ranked(summary.found),
+        "line_errors": ranked(summary.marks),
         "line_events": {kind.value: count for kind, count in summary.events.items()},
-        "verdicts": {verdict.value: count for verdict, count in summary.verdicts.items()},
+        "verdicts": ranked({verdict.value: count for verdict, count in summary.verdicts.items()}),
         "response_ms": _response_times(summary),
         "nodes": [_node_as_json(node) for node in summary.nodes.present()],
         "polled_only": summary.nodes.absent(),
@@ -115,8 +125,8 @@ def _node_as_json(node: Node) -> dict[str, Any]:
         "received": node.received,
         "damaged": node.damaged,
         "asked": node.asked,
-        "verdicts": {verdict.value: count for verdict, count in node.verdicts.items()},
-        "errors": dict(node.errors),
+        "verdicts": ranked({verdict.value: count for verdict, count in node.verdicts.items()}),
+        "errors": ranked(node.errors),
     }
 
 
@@ -220,12 +230,16 @@ def _span(seconds: float) -> str:
     return f"{f'{hours} h ' if hours else ''}{rest // 60} min {rest % 60} s"
 
 
-def _listed(counts: dict[str, int]) -> str:
-    ordered = sorted(counts.items(), key=lambda pair: -pair[1])
-    return ", ".join(f"{count} {name}" for name, count in ordered) or "none"
+def _listed(counts: Mapping[str, int]) -> str:
+    """The commonest, and how many more there are."""
+    shown = [f"{count} {name}" for name, count in ranked(counts).items()]
+    more = len(shown) - MOST_LISTED
+    if more > 1:
+        shown[MOST_LISTED:] = [f"… and {more} more"]
+    return ", ".join(shown) or "none"
 
 
-def _counts(counts: dict[str, int]) -> str:
+def _counts(counts: Mapping[str, int]) -> str:
     return f" ({_listed(counts)})" if counts else ""
 
 

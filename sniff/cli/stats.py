@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 from collections import Counter
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from dissectors import registry
 from dissectors.histogram import Histogram
@@ -19,7 +20,7 @@ from sniff.analysis.nodes import Node
 from sniff.analysis.summary import Summary
 from sniff.analysis.wording import station_word
 from sniff.bus.model import BusModel
-from sniff.bus.offline import outputs
+from sniff.bus.offline import survey
 from sniff.cli import USAGE, Failure, arguments, tables
 from sniff.cli.rows import iso
 from sniff.cli.tables import Cell
@@ -27,7 +28,6 @@ from sniff.devices import noted_devices
 from sniff.editing.merging import merged, merged_session
 from sniff.engine.engine import Output
 from sniff.engine.follow_settings import dissector_for
-from sniff.engine.observer import observe
 from sniff.engine.session import LineEvent
 
 TABLES = ("nodes", "health", "transactions", "latency", "load", "ring")
@@ -42,6 +42,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     style = parser.add_mutually_exclusive_group()
     style.add_argument("--json", action="store_const", const="json", dest="style", help="one JSON object a row")
     style.add_argument("--csv", action="store_const", const="csv", dest="style", help="comma-separated values")
+    arguments.add_reference(parser)
     parser.set_defaults(style="text")
 
 
@@ -69,11 +70,11 @@ def run(args: argparse.Namespace) -> int:
         return ring.show(items, session, shown, args.style)
     if table == "health":
         model = BusModel(session, dissector_for(session), noted_devices(session))
-        observe(outputs(items, session), model)
+        survey(items, session, model, reference=args.reference)
         tables.write(HEALTH_HEADINGS, _health(model.health(), station_word(session.protocol)), args.style)
         return 0
     summary, kinds = Summary(session.line), _Kinds()
-    observe(outputs(items, session), summary, kinds)
+    survey(items, session, summary, kinds, reference=args.reference)
     if table == "nodes":
         nodes = [_node(node) for node in summary.nodes.present()]
         if nodes or args.style != "text":
@@ -81,7 +82,7 @@ def run(args: argparse.Namespace) -> int:
         else:
             print(f"no stations were heard in {summary.frames} frames and {summary.noise} octets of noise")
     elif table == "transactions":
-        ordered = sorted(kinds.counts.items(), key=lambda pair: (pair[0][0], -pair[1]))
+        ordered = sorted(kinds.counts.items(), key=lambda pair: (pair[0][0], -pair[1], pair[0][1].value))
         words = [(kind, _verdict(verdict, args), count) for (kind, verdict), count in ordered]
         tables.write(("kind", "verdict", "count"), words, args.style)
     elif table == "latency":
@@ -92,6 +93,9 @@ def run(args: argparse.Namespace) -> int:
         tables.write(LOAD_HEADINGS, _load(summary, int(args.every * NS_PER_S)), args.style)
     return 0
 
+
+if TYPE_CHECKING:
+    from sniff.engine.table import Table
 
 NODE_HEADINGS = (
     "address",
@@ -122,6 +126,17 @@ class _Kinds:
     def add(self, output: Output) -> None:
         """Count what closed."""
         self.counts.update((transaction.kind, transaction.verdict) for transaction in output.transactions)
+
+    def add_table(self, table: Table) -> None:
+        """Count what closed."""
+        import numpy as np
+
+        from dissectors.columns import VERDICTS
+
+        closed = table.transactions
+        keys, counts = np.unique(np.stack((closed.kind, closed.verdict)), axis=1, return_counts=True)
+        for (kind, verdict), count in zip(keys.T.tolist(), counts.tolist(), strict=True):
+            self.counts[closed.names[kind], VERDICTS[verdict]] += count
 
     def add_line_event(self, event: LineEvent) -> None:
         """Nothing of it is counted here."""

@@ -38,7 +38,8 @@ class SessionEngine:
     Raises registry.UnknownProtocol.
     """
 
-    def __init__(self, session: Session, pairing: bool = True) -> None:
+    def __init__(self, session: Session, pairing: bool = True, first: int = 1, before_tx: int = 0) -> None:
+        """`first`, `before_tx`: of the rows and transactions to come, as `Engine` has them."""
         self.session = session
         self._pairing = pairing
         self.searching = bool(session.unknown)
@@ -46,7 +47,7 @@ class SessionEngine:
         self._since: int | None = None  # when the present attempt began, None before the first octet
         self._held: list[Chunk] = []
         self._held_octets = 0
-        self._engine = Engine(registry.get(session.protocol), session.timing, pairing=pairing)
+        self._engine = Engine(registry.get(session.protocol), session.timing, first, before_tx, pairing)
 
     @property
     def dissector(self) -> Dissector:

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Protocol, Self
+from typing import TYPE_CHECKING, Protocol, Self, runtime_checkable
 
 from sniff.engine.engine import Output
 from sniff.engine.session import LineEvent
+
+if TYPE_CHECKING:
+    from sniff.engine.table import Table
 
 
 class Observer(Protocol):
@@ -21,12 +24,38 @@ class Observer(Protocol):
         ...
 
 
+@runtime_checkable
+class TableObserver(Protocol):
+    """An observer that takes many rows at once."""
+
+    def add_table(self, table: Table) -> None:
+        """Take rows and transactions; the same as one after the other."""
+        ...
+
+
 class Mergeable(Protocol):
     """An observer of a part of a bus, whose value can be put together with that of the part that follows."""
 
     def merge(self, later: Self) -> Self:
         """Both together, as a new value: what an observer of the whole would be."""
         ...
+
+
+def observe_tables(items: Iterable[Table | LineEvent], *observers: Observer) -> None:
+    """The same with tables; those who only take row by row get them so. Raises what `items` raises."""
+    by_table = [one for one in observers if isinstance(one, TableObserver)]
+    by_row = [one for one in observers if not isinstance(one, TableObserver)]
+    for item in items:
+        if isinstance(item, LineEvent):
+            for observer in observers:
+                observer.add_line_event(item)
+            continue
+        for observer in by_table:
+            observer.add_table(item)
+        if by_row:
+            for output in item.outputs():
+                for row_observer in by_row:
+                    row_observer.add(output)
 
 
 def observe(outputs: Iterable[Output | LineEvent], *observers: Observer) -> None:

@@ -37,7 +37,7 @@ LEAST_SPLITS = 3.0
 ON_GRID = 0.85
 USB_FRAME = MS
 LONGEST_INTERVAL = 1000 * MS  # two clocks drift apart over longer ones
-_FAST = 0.97  # senders may be 2 % faster than the nominal rate, and stamps are rounded
+FAST = 0.97  # senders may be 2 % faster than the nominal rate, and stamps are rounded
 # ms; times of reads that are over a second wrong are no times, and mean no more with a larger bound
 _BOUNDS = (3, 5, 10, 18, 22, 33, 50, 70, 100, 140, 200, 300, 500, 1000)  # ms
 
@@ -122,27 +122,33 @@ def _backlogs(reads: ReadTimes, char: int, allowed: int) -> list[int]:
 class Backlog:
     """Line time of octets beyond what can have come, ns; summed up over reads until they have caught up.
 
-    `now`: of the present stretch of reads; `worst`: of all; `stretches`: how many went over what is `allowed` (ns).
+    `now`: of the present stretch of reads; `worst`: of all; `stretches`: how many went over what is
+    `allowed` (ns).
     """
 
-    __slots__ = ("_allowed", "_char", "_most", "now", "stretches", "worst")
+    __slots__ = ("_char", "_most", "allowed", "now", "stretches", "worst")
 
     def __init__(self, char: int, allowed: int) -> None:
         self._char = char
-        self._allowed = allowed
+        self.allowed = allowed
         self._most = 0.0
         self.now = self.worst = 0.0
         self.stretches = 0
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the present stretch of reads goes over what is allowed."""
+        return bool(self._most)
 
     def add(self, interval: int, octets: int) -> bool:
         """Take a read so many ns after the one before (negative: not known); whether it is worse than before."""
         if interval < 0:
             self.now = self._most = 0.0
             return False
-        self.now = max(0.0, self.now + _FAST * octets * self._char - interval)
+        self.now = max(0.0, self.now + FAST * octets * self._char - interval)
         if not self.now:
             self._most = 0.0
-        if self.now <= max(self._allowed, self._most):
+        if self.now <= max(self.allowed, self._most):
             return False
         self.stretches += not self._most
         self._most = self.now
@@ -180,7 +186,7 @@ def _fits(pairs: Sequence[tuple[int, int]], period: int, char: int) -> int | Non
     if len(on_grid) < ON_GRID * len(pairs):
         return None
     longest = period + tolerance + USB_FRAME
-    if sum(_FAST * count * char > longest for _, count in pairs) > 0.03 * len(pairs):
+    if sum(FAST * count * char > longest for _, count in pairs) > 0.03 * len(pairs):
         return None  # whole frames: a timer would have cut them
     # Where a period ends inside a frame, two reads stand one period apart.
     expected = sum(count for _, count in pairs) * char / period

@@ -1,0 +1,180 @@
+"""The engine for many rows at once: blocks of reads in, tables out; the rows that `engine.py` gives one by one. Pure.
+
+Where a protocol has no kernel, or where what is heard depends on settings that change, everything goes through the
+reference engine and only comes out as a table.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from dissectors import registry
+from dissectors.columns import Times
+from dissectors.frame import Event, Frame
+from dissectors.line import Timing
+from dissectors.manifest import Dissector
+from dissectors.tracker import Transaction
+from sniff.engine.blocks import Block
+from sniff.engine.capture import CaptureError
+from sniff.engine.engine import Output, Row
+from sniff.engine.follow_settings import SessionEngine
+from sniff.engine.framing import BulkFraming, Clean
+from sniff.engine.late_columns import LateColumns
+from sniff.engine.session import LineEvent, Session, settings_change
+from sniff.engine.table import Table, joined
+
+FAR = 1 << 61
+"""ns; times beyond it are not reckoned with in columns."""
+
+
+def tables(blocks: Iterable[Block | LineEvent], session: Session) -> Iterator[Table | LineEvent]:
+    """What a capture holds, as tables; line events pass through at their place. Raises what `blocks` raises, and
+    registry.UnknownProtocol."""
+    engine = BulkEngine(session)
+    try:
+        for item in blocks:
+            table = engine.take(item)
+            if table:
+                yield table
+            if isinstance(item, LineEvent):
+                yield item
+    except CaptureError:
+        yield engine.close()
+        raise
+    yield engine.close()
+
+
+class BulkEngine:
+    """Blocks and line events of one capture in, tables out."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self._leg = _Leg(registry.get(session.protocol), session.timing, 1, 0)
+        self._reference = SessionEngine(session) if session.unknown else None
+
+    @property
+    def session(self) -> Session:
+        """The bus; after a search, with what was found."""
+        return self._session if self._reference is None else self._reference.session
+
+    def take(self, item: Block | LineEvent) -> Table:
+        """Take what follows."""
+        reference = self._reference
+        if reference is not None:
+            items = item.chunks() if isinstance(item, Block) else (item,)
+            return _of_outputs(reference, [reference.take(one) for one in items])
+        if not isinstance(item, Block):
+            return self._happen(item)
+        if int(item.reads.times.min()) < -FAR or int(item.reads.times.max()) > FAR:
+            return self._one_by_one(item)
+        return self._leg.take(item)
+
+    def close(self) -> Table:
+        """End of the capture."""
+        reference = self._reference
+        return self._leg.close() if reference is None else _of_outputs(reference, [reference.close()])
+
+    def _happen(self, event: LineEvent) -> Table:
+        if event.kind.is_hole:  # what was asked before it and what is answered after it belong to nothing
+            return self._restart()
+        change, session = settings_change(event), self._session
+        nothing = Table.of(session.protocol, self._leg.next, [], [])
+        if change is None:
+            return nothing
+        same = change.line in (None, session.line) and change.protocol in (None, session.protocol)
+        if not change.searching and (same or session.given):
+            return nothing
+        table, leg = self._restart(), self._leg
+        self._reference = SessionEngine(session, first=leg.next, before_tx=leg.last_tx)  # rare: from here on one by one
+        self._reference.take(event)
+        return table
+
+    def _one_by_one(self, block: Block) -> Table:
+        """Times at the ends of what can be said in 64 bits, which only a damaged file or an evil one has."""
+        table, leg = self._restart(), self._leg
+        self._reference = SessionEngine(self._session, first=leg.next, before_tx=leg.last_tx)
+        return joined(leg.dissector.name, leg.next, [one for one in (table, self.take(block)) if one])
+
+    def _restart(self) -> Table:
+        table, before = self._leg.close(), self._leg
+        self._leg = _Leg(before.dissector, before.timing, before.next, before.last_tx)
+        return table
+
+
+def _of_outputs(engine: SessionEngine, outputs: list[Output]) -> Table:
+    rows = [row for output in outputs for row in output.rows]
+    closed = [one for output in outputs for one in output.transactions]
+    return Table.of(engine.dissector.name, rows[0].no if rows else 0, rows, closed)
+
+
+class _Leg:
+    """A stretch of a capture with one protocol and one line setting, without holes."""
+
+    def __init__(self, dissector: Dissector, timing: Timing, first: int, before_tx: int) -> None:
+        self.dissector = dissector
+        self.timing = timing
+        self.next = first
+        self.last_tx = before_tx
+        self._before_tx = before_tx
+        self._framing = BulkFraming(dissector, timing)
+        self._late = LateColumns(timing)
+        self._tracker = dissector.tracker(timing)
+
+    def take(self, block: Block) -> Table:
+        """Take reads."""
+        self._late.see(block.reads)
+        made = [self._clean(one) if isinstance(one, Clean) else self._events(one) for one in self._framing.take(block)]
+        return joined(self.dissector.name, self.next, made)
+
+    def close(self) -> Table:
+        """Give everything that is held."""
+        made = [self._events(one) for one in self._framing.close() if not isinstance(one, Clean)]
+        closed = self._numbered(self._tracker.close())
+        return joined(self.dissector.name, self.next, [*made, Table.of(self.dissector.name, self.next, [], closed)])
+
+    def _clean(self, stretch: Clean) -> Table:
+        """Rows of a kernel."""
+        table = stretch.table(self.dissector.name, self.next, self._late.slack(stretch.ends))
+        return self._placed(list(table.rows()))
+
+    def _events(self, events: list[Event]) -> Table:
+        """Rows of the reference framer."""
+        rows = []
+        slacks: Times = self._late.slack(np.array([event.end for event in events], np.int64))
+        for no, (event, slack) in enumerate(zip(events, slacks.tolist(), strict=True), self.next):
+            if isinstance(event, Frame):
+                event = replace(event, slack=slack) if slack > event.slack else event
+                rows.append(Row(no, event, self.dissector.peek(event)))
+            else:
+                rows.append(Row(no, event))
+        return self._placed(rows)
+
+    def _placed(self, rows: list[Row]) -> Table:
+        """The same rows where the tracker places them, with what they close."""
+        placed: list[Row] = []
+        closed: list[Transaction] = []
+        closed_by: list[int] = []
+        for place, row in enumerate(rows):
+            tracked = self._tracker.track(row.no, row.event, row.header)
+            event, placement = row.event, tracked.placement
+            if tracked.assembly is not None and isinstance(event, Frame):
+                event = replace(event, assembly=tracked.assembly)
+            if placement is not None:
+                if self._before_tx:
+                    placement = replace(placement, tx=placement.tx + self._before_tx)
+                self.last_tx = max(self.last_tx, placement.tx)
+            placed.append(Row(row.no, event, row.header, placement))
+            closed += self._numbered(tracked.closed)
+            closed_by += [place] * len(tracked.closed)
+        first, self.next = self.next, self.next + len(rows)
+        return Table.of(self.dissector.name, first, placed, closed, closed_by)
+
+    def _numbered(self, closed: tuple[Transaction, ...]) -> list[Transaction]:
+        """Transactions with their numbers on the whole bus."""
+        before = self._before_tx
+        if not before:
+            return list(closed)
+        return [replace(one, id=one.id + before, of=None if one.of is None else one.of + before) for one in closed]

@@ -1,0 +1,240 @@
+"""Reads to frames of any protocol in bulk: clean stretches by its kernel, everything else by its reference framer.
+
+The reference framer runs until it gives a good frame that the kernel gives too; from there on it is at rest inside a
+chain (`dissectors/columns.py`), whose rows are taken as they stand. Where the chain ends a new framer goes on. It is
+handed the last rows of the chain first, whose events are known and dropped, so that it has what it needs of the past.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from dissectors.columns import NONE, FrameColumns, Octets, PlacementColumns, Reads, Times
+from dissectors.frame import Chunk, Event, Frame
+from dissectors.framer import Framer
+from dissectors.line import Timing
+from dissectors.manifest import Dissector
+from sniff.engine.blocks import Block
+from sniff.engine.table import Table, transaction_columns
+
+MARGIN = 4096
+"""Octets before the end of a block from which on nothing is taken from a kernel: what follows may decide them."""
+
+SHORTEST = 3
+"""Rows that a chain must still hold for it to be worth taking up."""
+
+PRIMED = (6, 100)
+"""Rows of a chain that a new framer is handed first; more where it makes something else of the fewer."""
+
+
+@dataclass(frozen=True, slots=True)
+class Clean:
+    """Rows of a kernel; `octets`: theirs, so that `columns.offset` counts from their first."""
+
+    columns: FrameColumns
+    octets: Octets
+
+    @property
+    def ends(self) -> Times:
+        """ns, when each ended."""
+        return self.columns.end
+
+    def table(self, protocol: str, first: int, slack: Times) -> Table:
+        """The rows as a table that nobody has placed yet."""
+        count = len(self.columns)
+        nowhere = np.full(count, NONE, np.int16)
+        placed = PlacementColumns(np.zeros(count, np.int64), np.zeros(count, np.uint8), nowhere, nowhere)
+        nothing = transaction_columns(())
+        mask = np.ones(count, bool)
+        return Table(
+            protocol, first, self.octets, self.columns, slack, mask, placed, nothing, np.zeros(0, np.int64), {}
+        )
+
+
+Stretch = Clean | list[Event]
+"""Rows that follow one another: by columns, or events of the reference framer."""
+
+
+class BulkFraming:
+    """Blocks in, stretches of rows out; the same rows as the reference framer alone gives."""
+
+    def __init__(self, dissector: Dissector, timing: Timing) -> None:
+        self._dissector = dissector
+        self._timing = timing
+        self._framer: Framer = dissector.framer(timing)
+        self._known = 0  # octets handed to the framer whose events were given already
+        self._given = 0  # octets of the stream that are in rows
+        self._base = 0  # octets of the stream before the block at work
+        self._before: int | None = None  # nominal end of the newest octet
+        self._events: list[Event] = []
+
+    def take(self, block: Block) -> list[Stretch]:
+        """Take the reads that follow; give the rows that are certain by now."""
+        reads = replace(block.reads, before=self._before)
+        work = _Work(self, block, reads)
+        stretches = work.run()
+        self._base += len(reads.octets)
+        last = int(reads.times.max())
+        self._before = last if self._before is None else max(self._before, last)
+        return stretches
+
+    def close(self) -> list[Stretch]:
+        """End of the capture, or of its settings: everything still held."""
+        events = self._fresh(self._framer.close())
+        return [events] if events else []
+
+    def _fresh(self, events: Sequence[Event]) -> list[Event]:
+        """Those of the framer's events that were not given already."""
+        if not self._known:
+            return list(events)
+        fresh = []
+        for event in events:
+            if self._known > 0:
+                self._known -= len(event.octets)
+            else:
+                fresh.append(event)
+        if self._known < 0:  # an event over the end of the chain: the framer makes something else of it
+            raise _AnotherReadingError
+        return fresh
+
+
+class _AnotherReadingError(Exception):
+    """A framer that was handed the last rows of a chain goes over its end."""
+
+
+class _Work:
+    """One block on its way."""
+
+    def __init__(self, framing: BulkFraming, block: Block, reads: Reads) -> None:
+        self._framing = framing
+        self._block = block
+        self._reads = reads
+        self._begins = reads.begins
+        self._size = len(reads.octets)
+        kernel = framing._dissector.kernel
+        usable = kernel is not None and self._size > MARGIN and _is_forward(reads)
+        self._columns = kernel(reads, framing._timing) if kernel is not None and usable else None
+        self._last: Times | None = None
+        if self._columns is not None and len(self._columns):
+            self._columns, self._last = _chains(self._columns, self._size - MARGIN)
+        self._stretches: list[Stretch] = []
+        self._events: list[Event] = []
+        self._taken = (0, 0, 0)  # of the newest chain: its row that the reference gave, its end, its stretch
+        self._doubted = 0  # no chain is taken up before this place
+
+    def run(self) -> list[Stretch]:
+        """All stretches of the block."""
+        framing = self._framing
+        at = 0
+        while at < self._size:
+            chunk, at = self._part(at, self._size)
+            try:
+                fresh = framing._fresh(framing._framer.feed(chunk))
+            except _AnotherReadingError:
+                at = self._give_back()
+                continue
+            jump = self._take_events(fresh)
+            if jump is not None:
+                at = jump
+        self._end_events()
+        return self._stretches
+
+    def _take_events(self, events: list[Event]) -> int | None:
+        """Keep events; where a chain is taken up, the place in the block where it ends."""
+        framing = self._framing
+        for event in events:
+            begin = framing._given - framing._base
+            framing._given += len(event.octets)
+            self._events.append(event)
+            if begin >= self._doubted and isinstance(event, Frame) and event.ok and self._columns is not None:
+                row = int(np.searchsorted(self._columns.offset, begin))
+                if row < len(self._columns) and self._columns.offset[row] == begin:
+                    end = self._take_up(row, event)
+                    if end is not None:
+                        return end
+        return None
+
+    def _take_up(self, row: int, event: Frame) -> int | None:
+        columns, last = self._columns, self._last
+        assert columns is not None
+        assert last is not None
+        end = int(last[row]) + 1
+        if end - row - 1 < SHORTEST or columns.length[row] != len(event.octets):
+            return None
+        for primed in (*PRIMED, end - row):
+            first = max(row, end - primed)
+            stop = int(columns.offset[end - 1]) + int(columns.length[end - 1])
+            if self._prime(int(columns.offset[first]), stop, [int(n) for n in columns.length[first:end]]):
+                self._end_events()
+                self._taken = row, end, len(self._stretches)
+                self._stretches.append(self._clean(row + 1, end))
+                self._framing._given = self._framing._base + stop
+                return stop
+        return None
+
+    def _clean(self, first: int, end: int) -> Clean:
+        assert self._columns is not None
+        columns = self._columns.take(slice(first, end))
+        begin, stop = int(columns.offset[0]), int(columns.offset[-1]) + int(columns.length[-1])
+        return Clean(replace(columns, offset=columns.offset - begin), self._reads.octets[begin:stop])
+
+    def _give_back(self) -> int:
+        """Let the reference read the newest chain after all; where it goes on in the block."""
+        columns, framing = self._columns, self._framing
+        row, end, stretch = self._taken
+        assert columns is not None
+        self._doubted = int(columns.offset[end - 1]) + int(columns.length[end - 1])
+        del self._stretches[stretch:]
+        self._events = []
+        begin, length = int(columns.offset[row]), int(columns.length[row])
+        framing._framer, framing._known = framing._dissector.framer(framing._timing), length
+        framing._given = framing._base + begin + length
+        return begin
+
+    def _prime(self, begin: int, stop: int, lengths: list[int]) -> bool:
+        """Put a new framer behind the rows in [begin, stop); whether it makes the same rows of them so far."""
+        framer = self._framing._dissector.framer(self._framing._timing)
+        at, events = begin, []
+        while at < stop:
+            chunk, at = self._part(at, stop)
+            events += framer.feed(chunk)
+        if any(len(event.octets) != length for event, length in zip(events, lengths, strict=False)):
+            return False
+        self._framing._framer = framer
+        self._framing._known = stop - begin - sum(len(event.octets) for event in events)
+        return self._framing._known >= 0
+
+    def _part(self, at: int, stop: int) -> tuple[Chunk, int]:
+        """The read that holds octet `at`, from there on and before `stop`, and where it ends."""
+        begins, reads = self._begins, self._reads
+        index = int(np.searchsorted(begins, at, side="right")) - 1
+        begin, whole = int(begins[index]), int(begins[index + 1])
+        end = min(whole, stop)
+        marks = self._block.marks.get(index, ())
+        if marks and (at, end) != (begin, whole):
+            marks = tuple(
+                replace(m, offset=m.offset - at + begin) for m in marks if at - begin <= m.offset < end - begin
+            )
+        time = int(reads.times[index]) - (whole - end) * self._framing._timing.char
+        return Chunk(time, reads.octets[at:end].tobytes(), marks), end
+
+    def _end_events(self) -> None:
+        if self._events:
+            self._stretches.append(self._events)
+            self._events = []
+
+
+def _is_forward(reads: Reads) -> bool:
+    """Whether times never run backwards: what a framer makes of that depends on all of the past."""
+    return (reads.before is None or int(reads.times[0]) >= reads.before) and bool((np.diff(reads.times) >= 0).all())
+
+
+def _chains(columns: FrameColumns, limit: int) -> tuple[FrameColumns, Times]:
+    """The rows that end at or before `limit`, and for each the index of the last row of its chain."""
+    columns = columns.take(slice(0, int(np.searchsorted(columns.offset + columns.length, limit, side="right"))))
+    begins = np.flatnonzero(~columns.chained)
+    ends = np.append(begins[1:], len(columns)) - 1
+    return columns, np.repeat(ends, np.diff(np.append(begins, len(columns))))

@@ -1,0 +1,92 @@
+"""The slack that late reads leave to frames, for many reads at once: what `late_reads.py` says one by one. Pure."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dissectors.columns import Reads, Times
+from dissectors.line import Timing
+from sniff.engine.late_reads import ANOTHER, MOST, OFTEN, RARELY, TOGETHER
+from sniff.engine.read_times import FAST, Backlog
+
+KEPT = 64
+"""Reads of the block before that may hold the end of a frame to come."""
+
+
+class LateColumns:
+    """Fed blocks of reads whose times do not run backwards; gives frames their slack."""
+
+    def __init__(self, timing: Timing) -> None:
+        self._char = timing.char
+        self._least = timing.latency + ANOTHER * timing.char
+        self._together = timing.latency + TOGETHER
+        self._allowed = self._latency = timing.latency
+        self._backlog = Backlog(timing.char, timing.latency + timing.char)
+        self._seen = 0
+        self._before_run = 0
+        self._times = np.zeros(0, np.int64)  # of the last reads
+        self._starts = np.zeros(0, np.int64)
+        self._pauses = np.full(0, -1, np.int64)
+        self._latencies = np.zeros(0, np.int64)
+
+    def see(self, reads: Reads) -> None:
+        """Take the reads that follow."""
+        times, lasted = reads.times, reads.lengths * self._char
+        before = np.empty(len(reads), np.int64)
+        known = len(self._times) > 0
+        before[0] = self._times[-1] if known else times[0] - lasted[0]
+        before[1:] = times[:-1]
+        runs = times - lasted - before > self._together
+        if not known:
+            runs[0] = True
+        run_before = np.where(runs, before, 0)
+        at = np.maximum.accumulate(np.where(runs, np.arange(len(reads)), -1))
+        run_before = np.where(at >= 0, run_before[np.maximum(at, 0)], self._before_run)
+        starts = np.maximum(times - lasted, before)
+        pauses = np.minimum(starts - run_before, MOST)
+        long = lasted > self._least
+        long[0] &= known
+        self._before_run = int(run_before[-1])
+        latencies = self._follow(reads, before, known)
+        self._times = np.concatenate((self._times[-KEPT:], times))
+        self._starts = np.concatenate((self._starts[-KEPT:], starts))
+        self._pauses = np.concatenate((self._pauses[-KEPT:], np.where(long, pauses, -1)))
+        self._latencies = np.concatenate((self._latencies[-KEPT:], latencies))
+
+    def slack(self, ends: Times) -> Times:
+        """ns, of frames in their order, by when they ended; their reads were seen."""
+        read = np.searchsorted(self._times, ends)
+        inside = read < len(self._times)
+        read = np.minimum(read, len(self._times) - 1)
+        latency = self._latencies[read]
+        slack: Times = np.maximum(latency, self._allowed)
+        pauses = self._pauses[read]
+        held = inside & (pauses >= 0) & (self._starts[read] < ends)
+        late = np.zeros(len(self._times), bool)
+        late[read[held & (self._times[read] - ends >= self._least)]] = True
+        return np.where(held & late[read], np.maximum(slack, pauses), slack)
+
+    def _follow(self, reads: Reads, before: Times, known: bool) -> Times:
+        """The latency in force after each read: where reads hold more than can have come, it grows."""
+        intervals, backlog = reads.times - before, self._backlog
+        summed = np.cumsum(FAST * reads.lengths * self._char - intervals)
+        if not known:
+            summed -= summed[0]
+        summed += backlog.now
+        now = summed - np.minimum(np.minimum.accumulate(summed), 0.0)
+        if backlog.is_over or now.max() > backlog.allowed:
+            return self._one_by_one(reads, intervals, known)
+        self._seen += len(reads)
+        backlog.now = float(now[-1])
+        return np.full(len(reads), self._latency, np.int64)
+
+    def _one_by_one(self, reads: Reads, intervals: Times, known: bool) -> Times:
+        latencies, backlog = [], self._backlog
+        for at, (interval, octets) in enumerate(zip(intervals.tolist(), reads.lengths.tolist(), strict=True)):
+            self._seen += 1
+            if (known or at) and backlog.add(interval, octets):
+                stretches = backlog.stretches
+                if stretches >= OFTEN and RARELY * stretches >= self._seen:
+                    self._latency = min(MOST, max(self._latency, int(backlog.worst)))
+            latencies.append(self._latency)
+        return np.array(latencies, np.int64)

@@ -1,0 +1,352 @@
+"""The table: rows and transactions of one bus as columns; an object is the view of a row that somebody looks at.
+
+A table holds rows that follow one another. Most of them are nothing but their columns. Those of which the columns do
+not say all (noise, damage, line errors, pads, messages in several frames) are kept as they are beside them (`odd`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from dissectors.columns import (
+    CHECKS,
+    DAMAGES,
+    FOUNDS,
+    NONE,
+    ROLES,
+    VERDICTS,
+    FrameColumns,
+    Masks,
+    Octets,
+    PlacementColumns,
+    Times,
+    TransactionColumns,
+)
+from dissectors.frame import Check, Frame, Header
+from dissectors.tracker import Interval, Placement, Transaction
+from sniff.engine.engine import Output, Row
+
+_CHECKS = {one: at for at, one in enumerate(CHECKS)}
+_DAMAGES = {one: at for at, one in enumerate(DAMAGES)}
+_FOUNDS = {one: at for at, one in enumerate(FOUNDS)}
+_ROLES = {one: at for at, one in enumerate(ROLES)}
+_VERDICTS = {one: at for at, one in enumerate(VERDICTS)}
+
+TEXTS = frozenset(("kind", "error"))
+"""Columns that are places in `names`."""
+
+ROW_FORMS = ("i8", "i4", "i8", "i8", "u1", "u1", "u1", "i4", "i2", "i2", "u1", "u2", "i2", "i4", "i4", "?", "u2")
+TRANSACTION_FORMS = ("i8", "i2", "u2", "i8", "i8", "u1", "i8", "i8", "i8", "i8", "i8", "i4", "i8", "u2")
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """Rows `first` … `first + len - 1` of a bus, and the transactions that closed with them, in the order of closing.
+
+    `octets`: of all rows, in their order; `frames.offset` is a place in it. `slack`: ns, of each row. `is_frame`: false
+    for noise and for what a search only heard. `closed_by`: place of the row that closed each transaction; -1
+    where none did. `odd`: rows as they are, by place in the table. `protocol`: of its
+    frames.
+    """
+
+    protocol: str
+    first: int
+    octets: Octets
+    frames: FrameColumns
+    slack: Times
+    is_frame: Masks
+    placed: PlacementColumns
+    transactions: TransactionColumns
+    closed_by: Times
+    odd: Mapping[int, Row]
+
+    @classmethod
+    def of(
+        cls,
+        protocol: str,
+        first: int,
+        rows: Sequence[Row],
+        closed: Sequence[Transaction],
+        closed_by: Sequence[int] | None = None,
+    ) -> Table:
+        """What an engine gave; `first`: the number of the first row, or of the row to come. `closed_by`: by the last
+        row where it is not said."""
+        return cls(
+            protocol,
+            first,
+            np.frombuffer(b"".join(row.event.octets for row in rows), np.uint8),
+            frame_columns(rows),
+            np.array([row.event.slack if isinstance(row.event, Frame) else 0 for row in rows], np.int64),
+            np.array([row.header is not None for row in rows], bool),
+            placement_columns(rows),
+            transaction_columns(closed),
+            np.array(closed_by if closed_by is not None else [len(rows) - 1] * len(closed), np.int64),
+            {place: row for place, row in enumerate(rows) if not _is_plain(row)},
+        )
+
+    @property
+    def heard(self) -> Masks:
+        """bool[n]: all rows but those that were only heard while settings were searched for."""
+        heard: Masks = np.ones(len(self), bool)
+        for place, row in self.odd.items():
+            heard[place] = row.searched is None
+        return heard
+
+    @property
+    def good(self) -> Masks:
+        """bool[n]: frames of which nothing is damaged, with a good check where they have one (`Frame.ok`)."""
+        frames = self.frames
+        good: Masks = self.is_frame & (frames.damage == 0) & (frames.check != _CHECKS[Check.BAD])
+        return good
+
+    @property
+    def repaired(self) -> Masks:
+        """bool[n]: damaged frames that could be put right."""
+        repaired: Masks = np.zeros(len(self), bool)
+        for place, row in self.odd.items():
+            repaired[place] = isinstance(row.event, Frame) and row.event.repair is not None
+        return repaired
+
+    def __len__(self) -> int:
+        return len(self.frames)
+
+    def __bool__(self) -> bool:
+        return len(self.frames) > 0 or len(self.transactions) > 0
+
+    def row(self, place: int) -> Row:
+        """The row at a place, 0 … len - 1."""
+        odd = self.odd.get(place)
+        if odd is not None:
+            return odd
+        frames, no = self.frames, self.first + place
+        begin, length = int(frames.offset[place]), int(frames.length[place])
+        frame = Frame(
+            self.protocol,
+            self.octets[begin : begin + length].tobytes(),
+            int(frames.start[place]),
+            int(frames.end[place]),
+            CHECKS[frames.check[place]],
+            FOUNDS[frames.found[place]],
+            DAMAGES[frames.damage[place]],
+            _some(frames.expected[place]),
+            0,
+            int(self.slack[place]),
+        )
+        header = Header(
+            self.protocol,
+            _some(frames.source[place]),
+            _some(frames.destination[place]),
+            ROLES[frames.role[place]],
+            frames.names[frames.kind[place]],
+            _some(frames.function[place]),
+            _some(frames.address[place]),
+            _some(frames.count[place]),
+            bool(frames.ok[place]),
+            frames.names[frames.error[place]] if frames.error[place] else None,
+        )
+        return Row(no, frame, header, self._placement(place))
+
+    def rows(self) -> Iterator[Row]:
+        """All rows as objects."""
+        return map(self.row, range(len(self)))
+
+    def outputs(self) -> Iterator[Output]:
+        """Row by row, each with the transactions that it closed; those that no row closed come last."""
+        closed, at = self.closed_by.tolist(), 0
+        for place in range(len(self)):
+            begin = at
+            while at < len(closed) and 0 <= closed[at] <= place:
+                at += 1
+            yield Output((self.row(place),), tuple(map(self.transaction, range(begin, at))))
+        if at < len(closed):
+            yield Output((), tuple(map(self.transaction, range(at, len(closed)))))
+
+    def _placement(self, place: int) -> Placement | None:
+        placed = self.placed
+        tx = int(placed.tx[place])
+        if not tx:
+            return None
+        source, destination = _some(placed.source[place]), _some(placed.destination[place])
+        return Placement(self.first + place, tx, ROLES[placed.role[place]], source, destination)
+
+    def transaction(self, place: int) -> Transaction:
+        """The transaction that closed as number `place` of the table, from 0."""
+        held = self.transactions
+        latency = None
+        if held.latency[place] != NONE:
+            latency = Interval(int(held.latency[place]), int(held.least[place]), int(held.most[place]))
+        return Transaction(
+            int(held.id[place]),
+            _some(held.station[place]),
+            held.names[held.kind[place]],
+            _some(held.request[place]),
+            _some(held.response[place]),
+            VERDICTS[held.verdict[place]],
+            int(held.start[place]),
+            int(held.end[place]),
+            latency,
+            int(held.attempt[place]),
+            _some(held.of[place]),
+            held.names[held.error[place]] if held.error[place] else None,
+        )
+
+
+def joined(protocol: str, first: int, parts: Sequence[Table]) -> Table:
+    """Tables whose rows follow one another as one; an empty one whose rows would begin with `first` for none."""
+    if not parts:
+        return Table.of(protocol, first, [], [])
+    if len(parts) == 1:
+        return parts[0]
+    lengths, first = [len(part.octets) for part in parts], parts[0].first
+    odd = {part.first - first + place: row for part in parts for place, row in part.odd.items()}
+    frames = _joined_columns(FrameColumns, [part.frames for part in parts])
+    begins = np.repeat(np.cumsum([0, *lengths[:-1]]), [len(part) for part in parts])
+    return Table(
+        protocol,
+        first,
+        np.concatenate([part.octets for part in parts]),
+        replace(frames, offset=frames.offset + begins),
+        np.concatenate([part.slack for part in parts]),
+        np.concatenate([part.is_frame for part in parts]),
+        PlacementColumns(
+            *(
+                np.concatenate([getattr(part.placed, name) for part in parts])
+                for name in ("tx", "role", "source", "destination")
+            )
+        ),
+        _joined_columns(TransactionColumns, [part.transactions for part in parts]),
+        np.concatenate([part.closed_by + np.where(part.closed_by < 0, 0, part.first - first) for part in parts]),
+        odd,
+    )
+
+
+Named = TypeVar("Named", FrameColumns, TransactionColumns)
+
+
+def _joined_columns(kind: type[Named], parts: Sequence[Named]) -> Named:
+    """Columns one after the other, their texts under common numbers."""
+    names = Names()
+    columns: dict[str, list[npt.NDArray[Any]]] = {}
+    for part in parts:
+        numbers = np.array([names.number(text) for text in part.names], np.uint16)
+        for one in fields(kind)[:-1]:
+            values = getattr(part, one.name)
+            columns.setdefault(one.name, []).append(numbers[values] if one.name in TEXTS else values)
+    return kind(**{name: np.concatenate(values) for name, values in columns.items()}, names=names.texts)
+
+
+def _is_plain(row: Row) -> bool:
+    """Whether columns say all of it."""
+    event = row.event
+    if not isinstance(event, Frame) or row.header is None or row.searched is not None:
+        return False
+    if (_clip(event.start), _clip(event.end)) != (event.start, event.end):
+        return False
+    if event.marks or event.flags or event.repair or event.assembly or event.skipped:
+        return False
+    header = row.header  # a plug-in may give anything
+    numbers = (header.source, header.destination, header.function, header.address, header.count)
+    return header.error != "" and all(
+        value is None or 0 <= value <= most for value, most in zip(numbers, _MOST, strict=True)
+    )
+
+
+def _some(value: np.signedinteger) -> int | None:
+    number = int(value)
+    return None if number == NONE else number
+
+
+def _clip(time: int) -> int:
+    return min(max(time, -(1 << 62)), 1 << 62)
+
+
+_MOST = (0x7FFF, 0x7FFF, 0x7FFF, 0x7FFF_FFFF, 0x7FFF_FFFF)
+
+
+def _none(value: int | None, most: int = 0x7FFF_FFFF_FFFF_FFFF) -> int:
+    return NONE if value is None or not 0 <= value <= most else value
+
+
+class Names:
+    """Texts by number, from 1; 0 is none."""
+
+    def __init__(self) -> None:
+        self._numbers: dict[str, int] = {"": 0}
+
+    def number(self, text: str | None) -> int:
+        """Of a text; those beyond 65535 share one number, which no capture reaches that is not made to."""
+        if text is None:
+            return 0
+        return self._numbers.setdefault(text, min(len(self._numbers), 0xFFFF))
+
+    @property
+    def texts(self) -> tuple[str, ...]:
+        """By number."""
+        return tuple(self._numbers)[: 1 << 16]
+
+
+def frame_columns(rows: Sequence[Row]) -> FrameColumns:
+    """Rows as columns; the offset counts from the first octet of the first."""
+    names, at = Names(), 0
+    values: list[tuple[int, ...]] = []
+    for row in rows:
+        event, header = row.event, row.header
+        place = (at, len(event.octets), _clip(event.start), _clip(event.end))
+        at += len(event.octets)
+        if not isinstance(event, Frame) or header is None:
+            values.append((*place, 0, 0, 0, NONE, NONE, NONE, 0, 0, NONE, NONE, NONE, 0, 0))
+            continue
+        found = (_CHECKS[event.check], _FOUNDS[event.found], _DAMAGES[event.damage], _none(event.expected, 0x7FFF_FFFF))
+        ways = _none(header.source, 0x7FFF), _none(header.destination, 0x7FFF), _ROLES[header.role]
+        what = _none(header.function, 0x7FFF), _none(header.address, 0x7FFF_FFFF), _none(header.count, 0x7FFF_FFFF)
+        told = int(header.ok), names.number(header.error)
+        values.append((*place, *found, *ways, names.number(header.kind), *what, *told))
+    return FrameColumns(**_columns(FrameColumns, ROW_FORMS, values), names=names.texts)
+
+
+def placement_columns(rows: Sequence[Row]) -> PlacementColumns:
+    """Where rows belong."""
+    values = [
+        (0, 0, NONE, NONE)
+        if (placed := row.placement) is None
+        else (placed.tx, _ROLES[placed.role], _none(placed.source, 0x7FFF), _none(placed.destination, 0x7FFF))
+        for row in rows
+    ]
+    return PlacementColumns(**_columns(PlacementColumns, ("i8", "u1", "i2", "i2"), values))
+
+
+def transaction_columns(closed: Sequence[Transaction]) -> TransactionColumns:
+    """Transactions as columns."""
+    names = Names()
+    values: list[tuple[int, ...]] = []
+    for one in closed:
+        took = one.latency
+        latency = (NONE, NONE, NONE) if took is None else (took.nominal, took.low, took.high)
+        values.append(
+            (
+                one.id,
+                _none(one.station, 0x7FFF),
+                names.number(one.kind),
+                _none(one.request),
+                _none(one.response),
+                _VERDICTS[one.verdict],
+                _clip(one.start),
+                _clip(one.end),
+                *map(_clip, latency),
+                one.attempt,
+                _none(one.of),
+                names.number(one.error),
+            )
+        )
+    return TransactionColumns(**_columns(TransactionColumns, TRANSACTION_FORMS, values), names=names.texts)
+
+
+def _columns(kind: type, forms: Sequence[str], values: Sequence[tuple[int, ...]]) -> dict[str, np.ndarray]:
+    names = [name for name in kind.__dataclass_fields__ if name != "names"]  # type: ignore[attr-defined]
+    parts = zip(*values, strict=True) if values else ([] for _ in forms)
+    return {name: np.array(list(part), form) for name, part, form in zip(names, parts, forms, strict=True)}

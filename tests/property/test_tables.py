@@ -1,0 +1,86 @@
+"""Tables hold what the reference engine gives: every row, every transaction, of every capture, however it is cut."""
+
+from __future__ import annotations
+
+from itertools import chain
+from pathlib import Path
+
+import pytest
+
+from dissectors.tracker import Transaction
+from sniff.analysis.summary import Summary
+from sniff.bus.offline import outputs
+from sniff.engine.blocks import blocks_of
+from sniff.engine.bulk import tables
+from sniff.engine.capture import CaptureError
+from sniff.engine.engine import Output, Row
+from sniff.engine.observer import observe
+from sniff.engine.session import LineEvent
+from sniff.engine.table import Table
+from sniff.formats import read
+
+CAPTURES = Path(__file__).parents[2] / "captures"
+SHARED = Path(__file__).parents[3] / "shared" / "captures"
+NAMES = sorted(
+    path
+    for path in chain(CAPTURES.rglob("*"), SHARED.rglob("*") if SHARED.exists() else ())
+    if path.suffix in {".txt", ".pcap", ".pcapng", ".mcap"} and not path.name.endswith(".expect.txt")
+)
+
+
+def of_reference(path: Path) -> tuple[list[Row], list[Transaction], list[LineEvent]]:
+    capture = read(path)
+    rows: list[Row] = []
+    closed: list[Transaction] = []
+    events: list[LineEvent] = []
+    for item in outputs(capture.items(), capture.session):
+        if isinstance(item, Output):
+            rows += item.rows
+            closed += item.transactions
+        else:
+            events.append(item)
+    return rows, closed, events
+
+
+def of_tables(path: Path) -> tuple[list[Row], list[Transaction], list[LineEvent]]:
+    capture = read(path)
+    rows: list[Row] = []
+    closed: list[Transaction] = []
+    events: list[LineEvent] = []
+    for item in tables(blocks_of(capture.items()), capture.session):
+        if isinstance(item, Table):
+            assert not len(item) or item.first == len(rows) + 1
+            rows += item.rows()
+            closed += [item.transaction(place) for place in range(len(item.transactions))]
+        else:
+            events.append(item)
+    return rows, closed, events
+
+
+@pytest.mark.parametrize("path", NAMES, ids=lambda path: path.name)
+def test_what_is_counted_over_tables_is_what_is_counted_over_rows(path: Path) -> None:
+    try:
+        session = read(path).session
+        by_rows, by_tables = Summary(session.line), Summary(session.line)
+        observe(outputs(read(path).items(), session), by_rows)
+    except CaptureError as error:
+        pytest.skip(str(error))
+    for table in tables(blocks_of(read(path).items()), session):
+        if isinstance(table, Table):
+            by_tables.add_table(table)
+        else:
+            by_tables.add_line_event(table)
+    assert by_tables == by_rows
+
+
+@pytest.mark.parametrize("path", NAMES, ids=lambda path: path.name)
+def test_a_capture_gives_the_same_rows_as_tables(path: Path) -> None:
+    try:
+        expected_rows, expected_closed, expected_events = of_reference(path)
+    except CaptureError as error:
+        pytest.skip(str(error))
+    rows, closed, events = of_tables(path)
+    for row, expected in zip(rows, expected_rows, strict=True):
+        assert row == expected
+    assert closed == expected_closed
+    assert events == expected_events
