@@ -20,6 +20,9 @@ from dissectors.frame import Chunk
 from sniff.formats import read
 
 pytest.importorskip("termios")
+
+from tests.e2e.running import rest_of
+
 POLL = bytes.fromhex("010300000002c40b")
 LINE = ("-s", "19200,8E1")
 
@@ -107,7 +110,7 @@ def refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Capt
 def run(begin):
     def run(*arguments: str, **options) -> tuple[int, str, str]:
         process = begin(*arguments, **options)
-        said, errors = process.communicate(timeout=60)
+        said, errors = rest_of(process)
         return process.returncode, said, errors
 
     return run
@@ -179,7 +182,7 @@ def test_the_second_recorder_is_told_who_has_the_port(begin, refused, bus, tmp_p
     assert "to end it: kill" in errors
     assert not (tmp_path / "second.mcap").exists()
     first.send_signal(signal.SIGINT)
-    first.communicate(timeout=20)
+    rest_of(first)
     assert first.returncode == 0
     assert read(tmp_path / "first.mcap").completeness().whole
 
@@ -189,7 +192,7 @@ def test_a_signal_ends_it_whole(begin, bus, tmp_path, number) -> None:
     process = begin("record", str(bus.link), *LINE, "-w", "x.mcap")
     wait_for(tmp_path / "x.mcap")
     process.send_signal(number)
-    errors = process.communicate(timeout=20)[1]
+    errors = rest_of(process)[1]
     assert process.returncode == 0
     assert "recorded to x.mcap" in errors
     assert read(tmp_path / "x.mcap").completeness().whole
@@ -208,7 +211,7 @@ def test_a_port_that_goes_and_comes_back(begin, bus, tmp_path) -> None:
         assert time.monotonic() < until
         time.sleep(0.1)
     process.send_signal(signal.SIGTERM)
-    process.communicate(timeout=20)
+    rest_of(process)
     assert process.returncode == 0
     kinds = [item.kind.value for item in read(tmp_path / "x.mcap").items() if not isinstance(item, Chunk)]
     assert [kind for kind in kinds if kind != "note"] == ["unplugged", "replugged"]
@@ -226,7 +229,7 @@ def test_a_gateway_that_closes_is_waited_for(begin, tmp_path) -> None:
         assert next_line(process) == f"sniff485: {port} is gone (closed by the gateway)\n"
         assert next_line(process) == f"sniff485: {port} is back\n"
         process.send_signal(signal.SIGTERM)
-        process.communicate(timeout=20)
+        rest_of(process)
     assert process.returncode == 0
     assert octets_of(tmp_path / "x.mcap") == 2 * POLL
 
@@ -246,7 +249,7 @@ def test_a_full_disk_is_said_at_once_and_ends_in_an_error(begin, tmp_path) -> No
         assert "recording: x.mcap: File too large" in line
         assert process.poll() is None, "it goes on, for there may be room again"
         process.send_signal(signal.SIGINT)
-        errors = process.communicate(timeout=20)[1]
+        errors = rest_of(process)[1]
     finally:
         noisy.unplug()
     assert process.returncode == 3

@@ -25,6 +25,7 @@ from sniff.cli.searching import Unknowns
 from sniff.engine.engine import Output
 from sniff.engine.session import settings_change
 from sniff.formats import read
+from tests.e2e.running import rest_of
 
 pytest.importorskip("termios")
 SCRIPT = Path(__file__).with_name("line_bus.py")
@@ -193,7 +194,7 @@ def test_interrupted_while_searching_the_file_is_whole_and_says_so(tmp_path, cap
     process = begin("record", port, "-s", "auto", "-p", "auto", "-w", str(path))
     said_by(process, "listening with 9600,8N1" if port == SILENT else GOES_ON)
     process.send_signal(signal.SIGINT)
-    said = process.communicate(timeout=20)[1]
+    said = rest_of(process)[1]
     assert process.returncode == 130
     assert "interrupted while searching, no settings found" in said
     assert words in said
@@ -226,7 +227,7 @@ def test_capture_killed_while_searching(tmp_path: Path, begin, capsys) -> None:
         assert time.monotonic() < until
         time.sleep(0.05)
     os.kill(holder_of(path), signal.SIGKILL)
-    said = process.communicate(timeout=20)[1]
+    said = rest_of(process)[1]
     assert process.returncode == 4
     assert "SIGKILL" in said
     capture = read(path)
@@ -285,10 +286,11 @@ def test_auto_in_the_configuration(tmp_path: Path, monkeypatch, begin) -> None:
         lines.append(process.stdout.readline())
         assert lines[-1], "it has ended"
     process.send_signal(signal.SIGINT)
-    said, errors = process.communicate(timeout=20)
+    said, errors = rest_of(process)
     assert process.returncode == 0, errors
     rows = [json.loads(line) for line in [*lines, *said.splitlines()]]
     shown, kept = "".join(row["hex"] for row in rows), octets_of(Path("boiler.mcap")).hex()
+    said_unseen = re.search(r"(\d+) octets not looked at", errors)  # on a busy machine; then they are counted
     assert kept.startswith(shown)
-    assert shown == kept or len(kept) - len(shown) < 200, "a busy machine stops with some octets not yet shown"
+    assert len(kept) - len(shown) == 2 * int(said_unseen[1] if said_unseen else 0)
     assert {row["kind"] == "searching" for row in rows} == {True, False}
