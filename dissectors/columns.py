@@ -107,14 +107,8 @@ class OctetTimes:
     def start(self, octets: Times) -> Times:
         """Latest possible begin of octets, ns."""
         reads = self.read_of(octets)
-        last = self.begins[reads + 1] - 1 - octets
-        end = np.maximum(self.floors[reads], self.times[reads] - last * self.char)
-        before = np.where(
-            octets == self.begins[reads],
-            self.floors[reads],
-            np.maximum(self.floors[reads], self.times[reads] - (last + 1) * self.char),
-        )
-        start: Times = np.maximum(end - self.char, before)
+        first = self.times[reads] - (self.begins[reads + 1] - octets) * self.char
+        start: Times = np.maximum(first, self.floors[reads])
         return start
 
     def gaps(self) -> Times:

@@ -38,6 +38,7 @@ __all__ = [
 
 
 packet = on_first_use("dissectors.bacnet.packets:packet")
+kernel = on_first_use("dissectors.bacnet.kernel:kernel")
 
 
 def bits(frame: Frame) -> float:
@@ -75,4 +76,5 @@ MSTP = Dissector(
     packet_file=PacketFile((165, 252), "mstp", least=8, longer=True),
     renamer=MstpRenamer,
     makers={"mstp": frame},
+    kernel=kernel,
 )

@@ -1,0 +1,198 @@
+"""MS/TP traffic for tests of what works on many frames at once: frames, buses of any kind, captures that lie here."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+from hypothesis import strategies as st
+
+from dissectors.bacnet.frame_making import frame
+from dissectors.bacnet.frame_types import PREAMBLE
+from dissectors.checksums import crc8_mstp
+from dissectors.columns import Reads
+from dissectors.frame import Chunk, LineError, Mark
+from dissectors.line import LineSettings, Timing
+from sniff.engine.session import SettingsChange
+from sniff.formats import read
+
+MS = 1_000_000
+START = 10**18
+LINE = LineSettings(38400)
+
+OURS = sorted(path for path in Path("captures").rglob("*.cap.txt") if "protocol: mstp" in path.read_text("utf-8")[:400])
+OTHERS = Path(__file__).parents[2] / "../shared/captures"
+THEIRS = (
+    "mstp-kargs-2009/mstp_20090227094623.pcap",
+    "mstp-md5-2018-good1/mstp_2018_Good1.cap",
+    "mstp-cimetrics-snap-mixed/derived_linktype165.pcap",
+    "mstp-chipkin-cas-log/frames.txt",
+    "vectors-mstp-misc/frames.txt",
+)
+
+
+def others(name: str) -> Path:
+    """A capture that others made; skips the test where there is none."""
+    path = OTHERS / name
+    if not path.is_file():
+        pytest.skip(f"the shared captures are not here ({name})")
+    return path
+
+
+def chunks_of(path: Path, most: int = 1_000_000) -> tuple[list[Chunk], Timing]:
+    """The reads of a capture before its settings change, at most so many, and its timing."""
+    if path.name == "frames.txt":
+        return _listed(path), Timing(LINE)
+    capture, chunks = read(path), []
+    for item in capture.items():
+        if isinstance(item, SettingsChange) or len(chunks) >= most:
+            break
+        if isinstance(item, Chunk):
+            chunks.append(item)
+    return chunks, capture.session.timing
+
+
+def _listed(path: Path) -> list[Chunk]:
+    """Lines of an index or seconds, and octets."""
+    lines = [line.partition(";")[0].split(None, 1) for line in path.read_text().splitlines() if line[:1].isdigit()]
+    return [Chunk(START + int(float(when) * 1e9), bytes.fromhex(octets)) for when, octets in lines]
+
+
+def chunks_of_reads(reads: Reads) -> list[Chunk]:
+    """Columns of reads as chunks."""
+    octets, ends = reads.octets.tobytes(), reads.begins[1:].tolist()
+    cut = zip([0, *ends[:-1]], ends, reads.times.tolist(), strict=True)
+    return [Chunk(time, octets[begin:end]) for begin, end, time in cut]
+
+
+addresses = st.one_of(st.sampled_from([0, 1, 2, 3, 127, 255]), st.integers(0, 255))
+invokes = st.integers(0, 3)
+
+
+def _object(tag: int, instance: int) -> bytes:
+    return bytes((tag,)) + (0x00C00000 | instance).to_bytes(4, "big")
+
+
+objects = st.builds(_object, st.sampled_from([0x0C, 0xC4, 0x1C, 0x2C]), st.integers(0, 0x3FFFFF))
+_process = st.sampled_from([b"\x09\x07", b"\x0a\x01\x00", b"\x0c\x00\x00\x00\x01", b"\x0d\x01\x01"])
+_errors = st.sampled_from(
+    [b"\x91\x01\x91\x1f", b"\x91\x02\x91\x20", b"\x91\xc8\x91\xff", b"\x91\x01\x92\x01\x00", b"\x0e"]
+)
+parameters = st.lists(st.one_of(objects, _process, _errors, st.binary(max_size=6)), max_size=4).map(b"".join)
+_services = st.one_of(st.sampled_from([0, 1, 2, 5, 7, 8, 12, 14, 15, 31]), st.integers(0, 255))
+
+
+def _apdu(first: int, middle: bytes, service: int, rest: bytes, cut: int) -> bytes:
+    whole = bytes((first,)) + middle + bytes((service,)) + rest
+    return whole[: len(whole) - cut]
+
+
+apdus = st.one_of(
+    st.builds(_apdu, st.just(0x00), invokes.map(lambda i: bytes((0x75, i))), _services, parameters, st.just(0)),
+    st.builds(_apdu, st.just(0x30), invokes.map(lambda i: bytes((i,))), _services, parameters, st.just(0)),
+    st.builds(_apdu, st.just(0x20), invokes.map(lambda i: bytes((i,))), _services, st.just(b""), st.just(0)),
+    st.builds(_apdu, st.just(0x50), invokes.map(lambda i: bytes((i,))), _services, _errors, st.just(0)),
+    st.builds(
+        _apdu,
+        st.sampled_from([0x60, 0x70, 0x71, 0x40]),
+        invokes.map(lambda i: bytes((i,))),
+        _services,
+        st.just(b""),
+        st.just(0),
+    ),
+    st.builds(_apdu, st.just(0x10), st.just(b""), _services, parameters, st.just(0)),
+    st.builds(_apdu, st.integers(0, 255), st.binary(max_size=4), _services, parameters, st.integers(0, 4)),
+)
+_station = st.binary(max_size=3).map(lambda address: b"\x00\x05" + bytes((len(address),)) + address)
+npdus = st.one_of(
+    apdus.map(lambda apdu: b"\x01\x04" + apdu),
+    apdus.map(lambda apdu: b"\x01\x00" + apdu),
+    st.builds(lambda to, apdu: b"\x01\x24" + to + b"\xff" + apdu, _station, apdus),
+    st.builds(lambda by, apdu: b"\x01\x08" + by + apdu, _station, apdus),
+    st.builds(lambda to, by, apdu: b"\x01\x2c" + to + by + b"\xfe" + apdu, _station, _station, apdus),
+    st.builds(lambda control, rest: b"\x01" + bytes((control,)) + rest, st.integers(0, 255), st.binary(max_size=12)),
+    st.builds(lambda message, rest: b"\x01\x80" + bytes((message,)) + rest, st.integers(0, 255), st.binary(max_size=4)),
+    st.binary(max_size=3),
+)
+TOKEN = frame(0, 5, 2)
+_tricky = st.lists(
+    st.sampled_from([TOKEN, PREAMBLE, b"\x55", b"\xff", b"\x00", frame(6, 1, 2, b"\x01\x00\x10\x08")]),
+    min_size=1,
+    max_size=8,
+).map(b"".join)
+
+
+def _with_bad_header(octets: bytes, at: int, flip: int) -> bytes:
+    return octets[:at] + bytes((octets[at] ^ flip,)) + octets[at + 1 :]
+
+
+def _too_long(length: int) -> bytes:
+    header = bytes((6, 1, 2, length >> 8, length & 255))
+    return PREAMBLE + header + bytes((crc8_mstp(header),))
+
+
+plain_frames = st.one_of(
+    st.builds(frame, st.sampled_from([0, 0, 0, 1, 2, 7]), addresses, addresses),
+    st.builds(frame, st.sampled_from([5, 6]), addresses, addresses, npdus),
+)
+good_frames = st.one_of(
+    plain_frames,
+    st.builds(frame, st.integers(0, 255), addresses, addresses, st.one_of(st.just(b""), npdus, _tricky)),
+    st.builds(frame, st.sampled_from([32, 33, 34]), addresses, addresses, st.one_of(npdus, _tricky)),
+    st.binary(min_size=490, max_size=510).map(lambda data: frame(6, 1, 2, data)),
+)
+damaged_frames = st.one_of(
+    st.builds(_with_bad_header, good_frames, st.integers(0, 7), st.integers(1, 255)),
+    st.builds(lambda octets, flip: octets[:-1] + bytes((octets[-1] ^ flip,)), good_frames, st.integers(1, 255)),
+    good_frames.map(lambda octets: octets[:-2] + octets[-1:] + octets[-2:-1]),
+    st.builds(lambda octets, cut: octets[: max(1, len(octets) - cut)], good_frames, st.integers(1, 9)),
+    st.builds(_too_long, st.integers(500, 65535)),
+)
+streams = st.lists(
+    st.one_of(good_frames, good_frames, damaged_frames, _tricky, st.binary(max_size=6)), min_size=1, max_size=14
+)
+timings = st.builds(
+    Timing,
+    st.sampled_from([LineSettings.parse(line) for line in ("300", "9600,8E1", "38400", "115200,8N2")]),
+    st.sampled_from([0, 1 * MS, 16 * MS]),
+)
+
+
+@st.composite
+def captures(draw: st.DrawFn, timing: Timing, pieces: st.SearchStrategy[list[bytes]] = streams) -> list[Chunk]:
+    """Pieces on a wire with silences of every size between and inside, read in lumps; times may run backwards."""
+    pause = timing.line.bits(60)
+    gaps = (0, 0, 0, pause // 3, pause - 1, pause, pause + 1, 5 * MS, 20 * MS, 99 * MS, 100 * MS, 130 * MS, 600 * MS)
+    chunks, now, backwards = [], START, draw(st.booleans())
+    dice = draw(st.randoms(use_true_random=False))
+    held = b""
+    for piece in draw(pieces):
+        cuts = sorted({dice.randrange(len(piece) + 1) for _ in range(dice.choice((0, 0, 0, 1, 2)))})
+        for begin, end in zip([0, *cuts], [*cuts, len(piece)], strict=True):
+            held += piece[begin:end]
+            now += (end - begin) * timing.char + dice.choice(gaps[: dice.choice((3, 8, len(gaps)))])
+            if held and dice.random() < 0.8:
+                marks = (Mark(dice.randrange(len(held)), LineError.FRAMING),) if dice.random() < 0.03 else ()
+                late = dice.choice((0, 0, timing.latency, dice.randrange(timing.latency + 1)))
+                chunks.append(Chunk(now + late - (dice.randrange(40 * MS) if backwards else 0), held, marks))
+                held = b""
+    if held:
+        chunks.append(Chunk(now, held))
+    return chunks
+
+
+def recut(chunks: Sequence[Chunk], char: int, dice: random.Random) -> list[Chunk]:
+    """The same octets at the same times in other reads: some cut, others put together."""
+    given: list[Chunk] = []
+    for chunk in chunks:
+        if len(chunk.octets) > 1 and not chunk.marks and dice.random() < 0.4:
+            at = dice.randrange(1, len(chunk.octets))
+            left = len(chunk.octets) - at
+            given += [Chunk(chunk.time - left * char, chunk.octets[:at]), Chunk(chunk.time, chunk.octets[at:])]
+        elif given and not chunk.marks and not given[-1].marks and dice.random() < 0.2:
+            given[-1] = Chunk(chunk.time, given[-1].octets + chunk.octets)
+        else:
+            given.append(chunk)
+    return given
