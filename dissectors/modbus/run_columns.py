@@ -131,7 +131,7 @@ def _weighed(octets: Octets, rows: Rows, at: Times, stretches: Stretches) -> tup
         """With such bits from the open request and for a known station; `most`: what the other reading may have."""
         hope = hoped + np.maximum(known, most)
         outdone = (hope + HEARD >= 0) & (SCALE * (bits + fit - hope) + length - other < 0)
-        result: Masks = fair & (bits + fit + heard >= 0) & ~(hopes & outdone)
+        result: Masks = fair & (bits + fit + heard >= 0) & (~(hopes & outdone) | in_vain)
         return result
 
     before = np.maximum(at - 1, 0)
@@ -145,4 +145,22 @@ def _weighed(octets: Octets, rows: Rows, at: Times, stretches: Stretches) -> tup
     most = np.where(awaited, np.where(exact | ~surely, EXACT, ODD), 0)
     fits = surely & response & ((length == answer) | (code & EXCEPTION_BIT != 0))
     sound = ~rows.damaged[before]
+    solid = fair & (bits + EXACT * fits >= 0)
+    reach = _ends_of_runs(rows, at, solid)
+    in_vain = solid & ((reach - place > other) | (closed & (reach == stretches.end[stretch])))
     return taken(0, 0, EXACT), taken(EXACT * fits, HEARD * same_unit, most) & sound
+
+
+def _ends_of_runs(rows: Rows, at: Times, solid: Masks) -> Times:
+    """Where the frames end that follow each of rows `at` without a doubtful one between, in the same stretch.
+
+    What a reading that is not complete hopes for only delays the decision: when the octets are there and its check is
+    wrong, or the stretch is at its end, frames that stand side by side and for themselves are the best segmentation.
+    """
+    end = rows.end[at]
+    goes_on = np.zeros(len(at), bool)
+    goes_on[:-1] = solid[1:] & solid[:-1] & (rows.start[at[1:]] == end[:-1])
+    goes_on[:-1] &= rows.stretch[at[1:]] == rows.stretch[at[:-1]]
+    last = np.where(goes_on, len(at), np.arange(len(at)))
+    ends: Times = end[np.minimum.accumulate(last[::-1])[::-1]]
+    return ends

@@ -113,6 +113,18 @@ def _exchange(dice: random.Random, codes: tuple[int, ...]) -> list[bytes]:
     return [rtu(head + asked), rtu(head + answered)]
 
 
+def reads_at(high: int, seed: int, count: int) -> list[bytes]:
+    """Reads of registers whose address could be the byte count of an answer."""
+    dice, said = random.Random(seed), []
+    for _ in range(count):
+        head, registers = bytes((dice.randint(1, 8), 3)), dice.choice((1, 2, 10, 40, 120))
+        said.append(rtu(head + bytes((high, dice.randrange(50), 0, registers))))
+        said.append(rtu(head + bytes([2 * registers]) + dice.randbytes(2 * registers)))
+        if dice.random() < 0.05:
+            said[-1] = rtu(bytes((head[0], 0x83, 2)))
+    return said
+
+
 def bus(seed: int, count: int, codes: tuple[int, ...]) -> list[bytes]:
     """Exchanges of a master with eight stations."""
     dice = random.Random(seed)
@@ -161,6 +173,20 @@ def test_of_buses_behind_a_slow_adapter(codes: tuple[int, ...], least: float) ->
             wire = laid_out(bus(seed, 400, codes), timing, 3 * MS)
             by_columns, total = assert_equal(RTU, ftdi(wire), timing)
             assert by_columns >= least * total
+
+
+@pytest.mark.parametrize("high", [0x12, 0x14, 0x22, 0x26, 0x50, 0x9C, 0xF0])
+def test_of_addresses_like_byte_counts(high: int) -> None:
+    frames = reads_at(high, high, 400)
+    dice = random.Random(high)
+    for timing in (HELD_BACK, replace(FAST, latency=FTDI_LATENCY)):
+        by_columns, total = assert_equal(RTU, ftdi(laid_out(frames, timing, 3 * MS)), timing)
+        assert by_columns >= 0.9 * total
+        assert_equal(RTU, _glued(frames, timing, dice), timing)
+        for share in (0.02, 0.1, 0.3):
+            disturbed = _disturbed(frames, dice, share)
+            assert_equal(RTU, ftdi(laid_out(disturbed, timing, 3 * MS)), timing)
+            assert_equal(RTU, _glued(disturbed, timing, dice), timing)
 
 
 @pytest.mark.parametrize(("timing", "least"), [(bulk_rtu.TIMING, 0.99), (bulk_rtu.HELD_BACK, 0.95)])
