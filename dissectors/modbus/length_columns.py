@@ -49,6 +49,8 @@ PADDING: Final = 16
 RARE: Final = -100
 """Bits of frames whose shape is not weighed here."""
 
+NOT_WEIGHED: Final = RARE // 2
+
 _FIXED_REQUESTS: Final = {
     **dict.fromkeys((0x01, 0x02, 0x03, 0x04, 0x05, 0x06, 0x08), 8),
     **dict.fromkeys((0x07, 0x0B, 0x0C, 0x11), 4),
@@ -223,6 +225,14 @@ def shapes(octets: Octets, places: Times, codes: Codes) -> tuple[Bits, Bits]:
     request[to_all & ~writes] += ODD_BROADCAST
     response[to_all] += ODD_BROADCAST
     return request, response
+
+
+def frame_bits(octets: Octets, places: Times, request: Masks, response: Masks) -> Bits:
+    """As `octet_bits`, of frames that the directions `request`, `response` may have; below NOT_WEIGHED of others."""
+    as_request, as_response = shapes(octets, places, octets[places + 1])
+    best = np.maximum(np.where(request, as_request, RARE), np.where(response, as_response, RARE))
+    bits: Bits = best + unit_bits(octets[places])
+    return bits
 
 
 def unit_bits(units: Codes) -> Bits:

@@ -13,9 +13,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dissectors.modbus.candidates import CRC_BITS, WHOLE_STRETCH
 from dissectors.modbus.expectation import EXACT, ODD
 from dissectors.modbus.functions import EXCEPTION_BIT, MIN_FRAME, MORE, NEVER
-from dissectors.modbus.length_columns import RARE, answer_lengths, lengths, predicting, shapes, unit_bits
+from dissectors.modbus.length_columns import (
+    NOT_WEIGHED,
+    answer_lengths,
+    frame_bits,
+    lengths,
+    predicting,
+    shapes,
+    unit_bits,
+)
 from dissectors.modbus.past import KNOWN_LENGTH
 from dissectors.modbus.segmentation import HEARD, PROVED, SCALE
 from dissectors.modbus.stretch_rows import Rows, Stretches
@@ -26,6 +35,10 @@ if TYPE_CHECKING:
     from dissectors.modbus.stretch_crc import StretchCrc
 
 _HOPED_SHAPE = 4  # of a short reading that is not complete
+
+_PLAIN = WHOLE_STRETCH - CRC_BITS
+"""Bits of a whole stretch from which on it is its function's frame even if octets are held before it; others are so
+where it is sure that none are."""
 
 
 def candidates(octets: Octets, begin: int, end: int, crc: StretchCrc, stretches: Stretches, told: Codes) -> Rows:
@@ -93,8 +106,10 @@ def certain(octets: Octets, rows: Rows, stretches: Stretches, sound: Masks) -> M
     `rows`: none overlapping another. `sound`: those of them that are so by themselves or, if damaged, behind a sound
     one.
     """
-    free = rows.whole & ~rows.damaged
-    by_the_one_before = rows.whole & rows.damaged & sound
+    by_the_one_before = rows.whole & sound
+    free = by_the_one_before & ~rows.damaged
+    at = np.flatnonzero(free)
+    free[at] = frame_bits(octets, rows.start[at], rows.request[at], rows.response[at]) >= _PLAIN
     runs = np.flatnonzero(~rows.whole)
     if len(runs):
         free[runs], by_the_one_before[runs] = _weighed(octets, rows, runs, stretches)
@@ -117,9 +132,9 @@ def _weighed(octets: Octets, rows: Rows, at: Times, stretches: Stretches) -> tup
     last = closed & (length == room)
     fair = (closed | (room >= np.maximum(FIRST_LOOK, length + 1))) & ~stretches.marked[stretch]
     as_request, as_response = shapes(octets, place, code)
-    own = np.maximum(np.where(request, as_request, RARE), np.where(response, as_response, RARE))
-    fair &= own > RARE // 2
-    bits = own + unit_bits(unit) + PROVED * last
+    own = frame_bits(octets, place, request, response)
+    fair &= own > NOT_WEIGHED
+    bits = own + PROVED * last
     complete = (length < FIRST_LOOK) & (other <= np.minimum(FIRST_LOOK - 1, room))
     hopes = ((other > length) & ~complete) | (other == MORE)
     hopes &= ~last

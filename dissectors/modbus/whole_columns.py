@@ -15,7 +15,7 @@ import numpy as np
 
 from dissectors.modbus import damaged_columns
 from dissectors.modbus.functions import MAX_FRAME, MIN_FRAME, NEVER
-from dissectors.modbus.length_columns import RARE, common, lengths, predicting, shapes, unit_bits
+from dissectors.modbus.length_columns import common, frame_bits, lengths, predicting
 from dissectors.modbus.segmentation import PROVED
 from dissectors.modbus.stretch_rows import Rows, Stretches
 
@@ -95,9 +95,7 @@ def _looked_at(
     second = np.zeros(len(place), bool)
     at = np.flatnonzero(shorter)
     second[at] = crc.good(place[at], other[at].astype(np.int64))
-    as_request, as_response = shapes(octets, place, code)
-    bits = np.maximum(np.where(request, as_request, RARE), np.where(response, as_response, RARE))
-    bits += unit_bits(octets[place])
+    bits = frame_bits(octets, place, request, response)
     zero = octets[place + length - 1] == 0
     long = length >= FIRST_LOOK
     weak = (zero & (bits + PROVED < 0)) | (long & ~common()[code])
