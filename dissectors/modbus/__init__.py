@@ -32,6 +32,7 @@ __all__ = [
 
 
 packet = on_first_use("dissectors.modbus.packets:dissect")
+kernel = on_first_use("dissectors.modbus.kernel:kernel")
 
 
 def rtu_bits(frame: Frame) -> float:
@@ -70,6 +71,7 @@ RTU = Dissector(
     rules=RULES,
     readings=readings,
     refusal=refusal,
+    kernel=kernel,
 )
 
 ASCII = Dissector(

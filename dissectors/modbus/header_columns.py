@@ -1,0 +1,227 @@
+"""What `peek_rtu` says of RTU frames, for all frames of a capture at once.
+
+Reads, writes and exceptions by table and gather; other functions, and requests that contradict themselves, by
+`peek_rtu` once for each different frame. A property test holds both equal.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from dissectors.columns import NONE, ROLES
+from dissectors.frame import Check, Damage, Found, Frame, Role
+from dissectors.modbus.adu import RTU_NAME
+from dissectors.modbus.functions import (
+    BROADCAST,
+    EXCEPTION_BIT,
+    FUNCTIONS,
+    MAX_READ_BITS,
+    Function,
+    is_open_length,
+)
+from dissectors.modbus.header import exception_name, peek_rtu
+from dissectors.modbus.length_columns import common
+
+if TYPE_CHECKING:
+    from dissectors.columns import Codes, Masks, Names, Numbers, Octets, Small, Times
+
+REQUEST, RESPONSE, EITHER, TO_ALL = (
+    ROLES.index(role) for role in (Role.REQUEST, Role.RESPONSE, Role.EITHER, Role.BROADCAST)
+)
+_RANGE_BOTH_WAYS: Final = (0x0F, 0x10)
+_RANGE_ASKED: Final = (0x01, 0x02, 0x03, 0x04, 0x17)
+_COUNT_ANSWERED: Final = (0x03, 0x04, 0x17)
+_MOST_NAMES: Final = np.iinfo(np.uint16).max
+
+
+@dataclass(frozen=True, slots=True)
+class HeaderColumns:
+    """Headers as in `FrameColumns`. `known`: False where there was no room for one more name."""
+
+    expected: Numbers
+    source: Small
+    destination: Small
+    role: Codes
+    kind: Names
+    function: Small
+    address: Numbers
+    count: Numbers
+    ok: Masks
+    error: Names
+    known: Masks
+    names: tuple[str, ...]
+
+
+class _Names:
+    """Words by number; 0 is none."""
+
+    def __init__(self) -> None:
+        self._places: dict[str, int] = {"": 0}
+
+    def place(self, word: str | None) -> int:
+        """Its number; NONE when there are too many."""
+        if word is None:
+            return 0
+        if word not in self._places and len(self._places) > _MOST_NAMES:
+            return NONE
+        return self._places.setdefault(word, len(self._places))
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        return tuple(self._places)
+
+
+def headers(
+    octets: Octets, places: Times, lengths: Times, request: Masks, response: Masks, damage: Codes
+) -> HeaderColumns:
+    """The headers of frames of a predicted length, good or (damage: check) with a wrong CRC.
+
+    `request`, `response`: the directions that have this length.
+    """
+    size = len(places)
+    codes, units = octets[places + 1], octets[places]
+    names = _Names()
+    role = _roles(octets, places, codes, request, response)
+    role[(role == EITHER) & (units == BROADCAST)] = TO_ALL
+    role[(role == REQUEST) & (units == BROADCAST) & _table(lambda function: function.writes)[codes]] = TO_ALL
+    answers = role == RESPONSE
+    unit = units.astype(np.int16)
+    address, count = _addresses(octets, places, codes, role)
+    kinds = np.zeros(256, np.uint16)
+    for code, function in FUNCTIONS.items():
+        kinds[code] = kinds[code | EXCEPTION_BIT] = names.place(function.name)
+    error = np.zeros(size, np.uint16)
+    faults = codes & EXCEPTION_BIT != 0
+    texts = np.array([names.place(exception_name(code)) for code in range(256)], np.uint16)
+    error[faults] = texts[octets[places[faults] + 2]]
+    columns = HeaderColumns(
+        lengths.astype(np.int32),
+        np.where(answers, unit, NONE).astype(np.int16),
+        np.where(answers, NONE, unit).astype(np.int16),
+        role,
+        kinds[codes],
+        (codes & ~np.uint8(EXCEPTION_BIT)).astype(np.int16),
+        address,
+        count,
+        damage == 0,
+        error,
+        np.ones(size, bool),
+        (),
+    )
+    rare = ~common()[codes] | _contradicts_itself(octets, places, codes, role) | (damage != 0)
+    _scatter_peeks(columns, np.flatnonzero(rare), octets, places, lengths, damage, names)
+    return replace(columns, names=names.words)
+
+
+def _table(says: Callable[[Function], bool]) -> Masks:
+    """bool[256]: function codes of which that is true."""
+    table = np.zeros(256, bool)
+    for code, function in FUNCTIONS.items():
+        table[code] = says(function)
+    return table
+
+
+def _roles(octets: Octets, places: Times, codes: Codes, request: Masks, response: Masks) -> Codes:
+    """The role by length, and by shape where both directions have it; as if nothing were for all."""
+    role = np.where(request, REQUEST, RESPONSE).astype(np.uint8)
+    both = np.flatnonzero(request & response)
+    code, place = codes[both], places[both]
+    quantity = octets[place + 4].astype(np.int32) << 8 | octets[place + 5]
+    plausible = (quantity >= 1) & (quantity <= MAX_READ_BITS)
+    of_bits = np.where(plausible, EITHER, RESPONSE)
+    of_words = REQUEST  # an answer of three data octets breaks a rule in any case
+    role[both] = np.where(code <= 0x02, of_bits, np.where(code <= 0x04, of_words, EITHER))
+    return role
+
+
+def _addresses(octets: Octets, places: Times, codes: Codes, role: Codes) -> tuple[Numbers, Numbers]:
+    """First address and how many."""
+    table = np.zeros(256, np.uint8)
+    table[[*_RANGE_ASKED]] = 1
+    table[[*_RANGE_BOTH_WAYS]] = 2
+    table[[0x05, 0x06, 0x16]] = 3
+    of = table[codes]
+    asked = (role == REQUEST) | (role == TO_ALL)
+    ranged = (of == 2) | ((of == 1) & asked)
+    first = octets[places + 2].astype(np.int32) << 8 | octets[places + 3]
+    quantity = octets[places + 4].astype(np.int32) << 8 | octets[places + 5]
+    address = np.where(ranged | (of == 3), first, NONE).astype(np.int32)
+    count = np.where(ranged, quantity, np.where(of == 3, 1, NONE)).astype(np.int32)
+    counted = np.zeros(256, bool)
+    counted[[*_COUNT_ANSWERED]] = True
+    told = counted[codes] & (role == RESPONSE)
+    count[told] = octets[places[told] + 2] // 2
+    return address, count
+
+
+def _contradicts_itself(octets: Octets, places: Times, codes: Codes, role: Codes) -> Masks:
+    """Requests whose byte count does not fit their quantity."""
+    wrong = np.zeros(len(places), bool)
+    for code, at in ((0x0F, 4), (0x10, 4), (0x17, 8)):
+        which = np.flatnonzero((codes == code) & (role != RESPONSE))
+        place = places[which]
+        quantity = octets[place + at].astype(np.int32) << 8 | octets[place + at + 1]
+        needed = (quantity + 7) // 8 if code == 0x0F else 2 * quantity
+        wrong[which] = octets[place + at + 2] != needed
+    return wrong
+
+
+def _scatter_peeks(
+    columns: HeaderColumns,
+    which: Times,
+    octets: Octets,
+    places: Times,
+    lengths: Times,
+    damage: Codes,
+    names: _Names,
+) -> None:
+    """Headers by `peek_rtu`, once for each different frame, put where they belong."""
+    told: dict[tuple[bytes, bool], tuple[int, ...]] = {}
+    for row in which.tolist():
+        place = int(places[row])
+        whole, good = octets[place : place + int(lengths[row])].tobytes(), not damage[row]
+        header = told.get((whole, good))
+        if header is None:
+            header = told[whole, good] = _peeked(whole, good, names)
+        expected, source, destination, role, kind, function, address, count, ok, error = header
+        columns.expected[row] = expected
+        columns.source[row], columns.destination[row], columns.role[row] = source, destination, role
+        columns.function[row], columns.address[row], columns.count[row] = function, address, count
+        columns.ok[row] = ok
+        columns.known[row] = kind != NONE and error != NONE
+        columns.kind[row], columns.error[row] = max(kind, 0), max(error, 0)
+
+
+def _peeked(whole: bytes, good: bool, names: _Names) -> tuple[int, ...]:
+    expected = None if good and is_open_length(whole) else len(whole)
+    frame = Frame(
+        RTU_NAME,
+        whole,
+        0,
+        0,
+        Check.GOOD if good else Check.BAD,
+        Found.GAP,
+        None if good else Damage.CHECK,
+        expected,
+    )
+    header = peek_rtu(frame)
+    return (
+        _some(expected),
+        _some(header.source),
+        _some(header.destination),
+        ROLES.index(header.role),
+        names.place(header.kind),
+        _some(header.function),
+        _some(header.address),
+        _some(header.count),
+        header.ok,
+        names.place(header.error),
+    )
+
+
+def _some(value: int | None) -> int:
+    return NONE if value is None else value
