@@ -71,12 +71,16 @@ class MstpFramer:
         self._needs_pause = 0  # the silence that decides what is held; 0 while nothing is held
         self._clear = (0, 0)  # between these places of the window no good header begins
         self._plain = 0  # octets of the good frame without silence inside at the front of the window, 0 unknown
+        self._awaited = 0  # length of the window below which octets without silence before them decide nothing
 
     def feed(self, chunk: Chunk) -> list[Event]:
         """Take one read; give the events it completes."""
         count = len(chunk.octets)
         if count <= _PIECE:
+            silences = len(self._silences)
             self._append(chunk)
+            if count and len(self._window.octets) < self._awaited and len(self._silences) == silences:
+                return []
             return self._drain(0, final=False)
         events: list[Event] = []
         for begin in range(0, count, _PIECE):
@@ -203,8 +207,7 @@ class MstpFramer:
             return 1
         if have < HEADER:
             if not ended:
-                self._needs_pause = T_NO_TOKEN
-                return _WAIT
+                return self._await(at, at + (HEADER if have >= 2 else 2))
             return (have, Check.ABSENT, Damage.SHORT, self._found(at)) if have >= _NAMED else 1
         frame_type, length = octets[at + 2], octets[at + 5] << 8 | octets[at + 6]
         if crc8_mstp(bytes(octets[at + 2 : at + 7])) != octets[at + 7]:
@@ -218,7 +221,7 @@ class MstpFramer:
                 return _WAIT
             return cut - at, Check.ABSENT, Damage.RESTARTED, self._found(at)
         if have < size:
-            return self._incomplete(at, stop, ended)
+            return self._incomplete(at, size, stop, ended)
         if body_is_good(frame_type, length, bytes(octets[at + HEADER : at + size])):
             return self._complete(at, size, frame_type, length, quiet, ended)
         return self._bad_body(at, size, stop, ended)
@@ -257,10 +260,16 @@ class MstpFramer:
             begin = silent + 1
         return None
 
-    def _incomplete(self, at: int, stop: int, ended: bool) -> int | tuple[int, Check, Damage | None, Found]:
+    def _await(self, at: int, end: int) -> int:
+        """Wait for the octets of what begins at `at` up to `end`: before they are there only silence decides."""
+        self._needs_pause = T_NO_TOKEN
+        heard = len(self._window.octets)
+        self._awaited = 0 if self._silences and self._silence_in(at + 1, heard, 0) is not None else end
+        return _WAIT
+
+    def _incomplete(self, at: int, size: int, stop: int, ended: bool) -> int | tuple[int, Check, Damage | None, Found]:
         if not ended:
-            self._needs_pause = T_NO_TOKEN
-            return _WAIT
+            return self._await(at, at + size)
         cut = self._good_header(at + HEADER, stop, stop)
         if cut is not None:
             return cut - at, Check.ABSENT, Damage.RESTARTED, self._found(at)
@@ -420,6 +429,7 @@ class MstpFramer:
         return Frame("mstp", octets, start, end, Check.GOOD, found, None, size, skipped, slack, marks)
 
     def _take(self, count: int) -> Taken:
+        self._awaited = 0
         if self._silences:
             self._silences = [(index - count, silence) for index, silence in self._silences if index >= count]
         if self._clear[1]:

@@ -27,6 +27,7 @@ _ANSWERING = (6, 7, 33, 4)
 _OF_HOLDER = (5, 6, 32, 33)
 _USE_MOST = 100 * MS  # older texts let a station wait so long for the next one
 
+_FAR = 1 << 30  # a cost that no guess has
 _ANY = -1  # an octet of which nothing is known
 _ANY_COST, _SPOILT, _A_BIT, _LOST, _TOO_MANY = 2, 4, 3, 4, 5
 """What it costs to take an octet for one of which nothing is known, for one with several bits or with one bit wrong,
@@ -101,15 +102,17 @@ class Turn:
         """Who most likely sent a frame whose header is damaged; None where nothing is known of the bus."""
         guesses = self._guesses(frame)
         octets = frame.octets[: HEADER + 2]
-        best: tuple[int, _Guess] | None = None
+        best: _Guess | None = None
+        least = _FAR
         for guess in guesses:
-            cost = guess.cost + _distance(octets, _expected(guess))
-            if best is None or cost < best[0]:
-                best = cost, guess
+            if guess.cost >= least:
+                continue
+            cost = guess.cost + _distance(octets, _expected(guess), least - guess.cost)
+            if cost < least:
+                least, best = cost, guess
         if best is None:
             return None
-        _, guess = best
-        return Speaker(guess.source, None if guess.destination == _ANY else guess.destination, guess.frame_type)
+        return Speaker(best.source, None if best.destination == _ANY else best.destination, best.frame_type)
 
     def _take(self, frame_type: int, source: int, destination: int) -> None:
         if frame_type == _TOKEN:
@@ -174,17 +177,33 @@ def _expected(guess: _Guess) -> tuple[int, ...]:
     return (*PREAMBLE, guess.frame_type, guess.destination, guess.source, _ANY, _ANY, _ANY)
 
 
-def _distance(octets: bytes, header: tuple[int, ...]) -> int:
-    """What it costs to take the begin of `octets` for that header; octets after it cost nothing."""
+def _distance(octets: bytes, header: tuple[int, ...], limit: int) -> int:
+    """What it costs to take the begin of `octets` for that header; octets after it cost nothing.
+
+    `limit` where it is that or more: a row never costs less than the one before it, so the rest need not be known.
+    """
+    least = 0
     row = [at * _TOO_MANY for at in range(len(octets) + 1)]
     for wanted in header:
-        before, row = row, [row[0] + _LOST]
-        for at, octet in enumerate(octets):
+        before, diagonal = row, row[0]
+        left = least = diagonal + _LOST
+        row = [left]
+        for at, octet in enumerate(octets, 1):
+            above = before[at]
             if wanted == octet:
-                same = 0
+                cost = diagonal
             elif wanted == _ANY:
-                same = _ANY_COST
+                cost = diagonal + _ANY_COST
             else:
-                same = _A_BIT if (wanted ^ octet).bit_count() == 1 else _SPOILT
-            row.append(min(before[at] + same, before[at + 1] + _LOST, row[at] + _TOO_MANY))
-    return min(row)
+                cost = diagonal + (_A_BIT if (wanted ^ octet).bit_count() == 1 else _SPOILT)
+            if above + _LOST < cost:
+                cost = above + _LOST
+            if left + _TOO_MANY < cost:
+                cost = left + _TOO_MANY
+            row.append(cost)
+            diagonal, left = above, cost
+            if cost < least:
+                least = cost
+        if least >= limit:
+            return limit
+    return least

@@ -6,6 +6,7 @@ Run with `make bench ARGS="-k torture -s"`; each attack prints one line. The sui
 
 from __future__ import annotations
 
+import contextlib
 import os
 import re
 import signal
@@ -18,7 +19,14 @@ from typing import Any
 
 import pytest
 
-from tests.e2e.recording_bus import LINE, Command, Feeder, SlowDisk, capture_processes, octets_of, wait_until
+from tests.e2e.recording_bus import (
+    Feeder,
+    SlowDisk,
+    capture_processes,
+    octets_of,
+    recordings,
+    wait_until,
+)
 
 POLL = bytes.fromhex("010300000002c40b")
 FULL = 11_520
@@ -61,32 +69,20 @@ def folder(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def bus() -> Iterator[Feeder]:
-    made = Feeder()
-    yield made
-    made.close()
+    with contextlib.closing(Feeder()) as made:
+        yield made
 
 
 @pytest.fixture
 def disk(tmp_path: Path) -> Iterator[SlowDisk]:
-    made = SlowDisk(tmp_path / "disk")
-    yield made
-    made.open("write")
-    made.open("sync")
+    with contextlib.closing(SlowDisk(tmp_path / "disk")) as made:
+        yield made
 
 
 @pytest.fixture
 def begin(folder: Path, bus: Feeder) -> Iterator[Any]:
-    running: list[Command] = []
-
-    def begin(*words: str, port: str = bus.path, **options: Any) -> Command:
-        running.append(Command(folder, "record", port, *LINE, "-w", "x.mcap", *words, **options))
-        wait_until((folder / "x.mcap").exists, "no recording was begun")
-        running[-1].until_it_listens()
-        return running[-1]
-
-    yield begin
-    for command in running:
-        command.close()
+    with recordings(folder, bus.path) as begin:
+        yield begin
 
 
 def say(promise: str, figure: str) -> None:

@@ -4,6 +4,7 @@ disk that hangs on demand.
 
 from __future__ import annotations
 
+import contextlib
 import fcntl
 import os
 import signal
@@ -15,8 +16,9 @@ import textwrap
 import threading
 import time
 import tty
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 from dissectors.frame import Chunk
 from sniff.engine.capture import CaptureError
@@ -222,3 +224,27 @@ class SlowDisk:
 
     def until_it_waits(self, what: str) -> None:
         wait_until((self.folder / f"{what}.waits").exists, f"no {what} came")
+
+    def close(self) -> None:
+        """Nothing hangs any longer."""
+        self.open("write")
+        self.open("sync")
+
+
+@contextlib.contextmanager
+def recordings(folder: Path, port: str) -> Iterator[Callable[..., Command]]:
+    """Begins recordings to x.mcap in a folder, each listening when it is given; ends them all."""
+    running: list[Command] = []
+    listened_to = port
+
+    def begin(*words: str, port: str = listened_to, **options: Any) -> Command:
+        running.append(Command(folder, "record", port, *LINE, "-w", "x.mcap", *words, **options))
+        wait_until((folder / "x.mcap").exists, "no recording was begun")
+        running[-1].until_it_listens()
+        return running[-1]
+
+    try:
+        yield begin
+    finally:
+        for command in running:
+            command.close()

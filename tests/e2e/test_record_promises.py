@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import re
 import shutil
@@ -18,7 +19,7 @@ from sniff.formats import read
 
 pytest.importorskip("termios")
 
-from tests.e2e.recording_bus import LINE, Command, Feeder, SlowDisk, capture_processes, octets_of, wait_until
+from tests.e2e.recording_bus import Feeder, SlowDisk, capture_processes, octets_of, recordings, wait_until
 
 if not os.path.isdir("/proc/self"):
     pytest.skip("needs /proc", allow_module_level=True)
@@ -28,35 +29,23 @@ POLL = bytes.fromhex("010300000002c40b")
 
 @pytest.fixture
 def bus() -> Iterator[Feeder]:
-    made = Feeder()
-    yield made
-    made.close()
+    with contextlib.closing(Feeder()) as made:
+        yield made
 
 
 @pytest.fixture
 def disk(tmp_path: Path) -> Iterator[SlowDisk]:
-    made = SlowDisk(tmp_path / "disk")
-    yield made
-    made.open("write")
-    made.open("sync")
+    with contextlib.closing(SlowDisk(tmp_path / "disk")) as made:
+        yield made
 
 
 @pytest.fixture
 def record(tmp_path: Path, bus: Feeder) -> Iterator:
-    running: list[Command] = []
     folder = tmp_path / "work"
     folder.mkdir()
-
-    def record(*arguments: str, port: str = bus.path, **options) -> Command:
-        running.append(Command(folder, "record", port, *LINE, "-w", "x.mcap", *arguments, **options))
-        wait_until((folder / "x.mcap").exists, "no recording was begun")
-        running[-1].until_it_listens()
-        return running[-1]
-
-    record.folder = folder
-    yield record
-    for command in running:
-        command.close()
+    with recordings(folder, bus.path) as record:
+        record.folder = folder
+        yield record
 
 
 # -- limits are the capture's own ------------------------------------------------------------------------------
