@@ -14,7 +14,7 @@ octets, any times, any lengths; it never raises.
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
-from typing import Protocol, Self
+from typing import TYPE_CHECKING, Protocol, Self, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -22,6 +22,9 @@ import numpy.typing as npt
 from dissectors.frame import Check, Damage, Found, Role
 from dissectors.line import Timing
 from dissectors.tracker import Verdict
+
+if TYPE_CHECKING:
+    from dissectors.framer import Framer
 
 Octets = npt.NDArray[np.uint8]
 Times = npt.NDArray[np.int64]
@@ -205,6 +208,18 @@ class TransactionColumns:
     def take(self, which: slice | Masks | Times) -> TransactionColumns:
         """Some of them."""
         return replace(self, **{one.name: getattr(self, one.name)[which] for one in fields(self)[:-1]})
+
+
+@runtime_checkable
+class Remembering(Protocol):
+    """A framer that weighs octets by what it remembers of the bus."""
+
+    def remember(self, earlier: Framer, frames: FrameColumns, octets: Octets) -> None:
+        """Go on with the memory of an earlier framer, and with what `frames` teach, which came after what it gave.
+
+        `octets`: where `frames.offset` counts.
+        """
+        ...
 
 
 class Kernel(Protocol):

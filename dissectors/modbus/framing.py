@@ -20,11 +20,11 @@ Every decision depends on octets, their nominal times and proved silences only, 
 
 from __future__ import annotations
 
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from dissectors.checksums import crc16_modbus
 from dissectors.frame import Chunk, Event
-from dissectors.framer import OctetWindow
+from dissectors.framer import Framer, OctetWindow
 from dissectors.line import Timing
 from dissectors.modbus.candidates import (
     CRC_BITS,
@@ -52,6 +52,9 @@ from dissectors.modbus.past import KNOWN_LENGTH
 from dissectors.modbus.remains import Side
 from dissectors.modbus.rtu_window import RtuWindow
 from dissectors.modbus.segmentation import ADJACENT, HEARD, PROVED, SILENCE_INSIDE, Paths, worth
+
+if TYPE_CHECKING:
+    from dissectors.columns import FrameColumns, Octets
 
 WINDOW: Final = 2 * MAX_FRAME
 """Most octets held without silence: then all but the last MAX_FRAME are given out."""
@@ -118,6 +121,14 @@ class RtuFramer:
         if not self._window.octets:
             return None
         return self._times.proves_silence(self.hold if self._settled else self._t35)
+
+    def remember(self, earlier: Framer, frames: FrameColumns, octets: Octets) -> None:
+        """See `dissectors.columns.Remembering`."""
+        from dissectors.modbus.past_columns import learn
+
+        assert isinstance(earlier, RtuFramer)
+        self._window.past, self._window.units = earlier._window.past, earlier._window.units
+        learn(self._window.past, self._window.units, frames, octets)
 
     # --- when to decide --------------------------------------------------------------------------------------------
 

@@ -143,9 +143,11 @@ class _Leg:
     def _events(self, events: list[Event]) -> Table:
         """Rows of the reference framer."""
         rows = []
-        slacks: Times = self._late.slack(np.array([event.end for event in events], np.int64))
-        for no, (event, slack) in enumerate(zip(events, slacks.tolist(), strict=True), self.next):
+        ends: Times = np.array([event.end for event in events if isinstance(event, Frame)], np.int64)
+        slacks = iter(self._late.slack(ends).tolist())
+        for no, event in enumerate(events, self.next):
             if isinstance(event, Frame):
+                slack = next(slacks)
                 event = replace(event, slack=slack) if slack > event.slack else event
                 rows.append(Row(no, event, self.dissector.peek(event)))
             else:

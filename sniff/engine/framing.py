@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dissectors.columns import NONE, FrameColumns, Octets, PlacementColumns, Reads, Times
+from dissectors.columns import NONE, FrameColumns, Octets, PlacementColumns, Reads, Remembering, Times
 from dissectors.frame import Chunk, Event, Frame
 from dissectors.framer import Framer
 from dissectors.line import Timing
@@ -166,11 +166,11 @@ class _Work:
             return None
         for primed in (*PRIMED, end - row):
             first = max(row, end - primed)
-            stop = int(columns.offset[end - 1]) + int(columns.length[end - 1])
-            if self._prime(int(columns.offset[first]), stop, [int(n) for n in columns.length[first:end]]):
+            if self._prime(slice(row + 1, max(row + 1, first)), slice(first, end)):
                 self._end_events()
                 self._taken = row, end, len(self._stretches)
                 self._stretches.append(self._clean(row + 1, end))
+                stop = int(columns.offset[end - 1]) + int(columns.length[end - 1])
                 self._framing._given = self._framing._base + stop
                 return stop
         return None
@@ -190,22 +190,33 @@ class _Work:
         del self._stretches[stretch:]
         self._events = []
         begin, length = int(columns.offset[row]), int(columns.length[row])
-        framing._framer, framing._known = framing._dissector.framer(framing._timing), length
+        framer = framing._dissector.framer(framing._timing)
+        if isinstance(framer, Remembering):
+            framer.remember(framing._framer, columns.take(slice(0, 0)), self._reads.octets)
+        framing._framer, framing._known = framer, length
         framing._given = framing._base + begin + length
         return begin
 
-    def _prime(self, begin: int, stop: int, lengths: list[int]) -> bool:
-        """Put a new framer behind the rows in [begin, stop); whether it makes the same rows of them so far."""
-        framer = self._framing._dissector.framer(self._framing._timing)
+    def _prime(self, known: slice, handed: slice) -> bool:
+        """Put a new framer behind rows of the kernel, of which it is handed the last; whether it makes the same of them
+        so far. `known`: those before them, which it may learn from."""
+        columns, framing = self._columns, self._framing
+        assert columns is not None
+        framer = framing._dissector.framer(framing._timing)
+        if isinstance(framer, Remembering):
+            framer.remember(framing._framer, columns.take(known), self._reads.octets)
+        lengths = columns.length[handed].tolist()
+        begin = int(columns.offset[handed.start])
+        stop = int(columns.offset[handed.stop - 1]) + lengths[-1]
         at, events = begin, []
         while at < stop:
             chunk, at = self._part(at, stop)
             events += framer.feed(chunk)
         if any(len(event.octets) != length for event, length in zip(events, lengths, strict=False)):
             return False
-        self._framing._framer = framer
-        self._framing._known = stop - begin - sum(len(event.octets) for event in events)
-        return self._framing._known >= 0
+        framing._framer = framer
+        framing._known = stop - begin - sum(len(event.octets) for event in events)
+        return framing._known >= 0
 
     def _part(self, at: int, stop: int) -> tuple[Chunk, int]:
         """The read that holds octet `at`, from there on and before `stop`, and where it ends."""

@@ -6,11 +6,8 @@ import numpy as np
 
 from dissectors.columns import Reads, Times
 from dissectors.line import Timing
-from sniff.engine.late_reads import ANOTHER, MOST, OFTEN, RARELY, TOGETHER
+from sniff.engine.late_reads import ANOTHER, KEPT, MOST, OFTEN, RARELY, TOGETHER
 from sniff.engine.read_times import FAST, Backlog
-
-KEPT = 64
-"""Reads of the block before that may hold the end of a frame to come."""
 
 
 class LateColumns:
@@ -28,6 +25,7 @@ class LateColumns:
         self._starts = np.zeros(0, np.int64)
         self._pauses = np.full(0, -1, np.int64)
         self._latencies = np.zeros(0, np.int64)
+        self._is_late = np.zeros(0, bool)
 
     def see(self, reads: Reads) -> None:
         """Take the reads that follow."""
@@ -43,6 +41,8 @@ class LateColumns:
         at = np.maximum.accumulate(np.where(runs, np.arange(len(reads)), -1))
         run_before = np.where(at >= 0, run_before[np.maximum(at, 0)], self._before_run)
         starts = np.maximum(times - lasted, before)
+        if not known:
+            starts[0] = times[0] - lasted[0]
         pauses = np.minimum(starts - run_before, MOST)
         long = lasted > self._least
         long[0] &= known
@@ -52,19 +52,19 @@ class LateColumns:
         self._starts = np.concatenate((self._starts[-KEPT:], starts))
         self._pauses = np.concatenate((self._pauses[-KEPT:], np.where(long, pauses, -1)))
         self._latencies = np.concatenate((self._latencies[-KEPT:], latencies))
+        self._is_late = np.concatenate((self._is_late[-KEPT:], np.zeros(len(reads), bool)))
 
     def slack(self, ends: Times) -> Times:
-        """ns, of frames in their order, by when they ended; their reads were seen."""
+        """ns, of frames in their order, none of them twice, by when they ended; their reads were seen."""
         read = np.searchsorted(self._times, ends)
         inside = read < len(self._times)
         read = np.minimum(read, len(self._times) - 1)
-        latency = self._latencies[read]
-        slack: Times = np.maximum(latency, self._allowed)
+        within = inside & (self._starts[read] < ends)
+        slack: Times = np.where(within, np.maximum(self._latencies[read], self._allowed), self._allowed)
         pauses = self._pauses[read]
-        held = inside & (pauses >= 0) & (self._starts[read] < ends)
-        late = np.zeros(len(self._times), bool)
-        late[read[held & (self._times[read] - ends >= self._least)]] = True
-        return np.where(held & late[read], np.maximum(slack, pauses), slack)
+        held = within & (pauses >= 0)
+        self._is_late[read[held & (self._times[read] - ends >= self._least)]] = True
+        return np.where(held & self._is_late[read], np.maximum(slack, pauses), slack)
 
     def _follow(self, reads: Reads, before: Times, known: bool) -> Times:
         """The latency in force after each read: where reads hold more than can have come, it grows."""

@@ -32,20 +32,21 @@ reads at most one fewer; else the computer was busy."""
 MOST = 250_000_000
 """ns; no computer that is worth listening with is away for longer."""
 
-KEPT = 16
+KEPT = 64
 """Reads that may still hold the end of a frame to come."""
 
 
 class _Read:
-    """A long read: from when on its octets were on the line at the latest, when it came, how long after the one before.
+    """A read: from when on its octets were on the line at the latest, when it came, how long after the one before
+    (negative: it is short, so that no two frames end in it), how slow the adapter was known to be by then.
 
     `is_late`: a frame ended in it too long ago.
     """
 
-    __slots__ = ("is_late", "pause", "start", "time")
+    __slots__ = ("is_late", "latency", "pause", "start", "time")
 
-    def __init__(self, start: int, time: int, pause: int) -> None:
-        self.start, self.time, self.pause = start, time, pause
+    def __init__(self, start: int, time: int, pause: int, latency: int) -> None:
+        self.start, self.time, self.pause, self.latency = start, time, pause, latency
         self.is_late = False
 
 
@@ -75,18 +76,22 @@ class LateReads:
                 self._latency = min(MOST, max(self._latency, int(self._backlog.worst)))
         if self._before is None or chunk.time - lasted - self._before > self._together:
             self._before_run = chunk.time - lasted if self._before is None else self._before
-        if lasted > self._least and self._before is not None:
-            start = max(chunk.time - lasted, self._before)
-            self._reads.append(_Read(start, chunk.time, min(start - self._before_run, MOST)))
+        start = chunk.time - lasted if self._before is None else max(chunk.time - lasted, self._before)
+        is_long = lasted > self._least and self._before is not None
+        pause = min(start - self._before_run, MOST) if is_long else -1
+        self._reads.append(_Read(start, chunk.time, pause, self._latency))
         self._before = chunk.time
 
     def with_slack(self, frame: Frame) -> Frame:
         """The frame; with more slack where it ended in a read that was late, or where many are."""
-        slack = frame.slack if self._latency <= self._allowed else max(frame.slack, self._latency)
+        slack = frame.slack
         for read in reversed(self._reads):
             if read.start < frame.end <= read.time:
-                read.is_late = read.is_late or read.time - frame.end >= self._least
-                if read.is_late:
-                    slack = max(slack, read.pause)
+                if read.latency > self._allowed:
+                    slack = max(slack, read.latency)
+                if read.pause >= 0:
+                    read.is_late = read.is_late or read.time - frame.end >= self._least
+                    if read.is_late:
+                        slack = max(slack, read.pause)
                 break
         return frame if slack == frame.slack else replace(frame, slack=slack)
