@@ -80,7 +80,8 @@ class Gaps:
             longest = max(0, frame.start - before.end) + before.slack
             if before.end < frame.start and longest < timing.t35 - timing.line.bits(1):
                 self._seen.too_close(sender, frame.start, no - 1, no)
-        self._see_pause(no, frame, sender)
+        if header.ok and not frame.marks:  # in a damaged one octets may be missing, and leave the same silence
+            self._see_pause(no, frame, sender)
 
     def _see_pause(self, no: int, frame: Frame, sender: str) -> None:
         """A silence inside a frame, beyond the spacing that this sender always leaves between its octets."""

@@ -45,7 +45,8 @@ class LineFindings:
         self._session = session
         self._patterns = TimePatterns(session)
         self._use = LineUse(session.line)
-        self._senders = Senders(session.timing, "whole" in session.adapter.detail)
+        adapter = session.adapter
+        self._senders = Senders(session.timing, "whole" in adapter.detail if adapter.reports is not None else None)
         self._octets = self._in_frames = self._marked = self._rows = self._frames = self._good = 0
         self._first = self._now = 0
         self._damaged = self._damaged_here = 0  # rows that are no good frame, and those of them with an overrun
@@ -82,6 +83,7 @@ class LineFindings:
         if self._sampled < SAMPLE_OCTETS:
             self._sample.append(Chunk(event.end, event.octets[:SAMPLE_OCTETS], event.marks))
             self._sampled += len(event.octets)
+        self._senders.see_marks(event)
         if event.marks:
             self._see_marks(row.no, event)
         if not isinstance(event, Frame) or not event.ok:
@@ -196,8 +198,7 @@ class LineFindings:
             return (*made, self._whole("LN002", "bus", "not one octet was heard"))
         if self.rubbish:
             return (*made, self._rubbish())
-        many = 2 if self._senders.packets else 10  # where one flag marks a whole packet, few errors mark many octets
-        if many * self._marked > self._octets and 10 * self._in_frames >= 8 * self._octets:
+        if self._senders.are_all_struck(self._marked, self._octets) and 10 * self._in_frames >= 8 * self._octets:
             made.append(self._parity_setting())
         else:
             made += self._wrong_octets()
