@@ -104,8 +104,8 @@ _ALL = (
         "named that is struck clearly more often than the octets that it sends explain (2.5 times the rate of the "
         "other stations, by chance less than once in a thousand); else one finding names the bus. Where one flag "
         "covers a whole packet (the adapter says so, or in a capture that does not name it the marks: they go on in "
-        "long runs through good frames), damaged frames count, and packets with a flag: a station is named that is in nearly "
-        "all of them while the others are mostly in packets without one.",
+        "long runs through good frames), damaged frames count, and packets with a flag: a station is named that is in "
+        "nearly all of them while the others are mostly in packets without one.",
         "noise while this station sends, weak levels from it, or two that send at once",
         "this station's connector, stub and ground; " + _WIRING,
     ),
