@@ -19,13 +19,15 @@ may still answer. (Some battery systems are asked at one address and always answ
 from __future__ import annotations
 
 from collections import deque
+from dataclasses import replace
 
 from dissectors.frame import Event, Header, Noise, Reason, Role
 from dissectors.line import NS_PER_S, Timing
 from dissectors.modbus.adu import readable_adu
+from dissectors.modbus.damaged_unit import unit_of
 from dissectors.modbus.doubts import Doubts, is_full, of_chain, of_next, of_run
 from dissectors.modbus.exchange import Exchange, Garble, Seen, answer_apart, echo_of, is_begin_of
-from dissectors.modbus.functions import BROADCAST, FUNCTIONS
+from dissectors.modbus.functions import BROADCAST, EXCEPTION_BIT, FUNCTIONS
 from dissectors.modbus.learnt import READ, Learnt
 from dissectors.modbus.pairing import another_function, is_listen_only, is_restart, mismatch
 from dissectors.tracker import Placement, Tracked, Transaction, Verdict
@@ -44,6 +46,7 @@ _TURNAROUND = 90_000_000
 """Nobody speaks so soon after a broadcast: the master waits 100 … 200 ms (Modbus over Serial Line V1.02, 2.4.1)."""
 
 _CHAIN_MOST = 8  # equal requests in a row whose verdicts wait for each other
+_NAMED = 3  # octets of a frame, characters in ASCII, that say whose it is
 _GARBLE = 3  # so many octets of noise in place of an answer are a damaged answer
 _QUIET_NOISE = frozenset((Reason.ZEROS, Reason.BREAK, Reason.PAD))
 
@@ -73,6 +76,7 @@ class ModbusTracker:
         self._given_up: deque[Exchange] = deque(maxlen=8)
         self._echoing: bool | None = None  # whether this bus repeats requests at once; None while unlearnt
         self._echo_votes = 0  # answered requests with an echo, less those without
+        self._units: set[int] = set()  # named in good frames
         self._mute: set[int] = set()  # units in listen-only mode
         self._only: bytes | None = None  # what all frames so far say; empty when they differ
         self._doubts = Doubts(self.learnt)
@@ -95,13 +99,15 @@ class ModbusTracker:
         if self._only is None or self._only != seen.octets:
             self._only = b"" if self._last_end is not None else seen.octets
         if not header.ok or len(seen.octets) < 2:
-            placement = self._damaged(seen)
+            placement = self._damaged(self._as_named(seen))
         elif header.role is Role.RESPONSE:
             placement = self._response(seen)
         elif header.role in (Role.REQUEST, Role.BROADCAST):
             placement = self._request(seen)
         else:
             placement = self._either(seen)
+        if header.ok and seen.unit:
+            self._units.add(seen.unit)
         self._last_end = event.end
         self._last_was_answer = placement.role is Role.RESPONSE
         self._decide_doubts(event.end)
@@ -318,7 +324,28 @@ class ModbusTracker:
         an answer all the same when it comes as soon as that station's answers do, which no master does."""
         if seen.header.role is Role.REQUEST:
             return request.is_for(seen.octets) and self._is_prompt(request, seen)
-        return request.is_for(seen.octets) or self._in_time(request, seen)
+        if request.is_for(seen.octets):
+            return True
+        return self._in_time(request, seen) and not self._names_another(request, seen)
+
+    def _names_another(self, request: Exchange, seen: Seen) -> bool:
+        """Whether a damaged frame names a station that is known, and another one than the request.
+
+        What has the shape of an answer came from the one that was asked, whatever is left of its name; and where the
+        adapter marked the name, it is not to be relied on.
+        """
+        if any(mark.offset < _NAMED for mark in seen.frame.marks):
+            return False
+        if seen.unit == request.unit or seen.unit not in self._units or seen.header.role is Role.RESPONSE:
+            return False
+        return len(seen.octets) < 2 or seen.octets[1] & ~EXCEPTION_BIT in FUNCTIONS
+
+    def _as_named(self, seen: Seen) -> Seen:
+        """A damaged frame with the station that its check makes of what it names."""
+        unit = unit_of(seen.frame, seen.unit, self._units)
+        if unit is None or unit == seen.unit:
+            return seen
+        return replace(seen, octets=bytes((unit,)) + seen.octets[1:])
 
     def _is_prompt(self, request: Exchange, seen: Seen) -> bool:
         """Whether it comes as soon as answers of that station are known to come, or sooner than any master goes on."""

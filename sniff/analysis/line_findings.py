@@ -58,6 +58,7 @@ class LineFindings:
         self._lost_octets = self._rest_octets = self._only_heard = 0
         self._echo, self._asked = Tally(), 0
         self._values: Counter[int] = Counter()
+        self._before_ok = True  # the newest frame
         self._awaiting = False  # a request was the newest frame of a known kind
         self._pending: list[tuple[int, Noise]] = []  # noise directly before the frame to come
         self._sample: list[Chunk] = []  # what came first, to ask what else it may be
@@ -146,6 +147,7 @@ class LineFindings:
             sender = "bus"  # nobody was asked: it may be anything
         self._awaiting = role is Role.REQUEST or (self._awaiting and role is not Role.RESPONSE)
         self._frames += 1
+        self._before_ok = frame.ok
         if frame.ok:
             self._good += 1
             self._in_frames += len(frame.octets)
@@ -161,7 +163,8 @@ class LineFindings:
             return
         if self._rows == 1:  # the capture began in the middle of something
             return
-        if len(noise.octets) > STRAY_MOST:
+        of_damaged = noise.place is Place.AFTER and not self._before_ok  # where a damaged frame ends nobody knows
+        if len(noise.octets) > STRAY_MOST or of_damaged:
             self._rest.add(noise.start, no)
             self._rest_octets += len(noise.octets)
             if len(self._rests) < MOST_RESTS and len(noise.octets) <= 300:
