@@ -23,12 +23,12 @@ from dataclasses import replace
 from dissectors.frame import Event, Header, Noise, Reason, Role
 from dissectors.line import Timing
 from dissectors.modbus.adu import readable_adu
-from dissectors.modbus.damaged_unit import unit_of
+from dissectors.modbus.damaged_unit import names_another, unit_of
 from dissectors.modbus.doubts import is_full
 from dissectors.modbus.echoes import Echoes
 from dissectors.modbus.exchange import Exchange, Garble, Seen, answer_apart, echo_of
 from dissectors.modbus.exchanges import FIRST_SEEN, Exchanges
-from dissectors.modbus.functions import BROADCAST, EXCEPTION_BIT, FUNCTIONS
+from dissectors.modbus.functions import BROADCAST
 from dissectors.modbus.learnt import Learnt
 from dissectors.modbus.pairing import another_function, is_listen_only, is_restart, mismatch
 from dissectors.modbus.promptness import Promptness
@@ -41,7 +41,6 @@ _TURNAROUND = 90_000_000
 """Nobody speaks so soon after a broadcast: the master waits 100 … 200 ms (Modbus over Serial Line V1.02, 2.4.1)."""
 
 _CHAIN_MOST = 8  # equal requests in a row whose verdicts wait for each other
-_NAMED = 3  # octets of a frame, characters in ASCII, that say whose it is
 _GARBLE = 3  # so many octets of noise in place of an answer are a damaged answer
 _QUIET_NOISE = frozenset((Reason.ZEROS, Reason.BREAK, Reason.PAD))
 
@@ -297,19 +296,7 @@ class ModbusTracker:
             return request.is_for(seen.octets) and self._times.is_prompt(request, seen)
         if request.is_for(seen.octets):
             return True
-        return self._times.in_time(request, seen) and not self._names_another(request, seen)
-
-    def _names_another(self, request: Exchange, seen: Seen) -> bool:
-        """Whether a damaged frame names a station that is known, and another one than the request.
-
-        What has the shape of an answer came from the one that was asked, whatever is left of its name; and where the
-        adapter marked the name, it is not to be relied on.
-        """
-        if any(mark.offset < _NAMED for mark in seen.frame.marks):
-            return False
-        if seen.unit == request.unit or seen.unit not in self._units or seen.header.role is Role.RESPONSE:
-            return False
-        return len(seen.octets) < 2 or seen.octets[1] & ~EXCEPTION_BIT in FUNCTIONS
+        return self._times.in_time(request, seen) and not names_another(seen, request.unit, self._units)
 
     def _as_named(self, seen: Seen) -> Seen:
         """A damaged frame with the station that its check makes of what it names."""

@@ -172,9 +172,9 @@ _ALL = (
         "LN204",
         Severity.WARNING,
         "octets that are no frame",
-        "Stretches of four octets or more that are no frame, and what follows a damaged frame: 1 in 50 octets or more of all. A smaller share is only "
-        "noted. Said is where they are another protocol's frames with good checks, where they are always the same, and "
-        "where they were sent with a slower baud rate.",
+        "Stretches of four octets or more that are no frame, and what follows a damaged frame: 1 in 50 octets or more "
+        "of all. A smaller share is only noted. Said is where they are another protocol's frames with good checks, "
+        "where they are always the same, and where they were sent with a slower baud rate.",
         "damaged frames beyond recognition, another protocol on the same line, or a device with another baud rate",
         "what the stretches have in common: their place, time and first octets",
     ),
