@@ -19,6 +19,7 @@ RTU_NAME = "modbus-rtu"
 ASCII_NAME = "modbus-ascii"
 
 _PARITY_BIT = bytes(value & 0x7F for value in range(256))
+_CR = (b"\r", b"\x8d")
 _HEX = frozenset(b"0123456789ABCDEFabcdef")
 
 
@@ -72,7 +73,9 @@ def ascii_octets(frame: Frame) -> bytes:
 def ascii_adu(frame: Frame) -> bytes:
     """Unit and PDU of an ASCII frame, without its LRC; of a frame without check, what is there. Total."""
     octets = ascii_octets(frame)
-    return octets if frame.check is Check.ABSENT else octets[:-1]
+    if frame.check is Check.ABSENT or (frame.damage is Damage.FORM and not hex_pairs(frame.octets)[2].startswith(_CR)):
+        return octets  # no LRC came, or what is no hex digit stands before it
+    return octets[:-1]
 
 
 def ascii_check(frame: Frame) -> tuple[int, int] | None:

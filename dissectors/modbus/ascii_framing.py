@@ -35,7 +35,7 @@ LONGEST_SILENCE: Final = NS_PER_S
 MAX_NOISE: Final = 256
 
 _CR, _LF = 0x0D, 0x0A
-_MAX_FOREIGN = 4  # characters inside a frame that are no hex digits, before it is given up
+_MAX_FOREIGN = 8  # characters inside a frame that are no hex digits, before it is given up: a burst is not longer
 _DIAGNOSTICS = 0x08
 
 

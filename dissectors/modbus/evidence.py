@@ -30,9 +30,9 @@ class Evidence:
 
     `hasty`: requests after another that nothing had followed: (longest reading of the silence between, unit asked
     before, time, frame before, frame). `broken_in`: the same of
-    damaged frames that begin as a request to another station. `close`, `paused`: by sender; of the first, (time, frame
-    before, frame).
-    `damaged_by_reading`: damage at reads that came later than the adapter explains: a frame was torn, not spoilt.
+    damaged frames that begin as a request to another station. `close`, `paused`, `bare_ends`: by sender; of the first,
+    (time, frame before, frame). `bare_ends`: ASCII frames without their LF.
+    `asked_twice`: second answers to requests that were heard twice, one directly behind the other.
     `malformed`: requests that contradict themselves, with the exceptions they got. `to_nobody`: reads of address 0, and
     who answered. `cut_echoes`: requests given back in part. `octets`, `frames`: of each sender ("master", "station 3").
     `late_frames`: answers that came too late. `broadcast_answers`: who answered broadcasts. `pairs`: (unit asked, unit
@@ -48,14 +48,15 @@ class Evidence:
     echoes: int = 0
     stations: dict[int, Station] = field(default_factory=dict)
     damaged_requests: Tally = field(default_factory=Tally)
-    damaged_by_reading: int = 0
     unasked: Tally = field(default_factory=Tally)
+    asked_twice: Tally = field(default_factory=Tally)
     answers_to_broadcast: Tally = field(default_factory=Tally)
     noise_after_broadcast: Tally = field(default_factory=Tally)
     hasty: list[tuple[int, int, int, int, int]] = field(default_factory=list)
     broken_in: list[tuple[int, int, int, int, int]] = field(default_factory=list)
     close: dict[str, list[tuple[int, int, int]]] = field(default_factory=dict)
     paused: dict[str, Tally] = field(default_factory=dict)
+    bare_ends: dict[str, Tally] = field(default_factory=dict)
     pairs: dict[tuple[int, int], Tally] = field(default_factory=dict)
     repeated_elsewhere: Counter[int] = field(default_factory=Counter)
     malformed: Tally = field(default_factory=Tally)

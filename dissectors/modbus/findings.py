@@ -14,6 +14,7 @@ from dissectors.frame import Damage, Event, Flaw, Frame, Header, Noise, Role
 from dissectors.line import Timing
 from dissectors.modbus.adu import RTU_NAME, readable_adu, rtu_check
 from dissectors.modbus.asked import Asked
+from dissectors.modbus.bare_ends import BareEnds
 from dissectors.modbus.evidence import Evidence
 from dissectors.modbus.exchange import is_begin_of
 from dissectors.modbus.functions import BROADCAST, FUNCTIONS, answer_length
@@ -54,6 +55,7 @@ class ModbusFindings:
         self._learnt = Learnt(timing)
         self._seen = Evidence(timing)
         self._gaps = Gaps(timing, self._seen, self._learnt)
+        self._ends = BareEnds(timing, self._seen)
         self._asked: dict[int, Asked] = {}  # by transaction
         self._open: Asked | None = None  # the newest request, while nothing has come after it
         self._broadcast: Asked | None = None  # likewise
@@ -61,6 +63,7 @@ class ModbusFindings:
         self._answers: dict[int, bytes] = {}  # good answers by transaction
         self._elsewhere: dict[int, int] = {}  # requests (by frame) that another unit answered, and which
         self._repeats: deque[int] = deque(maxlen=64)  # the last transactions that repeated another
+        self._copied: deque[int | None] = deque(maxlen=64)  # the last transactions whose request came twice at once
         self._no_requests: deque[int] = deque(maxlen=64)  # frames that the tracker takes for requests, but are none
         self._damaged: deque[int] = deque(maxlen=64)  # transactions of the last damaged answers
         self._flaws: dict[int, Flaw] = {}  # of damaged frames, by transaction
@@ -89,6 +92,7 @@ class ModbusFindings:
             self._see_noise(no, event)
             self._open = None
             self._gaps.hear_noise()
+            self._ends.hear_noise(event)
             return
         if event.slack > self._timing.latency + MS:
             self._late_read = no
@@ -96,6 +100,7 @@ class ModbusFindings:
         if not header.ok:
             self._see_broken(no, event, octets)
         self._gaps.see(no, event, header, placement)
+        self._ends.see(no, event, header, placement)
         if placement.role is Role.RESPONSE:
             self._see_answer(no, event, header, placement, octets)
         elif placement.role is Role.EITHER:
@@ -116,6 +121,7 @@ class ModbusFindings:
         if verdict in _SETTLED_ELSEWHERE:
             if verdict is Verdict.ECHO:
                 self._seen.echoes += 1
+                self._copied.append(transaction.of)
                 if transaction.station is not None:
                     self._station(transaction.station).echoed += 1
             if verdict is Verdict.BROADCAST and asked is not None:
@@ -123,8 +129,7 @@ class ModbusFindings:
             return
         damaged = verdict in (Verdict.DAMAGED_ANSWER, Verdict.DAMAGED_REQUEST)
         if damaged and self._late_read >= (transaction.request or transaction.response or 0):
-            self._seen.damaged_by_reading += 1
-            return
+            return  # a frame was torn by a late read, not spoilt
         if verdict is Verdict.DAMAGED_REQUEST:
             self._seen.damaged_requests.add(transaction.start, transaction.request)
             if flaw is not None:
@@ -145,7 +150,9 @@ class ModbusFindings:
             return
         if transaction.attempt > 1:
             self._repeats.append(transaction.id)
-        if verdict is Verdict.ANSWERED_TWICE and transaction.of not in self._repeats:
+        if verdict is Verdict.ANSWERED_TWICE and transaction.of in self._copied:
+            self._seen.asked_twice.add(transaction.start, transaction.response)  # what seemed an echo had its answer
+        elif verdict is Verdict.ANSWERED_TWICE and transaction.of not in self._repeats:
             station.twice.add(transaction.start, transaction.response)
             first = self._final.get(transaction.of or 0)
             station.same_twice += not answer or first is None or first == answer

@@ -70,17 +70,18 @@ class Gaps:
         """Silences that are provably too short between frames, or too long inside one."""
         timing, before = self._timing, self._before
         if placement.role is not Role.EITHER:
-            self._seen.frames[_sender(placement)] += 1
-            self._seen.octets[_sender(placement)] += max(len(frame.octets), frame.expected or 0)
+            self._seen.frames[sender_of(placement)] += 1
+            self._seen.octets[sender_of(placement)] += max(len(frame.octets), frame.expected or 0)
         if frame.protocol != RTU_NAME:
             return
-        sender = _sender(placement)
+        sender = sender_of(placement)
         # frames that touch came in one read, which says nothing of the silence between them
         if before is not None and header.ok and not frame.skipped and before.octets != frame.octets:
             longest = max(0, frame.start - before.end) + before.slack
             if before.end < frame.start and longest < timing.t35 - timing.line.bits(1):
                 self._seen.too_close(sender, frame.start, no - 1, no)
-        self._see_pause(no, frame, sender)
+        if header.ok and not frame.marks:  # in a damaged one octets may be missing, and leave the same silence
+            self._see_pause(no, frame, sender)
 
     def _see_pause(self, no: int, frame: Frame, sender: str) -> None:
         """A silence inside a frame, beyond the spacing that this sender always leaves between its octets."""
@@ -111,5 +112,6 @@ class Gaps:
         self._learnt.paused(pause, 0)
 
 
-def _sender(placement: Placement) -> str:
+def sender_of(placement: Placement) -> str:
+    """Who sent a frame, as findings name him."""
     return "master" if placement.role is not Role.RESPONSE else f"station {placement.source}"

@@ -16,6 +16,8 @@ _WASTE = 0.05
 _HABIT = 10  # a sender that is too quick is so once in so many frames at least; what a computer holds up is rarer
 _HABIT_LEAST = 6
 _PAUSES_LEAST = 3
+_BARE_LEAST = 3
+_MASTERS_LEAST = 3
 _CUT_LEAST = 3
 _COMMON_LEAST = 3
 
@@ -27,6 +29,7 @@ def judge(seen: Evidence, timeout: int | None) -> tuple[Finding, ...]:
         *_of_bus(seen, "master" in damage.blamed),
         *_of_masters(seen),
         *_of_gaps(seen),
+        *_of_ends(seen),
         *_common_damage(seen, damage),
     ]
     for unit in sorted(seen.stations):
@@ -140,11 +143,12 @@ def _of_masters(seen: Evidence) -> Iterator[Finding]:
     alive = {unit: s for unit, s in seen.stations.items() if s.answered >= 3 and 2 * s.answered > s.asked}
 
     def too_soon(row: tuple[int, int, int, int, int]) -> bool:
-        return row[1] in alive and 10 * row[0] < 9 * alive[row[1]].times.quickest
+        return row[1] in alive and 10 * row[0] < 9 * alive[row[1]].times.soonest()
 
     hasty, broken_in = list(filter(too_soon, seen.hasty)), list(filter(too_soon, seen.broken_in))
     gaps = sorted(row[0] for row in (*hasty, *broken_in))
-    if len(gaps) < 3:
+    if len(gaps) < _MASTERS_LEAST:
+        yield from _asked_twice(seen)
         return
     same = MS + seen.timing.latency
     habitual = max(sum(abs(one - gap) <= same for one in gaps) for gap in gaps)
@@ -157,6 +161,19 @@ def _of_masters(seen: Evidence) -> Iterator[Finding]:
     if gaps[len(gaps) // 2] < 10 * MS:
         words += f"; half of them within {ms(gaps[len(gaps) // 2])}"
     yield tally.found(RULES["MB203"], "bus", words)
+
+
+def _asked_twice(seen: Evidence) -> Iterator[Finding]:
+    """Requests that came twice at once, and had two answers: no echo is answered, and no master repeats so soon.
+
+    Not where copies are usual, as behind a repeater, or where answers come twice to requests that do not.
+    """
+    twice = seen.asked_twice
+    usual = _HABIT * twice.count > seen.requests or 2 * twice.count < seen.echoes
+    if twice.count < _MASTERS_LEAST or usual or any(station.twice.count for station in seen.stations.values()):
+        return
+    words = f"{counted(twice.count, 'request')} came twice, one directly behind the other, and had two answers each"
+    yield twice.found(RULES["MB203"], "bus", words)
 
 
 def _of_gaps(seen: Evidence) -> Iterator[Finding]:
@@ -190,6 +207,28 @@ def _of_gaps(seen: Evidence) -> Iterator[Finding]:
             f"and {ms(timing.t35)} between frames"
         )
         yield found(RULES["MB303"], "adapter", words, first=seen.first or 0, last=seen.now)
+
+
+def _of_ends(seen: Evidence) -> Iterator[Finding]:
+    """Frames without LF: of those who leave it out while others send it; where all do, it is how this bus speaks."""
+    habits = {
+        sender: tally
+        for sender, tally in sorted(seen.bare_ends.items())
+        if tally.count >= _BARE_LEAST and _HABIT * tally.count >= seen.frames[sender]
+    }
+    if len(habits) > 1 and len(habits) == len(seen.frames):
+        count = sum(tally.count for tally in habits.values())
+        words = f"{counted(count, 'frame')} end with CR alone, whoever sends"
+        evidence = tuple(sorted(no for tally in habits.values() for no in tally.evidence))
+        first, last = min(one.first for one in habits.values()), max(one.last for one in habits.values())
+        severity = Severity.NOTE
+        yield found(
+            RULES["MB019"], "bus", words, first=first, last=last, count=count, evidence=evidence, severity=severity
+        )
+        return
+    for sender, tally in habits.items():
+        words = f"{tally.count} of {counted(seen.frames[sender], 'frame')} end with CR alone"
+        yield tally.found(RULES["MB019"], sender, words)
 
 
 def _common_damage(seen: Evidence, damage: Damage) -> list[Finding]:

@@ -204,6 +204,17 @@ _ALL = (
         explains=("MB005", "MB104", "MB301", "LN205"),
     ),
     Rule(
+        "MB019",
+        Severity.WARNING,
+        "frames end without line feed",
+        "ASCII frames that end with CR, and nothing where LF should be (Modbus over Serial Line V1.02, 2.5.2): at "
+        "least three, and 1 in 10 of the sender's. They are read as good. A note where everybody on the bus ends so.",
+        "a driver that is released before the last octet is out, or a device that ends its frames with CR alone; "
+        "others may wait for the LF and drop the frame",
+        "its turnaround or transmit-delay setting, a converter's timer for the direction; its end character",
+        explains=("MB104",),
+    ),
+    Rule(
         "MB101",
         Severity.WARNING,
         "slow station",
@@ -276,9 +287,10 @@ _ALL = (
         "MB203",
         Severity.ERROR,
         "two masters",
-        "Requests that come while another one waits for a station that is alive, sooner than that station has ever "
-        "answered, so that no answer can have been missed. At least three; not where they always come after the same "
-        "time, as those of a single master do that never waits.",
+        "Requests that come while another one waits for a station that is alive, sooner than that station ever answers "
+        "(what seems an answer to the second of two masters and is one to the first aside), so that no answer can have "
+        "been missed; or the same request twice at once, and an answer to each. At least three; not where "
+        "they always come after the same time, as those of a single master do that never waits.",
         "two masters on one bus, or a commissioning tool left connected",
         "find the second master; a bus has one, use a gateway or multiplexer for more",
         explains=(*_OF_COLLISIONS, "MB002", "MB003", "MB201", "MB202", "MB302"),
@@ -345,9 +357,9 @@ _ALL = (
         "MB302",
         Severity.WARNING,
         "pauses inside frames",
-        "More than 1.5 characters of silence inside an RTU frame (Modbus over Serial Line V1.02, 2.5.1.1), even by the "
-        "shortest reading that the adapter leaves, and beyond the even spacing of octets that the sender shows in most "
-        "of its frames. At least three, and only where the adapter's delay is at most a fifth of 1.5 characters.",
+        "More than 1.5 characters of silence inside a good RTU frame (Modbus over Serial Line V1.02, 2.5.1.1), even by "
+        "the shortest reading that the adapter leaves, and beyond the even spacing of octets that the sender shows in "
+        "most of its frames. At least three, and only where the adapter's delay is at most a fifth of 1.5 characters.",
         "a sender that cannot keep its transmitter fed: an interrupted program, a USB adapter, a radio link",
         "strict receivers drop such frames; use a sender with a FIFO or a lower baud rate",
     ),

@@ -18,37 +18,31 @@ may still answer. (Some battery systems are asked at one address and always answ
 
 from __future__ import annotations
 
-from collections import deque
+from dataclasses import replace
 
 from dissectors.frame import Event, Header, Noise, Reason, Role
-from dissectors.line import NS_PER_S, Timing
+from dissectors.line import Timing
 from dissectors.modbus.adu import readable_adu
-from dissectors.modbus.doubts import Doubts, is_full, of_chain, of_next, of_run
-from dissectors.modbus.exchange import Exchange, Garble, Seen, answer_apart, echo_of, is_begin_of
-from dissectors.modbus.functions import BROADCAST, FUNCTIONS
-from dissectors.modbus.learnt import READ, Learnt
+from dissectors.modbus.damaged_unit import names_another, unit_of
+from dissectors.modbus.doubts import is_full
+from dissectors.modbus.echoes import Echoes
+from dissectors.modbus.exchange import Exchange, Garble, Seen, answer_apart, echo_of
+from dissectors.modbus.exchanges import FIRST_SEEN, Exchanges
+from dissectors.modbus.functions import BROADCAST
+from dissectors.modbus.learnt import Learnt
 from dissectors.modbus.pairing import another_function, is_listen_only, is_restart, mismatch
+from dissectors.modbus.promptness import Promptness
 from dissectors.tracker import Placement, Tracked, Transaction, Verdict
-
-GIVE_UP = 5 * NS_PER_S
-"""An unanswered request is closed after 5 s of nothing while the master's timeout is unlearnt."""
 
 _IMPATIENT = "the master went on long before its timeout: the answer may have been missed at this tap"
 _PERHAPS_ANSWER = "the master went on long before its timeout: perhaps an answer whose request was missed at this tap"
 _REQUEST_OCTETS = 8  # of the commonest request, RTU
-_FIRST_SEEN = "the first frame of the capture: perhaps an answer whose request came before"
-_AT_ONCE = 50_000_000
-"""ns; no master repeats a request sooner, unless its timeout is known to be that short."""
-
 _TURNAROUND = 90_000_000
 """Nobody speaks so soon after a broadcast: the master waits 100 … 200 ms (Modbus over Serial Line V1.02, 2.4.1)."""
 
 _CHAIN_MOST = 8  # equal requests in a row whose verdicts wait for each other
 _GARBLE = 3  # so many octets of noise in place of an answer are a damaged answer
 _QUIET_NOISE = frozenset((Reason.ZEROS, Reason.BREAK, Reason.PAD))
-
-_ECHO_VOTES = 4
-"""Answered requests with an echo, or without, that count at most against what is seen now."""
 
 
 class ModbusTracker:
@@ -62,21 +56,13 @@ class ModbusTracker:
         self.learnt = Learnt(timing)
         self._timing = timing
         self._silence = 7 * timing.char // 2 if silence is None else silence
-        self._echo_limit = max(self._silence, timing.char + timing.latency)
-        self._next_tx = 1
-        self._closed: list[Transaction] = []  # by the event under way
-        self._open: Exchange | None = None
-        self._last: Exchange | None = None  # the exchange that closed last
+        self._times = Promptness(self.learnt, self._silence)
+        self._echoes = Echoes(timing, self._silence, self.learnt)
+        self._held = Exchanges(self.learnt, self._echoes)
         self._last_end: int | None = None  # of the newest frame
         self._last_was_answer = False
-        self._answered: deque[Exchange] = deque(maxlen=4)  # the exchanges that were answered last
-        self._given_up: deque[Exchange] = deque(maxlen=8)
-        self._echoing: bool | None = None  # whether this bus repeats requests at once; None while unlearnt
-        self._echo_votes = 0  # answered requests with an echo, less those without
+        self._units: set[int] = set()  # named in good frames
         self._mute: set[int] = set()  # units in listen-only mode
-        self._only: bytes | None = None  # what all frames so far say; empty when they differ
-        self._doubts = Doubts(self.learnt)
-        self._chain: list[Exchange] = []  # equal requests before the open one, whose verdicts wait for it
 
     @property
     def timeout(self) -> int | None:
@@ -87,57 +73,59 @@ class ModbusTracker:
 
     def track(self, no: int, event: Event, header: Header | None) -> Tracked:
         """Place the next event; see `dissectors.tracker.Tracker`."""
-        self._expire(event.start)
+        self._held.expire(event.start)
         if isinstance(event, Noise) or header is None:
             self._noise(event)
-            return Tracked(None, self._take_closed())
+            return Tracked(None, self._held.take_closed())
         seen = Seen(no, event, header, readable_adu(event))
-        if self._only is None or self._only != seen.octets:
-            self._only = b"" if self._last_end is not None else seen.octets
+        if self._held.only is None or self._held.only != seen.octets:
+            self._held.only = b"" if self._last_end is not None else seen.octets
         if not header.ok or len(seen.octets) < 2:
-            placement = self._damaged(seen)
+            placement = self._damaged(self._as_named(seen))
         elif header.role is Role.RESPONSE:
             placement = self._response(seen)
         elif header.role in (Role.REQUEST, Role.BROADCAST):
             placement = self._request(seen)
         else:
             placement = self._either(seen)
+        if header.ok and seen.unit:
+            self._units.add(seen.unit)
         self._last_end = event.end
         self._last_was_answer = placement.role is Role.RESPONSE
-        self._decide_doubts(event.end)
-        return Tracked(placement, self._take_closed())
+        self._held.decide_doubts(event.end)
+        return Tracked(placement, self._held.take_closed())
 
     def advance(self, now: int) -> tuple[Transaction, ...]:
         """Close the open request when the master has long given up at `now` (ns)."""
         # an answer that began in time may still be under way through the adapter
-        self._expire(now - self._timing.latency - self._echo_limit)
-        self._decide_doubts(now)
-        return self._take_closed()
+        self._held.expire(now - self._timing.latency - self._echoes.limit)
+        self._held.decide_doubts(now)
+        return self._held.take_closed()
 
     def close(self) -> tuple[Transaction, ...]:
         """End of capture."""
-        if self._open is not None and self._open.copies:
-            self._finish_copies(self._open, None)
-        if self._open is not None:
-            unfinished = not (self._open.fault or self._open.garble or self._open.silent)
-            self._close_open(Verdict.OPEN if unfinished else None)
-        self._decide_doubts(None)
-        return self._take_closed()
+        if self._held.open is not None and self._held.open.copies:
+            self._held.finish_copies(self._held.open, None)
+        if self._held.open is not None:
+            unfinished = not (self._held.open.fault or self._held.open.garble or self._held.open.silent)
+            self._held.close_open(Verdict.OPEN if unfinished else None)
+        self._held.decide_doubts(None)
+        return self._held.take_closed()
 
     # ---- what the shape decides
 
     def _request(self, seen: Seen, sure: bool = True, fault: str | None = None) -> Placement:
         """A request: an echo of the newest one, its repeat, or another."""
-        if sure and self._is_echo_of_request(seen):
-            if self._echoing is None:
-                self._echoing = True
+        if sure and self._echoes.is_of_request(self._held.open or self._held.last, seen):
+            if self._echoes.usual is None:
+                self._echoes.usual = True
             return self._echo(seen)
-        if self._open is not None and self._open.copies:
-            self._finish_copies(self._open, seen)
-        before = self._open
-        copied = None if self._last is None else self._last.copied
+        if self._held.open is not None and self._held.open.copies:
+            self._held.finish_copies(self._held.open, seen)
+        before = self._held.open
+        copied = None if self._held.last is None else self._held.last.copied
         self._learn_from_next(seen, sure)
-        request = Exchange(self._take_tx(), seen, sure, fault=fault)
+        request = Exchange(self._held.take_tx(), seen, sure, fault=fault)
         request.silent = is_listen_only(seen.octets) or (request.unit in self._mute and is_restart(seen.octets))
         if before is not None:
             if before.octets == seen.octets and not (before.fault or before.silent):
@@ -147,21 +135,21 @@ class ModbusTracker:
             if before.remark is None and hasty:
                 before.remark = _IMPATIENT if before.sure else _PERHAPS_ANSWER
             if request.attempt > 1 and self._may_be_answered_by(before, seen):
-                self._open, self._last = None, before
-                self._chain.append(before)
+                self._held.open, self._held.last = None, before
+                self._held.chain.append(before)
             else:
                 before.may_be_answer |= hasty and not (before.sure or before.attempt > 1 or before.echoed)
-                self._close_open()
-        elif self._last is not None and not sure and not fault:
-            self._note_likeness(request, self._last, copied)
-        if not sure and not fault and self._last is None:
-            request.remark = _FIRST_SEEN
+                self._held.close_open()
+        elif self._held.last is not None and not sure and not fault:
+            self._note_likeness(request, self._held.last, copied)
+        if not sure and not fault and self._held.last is None:
+            request.remark = FIRST_SEEN
         self._note_mode(request)
         if request.unit == BROADCAST and not fault and not request.asks_nobody:
-            self._last = request
-            self._closed.append(request.close(Verdict.BROADCAST))
+            self._held.last = request
+            self._held.closed.append(request.close(Verdict.BROADCAST))
             return Placement(seen.no, request.tx, Role.BROADCAST, destination=BROADCAST)
-        self._open = request
+        self._held.open = request
         return Placement(seen.no, request.tx, Role.REQUEST, destination=seen.unit)
 
     def _note_likeness(self, request: Exchange, last: Exchange, copied: int | None) -> None:
@@ -171,38 +159,38 @@ class ModbusTracker:
         if last.unit == BROADCAST and last.octets[1:] == request.octets[1:]:
             request.after_broadcast = gap < _TURNAROUND
         elif last.octets == request.octets and copied is not None:
-            request.may_be_answer = copied <= self._echo_limit + self._timing.latency
+            request.may_be_answer = copied <= self._echoes.limit + self._timing.latency
 
     def _response(self, seen: Seen) -> Placement:
         """An answer: to the open request, a late, a second or an unsolicited one."""
-        request = self._open
-        late = self._late_for(seen)
+        request = self._held.open
+        late = self._held.late_for(seen)
         if request is not None:
             if request.is_for(seen.octets):
                 why = mismatch(request.octets, seen.octets)
-                before = self._repeats(request, seen) if why and late is None else None
+                before = self._held.repeats(request, seen) if why and late is None else None
                 if before is not None:
                     request.disturbed = True
                     return self._answer_apart(seen, Verdict.ANSWERED_TWICE, before)
-                if late is None or not (why or self._is_too_soon(request, seen)):
+                if late is None or not (why or self._times.is_too_soon(request, seen)):
                     return self._answer(request, seen, why)
             elif request.unit == seen.unit and late is None and not request.fault:
                 return self._another_function(request, seen)
-            elif request.fault and self._in_time(request, seen):
+            elif request.fault and self._times.in_time(request, seen):
                 return self._answer(request, seen, None)
             elif late is None:
                 return self._from_elsewhere(request, seen)
             request.disturbed = True
         if late is not None:
-            self._given_up.remove(late)
+            self._held.given_up.remove(late)
             return self._answer_apart(seen, Verdict.LATE, late)
         if self._is_second_answer(seen):
-            return self._answer_apart(seen, Verdict.ANSWERED_TWICE, self._last)
+            return self._answer_apart(seen, Verdict.ANSWERED_TWICE, self._held.last)
         return self._answer_apart(seen, Verdict.UNSOLICITED)
 
     def _another_function(self, request: Exchange, seen: Seen) -> Placement:
         """An answer of the station that was asked, to something else: to a request before, or to this one, wrong."""
-        before = self._repeats(request, seen)
+        before = self._held.repeats(request, seen)
         if before is not None:
             request.disturbed = True
             return self._answer_apart(seen, Verdict.ANSWERED_TWICE, before)
@@ -210,36 +198,30 @@ class ModbusTracker:
             return self._from_elsewhere(request, seen)
         return self._answer(request, seen, another_function(request.octets, seen.octets))
 
-    def _repeats(self, request: Exchange, seen: Seen) -> Exchange | None:
-        """The request answered lately that an answer fits which comes sooner than the station has ever answered."""
-        fastest = self.learnt.fastest(request.unit)
-        if fastest is None or request.latency(seen.frame).high >= fastest:
-            return None
-        fitting = (before for before in reversed(self._answered) if before.is_for(seen.octets) and not before.fault)
-        return next((before for before in fitting if mismatch(before.octets, seen.octets) is None), None)
-
     # ---- what only time decides
 
     def _either(self, seen: Seen) -> Placement:
         """A frame that could be a request as well as a response, or is of no known shape."""
-        request = self._open
+        request = self._held.open
         if request is None:
             return self._either_unasked(seen)
         if request.copies:
             return self._after_copy(request, seen)
         if request.is_for(seen.octets):
-            if request.octets == seen.octets and self._is_echo_of_write(request, seen):
+            if request.octets == seen.octets and self._echoes.is_of_write(request, seen):
                 return self._echo(seen)
-            if request.octets == seen.octets and self._is_repeat_after_damage(request, seen):
+            if request.octets == seen.octets and self._times.is_repeat_after_damage(request, seen, self._echoes.usual):
                 return self._request(seen, sure=False)
             why = None if request.fault else mismatch(request.octets, seen.octets)
             # a station may answer with the value that it really took, or with a wrong length
-            near = request.octets[:4] == seen.octets[:4] and self._is_prompt(request, seen)
-            if (why is None or near or seen.header.role is Role.UNKNOWN) and self._in_time(request, seen):
+            near = request.octets[:4] == seen.octets[:4] and self._times.is_prompt(request, seen)
+            if (why is None or near or seen.header.role is Role.UNKNOWN) and self._times.in_time(request, seen):
                 return self._answer(request, seen, why)
-            if self._is_doubtful(request, seen):
+            if self._times.is_doubtful(request, seen):
                 return self._join(request, seen)
-        elif request.octets[1:] == seen.octets[1:] and self._knows(request) and self._in_time(request, seen):
+        elif (
+            request.octets[1:] == seen.octets[1:] and self._times.knows(request) and self._times.in_time(request, seen)
+        ):
             return self._from_elsewhere(request, seen)
         return self._request(seen, sure=False)
 
@@ -250,8 +232,8 @@ class ModbusTracker:
             return self._request(seen, sure=False)
         pause = max(0, seen.frame.start - request.last_end)
         gap = request.gap(request.copies[0].frame.start)
-        if pause < self._echo_limit:  # whichever it was, this repeats it at once
-            if self._echoing:
+        if pause < self._echoes.limit:  # whichever it was, this repeats it at once
+            if self._echoes.usual:
                 return self._echo(seen)
             return self._answer_apart(seen, Verdict.ANSWERED_TWICE, request)
         if newest.octets != request.octets:  # the newest was a request, and this answers it
@@ -269,7 +251,7 @@ class ModbusTracker:
 
     def _either_unasked(self, seen: Seen) -> Placement:
         """No request is open: a new one, unless it comes too soon for that."""
-        last = self._last
+        last = self._held.last
         gap = 0 if self._last_end is None else max(0, seen.frame.start - self._last_end)
         if last is not None and last.octets == seen.octets and gap < self.learnt.too_soon(self._silence):
             if last.answered:
@@ -279,8 +261,8 @@ class ModbusTracker:
 
     def _damaged(self, seen: Seen) -> Placement:
         """A damaged frame: in answer to the open request, a damaged request, or neither."""
-        request = self._open
-        if request is not None and self._is_cut_echo(request, seen.frame.octets, seen.frame.start):
+        request = self._held.open
+        if request is not None and self._echoes.is_cut(request, seen.frame.octets, seen.frame.start):
             return self._echo(seen, f"the echo ends after {len(seen.frame.octets)} octets")
         error = seen.header.error or "damaged"
         if request is None:
@@ -293,11 +275,11 @@ class ModbusTracker:
         return self._request(seen, sure=False, fault=error)
 
     def _noise(self, noise: Event) -> None:
-        request = self._open
+        request = self._held.open
         if request is None or not isinstance(noise, Noise):
             return
         request.disturbed = True
-        if self._is_cut_echo(request, noise.octets, noise.start):
+        if self._echoes.is_cut(request, noise.octets, noise.start):
             request.echoed = True
             return
         if request.garble or noise.reason in _QUIET_NOISE or len(noise.octets) < _GARBLE:
@@ -307,110 +289,46 @@ class ModbusTracker:
 
     # ---- judging
 
-    def _in_time(self, request: Exchange, seen: Seen) -> bool:
-        return self.learnt.in_time(request.unit, request.pace, request.gap(seen.frame.start))
-
-    def _knows(self, request: Exchange) -> bool:
-        return self.learnt.response_limit(request.unit, request.pace) is not None
-
     def _is_damaged_answer(self, request: Exchange, seen: Seen) -> bool:
         """Whether a damaged frame came in answer. One that was cut may have the length of a request by chance: it is
         an answer all the same when it comes as soon as that station's answers do, which no master does."""
         if seen.header.role is Role.REQUEST:
-            return request.is_for(seen.octets) and self._is_prompt(request, seen)
-        return request.is_for(seen.octets) or self._in_time(request, seen)
+            return request.is_for(seen.octets) and self._times.is_prompt(request, seen)
+        if request.is_for(seen.octets):
+            return True
+        return self._times.in_time(request, seen) and not names_another(seen, request.unit, self._units)
 
-    def _is_prompt(self, request: Exchange, seen: Seen) -> bool:
-        """Whether it comes as soon as answers of that station are known to come, or sooner than any master goes on."""
-        limits = (self.learnt.response_limit(request.unit, pace) for pace in (request.pace, READ))
-        limit = max((limit for limit in limits if limit is not None), default=_AT_ONCE)
-        return request.gap(seen.frame.start) <= limit
-
-    def _is_doubtful(self, request: Exchange, seen: Seen) -> bool:
-        """Whether a frame that comes late, for all that is learnt, may be the answer of a slow station."""
-        if self._knows(request) or self.timeout is not None or request.garble or request.fault or request.silent:
-            return False
-        if request.unit == BROADCAST:
-            return False
-        return request.octets == seen.octets or seen.header.function not in FUNCTIONS
+    def _as_named(self, seen: Seen) -> Seen:
+        """A damaged frame with the station that its check makes of what it names."""
+        unit = unit_of(seen.frame, seen.unit, self._units)
+        if unit is None or unit == seen.unit:
+            return seen
+        return replace(seen, octets=bytes((unit,)) + seen.octets[1:])
 
     def _may_be_answered_by(self, before: Exchange, seen: Seen) -> bool:
         """Whether an equal request that comes later than answers usually do may be a slow answer all the same."""
         if before.sure or not self._is_plain(before) or before.echoed:
             return False
         gap = before.gap(seen.frame.start)
-        return len(self._chain) < _CHAIN_MOST and (self.timeout is None or gap < self.timeout * 9 // 10)
+        return len(self._held.chain) < _CHAIN_MOST and (self.timeout is None or gap < self.timeout * 9 // 10)
 
     def _is_plain(self, request: Exchange) -> bool:
         """Whether nothing at all came to a request that should have been answered."""
         return not (request.fault or request.silent or request.garble)
 
-    def _is_cut_echo(self, request: Exchange, octets: bytes, start: int) -> bool:
-        """Whether octets are the begin of the request, given back at once and cut short."""
-        if not is_begin_of(octets, request.request.frame.octets):
-            return False
-        gap = request.gap(start)
-        return gap < self._echo_limit or (gap < _AT_ONCE and request.sure)
-
-    def _is_too_soon(self, request: Exchange, seen: Seen) -> bool:
-        """Whether it began before the station can have seen the end of this repeat: it answers an earlier attempt."""
-        soonest = request.latency(seen.frame).high
-        return request.attempt > 1 and soonest < self._silence
-
-    def _is_echo_of_request(self, seen: Seen) -> bool:
-        """Whether a sure request repeats the newest one at once; a master repeats only after its timeout."""
-        newest = self._open or self._last
-        if newest is None or newest.octets != seen.octets or newest.answered or newest.fault:
-            return False
-        gap = newest.gap(seen.frame.start)
-        if self.timeout is not None:
-            return gap < self._echo_limit or gap * 8 < self.timeout
-        return gap < self._echo_limit or (gap < _AT_ONCE and newest.unit != BROADCAST)
-
-    def _is_echo_of_write(self, request: Exchange, seen: Seen) -> bool:
-        """Whether a copy that could be an answer comes too soon to be one."""
-        latency = request.latency(seen.frame)
-        if request.echoed or latency.low > self._echo_limit:
-            return False
-        if self._echoing is not None:
-            return self._echoing
-        if not latency.nominal:
-            return False  # both came in one read, which says nothing of the time between
-        if latency.high < self._silence:
-            return True
-        fastest = self.learnt.fastest(request.unit)
-        return fastest is not None and latency.nominal + self._timing.char < fastest // 2
-
-    def _is_repeat_after_damage(self, request: Exchange, seen: Seen) -> bool:
-        """Whether a copy of a request comes well behind a damaged answer to it, with no learnt time that would make it
-        the answer: a master that repeats is far more frequent than a second station with the same address."""
-        if request.garble is None or self._knows(request) or self._echoing:
-            return False
-        return seen.frame.start - request.garble.end >= self.learnt.too_soon(self._silence)
-
     def _is_second_answer(self, seen: Seen) -> bool:
         """Whether an answer follows the last one of that unit with no room for a request between."""
-        last = self._last
+        last = self._held.last
         if last is None or not last.answered or self._last_end is None or not last.is_for(seen.octets):
             return False
         room = self.learnt.too_soon(self._silence) + _REQUEST_OCTETS * self._timing.char
         return seen.frame.start - self._last_end < room + (self.learnt.fastest(last.unit) or 0) // 2
 
-    def _late_for(self, seen: Seen) -> Exchange | None:
-        """The newest request given up lately that this answer fits."""
-        patience = 3 * (self.timeout or GIVE_UP)
-        for request in reversed(self._given_up):
-            if request.gap(seen.frame.start) > patience:
-                return None
-            if request.is_for(seen.octets) and mismatch(request.octets, seen.octets) is None:
-                return request
-        return None
-
     # ---- learning
 
     def _learn_from_next(self, seen: Seen, sure: bool) -> None:
         """A request after all that came before it: how long the master waited, paused, and whether a copy answered."""
-        before, last = self._open, self._last
+        before, last = self._held.open, self._held.last
         if before is not None:
             undisturbed = not (before.disturbed or before.fault or before.garble or before.silent)
             if sure and before.sure and undisturbed:
@@ -430,16 +348,7 @@ class ModbusTracker:
             request.copied = gap
         elif request.sure and seen.header.role is Role.RESPONSE and not (why or request.fault):
             self.learnt.answered(request.unit, request.pace, gap)
-            self._learn_echo(request.echoed)
-
-    def _learn_echo(self, echoed: bool) -> None:
-        """One more request that a station answered, with its copy before the answer or without. One says little where
-        many were otherwise: a late read puts a repeat directly behind the request."""
-        if self._echoing is None or (echoed and not self._echo_votes):
-            self._echoing = echoed
-        self._echo_votes = max(-_ECHO_VOTES, min(_ECHO_VOTES, self._echo_votes + (1 if echoed else -1)))
-        if self._echo_votes:
-            self._echoing = self._echo_votes > 0
+            self._echoes.learn(request.echoed)
 
     def _note_mode(self, request: Exchange) -> None:
         """Listen-only mode begins with its command and ends with a restart, or when the unit speaks again."""
@@ -457,11 +366,11 @@ class ModbusTracker:
     def _answer(self, request: Exchange, seen: Seen, why: str | None) -> Placement:
         self._learn_from_answer(request, seen, why)
         request.answered = True
-        self._answered.append(request)
-        self._drop_chain(Verdict.NO_RESPONSE)
-        self._open, self._last = None, request
+        self._held.answered.append(request)
+        self._held.drop_chain(Verdict.NO_RESPONSE)
+        self._held.open, self._held.last = None, request
         self._mute.discard(seen.octets[0])
-        self._closed.append(request.close_with(seen, why))
+        self._held.closed.append(request.close_with(seen, why))
         return Placement(seen.no, request.tx, Role.RESPONSE, source=seen.unit)
 
     def _from_elsewhere(self, request: Exchange, seen: Seen) -> Placement:
@@ -476,101 +385,15 @@ class ModbusTracker:
     def _answer_apart(
         self, seen: Seen, verdict: Verdict, other: Exchange | None = None, error: str | None = None
     ) -> Placement:
-        tx = self._take_tx()
-        self._closed.append(answer_apart(tx, seen, verdict, other, error))
+        tx = self._held.take_tx()
+        self._held.closed.append(answer_apart(tx, seen, verdict, other, error))
         return Placement(seen.no, tx, Role.RESPONSE, source=seen.unit)
 
     def _echo(self, seen: Seen, error: str | None = None) -> Placement:
-        original = self._open or self._last
+        original = self._held.open or self._held.last
         assert original is not None  # an echo is of something
         original.echoed = True
-        tx = self._take_tx()
-        self._closed.append(echo_of(tx, seen, original, error))
+        tx = self._held.take_tx()
+        self._held.closed.append(echo_of(tx, seen, original, error))
         role = Role.BROADCAST if original.unit == BROADCAST else Role.REQUEST
         return Placement(seen.no, tx, role, destination=original.unit)
-
-    def _expire(self, now: int) -> None:
-        limit = GIVE_UP if self.timeout is None else self.timeout * 3 // 2
-        request = self._open
-        if request is None or now < request.last_end + limit:
-            return
-        if request.copies:
-            self._finish_copies(request, None)
-        else:
-            self._close_open()
-
-    def _close_open(self, verdict: Verdict | None = None) -> None:
-        """Close the open request, that no good answer came to."""
-        request = self._open
-        if request is None:
-            return
-        self._open, self._last = None, request
-        if verdict is None:
-            if request.fault:
-                verdict = Verdict.DAMAGED_REQUEST
-            elif request.silent:
-                verdict = Verdict.DATA
-            elif request.garble:
-                verdict = Verdict.DAMAGED_ANSWER
-            elif request.after_broadcast:
-                error = f"unit {request.unit} answered a broadcast"
-                self._closed.append(answer_apart(request.tx, request.request, Verdict.UNSOLICITED, None, error))
-                return
-            elif request.may_be_answer or (request.echoed and not request.sure and not self._echoing):
-                verdict = Verdict.UNDECIDED
-            elif request.remark is _FIRST_SEEN and request.tx == 1:
-                verdict = Verdict.OPEN
-            else:
-                verdict = of_chain([*self._chain, request], self.learnt) if self._chain else Verdict.NO_RESPONSE
-        self._drop_chain(Verdict.UNDECIDED if verdict is Verdict.UNDECIDED else Verdict.NO_RESPONSE)
-        if verdict is Verdict.NO_RESPONSE:
-            self._given_up.append(request)
-        self._closed.append(request.close(verdict))
-
-    def _drop_chain(self, verdict: Verdict) -> None:
-        """Close the requests that waited for the open one, in the order they came."""
-        for request in self._chain:
-            if verdict is Verdict.NO_RESPONSE:
-                self._given_up.append(request)
-            self._closed.append(request.close(verdict))
-        self._chain.clear()
-
-    def _finish_copies(self, request: Exchange, following: Seen | None) -> None:
-        """Close a request with frames that are its answer or its repeats, or leave it to what will be learnt."""
-        self._open, self._last = None, request
-        verdict = None
-        if following is not None:
-            resembles = following.octets[:2] == request.octets[:2] and len(following.octets) == len(request.octets)
-            verdict = of_next(request, following.frame.start, resembles, self.learnt)
-        elif len(request.copies) > 1:
-            verdict = of_run(request)
-        if verdict is Verdict.ANSWERED and self._only == request.octets:
-            verdict = Verdict.UNDECIDED  # where nothing else is said, an answer may have been the first frame
-        if verdict is None:
-            self._doubts.add(request)
-        else:
-            self._close_doubt(request, verdict)
-
-    def _close_doubt(self, request: Exchange, verdict: Verdict) -> None:
-        if verdict is Verdict.ANSWERED:
-            answer = request.copies[0]
-            request.answered = True
-            self.learnt.answered(request.unit, request.pace, request.gap(answer.frame.start))
-            self._closed.append(request.close_with(answer, None))
-            return
-        if verdict is Verdict.NO_RESPONSE:
-            self._given_up.append(request)
-        self._closed.append(request.close(verdict))
-
-    def _decide_doubts(self, now: int | None) -> None:
-        for request, verdict in self._doubts.decide(now):
-            self._close_doubt(request, verdict)
-
-    def _take_closed(self) -> tuple[Transaction, ...]:
-        closed, self._closed = tuple(self._closed), []
-        return closed
-
-    def _take_tx(self) -> int:
-        tx = self._next_tx
-        self._next_tx += 1
-        return tx

@@ -108,11 +108,6 @@ class Reading:
             and self.marked <= MARKED_MOST
         )
 
-    @property
-    def wrong_share(self) -> float:
-        """About how likely it is that chance alone made it; 2^-bits, at least 1e-9."""
-        return float(max(1e-9, math.pow(2.0, -max(0.0, self.bits))))
-
 
 class Evidence:
     """One stay at one candidate: all protocols side by side."""

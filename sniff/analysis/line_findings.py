@@ -45,7 +45,8 @@ class LineFindings:
         self._session = session
         self._patterns = TimePatterns(session)
         self._use = LineUse(session.line)
-        self._senders = Senders(session.timing, "whole" in session.adapter.detail)
+        adapter = session.adapter
+        self._senders = Senders(session.timing, "whole" in adapter.detail if adapter.reports is not None else None)
         self._octets = self._in_frames = self._marked = self._rows = self._frames = self._good = 0
         self._first = self._now = 0
         self._damaged = self._damaged_here = 0  # rows that are no good frame, and those of them with an overrun
@@ -57,6 +58,7 @@ class LineFindings:
         self._lost_octets = self._rest_octets = self._only_heard = 0
         self._echo, self._asked = Tally(), 0
         self._values: Counter[int] = Counter()
+        self._before_ok = True  # the newest frame
         self._awaiting = False  # a request was the newest frame of a known kind
         self._pending: list[tuple[int, Noise]] = []  # noise directly before the frame to come
         self._sample: list[Chunk] = []  # what came first, to ask what else it may be
@@ -82,6 +84,7 @@ class LineFindings:
         if self._sampled < SAMPLE_OCTETS:
             self._sample.append(Chunk(event.end, event.octets[:SAMPLE_OCTETS], event.marks))
             self._sampled += len(event.octets)
+        self._senders.see_marks(event)
         if event.marks:
             self._see_marks(row.no, event)
         if not isinstance(event, Frame) or not event.ok:
@@ -144,6 +147,7 @@ class LineFindings:
             sender = "bus"  # nobody was asked: it may be anything
         self._awaiting = role is Role.REQUEST or (self._awaiting and role is not Role.RESPONSE)
         self._frames += 1
+        self._before_ok = frame.ok
         if frame.ok:
             self._good += 1
             self._in_frames += len(frame.octets)
@@ -159,7 +163,8 @@ class LineFindings:
             return
         if self._rows == 1:  # the capture began in the middle of something
             return
-        if len(noise.octets) > STRAY_MOST:
+        of_damaged = noise.place is Place.AFTER and not self._before_ok  # where a damaged frame ends nobody knows
+        if len(noise.octets) > STRAY_MOST or of_damaged:
             self._rest.add(noise.start, no)
             self._rest_octets += len(noise.octets)
             if len(self._rests) < MOST_RESTS and len(noise.octets) <= 300:
@@ -196,8 +201,7 @@ class LineFindings:
             return (*made, self._whole("LN002", "bus", "not one octet was heard"))
         if self.rubbish:
             return (*made, self._rubbish())
-        many = 2 if self._senders.packets else 10  # where one flag marks a whole packet, few errors mark many octets
-        if many * self._marked > self._octets and 10 * self._in_frames >= 8 * self._octets:
+        if self._senders.are_all_struck(self._marked, self._octets) and 10 * self._in_frames >= 8 * self._octets:
             made.append(self._parity_setting())
         else:
             made += self._wrong_octets()

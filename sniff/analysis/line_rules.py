@@ -12,7 +12,21 @@ from dissectors.findings import Rule, Severity
 
 _WIRING = "termination at both ends and nowhere else, one fail-safe bias, A and B, ground"
 
-_DAMAGE = ("LN1", "LN2", "MB002", "MB005", "MB006", "MB007", "MB009", "MB104", "MB401", "N2004", "N2010", "MS4")
+_DAMAGE = (
+    "LN1",
+    "LN2",
+    "MB002",
+    "MB005",
+    "MB006",
+    "MB007",
+    "MB009",
+    "MB104",
+    "MB401",
+    "N2004",
+    "N2005",
+    "N2010",
+    "MS4",
+)
 """What damage to frames is told by, in every protocol."""
 
 _ALL = (
@@ -51,7 +65,8 @@ _ALL = (
         "LN004",
         Severity.ERROR,
         "parity set differently from the bus",
-        "Over 1 in 10 octets with a parity or framing error, while at least 8 in 10 octets are in good frames.",
+        "Over 1 in 10 octets with a parity or framing error, whoever sends (a sender that is struck far more than the "
+        "others aside), while at least 8 in 10 octets are in good frames.",
         "the port listens with another parity than the bus has; frames get through by their check alone",
         "the parity of the bus (8E1, 8O1, 8N1, 8N2), and set it with -s",
     ),
@@ -88,8 +103,9 @@ _ALL = (
         "the master). A single one, or fewer than 1 frame in 100 and at most two a minute, is only noted. A sender is "
         "named that is struck clearly more often than the octets that it sends explain (2.5 times the rate of the "
         "other stations, by chance less than once in a thousand); else one finding names the bus. Where one flag "
-        "covers a whole packet, damaged frames count, and packets with a flag: a station is named that is in nearly "
-        "all of them while the others are mostly in packets without one.",
+        "covers a whole packet (the adapter says so, or in a capture that does not name it the marks: they go on in "
+        "long runs through good frames), damaged frames count, and packets with a flag: a station is named that is in "
+        "nearly all of them while the others are mostly in packets without one.",
         "noise while this station sends, weak levels from it, or two that send at once",
         "this station's connector, stub and ground; " + _WIRING,
     ),
@@ -118,7 +134,7 @@ _ALL = (
         "is damaged is so without an overrun.",
         "an adapter or computer that is too slow for this baud rate; the bus itself may be in order",
         "another adapter; fewer programs on the computer; a UART with a FIFO",
-        explains=(*_DAMAGE, "MB003", "N2005"),
+        explains=(*_DAMAGE, "MB003"),
     ),
     Rule(
         "LN201",
@@ -156,9 +172,9 @@ _ALL = (
         "LN204",
         Severity.WARNING,
         "octets that are no frame",
-        "Stretches of four octets or more that are no frame, 1 in 50 octets or more of all. A smaller share is only "
-        "noted. Said is where they are another protocol's frames with good checks, where they are always the same, and "
-        "where they were sent with a slower baud rate.",
+        "Stretches of four octets or more that are no frame, and what follows a damaged frame: 1 in 50 octets or more "
+        "of all. A smaller share is only noted. Said is where they are another protocol's frames with good checks, "
+        "where they are always the same, and where they were sent with a slower baud rate.",
         "damaged frames beyond recognition, another protocol on the same line, or a device with another baud rate",
         "what the stretches have in common: their place, time and first octets",
     ),

@@ -11,8 +11,9 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 
 from dissectors.findings import Finding, Severity, Tally, counted, times
-from dissectors.frame import Frame, LineError, Mark, Noise
+from dissectors.frame import Event, Frame, LineError, Mark, Noise
 from dissectors.line import Timing
+from sniff.analysis.flag_runs import FlagRuns
 from sniff.analysis.line_rules import LINE_RULES as RULES
 from sniff.analysis.shares import UNLIKELY, at_least, standing_out
 
@@ -36,7 +37,9 @@ class Sender:
     frames: int = 0
     octets: int = 0
     flagged: int = 0
+    marked: int = 0  # octets with an error
     wrong: Tally = field(default_factory=Tally)
+    spoilt: Tally = field(default_factory=Tally)  # those of them that are no good frames
     at: Counter[str] = field(default_factory=Counter)  # place of the wrong octets in the frame
     stray: dict[str, Tally] = field(default_factory=dict)  # by rule
     values: Counter[tuple[str, int]] = field(default_factory=Counter)  # of those octets, by rule
@@ -44,10 +47,12 @@ class Sender:
 
 
 class Senders:
-    """All senders of a bus. `packets`: an error flag is somewhere among the octets marked (USB packets)."""
+    """All senders of a bus. `packets`: whether an error flag is somewhere among the octets marked (USB packets); None
+    where the capture does not say, and the marks must."""
 
-    def __init__(self, timing: Timing, packets: bool) -> None:
-        self.packets = packets
+    def __init__(self, timing: Timing, packets: bool | None) -> None:
+        self._packets = packets
+        self._runs = FlagRuns()
         self.beside = timing.latency <= timing.t35  # else octets beside a frame may be far from it
         self._near = timing.latency + NEAR * timing.char
         self._end = 0  # of the frame before
@@ -59,6 +64,16 @@ class Senders:
         self._goes_on = False
         self._flagged: Counter[frozenset[str]] = Counter()
         self._flags = Tally()
+
+    @property
+    def packets(self) -> bool:
+        """Whether an error flag is somewhere among the octets marked."""
+        return self._runs.cover_reads if self._packets is None else self._packets
+
+    def see_marks(self, event: Event) -> None:
+        """Take any row, for what its marks tell of the adapter."""
+        marked = [mark.offset for mark in event.marks if mark.error & WRONG]
+        self._runs.see(marked, len(event.octets), isinstance(event, Frame) and event.ok)
 
     def of(self, name: str) -> Sender:
         """A sender; one beyond the limit is not kept."""
@@ -76,12 +91,13 @@ class Senders:
         sender.octets += len(frame.octets)
         self.frames += 1
         wrong = [mark for mark in frame.marks if mark.error & WRONG]
-        if self.packets:
-            self._see_packet(name, no, frame, wrong)
-        if wrong and not (self.packets and frame.ok):
+        self._see_packet(name, no, frame, wrong)
+        sender.marked += len(wrong)
+        if wrong:
             sender.wrong.add(frame.start, no)
-            if not self.packets:
-                sender.at.update(_place(frame, mark) for mark in wrong)
+            sender.at.update(_place(frame, mark) for mark in wrong)
+        if wrong and not frame.ok:
+            sender.spoilt.add(frame.start, no)
         breaks = sum(bool(mark.error & LineError.BREAK) for mark in frame.marks)
         for _ in range(min(breaks, 1) if self.packets else breaks):
             sender.breaks.add(frame.start, no)
@@ -120,11 +136,25 @@ class Senders:
 
     # ---- judging
 
+    def are_all_struck(self, marked: int, octets: int) -> bool:
+        """Whether so many of all octets are marked as a wrong setting of the port marks: whoever sends."""
+        many = 2 if self.packets else 10  # where one flag marks a whole packet, few errors mark many octets
+        if many * marked <= octets:
+            return False
+        known = {name: one for name, one in self.by_name.items() if name != BUS}
+        out = standing_out({name: (one.marked, float(one.octets)) for name, one in known.items()}, MASTER)
+        rest = [one for name, one in known.items() if name not in out]
+        return not out or many * sum(one.marked for one in rest) > sum(one.octets for one in rest)
+
+    def _wrong(self, record: Sender) -> Tally:
+        """Frames with an error in them: of those in a packet with a flag, only the damaged ones surely have it."""
+        return record.spoilt if self.packets else record.wrong
+
     def wrong_octets(self, note_if: NoteIf) -> Iterator[Finding]:
         """Line errors at the senders that have more than their share, the rest at the bus."""
-        struck = {name: record for name, record in sorted(self.by_name.items()) if record.wrong.count}
+        struck = {name: record for name, record in sorted(self.by_name.items()) if self._wrong(record).count}
         known = {name: one for name, one in self.by_name.items() if name != BUS}
-        out = standing_out({name: (one.wrong.count, float(one.octets)) for name, one in known.items()}, MASTER)
+        out = standing_out({name: (self._wrong(one).count, float(one.octets)) for name, one in known.items()}, MASTER)
         rest = {name: record for name, record in struck.items() if name not in out}
         if len(rest) > 1:
             yield self._wrong_everywhere(rest, note_if)
@@ -139,11 +169,12 @@ class Senders:
 
     def _wrong_of(self, name: str, record: Sender, note_if: NoteIf) -> Finding:
         kinds = "line errors somewhere in" if self.packets else "parity or framing errors in"
-        words = f"{kinds} {record.wrong.count} of {counted(record.frames, 'frame')}"
-        if record.at:
+        wrong = self._wrong(record)
+        words = f"{kinds} {wrong.count} of {counted(record.frames, 'frame')}"
+        if record.at and not self.packets:
             words += f" ({', '.join(f'{count} {place}' for place, count in record.at.most_common())})"
-        finding = record.wrong.found(RULES["LN101"], name, words, note_if(record.wrong.count, record.frames))
-        if 4 * record.at["at the last octet"] >= 3 * sum(record.at.values()) > 8:
+        finding = wrong.found(RULES["LN101"], name, words, note_if(wrong.count, record.frames))
+        if not self.packets and 4 * record.at["at the last octet"] >= 3 * sum(record.at.values()) > 8:
             finding = replace(
                 finding,
                 means="the station releases its driver before the last octet is out",
@@ -153,8 +184,9 @@ class Senders:
 
     def _wrong_everywhere(self, struck: dict[str, Sender], note_if: NoteIf) -> Finding:
         """One finding in place of one for each sender."""
-        tally = together(record.wrong for record in struck.values())
-        each = ", ".join(f"{'unknown' if name == BUS else name} {one.wrong.count}" for name, one in struck.items())
+        tally = together(self._wrong(record) for record in struck.values())
+        counts = {"unknown" if name == BUS else name: self._wrong(one).count for name, one in struck.items()}
+        each = ", ".join(f"{name} {count}" for name, count in counts.items())
         words = f"parity or framing errors in {tally.count} of {self.frames} frames, whoever sends ({each})"
         return replace(
             tally.found(RULES["LN101"], BUS, words, note_if(tally.count, self.frames)),

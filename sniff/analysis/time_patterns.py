@@ -32,6 +32,9 @@ MAINS = {20 * MS: "50 Hz", 10 * MS: "twice 50 Hz", 50 * MS // 3: "60 Hz", 25 * M
 HUM_LEAST = 15
 HUM_LOCKED = 0.7
 HUM_OWN = 0.35
+STRUCK_LEAST = 5
+"""So many disturbances of known senders' frames tell whether they strike whoever sends."""
+
 HUM_SPAN = 2 * NS_PER_S  # over longer the mains drift
 SAME = 4 * MS  # what follows sooner is the same disturbance
 
@@ -282,7 +285,7 @@ class TimePatterns:
     def _in_step_with_mains(self) -> Iterator[Finding]:
         if self._steps < HUM_LEAST:
             return
-        if 3 * max(self._apart.values()) > self._steps or 10 * max(self._struck.values()) > 9 * self._struck.total():
+        if 3 * max(self._apart.values()) > self._steps or self._is_of_one_sender():
             return  # one rhythm of the bus, or one sender's
         for period, words in MAINS.items():
             if 6 * self._latency > period:
@@ -300,6 +303,16 @@ class TimePatterns:
             )
             yield self._hum.found(RULES["LN301"], "bus", seen)
             return
+
+    def _is_of_one_sender(self) -> bool:
+        """Whether nearly all that is disturbed is one sender's, or that of somebody who is not known.
+
+        Where frames of several known ones are struck, the rest needs no sender: hum in silence is beside nobody.
+        """
+        known = Counter({name: count for name, count in self._struck.items() if name != "bus"})
+        if known.total() >= STRUCK_LEAST and 10 * max(known.values()) <= 9 * known.total():
+            return False
+        return 10 * max(self._struck.values()) > 9 * self._struck.total()
 
     def _in_bursts(self) -> Iterator[Finding]:
         """All bursts; where single errors lie between them, those of several."""

@@ -3,7 +3,8 @@
     python -m tests.bench.crc_zero_sweep [EXCHANGES]       (default 300 for each function)
 
 Three ways: each exchange as a capture of its own; all of a function in a row; requests alone, which nobody answers.
-Printed are frames whose limits were wrong, and frames whose limits were right and whose direction the tracker missed.
+Printed are frames whose limits were wrong; frames whose limits were right and whose direction the tracker missed; and
+those whose direction it left open (answered or repeated), as it must where nothing on the bus tells.
 What is only ever confirmed by a copy of the request (functions 5, 6, 8, 21, 22) tells no direction where an adapter
 hides the times; beside a poll that teaches them it must be right.
 """
@@ -38,12 +39,12 @@ def _beside_polls(sent: list[tuple[bytes, bytes]]) -> Iterator[tuple[bytes, byte
 
 def sweep(count: int) -> None:
     """Print a line for each way, bus and adapter."""
-    print(f"{'':44}{'exchanges':>10}{'limits':>8}{'direction':>11}")
+    print(f"{'':44}{'exchanges':>10}{'limits':>8}{'direction':>11}{'open':>8}")
     for way in ("alone", "in a row", "beside polls", "not answered"):
         for adapter in ADAPTERS:
             for name, pace in PACES.items():
                 for line in LINES:
-                    tried, limits, directions = 0, 0, 0
+                    tried, limits, directions, left_open = 0, 0, 0, 0
                     for code in (*CODES, *VENDOR_CODES):
                         sent = list(exchanges_with_zeros(code, random.Random(f"{code} {line} {name}"), count))
                         if way == "not answered":
@@ -56,11 +57,14 @@ def sweep(count: int) -> None:
                         for run in runs:
                             wrong = misread(run, line, pace, adapter)
                             limits += sum(" read as " in each for each in wrong)
-                            directions += sum(" taken for " in each for each in wrong)
+                            is_open = sum(" taken for a either" in each for each in wrong)
+                            directions += sum(" taken for " in each for each in wrong) - is_open
+                            left_open += is_open
                             for each in wrong[:1]:
                                 if " read as " in each:
                                     print("   ", each)
-                    print(f"{way:14}{adapter:8}{name:8}{line:14}{tried:10}{limits:8}{directions:11}", flush=True)
+                    found = f"{tried:10}{limits:8}{directions:11}{left_open:8}"
+                    print(f"{way:14}{adapter:8}{name:8}{line:14}{found}", flush=True)
 
 
 if __name__ == "__main__":

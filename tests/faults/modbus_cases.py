@@ -122,6 +122,12 @@ MODBUS_CASES: tuple[Case, ...] = (
         CH340,
     ),
     Case(
+        "ASCII line feed of one station lost",
+        partial(_ascii, (Trimmed("unit 2", last=1, rate=0.5),)),
+        (Said(_second, ("MB019",)),),
+        never=("MB202", "LN202"),
+    ),
+    Case(
         "ASCII first character of one station lost",
         partial(_ascii, (Trimmed("unit 2", first=1, rate=0.5),)),
         (Said(_second, ("MB005",), _FIRST),),
@@ -296,6 +302,17 @@ MODBUS_CASES: tuple[Case, ...] = (
         ),
         (("MB203", "bus"),),
         struck=("master",),
+    ),
+    Case(
+        "RTU two masters often meet at one station",
+        Modbus(
+            usual_requests(_FOUR),
+            usual_stations(_FOUR),
+            others={"second master": partial(_two_masters, _FOUR, 610 * MS, False)},
+        ),
+        (("MB203", "bus"),),
+        struck=("master",),
+        seeds=4,
     ),
     Case(
         "ASCII two masters ask the same by two clocks",

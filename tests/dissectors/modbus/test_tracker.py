@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from dissectors.frame import Role
-from dissectors.modbus.tracker import GIVE_UP
+from dissectors.modbus.exchanges import GIVE_UP
 from dissectors.tracker import Interval, Verdict
 
 READ, VALUES = "010325200002", "01030425202521"

@@ -1,0 +1,70 @@
+"""Whether a copy of a request is its echo: given back at once, sooner than a station can answer or a master repeat.
+
+A bus with an echo (a converter or adapter that hears itself) gives back every request; most buses none.
+"""
+
+from __future__ import annotations
+
+from dissectors.line import Timing
+from dissectors.modbus.exchange import Exchange, Seen, is_begin_of
+from dissectors.modbus.functions import BROADCAST
+from dissectors.modbus.learnt import Learnt
+from dissectors.modbus.promptness import AT_ONCE
+
+_ECHO_VOTES = 4
+"""Answered requests with an echo, or without, that count at most against what is seen now."""
+
+
+class Echoes:
+    """What is known of echoes on one bus.
+
+    `silence`: ns, the shortest time in which a station can begin an answer. `limit`: ns, within which a copy is no
+    answer. `usual`: whether this bus repeats requests at once; None while unlearnt.
+    """
+
+    def __init__(self, timing: Timing, silence: int, learnt: Learnt) -> None:
+        self._timing = timing
+        self._silence = silence
+        self._learnt = learnt
+        self.limit = max(silence, timing.char + timing.latency)
+        self.usual: bool | None = None
+        self._votes = 0  # answered requests with an echo, less those without
+
+    def is_of_request(self, newest: Exchange | None, seen: Seen) -> bool:
+        """Whether a sure request repeats the newest one at once; a master repeats only after its timeout."""
+        if newest is None or newest.octets != seen.octets or newest.answered or newest.fault:
+            return False
+        gap = newest.gap(seen.frame.start)
+        if self._learnt.timeout is not None:
+            return gap < self.limit or gap * 8 < self._learnt.timeout
+        return gap < self.limit or (gap < AT_ONCE and newest.unit != BROADCAST)
+
+    def is_of_write(self, request: Exchange, seen: Seen) -> bool:
+        """Whether a copy that could be an answer comes too soon to be one."""
+        latency = request.latency(seen.frame)
+        if request.echoed or latency.low > self.limit:
+            return False
+        if self.usual is not None:
+            return self.usual
+        if not latency.nominal:
+            return False  # both came in one read, which says nothing of the time between
+        if latency.high < self._silence:
+            return True
+        fastest = self._learnt.fastest(request.unit)
+        return fastest is not None and latency.nominal + self._timing.char < fastest // 2
+
+    def is_cut(self, request: Exchange, octets: bytes, start: int) -> bool:
+        """Whether octets are the begin of the request, given back at once and cut short."""
+        if not is_begin_of(octets, request.request.frame.octets):
+            return False
+        gap = request.gap(start)
+        return gap < self.limit or (gap < AT_ONCE and request.sure)
+
+    def learn(self, echoed: bool) -> None:
+        """One more request that a station answered, with its copy before the answer or without. One says little where
+        many were otherwise: a late read puts a repeat directly behind the request."""
+        if self.usual is None or (echoed and not self._votes):
+            self.usual = echoed
+        self._votes = max(-_ECHO_VOTES, min(_ECHO_VOTES, self._votes + (1 if echoed else -1)))
+        if self._votes:
+            self.usual = self._votes > 0

@@ -1,0 +1,149 @@
+"""The exchanges of a bus: the open one, those that wait with it or came before it, and how each closes."""
+
+from __future__ import annotations
+
+from collections import deque
+
+from dissectors.line import NS_PER_S
+from dissectors.modbus.doubts import Doubts, of_chain, of_next, of_run
+from dissectors.modbus.echoes import Echoes
+from dissectors.modbus.exchange import Exchange, Seen, answer_apart
+from dissectors.modbus.learnt import Learnt
+from dissectors.modbus.pairing import mismatch
+from dissectors.tracker import Transaction, Verdict
+
+GIVE_UP = 5 * NS_PER_S
+"""An unanswered request is closed after 5 s of nothing while the master's timeout is unlearnt."""
+
+FIRST_SEEN = "the first frame of the capture: perhaps an answer whose request came before"
+"""The remark on a first request that has the shape of an answer."""
+
+
+class Exchanges:
+    """Bounded: one open exchange, a short chain of equal requests before it, and the last few that closed.
+
+    `last`: the exchange that closed last. `answered`, `given_up`: the newest of each. `chain`: equal requests before
+    the open one, whose verdicts wait for it. `closed`: by the event under way. `only`: what all frames so far say;
+    empty when they differ.
+    """
+
+    def __init__(self, learnt: Learnt, echoes: Echoes) -> None:
+        self._learnt = learnt
+        self._echoes = echoes
+        self._doubts = Doubts(learnt)
+        self._next_tx = 1
+        self.closed: list[Transaction] = []
+        self.open: Exchange | None = None
+        self.last: Exchange | None = None
+        self.answered: deque[Exchange] = deque(maxlen=4)
+        self.given_up: deque[Exchange] = deque(maxlen=8)
+        self.chain: list[Exchange] = []
+        self.only: bytes | None = None
+
+    def expire(self, now: int) -> None:
+        """Close the open request when nothing has come until `now`, well beyond the master's timeout."""
+        limit = GIVE_UP if self._learnt.timeout is None else self._learnt.timeout * 3 // 2
+        request = self.open
+        if request is None or now < request.last_end + limit:
+            return
+        if request.copies:
+            self.finish_copies(request, None)
+        else:
+            self.close_open()
+
+    def close_open(self, verdict: Verdict | None = None) -> None:
+        """Close the open request, that no good answer came to."""
+        request = self.open
+        if request is None:
+            return
+        self.open, self.last = None, request
+        if verdict is None:
+            if request.fault:
+                verdict = Verdict.DAMAGED_REQUEST
+            elif request.silent:
+                verdict = Verdict.DATA
+            elif request.garble:
+                verdict = Verdict.DAMAGED_ANSWER
+            elif request.after_broadcast:
+                error = f"unit {request.unit} answered a broadcast"
+                self.closed.append(answer_apart(request.tx, request.request, Verdict.UNSOLICITED, None, error))
+                return
+            elif request.may_be_answer or (request.echoed and not request.sure and not self._echoes.usual):
+                verdict = Verdict.UNDECIDED
+            elif request.remark is FIRST_SEEN and request.tx == 1:
+                verdict = Verdict.OPEN
+            else:
+                verdict = of_chain([*self.chain, request], self._learnt) if self.chain else Verdict.NO_RESPONSE
+        self.drop_chain(Verdict.UNDECIDED if verdict is Verdict.UNDECIDED else Verdict.NO_RESPONSE)
+        if verdict is Verdict.NO_RESPONSE:
+            self.given_up.append(request)
+        self.closed.append(request.close(verdict))
+
+    def drop_chain(self, verdict: Verdict) -> None:
+        """Close the requests that waited for the open one, in the order they came."""
+        for request in self.chain:
+            if verdict is Verdict.NO_RESPONSE:
+                self.given_up.append(request)
+            self.closed.append(request.close(verdict))
+        self.chain.clear()
+
+    def finish_copies(self, request: Exchange, following: Seen | None) -> None:
+        """Close a request with frames that are its answer or its repeats, or leave it to what will be learnt."""
+        self.open, self.last = None, request
+        verdict = None
+        if following is not None:
+            resembles = following.octets[:2] == request.octets[:2] and len(following.octets) == len(request.octets)
+            verdict = of_next(request, following.frame.start, resembles, self._learnt)
+        elif len(request.copies) > 1:
+            verdict = of_run(request)
+        if verdict is Verdict.ANSWERED and self.only == request.octets:
+            verdict = Verdict.UNDECIDED  # where nothing else is said, an answer may have been the first frame
+        if verdict is None:
+            self._doubts.add(request)
+        else:
+            self._close_doubt(request, verdict)
+
+    def _close_doubt(self, request: Exchange, verdict: Verdict) -> None:
+        if verdict is Verdict.ANSWERED:
+            answer = request.copies[0]
+            request.answered = True
+            self._learnt.answered(request.unit, request.pace, request.gap(answer.frame.start))
+            self.closed.append(request.close_with(answer, None))
+            return
+        if verdict is Verdict.NO_RESPONSE:
+            self.given_up.append(request)
+        self.closed.append(request.close(verdict))
+
+    def decide_doubts(self, now: int | None) -> None:
+        """Close what the bus has shown enough for; with None all that was left open."""
+        for request, verdict in self._doubts.decide(now):
+            self._close_doubt(request, verdict)
+
+    def take_closed(self) -> tuple[Transaction, ...]:
+        """The transactions that closed since, in order."""
+        closed, self.closed = tuple(self.closed), []
+        return closed
+
+    def take_tx(self) -> int:
+        """The number of the next transaction."""
+        tx = self._next_tx
+        self._next_tx += 1
+        return tx
+
+    def late_for(self, seen: Seen) -> Exchange | None:
+        """The newest request given up lately that this answer fits."""
+        patience = 3 * (self._learnt.timeout or GIVE_UP)
+        for request in reversed(self.given_up):
+            if request.gap(seen.frame.start) > patience:
+                return None
+            if request.is_for(seen.octets) and mismatch(request.octets, seen.octets) is None:
+                return request
+        return None
+
+    def repeats(self, request: Exchange, seen: Seen) -> Exchange | None:
+        """The request answered lately that an answer fits which comes sooner than the station has ever answered."""
+        fastest = self._learnt.fastest(request.unit)
+        if fastest is None or request.latency(seen.frame).high >= fastest:
+            return None
+        fitting = (before for before in reversed(self.answered) if before.is_for(seen.octets) and not before.fault)
+        return next((before for before in fitting if mismatch(before.octets, seen.octets) is None), None)

@@ -1,0 +1,52 @@
+"""Whether a frame comes when an answer to the open request would, by the times that this bus has shown."""
+
+from __future__ import annotations
+
+from dissectors.modbus.exchange import Exchange, Seen
+from dissectors.modbus.functions import BROADCAST, FUNCTIONS
+from dissectors.modbus.learnt import READ, Learnt
+
+AT_ONCE = 50_000_000
+"""ns; no master repeats a request sooner, unless its timeout is known to be that short."""
+
+
+class Promptness:
+    """Compares times with what was learnt. `silence`: ns, the shortest time in which a station can begin an answer."""
+
+    def __init__(self, learnt: Learnt, silence: int) -> None:
+        self._learnt = learnt
+        self._silence = silence
+
+    def in_time(self, request: Exchange, seen: Seen) -> bool:
+        """Whether it comes within the time in which that station answers."""
+        return self._learnt.in_time(request.unit, request.pace, request.gap(seen.frame.start))
+
+    def knows(self, request: Exchange) -> bool:
+        """Whether that station's response times are learnt."""
+        return self._learnt.response_limit(request.unit, request.pace) is not None
+
+    def is_prompt(self, request: Exchange, seen: Seen) -> bool:
+        """Whether it comes as soon as answers of that station are known to come, or sooner than any master goes on."""
+        limits = (self._learnt.response_limit(request.unit, pace) for pace in (request.pace, READ))
+        limit = max((limit for limit in limits if limit is not None), default=AT_ONCE)
+        return request.gap(seen.frame.start) <= limit
+
+    def is_doubtful(self, request: Exchange, seen: Seen) -> bool:
+        """Whether a frame that comes late, for all that is learnt, may be the answer of a slow station."""
+        if self.knows(request) or self._learnt.timeout is not None or request.garble or request.fault or request.silent:
+            return False
+        if request.unit == BROADCAST:
+            return False
+        return request.octets == seen.octets or seen.header.function not in FUNCTIONS
+
+    def is_too_soon(self, request: Exchange, seen: Seen) -> bool:
+        """Whether it began before the station can have seen the end of this repeat: it answers an earlier attempt."""
+        soonest = request.latency(seen.frame).high
+        return request.attempt > 1 and soonest < self._silence
+
+    def is_repeat_after_damage(self, request: Exchange, seen: Seen, echoing: bool | None) -> bool:
+        """Whether a copy of a request comes well behind a damaged answer to it, with no learnt time that would make it
+        the answer: a master that repeats is far more frequent than a second station with the same address."""
+        if request.garble is None or self.knows(request) or echoing:
+            return False
+        return seen.frame.start - request.garble.end >= self._learnt.too_soon(self._silence)
