@@ -8,8 +8,8 @@ Every place where a frame could begin is looked at by itself, as `framing.py` wo
                   no other preamble stands in it
 
 What is left out, and so doubtful: all else that is damaged, what could be repaired, lengths over the limits, frames
-with a trailing pad, frames with proved silence of 100 ms inside (or of Tframe_abort and a good header), marked reads, and
-the last frame, which more octets may change.
+with a trailing pad, frames with proved silence of 100 ms inside (or of Tframe_abort and a good header), marked reads,
+and the last frame, which more octets may change.
 """
 
 from __future__ import annotations

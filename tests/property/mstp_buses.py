@@ -196,3 +196,70 @@ def recut(chunks: Sequence[Chunk], char: int, dice: random.Random) -> list[Chunk
         else:
             given.append(chunk)
     return given
+
+
+def conversation(dice: random.Random, frames: int) -> list[Chunk]:
+    """Stations that ask, answer, repeat, postpone, pass tokens and fall silent in any order, some behind a router."""
+    now, chunks = START, []
+    asked: list[tuple[int, int, int, bytes, bytes]] = []
+    pauses = (0, 1, 2, 3, 5, 10, 20, 30)
+    odd_pauses = (300, 499, 500, 501, 900, 2_500, 11_000, 61_000)
+
+    def request(client: int, server: int) -> bytes:
+        invoke, service = dice.randrange(4), dice.choice((12, 15))
+        there = dice.choice((b"", b"", b"\x00\x07\x01\x63"))
+        apdu = bytes((0, 5, invoke, service)) + dice.choice((b"", _object(0x0C, 7) + b"\x19\x55"))
+        asked.append((client, server, invoke, bytes((service,)), there))
+        control = 0x0C if there else 0x04
+        return frame(dice.choice((5, 5, 5, 5, 6)), server, client, bytes((1, control)) + there + apdu)
+
+    def answer(which: tuple[int, int, int, bytes, bytes]) -> bytes:
+        client, server, invoke, service, there = which
+        kind = dice.randrange(12)
+        apdu = bytes((0x30, invoke)) + service + _object(0x0C, 7)
+        if kind == 0:
+            apdu = bytes((0x50, invoke)) + service + b"\x91\x01\x91\x1f"
+        elif kind == 1:
+            apdu = bytes((dice.choice((0x60, 0x70, 0x71)), invoke, 2))
+        elif kind == 2:
+            apdu = bytes((0x20, invoke)) + service
+        elif kind == 3:
+            return frame(7, client, server)
+        elif kind == 4:
+            more = dice.choice((0x3C, 0x38))
+            apdu = bytes((more, invoke, dice.randrange(3), 2)) + service + b"\x11\x22"
+        elif kind == 5:
+            apdu = bytes((0x40 | dice.randrange(2), invoke, dice.randrange(3), 2))
+        control = b"\x20" + there + b"\xff" if there else b"\x00"
+        return frame(dice.choice((6, 6, 6, 5)), client, server, b"\x01" + control + apdu)
+
+    said = b""
+    while len(chunks) < frames:
+        station, other = dice.sample((1, 2, 3, 9), 2)
+        choice = dice.randrange(20)
+        if choice < 5:
+            said = frame(0, other, station)
+        elif choice < 7:
+            said = frame(1, other, station)
+        elif choice == 7:
+            said = frame(2, other, station)
+        elif choice < 11:
+            said = request(station, other)
+        elif choice < 15 and asked:
+            said = answer(asked[-1] if dice.random() < 0.85 else dice.choice(asked[-6:]))
+        elif choice == 15:
+            said = frame(dice.choice((5, 6, 6)), dice.choice((255, other)), station, b"\x01\x00\x10\x08")
+        elif choice == 16:
+            said = frame(dice.choice((3, 4, 7, 130)), other, station, b"\x01\x02")
+        elif choice == 17 and said:
+            pass  # the same again
+        elif choice == 18:
+            said = frame(1, 1, 2) if dice.random() < 0.5 else frame(2, 2, 1)
+        octets = said
+        if dice.random() < 0.04:
+            at = dice.randrange(len(octets))
+            octets = _with_bad_header(octets, at, 1 << dice.randrange(8))
+        pause = dice.choice(odd_pauses if dice.random() < 0.06 else pauses)
+        now += pause * MS + len(octets) * Timing(LINE).char
+        chunks.append(Chunk(now, octets))
+    return chunks
