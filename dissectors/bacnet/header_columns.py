@@ -17,6 +17,7 @@ from dissectors.bacnet.frame_types import CARRIES_NPDU, HEADER, PREAMBLE, is_enc
 from dissectors.bacnet.frame_types import name as type_name
 from dissectors.bacnet.header import DAMAGE_WORDS, peek
 from dissectors.bacnet.limits import BROADCAST
+from dissectors.bacnet.npdu_columns import bodies
 from dissectors.columns import NONE, ROLES
 from dissectors.frame import Check, Damage, Found, Frame, Role
 
@@ -145,8 +146,8 @@ class _Data:
         control = self._octet(self.begin + 1)
         self.odd |= encoded | (self.size < 2) | (self._octet(self.begin) != npdus.VERSION)
         self.odd |= control & npdus.NETWORK_MESSAGE != 0
-        at = self._body(control)
-        self.odd |= at >= self.size
+        at, cut = bodies(self.octets, self.begin, self.size, control)
+        self.odd |= cut | (at >= self.size)
         first = self._octet(self.begin + at)
         self._without_service(at, first, vocabulary)
         service = at + _SERVICE_PLACE.take(first)
@@ -166,16 +167,6 @@ class _Data:
 
     def _octet(self, places: Times) -> Octets:
         return self.octets.take(places, mode="clip")
-
-    def _body(self, control: Octets) -> Times:
-        """Where the APDU begins in the NPDU; beyond its end where the header is cut."""
-        at = np.full(len(control), 2, np.int64)
-        for flag in (npdus.HAS_DESTINATION, npdus.HAS_SOURCE):
-            rows = np.flatnonzero(control & flag)
-            at[rows] += 3 + self._octet(self.begin[rows] + at[rows] + 2).astype(np.int64)
-            self.odd[rows] |= at[rows] > self.size[rows]
-        at += control & npdus.HAS_DESTINATION != 0  # hop count
-        return at
 
     def _without_service(self, at: Times, first: Octets, vocabulary: Vocabulary) -> None:
         rows = np.flatnonzero((_SERVICE_PLACE.take(first) == _ODD) & ~self.odd)

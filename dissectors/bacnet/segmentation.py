@@ -73,6 +73,11 @@ class Reassembler:
         self._open: OrderedDict[tuple[Key, int], _Open] = OrderedDict()
         self._octets = 0
 
+    @property
+    def open_keys(self) -> tuple[Key, ...]:
+        """The exchanges of which messages are gathered, or may come again."""
+        return tuple({key for key, _ in self._open})
+
     def add(self, no: int, frame: Frame) -> Assembly | None:
         """Take the next frame; give the message that it completes, or ends with holes. Total."""
         first = _first_of_apdu(frame)

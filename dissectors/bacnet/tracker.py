@@ -22,7 +22,7 @@ The rules:
 from __future__ import annotations
 
 from collections import OrderedDict
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from dissectors.bacnet.apdu import Apdu, PduType
 from dissectors.bacnet.exchange import Exchange, Key, mirrored, read, trails
@@ -54,6 +54,23 @@ _REPLY: dict[int, int] = {
 
 _ENDED = frozenset(Verdict) - {Verdict.NO_RESPONSE, Verdict.DAMAGED_ANSWER}
 """How an exchange ended whose segments had come: what trails after it changes nothing."""
+
+
+@dataclass(slots=True)
+class Standing:
+    """What a tracker knows between two frames.
+
+    `next`: id of the next transaction. `waiting`: what holds the bus. `previous`: the frame before, and its
+    transaction. `postponed`, `past`: open exchanges, and those that are over, by key.
+    """
+
+    next: int
+    waiting: Exchange | None
+    previous: tuple[Frame, int] | None
+    postponed: OrderedDict[Key, Exchange]
+    past: OrderedDict[Key, tuple[Exchange, Verdict, int]]
+    turn: Turn
+    reassembler: Reassembler
 
 
 class MstpTracker:
@@ -521,6 +538,20 @@ class MstpTracker:
 
     def _at(self, no: int, tx: int, header: Header, role: Role | None = None) -> Placement:
         return Placement(no, tx, header.role if role is None else role, header.source, header.destination)
+
+    # At a seam: frames that were paired by columns are not tracked (pairing.py)
+
+    def standing(self) -> Standing:
+        """Where it stands after the newest frame; what is mutable in it is its own."""
+        return Standing(
+            self._next, self._waiting, self._previous, self._postponed, self._past, self._turn, self._reassembler
+        )
+
+    def resume(self, standing: Standing) -> None:
+        """Go on as if it had tracked what came meanwhile."""
+        self._next, self._waiting, self._previous = standing.next, standing.waiting, standing.previous
+        self._past = standing.past
+        self._assembly = None
 
 
 def _side(apdu: Apdu | None) -> Role:

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import strategies as st
 
 from dissectors.bacnet.frame_making import frame
-from dissectors.bacnet.frame_types import PREAMBLE
+from dissectors.bacnet.frame_types import HEADER, PREAMBLE
 from dissectors.checksums import crc8_mstp
 from dissectors.columns import Reads
 from dissectors.frame import Chunk, LineError, Mark
@@ -196,3 +196,160 @@ def recut(chunks: Sequence[Chunk], char: int, dice: random.Random) -> list[Chunk
         else:
             given.append(chunk)
     return given
+
+
+def conversation(dice: random.Random, frames: int) -> list[Chunk]:
+    """Stations that ask, answer, repeat, postpone, pass tokens and fall silent in any order, some behind a router."""
+    now, chunks = START, []
+    asked: list[tuple[int, int, int, bytes, bytes]] = []
+    pauses = (0, 1, 2, 3, 5, 10, 20, 30)
+    odd_pauses = (300, 499, 500, 501, 900, 2_500, 11_000, 61_000)
+
+    def request(client: int, server: int) -> bytes:
+        invoke, service = dice.randrange(4), dice.choice((12, 15))
+        there = dice.choice((b"", b"", b"\x00\x07\x01\x63"))
+        apdu = bytes((0, 5, invoke, service)) + dice.choice((b"", _object(0x0C, 7) + b"\x19\x55"))
+        asked.append((client, server, invoke, bytes((service,)), there))
+        control = 0x0C if there else 0x04
+        return frame(dice.choice((5, 5, 5, 5, 6)), server, client, bytes((1, control)) + there + apdu)
+
+    def answer(which: tuple[int, int, int, bytes, bytes]) -> bytes:
+        client, server, invoke, service, there = which
+        kind = dice.randrange(12)
+        apdu = bytes((0x30, invoke)) + service + _object(0x0C, 7)
+        if kind == 0:
+            apdu = bytes((0x50, invoke)) + service + b"\x91\x01\x91\x1f"
+        elif kind == 1:
+            apdu = bytes((dice.choice((0x60, 0x70, 0x71)), invoke, 2))
+        elif kind == 2:
+            apdu = bytes((0x20, invoke)) + service
+        elif kind == 3:
+            return frame(7, client, server)
+        elif kind == 4:
+            more = dice.choice((0x3C, 0x38))
+            apdu = bytes((more, invoke, dice.randrange(3), 2)) + service + b"\x11\x22"
+        elif kind == 5:
+            apdu = bytes((0x40 | dice.randrange(2), invoke, dice.randrange(3), 2))
+        control = b"\x20" + there + b"\xff" if there else b"\x00"
+        return frame(dice.choice((6, 6, 6, 5)), client, server, b"\x01" + control + apdu)
+
+    said = frame(0, 1, 2)
+    while len(chunks) < frames:
+        station, other = dice.sample((1, 2, 3, 9), 2)
+        choice = dice.randrange(20)
+        if choice < 5:
+            said = frame(0, other, station)
+        elif choice < 7:
+            said = frame(1, other, station)
+        elif choice == 7:
+            said = frame(2, other, station)
+        elif choice < 11:
+            said = request(station, other)
+        elif choice < 15 and asked:
+            said = answer(asked[-1] if dice.random() < 0.85 else dice.choice(asked[-6:]))
+        elif choice == 15:
+            said = frame(dice.choice((5, 6, 6)), dice.choice((255, other)), station, b"\x01\x00\x10\x08")
+        elif choice == 16:
+            said = frame(dice.choice((3, 4, 7, 130)), other, station, b"\x01\x02")
+        elif choice == 17:
+            pass  # the same again
+        elif choice == 18:
+            said = frame(1, 1, 2) if dice.random() < 0.5 else frame(2, 2, 1)
+        octets = said
+        if dice.random() < 0.04:
+            at = dice.randrange(len(octets))
+            octets = _with_bad_header(octets, at, 1 << dice.randrange(8))
+        pause = dice.choice(odd_pauses if dice.random() < 0.06 else pauses)
+        now += pause * MS + len(octets) * Timing(LINE).char
+        chunks.append(Chunk(now, octets))
+    return chunks
+
+
+def data_of_any_form(dice: random.Random, count: int) -> list[bytes]:
+    """Good frames whose NPDUs are as they should be, cut anywhere, or a little off; every head of an APDU abounds."""
+    errors = (
+        b"\x91\x01\x91\x1f",
+        b"\x91\x02\x91\x20",
+        b"\x91\xc8\x91\xff",
+        b"\x91\x01\x92\x01\x00",
+        b"\x0e\x91\x01\x91\x02",
+    )
+    processes = (
+        b"\x09\x07",
+        b"\x0a\x01\x00",
+        b"\x0c\x00\x00\x00\x01",
+        b"\x0d\x01\x01",
+        b"\x0d\x01\x01\x02\x03",
+        b"\x08",
+    )
+    addresses_there = (b"\x00\x05\x00", b"\x00\x05\x01\x09", b"\xff\xff\x00", b"\x00\x05\x06\x01\x02\x03\x04\x05\x06")
+
+    def parts() -> bytes:
+        made = b""
+        for _ in range(dice.randrange(4)):
+            kind = dice.randrange(4)
+            if kind == 0:
+                made += _object(dice.choice((0x0C, 0xC4, 0x1C, 0x2C)), dice.randrange(1 << 22))
+            else:
+                made += dice.choice((errors, processes, (dice.randbytes(3),))[kind - 1])
+        return made
+
+    frames = []
+    for _ in range(count):
+        pdu = dice.choice((0, 0, 1, 1, 2, 3, 3, 4, 5, 5, 5, 6, 7, dice.randrange(16)))
+        first = pdu << 4 | (dice.randrange(16) if dice.random() < 0.4 else 0)
+        middle = {0: 2, 1: 0}.get(pdu, 1) + (2 if pdu in (0, 3) and first & 8 else 0)
+        services = (0, 1, 2, 5, 8, 12, 14, 15, 31, dice.randrange(256))
+        between = bytes(dice.choice((0, 0, 1, dice.randrange(256))) for _ in range(middle))
+        apdu = bytes((first,)) + between + bytes((dice.choice(services),)) + parts()
+        control, routed = dice.choice((0, 4)), b""
+        for flag in (0x20, 0x08):
+            if dice.random() < 0.15:
+                control, routed = control | flag, routed + dice.choice(addresses_there)
+        routed += b"\xff" if control & 0x20 else b""
+        if dice.random() < 0.05:
+            control |= dice.choice((0x80, dice.randrange(256)))
+        npdu = bytes((1 if dice.random() < 0.98 else dice.randrange(3), control)) + routed + apdu
+        if dice.random() < 0.4:
+            npdu = npdu[: dice.randrange(len(npdu) + 1)]
+        kind = dice.choice((5, 5, 6, 6, 6, 32, 33, dice.randrange(256)))
+        frames.append(frame(kind, dice.choice((255, dice.randrange(256))), dice.randrange(256), npdu))
+    return frames
+
+
+def spoilt_bus(dice: random.Random, frames: int) -> list[Chunk]:
+    """Frames of any form, one in six of them damaged in some way, with silences and merged reads as they come."""
+    char, pause = Timing(LINE).char, LINE.bits(60)
+    chunks: list[Chunk] = []
+    now, held = START, b""
+    for octets in data_of_any_form(dice, frames):
+        said = octets if dice.random() < 0.5 else frame(dice.choice((0, 0, 1, 2)), dice.randrange(9), dice.randrange(9))
+        if dice.random() < 0.17:
+            said = _damaged(dice, said)
+        gaps = (0, 0, 1, pause - 1, pause, pause + 1, 5 * MS, 20 * MS, 90 * MS, 100 * MS, 499 * MS, 600 * MS)
+        cut = dice.randrange(len(said) + 1) if dice.random() < 0.1 else len(said)
+        for piece in (said[:cut], said[cut:]):
+            held += piece
+            now += len(piece) * char + dice.choice(gaps[: dice.choice((4, 9, 12))])
+            if held and dice.random() < 0.8:
+                chunks.append(Chunk(now, held))
+                held = b""
+    return [*chunks, Chunk(now + MS, TOKEN)]
+
+
+def _damaged(dice: random.Random, octets: bytes) -> bytes:
+    way = dice.randrange(8)
+    if way < 3:
+        at = dice.randrange(min(len(octets), HEADER))
+        return _with_bad_header(octets, at, 1 << dice.randrange(8))
+    if way == 3:
+        return octets[: dice.randrange(len(octets))]
+    if way == 4:
+        return octets[:-2] + octets[-1:] + octets[-2:-1]
+    if way == 5:
+        return octets + dice.choice((b"\xff", b"\x00", b"\x55", PREAMBLE))
+    if way == 6:
+        return frame(6, 1, 2, b"\x01\x00" + dice.choice((TOKEN, PREAMBLE, b"\x55\x55\xff")) + dice.randbytes(3))[
+            : dice.choice((-1, None, -3))
+        ]
+    return _with_bad_header(octets, dice.randrange(len(octets)), 1 << dice.randrange(8))

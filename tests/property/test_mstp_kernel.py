@@ -58,7 +58,45 @@ def test_a_bus_with_some_damage_is_mostly_columns() -> None:
     assert by_columns > 0.97 * total
 
 
-@settings(max_examples=300, deadline=None)
+@pytest.mark.parametrize("seed", range(4))
+def test_headers_of_data_of_any_form(seed: int) -> None:
+    frames = buses.data_of_any_form(random.Random(seed), 3_000)
+    frames = [one for one in frames if not (32 <= one[2] <= 127 and len(one) < 15)]
+    chunks = [Chunk(buses.START + at * 10**9, one) for at, one in enumerate(frames)]
+    by_columns, total = assert_equal(MSTP, chunks, Timing(buses.LINE))
+    assert by_columns > 0.99 * total
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_damage_of_any_kind(seed: int) -> None:
+    dice = random.Random(seed)
+    assert_equal(MSTP, buses.spoilt_bus(dice, 800), Timing(buses.LINE, dice.choice(LATENCIES)))
+
+
+def test_a_good_header_behind_a_pause_ends_the_frame_around_it() -> None:
+    token = frame(0, 1, 2)
+    around = frame(6, 1, 2, b"\x01\x00" + token + b"\x05")
+    for pause, whole in ((0, True), (30 * MS, False), (99 * MS, False)):
+        first = Chunk(buses.START, token + around[:10])
+        chunks = [first, Chunk(buses.START + pause + 40 * MS * bool(pause), around[10:] + token + token)]
+        by_columns, _ = assert_equal(MSTP, chunks, Timing(buses.LINE))
+        assert (by_columns >= 2) == whole, pause
+
+
+def test_a_header_at_the_end_of_a_block_may_end_the_damaged_frame_before_it() -> None:
+    """What is said of a block must hold whatever follows."""
+    token = frame(0, 1, 2)
+    damaged = bytearray(frame(6, 1, 2, b"\x01\x00\x10\x08\x00\x55"))
+    for octets in (bytes(damaged[:-2]) + token, bytes(damaged[:-1]) + token):
+        whole = token + octets + token + token
+        for cut in range(1, len(whole)):
+            known = kernel(reads_of([Chunk(buses.START, whole[:cut])]), Timing(buses.LINE))
+            later = kernel(reads_of([Chunk(buses.START, whole)]), Timing(buses.LINE))
+            for offset, length in zip(known.offset.tolist(), known.length.tolist(), strict=True):
+                assert (offset, length) in set(zip(later.offset.tolist(), later.length.tolist(), strict=True))
+
+
+@settings(max_examples=200, deadline=None)
 @given(st.data(), buses.timings)
 def test_any_traffic(data: st.DataObject, timing: Timing) -> None:
     assert_equal(MSTP, data.draw(buses.captures(timing)), timing)
