@@ -277,6 +277,18 @@ def test_of_frames_whose_check_ends_with_zeros() -> None:
         assert_equal(RTU, _glued(frames, timing, random.Random(1)), timing)
 
 
+def test_of_a_lost_answer_before_one_that_fits_an_earlier_request() -> None:
+    """Behind noise the best segmentation may rather leave out a request than the answer to the one before it."""
+    said = bus(8, 8, (3,))
+    write, other = rtu(bytes((4, 6, 0, 50, 1, 7))), rtu(bytes((4, 6, 1, 42, 1, 9)))
+    for lost in range(4):
+        rubbish = random.Random(lost).randbytes(40)
+        said += [rubbish, write, rtu(bytes((3, 3, 2, 0xDA, 0, 2))), rubbish[:8], other, *bus(lost, 8, (3, 6))]
+    for timing in TIMINGS:
+        assert_equal(RTU, ftdi(laid_out(said, timing, MS)), timing)
+        assert_equal(RTU, ftdi(laid_out(said, timing, 0)), timing)
+
+
 def test_of_frames_inside_frames() -> None:
     dice = random.Random(4)
     inner = bus(1, 60, (3, 6, 16))
