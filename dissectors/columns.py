@@ -14,23 +14,22 @@ octets, any times, any lengths; it never raises.
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING, Protocol, Self
+from typing import Protocol, Self
 
 import numpy as np
+import numpy.typing as npt
 
 from dissectors.frame import Check, Damage, Found, Role
 from dissectors.line import Timing
+from dissectors.tracker import Verdict
 
-if TYPE_CHECKING:
-    import numpy.typing as npt
-
-    Octets = npt.NDArray[np.uint8]
-    Times = npt.NDArray[np.int64]
-    Numbers = npt.NDArray[np.int32]
-    Small = npt.NDArray[np.int16]
-    Codes = npt.NDArray[np.uint8]
-    Names = npt.NDArray[np.uint16]
-    Masks = npt.NDArray[np.bool_]
+Octets = npt.NDArray[np.uint8]
+Times = npt.NDArray[np.int64]
+Numbers = npt.NDArray[np.int32]
+Small = npt.NDArray[np.int16]
+Codes = npt.NDArray[np.uint8]
+Names = npt.NDArray[np.uint16]
+Masks = npt.NDArray[np.bool_]
 
 NONE = -1
 """An optional number that is not there."""
@@ -39,7 +38,8 @@ CHECKS = tuple(Check)
 FOUNDS = tuple(Found)
 DAMAGES = (None, *Damage)
 ROLES = tuple(Role)
-"""What the codes in `check`, `found`, `damage` and `role` stand for: the member at that place."""
+VERDICTS = tuple(Verdict)
+"""What the codes in `check`, `found`, `damage`, `role` and `verdict` stand for: the member at that place."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,14 +107,8 @@ class OctetTimes:
     def start(self, octets: Times) -> Times:
         """Latest possible begin of octets, ns."""
         reads = self.read_of(octets)
-        last = self.begins[reads + 1] - 1 - octets
-        end = np.maximum(self.floors[reads], self.times[reads] - last * self.char)
-        before = np.where(
-            octets == self.begins[reads],
-            self.floors[reads],
-            np.maximum(self.floors[reads], self.times[reads] - (last + 1) * self.char),
-        )
-        start: Times = np.maximum(end - self.char, before)
+        first = self.times[reads] - (self.begins[reads + 1] - octets) * self.char
+        start: Times = np.maximum(first, self.floors[reads])
         return start
 
     def gaps(self) -> Times:
@@ -166,6 +160,51 @@ class FrameColumns:
         if len(self):
             chained[1:] = self.offset[1:] == self.offset[:-1] + self.length[:-1]
         return chained
+
+
+@dataclass(frozen=True, slots=True)
+class PlacementColumns:
+    """Where frames belong, one entry a row, as `tracker.Placement`. `tx`: 0 where a row has no place (noise)."""
+
+    tx: Times
+    role: Codes
+    source: Small
+    destination: Small
+
+    def __len__(self) -> int:
+        return len(self.tx)
+
+
+@dataclass(frozen=True, slots=True)
+class TransactionColumns:
+    """Transactions in the order of closing, as `tracker.Transaction`; `NONE` where an optional number is None.
+
+    `request`, `response`, `of`: numbers of rows and of a transaction. `latency`, `least`, `most`: ns, the three
+    readings of the interval. `kind`, `error`: places in `names`; error 0 is None.
+    """
+
+    id: Times
+    station: Small
+    kind: Names
+    request: Times
+    response: Times
+    verdict: Codes
+    start: Times
+    end: Times
+    latency: Times
+    least: Times
+    most: Times
+    attempt: Numbers
+    of: Times
+    error: Names
+    names: tuple[str, ...] = ("",)
+
+    def __len__(self) -> int:
+        return len(self.id)
+
+    def take(self, which: slice | Masks | Times) -> TransactionColumns:
+        """Some of them."""
+        return replace(self, **{one.name: getattr(self, one.name)[which] for one in fields(self)[:-1]})
 
 
 class Kernel(Protocol):
