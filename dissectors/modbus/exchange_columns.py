@@ -325,16 +325,21 @@ def passed(found: Exchanges, frames: FrameColumns, place: int, end: int) -> Pass
     told = answered & (found.sure[part] | found.copy[part])
     if end > place and found.copy[end - 1]:
         told[-1] = False  # a copy teaches when the next request has come
-    times = {}
-    key = unit << 1 | found.writes[part]
-    for one in np.flatnonzero(np.bincount(key[told])).tolist():
-        newest = np.flatnonzero(told & (key == one))[-SAMPLES:]
-        times[one >> 1, WRITE if one & 1 else READ] = found.gap[place + newest].tolist()
+    at = np.flatnonzero(told)
+    key = unit[at] << 1 | found.writes[part][at]
+    order = np.argsort(key, kind="stable")
+    gaps, key = found.gap[part][at[order]].tolist(), key[order]
+    ends = np.append(np.flatnonzero(key[1:] != key[:-1]) + 1, len(key)).tolist()
+    times, begin = {}, 0
+    for behind in ends if gaps else ():
+        one = int(key[begin])
+        times[one >> 1, WRITE if one & 1 else READ] = gaps[max(begin, behind - SAMPLES) : behind]
+        begin = behind
     asks = answered[:-1] & (found.sure[part][1:] | (frames.role[found.request[part][1:]] == _TO_ALL))
     asks |= answered[:-1] & (unit[1:] != unit[:-1])
     at = place + 1 + np.flatnonzero(asks)[-PAUSES:]
     start = frames.start[found.request[at]]
-    pause = np.maximum(start - frames.end[found.last[at - 1]], 0)
+    pause = np.maximum(start - frames.end[found.request[at - 1] + found.answered[at - 1]], 0)
     cycle = start - frames.start[found.request[at - 1]]
     return Passed(
         times,
@@ -359,7 +364,7 @@ def placed(
     `numbers`: of all frames, as the tracker would be told. `tx`: number of the first of the transactions.
     """
     request, answered, unit = found.request[which], found.answered[which], found.unit[which]
-    last, count = found.last[which], len(request)
+    last, count = request + answered, len(request)
     held_back = _slack(frames, timing, slack)
     gap = found.gap[which]
     refused = answered & (frames.error[last] != 0)
