@@ -96,8 +96,11 @@ def headers(
         kinds[code] = kinds[code | EXCEPTION_BIT] = names.place(function.name)
     error = np.zeros(size, np.uint16)
     faults = codes & EXCEPTION_BIT != 0
-    texts = np.array([names.place(exception_name(code)) for code in range(256)], np.uint16)
-    error[faults] = texts[octets[places[faults] + 2]]
+    reasons = octets[places[faults] + 2]
+    texts = np.zeros(256, np.uint16)
+    for code in np.flatnonzero(np.bincount(reasons)).tolist():
+        texts[code] = names.place(exception_name(code))
+    error[faults] = texts[reasons]
     columns = HeaderColumns(
         lengths.astype(np.int32),
         np.where(answers, unit, NONE).astype(np.int16),

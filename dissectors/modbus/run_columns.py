@@ -142,6 +142,8 @@ def _weighed(octets: Octets, rows: Rows, at: Times, stretches: Stretches) -> tup
     hoped = np.where(other > 8, np.where(request, as_response, as_request), _HOPED_SHAPE) + unit_bits(unit)
     known = np.where(request, KNOWN_LENGTH, 0)  # the other one is an answer, perhaps as long as one before
 
+    in_vain = np.zeros(len(at), bool)
+
     def taken(fit: Times | int, heard: Times | int, most: Times | int) -> Masks:
         """With such bits from the open request and for a known station; `most`: what the other reading may have."""
         hope = hoped + np.maximum(known, most)
@@ -160,10 +162,46 @@ def _weighed(octets: Octets, rows: Rows, at: Times, stretches: Stretches) -> tup
     most = np.where(awaited, np.where(exact | ~surely, EXACT, ODD), 0)
     fits = surely & response & ((length == answer) | (code & EXCEPTION_BIT != 0))
     sound = ~rows.damaged[before]
-    solid = fair & (bits + EXACT * fits >= 0)
+    firm = _firm(octets, rows)[at]
+    solid = fair & firm & (bits + EXACT * fits >= 0)
     reach = _ends_of_runs(rows, at, solid)
+    at_once = taken(0, 0, EXACT), taken(EXACT * fits, HEARD * same_unit, most) & sound
     in_vain = solid & ((reach - place > other) | (closed & (reach == stretches.end[stretch])))
+    fair &= firm | _from_the_begin(rows, at, at_once[0] | at_once[1], stretches)
     return taken(0, 0, EXACT), taken(EXACT * fits, HEARD * same_unit, most) & sound
+
+
+def _firm(octets: Octets, rows: Rows) -> Masks:
+    """Which frames the best segmentation never leaves out so that a later one answers an earlier request.
+
+    A request directly before its answer; the answer; and what follows an answer that can be nothing else.
+    """
+    firm = np.zeros(len(rows), bool)
+    place, length = rows.start, rows.length
+    code = octets[place + 1]
+    asks = rows.request[:-1] & (place[1:] == rows.end[:-1]) & (octets[place[1:]] == octets[place[:-1]])
+    same = (code[1:] == code[:-1]) & rows.response[1:]
+    same &= length[1:] == answer_lengths(octets, place[:-1], code[:-1])
+    asks &= same | (code[1:] == code[:-1] | np.uint8(EXCEPTION_BIT))
+    firm[:-1] = asks
+    firm[1:] |= asks
+    firm[2:] |= asks[:-1] & ~rows.request[1:-1] & (place[2:] == rows.end[1:-1])
+    return firm & ~rows.damaged
+
+
+def _from_the_begin(rows: Rows, at: Times, sure: Masks, stretches: Stretches) -> Masks:
+    """Which of rows `at` stand behind nothing but sure ones since silence was proved.
+
+    There the reference goes from frame to frame, and nothing is left to the best segmentation.
+    """
+    start, stretch = rows.start[at], rows.stretch[at]
+    first = (start == stretches.begin[stretch]) & stretches.proved[stretch]
+    follows = np.zeros(len(at), bool)
+    follows[1:] = (start[1:] == rows.end[at[:-1]]) & sure[:-1] & (stretch[1:] == stretch[:-1])
+    number = np.arange(len(at))
+    newest_first = np.maximum.accumulate(np.where(first, number, -1))
+    newest_break = np.maximum.accumulate(np.where(first | follows, -1, number))
+    return newest_first > newest_break
 
 
 def _ends_of_runs(rows: Rows, at: Times, solid: Masks) -> Times:

@@ -156,9 +156,9 @@ def _apart(frames: list[bytes], timing: Timing, pause: int = 6 * MS) -> list[Chu
     ids=["usual", "all", "vendor"],
 )
 def test_of_buses_with_silences(codes: tuple[int, ...], least: float) -> None:
-    for seed in range(3):
+    for seed in range(2):
         for timing in TIMINGS:
-            by_columns, total = assert_equal(RTU, _apart(bus(seed, 500, codes), timing), timing)
+            by_columns, total = assert_equal(RTU, _apart(bus(seed, 300, codes), timing), timing)
             assert by_columns >= least * total
 
 
@@ -175,9 +175,9 @@ def test_of_buses_behind_a_slow_adapter(codes: tuple[int, ...], least: float) ->
             assert by_columns >= least * total
 
 
-@pytest.mark.parametrize("high", [0x12, 0x14, 0x22, 0x26, 0x50, 0x9C, 0xF0])
+@pytest.mark.parametrize("high", [0x14, 0x26, 0x9C])
 def test_of_addresses_like_byte_counts(high: int) -> None:
-    frames = reads_at(high, high, 400)
+    frames = reads_at(high, high, 250)
     dice = random.Random(high)
     for timing in (HELD_BACK, replace(FAST, latency=FTDI_LATENCY)):
         by_columns, total = assert_equal(RTU, ftdi(laid_out(frames, timing, 3 * MS)), timing)
@@ -243,7 +243,7 @@ _ALL = (1, 2, 3, 4, 5, 6, 15, 16, 23, *_VENDOR)
 _RARE = (3, 7, 8, 11, 12, 17, 20, 22, 24, 43)
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("timing", TIMINGS, ids=str)
 def test_of_disturbed_buses(seed: int, timing: Timing) -> None:
     dice = random.Random(seed)
@@ -277,6 +277,18 @@ def test_of_frames_whose_check_ends_with_zeros() -> None:
         assert_equal(RTU, _glued(frames, timing, random.Random(1)), timing)
 
 
+def test_of_a_lost_answer_before_one_that_fits_an_earlier_request() -> None:
+    """Behind noise the best segmentation may rather leave out a request than the answer to the one before it."""
+    said = bus(8, 8, (3,))
+    write, other = rtu(bytes((4, 6, 0, 50, 1, 7))), rtu(bytes((4, 6, 1, 42, 1, 9)))
+    for lost in range(4):
+        rubbish = random.Random(lost).randbytes(40)
+        said += [rubbish, write, rtu(bytes((3, 3, 2, 0xDA, 0, 2))), rubbish[:8], other, *bus(lost, 8, (3, 6))]
+    for timing in TIMINGS:
+        assert_equal(RTU, ftdi(laid_out(said, timing, MS)), timing)
+        assert_equal(RTU, ftdi(laid_out(said, timing, 0)), timing)
+
+
 def test_of_frames_inside_frames() -> None:
     dice = random.Random(4)
     inner = bus(1, 60, (3, 6, 16))
@@ -302,7 +314,7 @@ def test_of_line_errors() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_of_random_octets(seed: int) -> None:
     dice = random.Random(seed)
     for timing in TIMINGS:
@@ -330,7 +342,7 @@ _pieces = st.one_of(
 _pauses = st.sampled_from((0, 0, MS, 2 * MS, 5 * MS, 19 * MS, 50 * MS, -3 * MS))
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(st.lists(st.tuples(_pieces, _pauses, st.integers(0, 30)), max_size=30), st.sampled_from(TIMINGS))
 def test_of_any_cut(said: list[tuple[bytes, int, int]], timing: Timing) -> None:
     chunks, now = [], 10**9
@@ -360,7 +372,7 @@ def test_no_cut_of_blocks_matters_to_what_is_said(data: st.DataObject, timing: T
 # --- tables ----------------------------------------------------------------------------------------------------------
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(
     st.lists(st.one_of(rtu_frames, st.binary(min_size=4, max_size=40)), min_size=1, max_size=10), st.integers(2, 300)
 )
