@@ -8,46 +8,13 @@ import numpy as np
 
 from dissectors.bacnet import npdu as npdus
 from dissectors.bacnet.apdu import SEGMENTED, SERVER, PduType
-from dissectors.bacnet.exchange import Key, Party
+from dissectors.bacnet.past_exchanges import NO_KEY
 
 if TYPE_CHECKING:
+    from dissectors.bacnet.past_exchanges import Nets
     from dissectors.columns import Masks, Octets, Times
 
 _ROUTED = npdus.HAS_DESTINATION | npdus.HAS_SOURCE
-_NETS_MAX = 1 << 15
-NO_KEY = -1
-
-Net = tuple[int | None, bytes | None]
-
-
-class Nets:
-    """Numbers for networks and addresses behind routers, so that keys of exchanges can be compared as numbers."""
-
-    def __init__(self) -> None:
-        self._nets: list[Net] = [(None, None)]
-        self._numbers: dict[Net, int] = {(None, None): 0}
-
-    def number(self, net: Net) -> int | None:
-        """The number of an address behind a router, 0 for none; None when there are too many."""
-        known = self._numbers.get(net)
-        if known is None and len(self._nets) < _NETS_MAX:
-            known = self._numbers[net] = len(self._nets)
-            self._nets.append(net)
-        return known
-
-    def code(self, key: Key) -> int:
-        """A key as a number; `NO_KEY` where it has none."""
-        client, server = (self.number((party.net, party.address)) for party in (key.client, key.server))
-        if client is None or server is None:
-            return NO_KEY
-        return (((client << 8 | key.client.mac) << 15 | server) << 8 | key.server.mac) << 8 | key.invoke_id
-
-    def key(self, code: int) -> Key:
-        """The key that a number stands for."""
-        (client_net, client), (server_net, server) = self._nets[code >> 39], self._nets[code >> 16 & 0x7FFF]
-        return Key(
-            Party(code >> 31 & 0xFF, client_net, client), Party(code >> 8 & 0xFF, server_net, server), code & 0xFF
-        )
 
 
 class Heads(NamedTuple):

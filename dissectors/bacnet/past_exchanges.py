@@ -1,103 +1,135 @@
-"""Exchanges that are over, by which a tracker knows repeats, late and double answers; those of columns come in late.
+"""Exchanges that are over, by which a tracker knows repeats, late and double answers; those of columns are made late.
 
-Of exchanges paired by columns nobody needs an object, unless the tracker asks: then the newest of them are made.
+Of exchanges paired by columns nobody needs an object unless the tracker asks for one. So keys are numbers here, and an
+exchange may be kept as a place among the rows of a run.
 """
 
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Callable, Iterator
-from typing import Any
+from typing import Any, Protocol
 
-from dissectors.bacnet.exchange import Exchange, Key
-from dissectors.bacnet.npdu_columns import Nets
+from dissectors.bacnet.exchange import Exchange, Key, Party
 from dissectors.tracker import Verdict
 
-REMEMBERED = 256
-"""Exchanges that are kept; `MstpTracker` keeps as many."""
-
-_HELD_MOST = 4096
-_FAILED_MOST = 4096
+NO_KEY = -1
+_NETS_MAX = 1 << 15
 _FAILED = frozenset((Verdict.NO_RESPONSE, Verdict.DAMAGED_ANSWER))
 
 Entry = tuple[Exchange, Verdict, int]
-Newest = Callable[[set[Key], int], Iterator[tuple[Key, Entry]]]
-"""Gives the newest exchanges of a run, the latest first, without keys that are in a set, at most so many."""
+Net = tuple[int | None, bytes | None]
+
+
+class Nets:
+    """Numbers for networks and addresses behind routers, so that keys of exchanges can be compared as numbers."""
+
+    def __init__(self) -> None:
+        self._nets: list[Net] = [(None, None)]
+        self._numbers: dict[Net, int] = {(None, None): 0}
+
+    def number(self, net: Net) -> int | None:
+        """The number of an address behind a router, 0 for none; None when there are too many."""
+        known = self._numbers.get(net)
+        if known is None and len(self._nets) < _NETS_MAX:
+            known = self._numbers[net] = len(self._nets)
+            self._nets.append(net)
+        return known
+
+    def code(self, key: Key) -> int:
+        """A key as a number; `NO_KEY` where it has none."""
+        client, server = (self.number((party.net, party.address)) for party in (key.client, key.server))
+        if client is None or server is None:
+            return NO_KEY
+        return (((client << 8 | key.client.mac) << 15 | server) << 8 | key.server.mac) << 8 | key.invoke_id
+
+    def key(self, code: int) -> Key:
+        """The key that a number stands for."""
+        (client_net, client), (server_net, server) = self._nets[code >> 39], self._nets[code >> 16 & 0x7FFF]
+        return Key(
+            Party(code >> 31 & 0xFF, client_net, client), Party(code >> 8 & 0xFF, server_net, server), code & 0xFF
+        )
+
+
+class PairedRows(Protocol):
+    """Exchanges of a run of rows that are over."""
+
+    def entry(self, row: int) -> Entry:
+        """The exchange that a row opened, how it ended and when."""
+        ...
+
+    def failed_at(self, row: int) -> int | None:
+        """When the exchange that a row opened was over without an answer; None where it had one."""
+        ...
 
 
 class PastExchanges(OrderedDict[Key, Entry]):
-    """Key → (exchange, verdict, end), the latest last, as the tracker keeps them.
+    """Key → (exchange, verdict, end), the latest last, with what of a mapping the tracker uses.
 
-    `nets`: numbers of addresses behind routers, the same for everything on this bus. `failed`: numbers of keys whose
-    exchange may have failed; no other has.
+    `nets`: numbers of addresses behind routers, the same for everything on this bus.
     """
 
     def __init__(self, entries: OrderedDict[Key, Entry]) -> None:
         super().__init__()
         self.nets = Nets()
-        self.failed: set[int] = set()
-        self._runs: list[Newest] = []
-        self._held = 0
+        self._entries: OrderedDict[int | Key, Entry | tuple[PairedRows, int]] = OrderedDict()
         for key, entry in entries.items():
             self[key] = entry
 
-    def add_run(self, newest: Newest, count: int, failed: list[int]) -> None:
-        """A run of `count` exchanges paired by columns, of which those with the keys `failed` had no answer."""
-        self._runs.append(newest)
-        self._held += count
-        self.failed.update(failed)
-        if self._held > _HELD_MOST:
-            self.settle()
+    def add(self, rows: PairedRows, codes: list[int], places: list[int], most: int) -> None:
+        """Exchanges of a run, the latest last; at most so many are kept."""
+        entries = self._entries
+        for code, row in zip(codes, places, strict=True):
+            entries[code] = rows, row
+            entries.move_to_end(code)
+            if len(entries) > most:
+                entries.popitem(last=False)
+
+    def failed_at(self, code: int) -> int | None:
+        """When the newest exchange with that key was over, if it had no answer or a damaged one; else None."""
+        entry = self._entries.get(code)
+        if entry is None:
+            return None
+        if len(entry) == 2:
+            return entry[0].failed_at(entry[1])
+        return entry[2] if entry[1] in _FAILED else None
 
     def settle(self) -> None:
-        """Make the exchanges of all runs that the tracker would still remember."""
-        if not self._runs:
-            return
-        runs, self._runs, self._held = self._runs, [], 0
-        newest: list[tuple[Key, Entry]] = []
-        seen: set[Key] = set()
-        for run in reversed(runs):
-            if len(seen) >= REMEMBERED:
-                break
-            for key, entry in run(seen, REMEMBERED - len(seen)):
-                seen.add(key)
-                newest.append((key, entry))
-        for key, entry in reversed(newest):
-            super().__setitem__(key, entry)
-            super().move_to_end(key)
-        while super().__len__() > REMEMBERED:
-            super().popitem(last=False)
-        if len(self.failed) > _FAILED_MOST:
-            self.failed = {self.nets.code(key) for key, entry in super().items() if entry[1] in _FAILED}
-
-    def may_be_tried_again(self, code: int, now: int, within: int) -> bool:
-        """Whether a request with that key at `now` may be a further attempt of one that failed."""
-        if code not in self.failed:
-            return False
-        self.settle()
-        entry = super().get(self.nets.key(code))
-        if entry is not None and entry[1] in _FAILED and now - entry[2] < within:
-            return True
-        self.failed.discard(code)
-        return False
+        """Make all exchanges that are still places in a run, so that its rows can be forgotten."""
+        for place, entry in self._entries.items():
+            if len(entry) == 2:
+                self._entries[place] = entry[0].entry(entry[1])
 
     # What the tracker asks
 
+    def _place(self, key: Key) -> int | Key:
+        code = self.nets.code(key)
+        return key if code == NO_KEY else code
+
     def get(self, key: Key, default: Any = None) -> Any:
         """As of a mapping."""
-        self.settle()
-        return super().get(key, default)
+        place = self._place(key)
+        entry = self._entries.get(place)
+        if entry is None:
+            return default
+        if len(entry) == 2:
+            entry = self._entries[place] = entry[0].entry(entry[1])
+        return entry
 
     def __contains__(self, key: object) -> bool:
-        self.settle()
-        return super().__contains__(key)
+        return isinstance(key, Key) and self._place(key) in self._entries
 
     def __len__(self) -> int:
-        self.settle()
-        return super().__len__()
+        return len(self._entries)
 
     def __setitem__(self, key: Key, entry: Entry) -> None:
-        self.settle()
-        super().__setitem__(key, entry)
-        if entry[1] in _FAILED:
-            self.failed.add(self.nets.code(key))
+        self._entries[self._place(key)] = entry
+
+    def move_to_end(self, key: Key, last: bool = True) -> None:
+        """As of an ordered mapping."""
+        self._entries.move_to_end(self._place(key), last)
+
+    def popitem(self, last: bool = True) -> tuple[Key, Entry]:
+        """As of an ordered mapping."""
+        place, entry = self._entries.popitem(last)
+        made = entry[0].entry(entry[1]) if len(entry) == 2 else entry
+        return self.nets.key(place) if isinstance(place, int) else place, made

@@ -6,6 +6,7 @@ is compared with what each of those could have sent; octets may be wrong, missin
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 from dissectors.bacnet.frame_types import EXPECTING, HEADER, PREAMBLE, FrameType
@@ -165,6 +166,11 @@ class Turn:
         made = [_Guess(cost, _TOKEN, following, mac)] if following != mac else []
         made.append(_Guess(cost, _POLL, _ANY, mac))
         return made + [_Guess(cost, kind, _ANY, mac) for kind in _OF_HOLDER]
+
+    def learn(self, following: Mapping[int, int], heard: Iterable[int]) -> None:
+        """What frames taught that were not seen one by one: to whom stations passed the token, and who spoke."""
+        self._next.update(following)
+        self._heard.update(heard)
 
 
 def _expected(guess: _Guess) -> tuple[int, ...]:
