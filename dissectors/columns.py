@@ -14,7 +14,7 @@ octets, any times, any lengths; it never raises.
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING, Protocol, Self, runtime_checkable
+from typing import TYPE_CHECKING, NamedTuple, Protocol, Self, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -25,6 +25,7 @@ from dissectors.tracker import Verdict
 
 if TYPE_CHECKING:
     from dissectors.framer import Framer
+    from dissectors.tracker import Tracker
 
 Octets = npt.NDArray[np.uint8]
 Times = npt.NDArray[np.int64]
@@ -208,6 +209,40 @@ class TransactionColumns:
     def take(self, which: slice | Masks | Times) -> TransactionColumns:
         """Some of them."""
         return replace(self, **{one.name: getattr(self, one.name)[which] for one in fields(self)[:-1]})
+
+
+class Run(NamedTuple):
+    """What was paired: rows [begin, end), where they belong, and the transactions that they closed, in order.
+
+    `closed_by`: the row that closed each.
+    """
+
+    begin: int
+    end: int
+    placements: PlacementColumns
+    transactions: TransactionColumns
+    closed_by: Times
+
+
+class BlockPairing(Protocol):
+    """Frames that follow one another, paired by columns wherever the tracker need not see them."""
+
+    def run(self, begin: int, no: int) -> Run | None:
+        """Pair rows from `begin` on, which has the number `no`, and put the tracker behind them.
+
+        The tracker has just taken the row before, which had the number before. None where it must take `begin` too.
+        """
+        ...
+
+
+class Pairing(Protocol):
+    """Makes the bulk form of a protocol's tracker for some frames."""
+
+    def __call__(
+        self, tracker: Tracker, frames: FrameColumns, octets: Octets, timing: Timing, slack: Times
+    ) -> BlockPairing:
+        """`tracker`: will be moved. `octets`: where `frames.offset` counts. `slack`: ns, of each frame."""
+        ...
 
 
 @runtime_checkable

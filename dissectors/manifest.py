@@ -22,7 +22,7 @@ from dissectors.token_ring import TokenRing
 from dissectors.tracker import Tracker
 
 if TYPE_CHECKING:  # columns need numpy, which takes longer to import than a small capture to read
-    from dissectors.columns import Kernel
+    from dissectors.columns import Kernel, Pairing
 
 RARE_BITS = 8.0
 """Evidence of a good frame where its protocol does not say: one in 256 of random octets."""
@@ -67,6 +67,7 @@ class Dissector:
     `packet_file`: how its frames lie in packet files.
     `renamer`: makes what gives stations other numbers and blanks texts, checks made right again.
     `kernel`: framer and peek for clean stretches of many frames at once (`dissectors/columns.py`).
+    `pairing`: the same for the tracker.
     `makers`: whole frames from their parts, checks included, by the kind of frame; parts are keywords.
     """
 
@@ -92,6 +93,7 @@ class Dissector:
     renamer: Callable[[], Renamer] | None = None
     makers: Mapping[str, Callable[..., bytes]] = field(default_factory=dict)
     kernel: Kernel | None = None
+    pairing: Pairing | None = None
 
     @property
     def prefixes(self) -> tuple[str, ...]:

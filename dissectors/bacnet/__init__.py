@@ -39,6 +39,7 @@ __all__ = [
 
 packet = on_first_use("dissectors.bacnet.packets:packet")
 kernel = on_first_use("dissectors.bacnet.kernel:kernel")
+pairing = on_first_use("dissectors.bacnet.block_pairing:pairing")
 
 
 def bits(frame: Frame) -> float:
@@ -77,4 +78,5 @@ MSTP = Dissector(
     renamer=MstpRenamer,
     makers={"mstp": frame},
     kernel=kernel,
+    pairing=pairing,
 )

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from dissectors import registry
-from dissectors.columns import Times
+from dissectors.columns import Run, Times
 from dissectors.frame import Event, Frame
 from dissectors.line import Timing
 from dissectors.manifest import Dissector
@@ -136,9 +136,40 @@ class _Leg:
         return joined(self.dissector.name, self.next, [*made, Table.of(self.dissector.name, self.next, [], closed)])
 
     def _clean(self, stretch: Clean) -> Table:
-        """Rows of a kernel."""
+        """Rows of a kernel: paired by columns as far as that is certain, by the tracker where it is not."""
         table = stretch.table(self.dissector.name, self.next, self._late.slack(stretch.ends))
-        return self._placed(list(table.rows()))
+        make = self.dissector.pairing
+        if make is None:
+            return self._placed(list(table.rows()))
+        pairing = make(self._tracker, table.frames, table.octets, self.timing, table.slack)
+        parts: list[Table] = []
+        tracked: list[Row] = []
+        place = 0
+        while place < len(table):
+            run = pairing.run(place, table.first + place) if not tracked else None
+            if run is None:
+                tracked.append(table.row(place))
+                parts.append(self._placed(tracked))
+                tracked = []
+                place += 1
+                continue
+            parts.append(self._paired(table, run))
+            place = run.end
+        return joined(self.dissector.name, self.next, parts)
+
+    def _paired(self, table: Table, run: Run) -> Table:
+        """A run of a table with its places and transactions."""
+        made = replace(
+            table.part(run.begin, run.end),
+            placed=run.placements,
+            transactions=run.transactions,
+            closed_by=run.closed_by - run.begin,
+        )
+        if self._before_tx:
+            made = made.numbered_after(self._before_tx)
+        self.next += run.end - run.begin
+        self.last_tx = max(self.last_tx, int(made.placed.tx.max(initial=0)))
+        return made
 
     def _events(self, events: list[Event]) -> Table:
         """Rows of the reference framer."""

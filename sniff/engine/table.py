@@ -118,6 +118,32 @@ class Table:
     def __bool__(self) -> bool:
         return len(self.frames) > 0 or len(self.transactions) > 0
 
+    def part(self, begin: int, end: int) -> Table:
+        """Rows [begin, end) that nobody has placed yet, none of them odd."""
+        rows = slice(begin, end)
+        first = int(self.frames.offset[begin])
+        frames = self.frames.take(rows)
+        stop = int(frames.offset[-1]) + int(frames.length[-1])
+        return replace(
+            self,
+            first=self.first + begin,
+            octets=self.octets[first:stop],
+            frames=replace(frames, offset=frames.offset - first),
+            slack=self.slack[rows],
+            is_frame=self.is_frame[rows],
+        )
+
+    def numbered_after(self, before: int) -> Table:
+        """The same with the numbers of transactions so much higher."""
+        closed, placed = self.transactions, self.placed
+        return replace(
+            self,
+            placed=replace(placed, tx=np.where(placed.tx > 0, placed.tx + before, 0)),
+            transactions=replace(
+                closed, id=closed.id + before, of=np.where(closed.of == NONE, NONE, closed.of + before)
+            ),
+        )
+
     def row(self, place: int) -> Row:
         """The row at a place, 0 … len - 1."""
         odd = self.odd.get(place)
