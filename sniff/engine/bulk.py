@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from dissectors import registry
-from dissectors.columns import Run, Times
+from dissectors.columns import Times
 from dissectors.frame import Event, Frame
 from dissectors.line import Timing
 from dissectors.manifest import Dissector
@@ -23,6 +23,7 @@ from sniff.engine.engine import Output, Row
 from sniff.engine.follow_settings import SessionEngine
 from sniff.engine.framing import BulkFraming, Clean
 from sniff.engine.late_columns import LateColumns
+from sniff.engine.placing import Placing
 from sniff.engine.session import LineEvent, Session, settings_change
 from sniff.engine.table import Table, joined
 
@@ -142,32 +143,18 @@ class _Leg:
         if make is None:
             return self._placed(list(table.rows()))
         pairing = make(self._tracker, table.frames, table.octets, self.timing, table.slack)
-        parts: list[Table] = []
-        tracked: list[Row] = []
-        place = 0
+        placing, place = Placing(table), 0
         while place < len(table):
-            run = pairing.run(place, table.first + place) if not tracked else None
+            run = pairing.run(place, table.first + place)
             if run is None:
-                tracked.append(table.row(place))
-                parts.append(self._placed(tracked))
-                tracked = []
+                row, closed = self._track(table.row(place))
+                placing.add(place, row, closed)
                 place += 1
-                continue
-            parts.append(self._paired(table, run))
-            place = run.end
-        return joined(self.dissector.name, self.next, parts)
-
-    def _paired(self, table: Table, run: Run) -> Table:
-        """A run of a table with its places and transactions."""
-        made = replace(
-            table.part(run.begin, run.end),
-            placed=run.placements,
-            transactions=run.transactions,
-            closed_by=run.closed_by - run.begin,
-        )
-        if self._before_tx:
-            made = made.numbered_after(self._before_tx)
-        self.next += run.end - run.begin
+            else:
+                placing.add_run(run, self._before_tx)
+                place = run.end
+        made = placing.table()
+        self.next += len(made)
         self.last_tx = max(self.last_tx, int(made.placed.tx.max(initial=0)))
         return made
 
@@ -191,19 +178,24 @@ class _Leg:
         closed: list[Transaction] = []
         closed_by: list[int] = []
         for place, row in enumerate(rows):
-            tracked = self._tracker.track(row.no, row.event, row.header)
-            event, placement = row.event, tracked.placement
-            if tracked.assembly is not None and isinstance(event, Frame):
-                event = replace(event, assembly=tracked.assembly)
-            if placement is not None:
-                if self._before_tx:
-                    placement = replace(placement, tx=placement.tx + self._before_tx)
-                self.last_tx = max(self.last_tx, placement.tx)
-            placed.append(Row(row.no, event, row.header, placement))
-            closed += self._numbered(tracked.closed)
-            closed_by += [place] * len(tracked.closed)
+            made, ended = self._track(row)
+            placed.append(made)
+            closed += ended
+            closed_by += [place] * len(ended)
         first, self.next = self.next, self.next + len(rows)
         return Table.of(self.dissector.name, first, placed, closed, closed_by)
+
+    def _track(self, row: Row) -> tuple[Row, list[Transaction]]:
+        """The row with its place, and what it closed."""
+        tracked = self._tracker.track(row.no, row.event, row.header)
+        event, placement = row.event, tracked.placement
+        if tracked.assembly is not None and isinstance(event, Frame):
+            event = replace(event, assembly=tracked.assembly)
+        if placement is not None:
+            if self._before_tx:
+                placement = replace(placement, tx=placement.tx + self._before_tx)
+            self.last_tx = max(self.last_tx, placement.tx)
+        return Row(row.no, event, row.header, placement), self._numbered(tracked.closed)
 
     def _numbered(self, closed: tuple[Transaction, ...]) -> list[Transaction]:
         """Transactions with their numbers on the whole bus."""

@@ -118,32 +118,6 @@ class Table:
     def __bool__(self) -> bool:
         return len(self.frames) > 0 or len(self.transactions) > 0
 
-    def part(self, begin: int, end: int) -> Table:
-        """Rows [begin, end) that nobody has placed yet, none of them odd."""
-        rows = slice(begin, end)
-        first = int(self.frames.offset[begin])
-        frames = self.frames.take(rows)
-        stop = int(frames.offset[-1]) + int(frames.length[-1])
-        return replace(
-            self,
-            first=self.first + begin,
-            octets=self.octets[first:stop],
-            frames=replace(frames, offset=frames.offset - first),
-            slack=self.slack[rows],
-            is_frame=self.is_frame[rows],
-        )
-
-    def numbered_after(self, before: int) -> Table:
-        """The same with the numbers of transactions so much higher."""
-        closed, placed = self.transactions, self.placed
-        return replace(
-            self,
-            placed=replace(placed, tx=np.where(placed.tx > 0, placed.tx + before, 0)),
-            transactions=replace(
-                closed, id=closed.id + before, of=np.where(closed.of == NONE, NONE, closed.of + before)
-            ),
-        )
-
     def row(self, place: int) -> Row:
         """The row at a place, 0 … len - 1."""
         odd = self.odd.get(place)
@@ -230,7 +204,7 @@ def joined(protocol: str, first: int, parts: Sequence[Table]) -> Table:
         return parts[0]
     lengths, first = [len(part.octets) for part in parts], parts[0].first
     odd = {part.first - first + place: row for part in parts for place, row in part.odd.items()}
-    frames = _joined_columns(FrameColumns, [part.frames for part in parts])
+    frames = joined_columns(FrameColumns, [part.frames for part in parts])
     begins = np.repeat(np.cumsum([0, *lengths[:-1]]), [len(part) for part in parts])
     return Table(
         protocol,
@@ -245,7 +219,7 @@ def joined(protocol: str, first: int, parts: Sequence[Table]) -> Table:
                 for name in ("tx", "role", "source", "destination")
             )
         ),
-        _joined_columns(TransactionColumns, [part.transactions for part in parts]),
+        joined_columns(TransactionColumns, [part.transactions for part in parts]),
         np.concatenate([part.closed_by + np.where(part.closed_by < 0, 0, part.first - first) for part in parts]),
         odd,
     )
@@ -254,16 +228,18 @@ def joined(protocol: str, first: int, parts: Sequence[Table]) -> Table:
 Named = TypeVar("Named", FrameColumns, TransactionColumns)
 
 
-def _joined_columns(kind: type[Named], parts: Sequence[Named]) -> Named:
+def joined_columns(kind: type[Named], parts: Sequence[Named]) -> Named:
     """Columns one after the other, their texts under common numbers."""
-    names = Names()
-    columns: dict[str, list[npt.NDArray[Any]]] = {}
+    names, columns = Names(), [one.name for one in fields(kind)[:-1]]
+    held: dict[str, list[npt.NDArray[Any]]] = {name: [] for name in columns}
+    texts: tuple[str, ...] = ()
     for part in parts:
-        numbers = np.array([names.number(text) for text in part.names], np.uint16)
-        for one in fields(kind)[:-1]:
-            values = getattr(part, one.name)
-            columns.setdefault(one.name, []).append(numbers[values] if one.name in TEXTS else values)
-    return kind(**{name: np.concatenate(values) for name, values in columns.items()}, names=names.texts)
+        if part.names is not texts:
+            texts, numbers = part.names, np.array([names.number(text) for text in part.names], np.uint16)
+        for name in columns:
+            values = getattr(part, name)
+            held[name].append(numbers[values] if name in TEXTS else values)
+    return kind(**{name: np.concatenate(values) for name, values in held.items()}, names=names.texts)
 
 
 def _is_plain(row: Row) -> bool:

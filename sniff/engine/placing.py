@@ -1,0 +1,63 @@
+"""Placing the rows of a clean stretch: runs by columns, single rows by the tracker, in any order of both."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from dissectors.columns import NONE, ROLES, PlacementColumns, Run, TransactionColumns
+from dissectors.tracker import Transaction
+from sniff.engine.engine import Row
+from sniff.engine.table import Table, joined_columns, transaction_columns
+
+_ROLES = {one: at for at, one in enumerate(ROLES)}
+
+
+class Placing:
+    """Fills in where the rows of a table belong, and what they closed."""
+
+    def __init__(self, table: Table) -> None:
+        count = len(table)
+        self._table = table
+        self._tx, self._role = np.zeros(count, np.int64), np.zeros(count, np.uint8)
+        self._source, self._destination = np.full(count, NONE, np.int16), np.full(count, NONE, np.int16)
+        self._odd: dict[int, Row] = {}
+        self._closed: list[Transaction] = []
+        self._closed_by: list[int] = []
+        self._runs: list[TransactionColumns] = []
+        self._runs_closed_by: list[np.ndarray[tuple[int], np.dtype[np.int64]]] = []
+
+    def add(self, place: int, row: Row, closed: Sequence[Transaction]) -> None:
+        """A row that the tracker took, and what it closed."""
+        placement = row.placement
+        if placement is not None:
+            self._tx[place], self._role[place] = placement.tx, _ROLES[placement.role]
+            self._source[place] = NONE if placement.source is None else placement.source
+            self._destination[place] = NONE if placement.destination is None else placement.destination
+        if getattr(row.event, "assembly", None) is not None:
+            self._odd[place] = row
+        self._closed += closed
+        self._closed_by += [place] * len(closed)
+
+    def add_run(self, run: Run, before: int) -> None:
+        """Rows that were paired by columns; `before`: what is added to numbers of transactions."""
+        rows, placed, closed = slice(run.begin, run.end), run.placements, run.transactions
+        self._tx[rows], self._role[rows] = placed.tx + before, placed.role
+        self._source[rows], self._destination[rows] = placed.source, placed.destination
+        if before:
+            closed = replace(closed, id=closed.id + before, of=np.where(closed.of == NONE, NONE, closed.of + before))
+        self._runs.append(closed)
+        self._runs_closed_by.append(run.closed_by)
+
+    def table(self) -> Table:
+        """The table, whole."""
+        closed, closed_by = transaction_columns(self._closed), np.array(self._closed_by, np.int64)
+        if self._runs:
+            closed = joined_columns(TransactionColumns, [*self._runs, closed])
+            closed_by = np.concatenate([*self._runs_closed_by, closed_by])
+            order = np.argsort(closed_by, kind="stable")  # a row is in a run or not: none closes some of both
+            closed, closed_by = closed.take(order), closed_by[order]
+        placed = PlacementColumns(self._tx, self._role, self._source, self._destination)
+        return replace(self._table, placed=placed, transactions=closed, closed_by=closed_by, odd=self._odd)
