@@ -39,6 +39,7 @@ from typing import BinaryIO
 
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
+from sniff.engine.blocks import Block, blocks_of
 from sniff.engine.capture import CaptureError
 from sniff.engine.session import DEVICES_NOTE, Completeness, Item, LineEvent, Session, settings_change
 from sniff.formats.files import NewFile, explain, open_capture
@@ -98,6 +99,10 @@ class TextCapture:
                 chunk = reading.chunk(last, line)
                 last = chunk.time
                 yield chunk
+
+    def blocks(self) -> Iterator[Block | LineEvent]:
+        """The same as columns. Raises CaptureError."""
+        return blocks_of(self.items())
 
     def completeness(self) -> Completeness:
         """Always whole: a text capture that was cut has a bad line or cannot be told from a shorter one."""
