@@ -62,6 +62,11 @@ class SearchMarks:
         self._session = session
         self._with: str | None = None
 
+    @property
+    def searching(self) -> bool:
+        """Whether the record before belonged to a search: the next one has something before it, or is of it too."""
+        return self._with is not None
+
     def before(self, record: Record) -> Iterator[LineEvent]:
         """What happened before a record."""
         match = _SEARCHED.search(record.comment)

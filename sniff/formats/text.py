@@ -35,15 +35,17 @@ from collections.abc import Iterable, Iterator
 from datetime import timedelta
 from itertools import chain
 from pathlib import Path
-from typing import BinaryIO
+from typing import TYPE_CHECKING, BinaryIO
 
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
-from sniff.engine.blocks import Block, blocks_of
 from sniff.engine.capture import CaptureError
 from sniff.engine.session import DEVICES_NOTE, Completeness, Item, LineEvent, Session, settings_change
 from sniff.formats.files import NewFile, explain, open_capture
 from sniff.formats.text_line import DEVICE, EPOCH, HEADER, LATEST, MAGIC, MARKS, VERSION, Line, is_device
+
+if TYPE_CHECKING:
+    from sniff.engine.blocks import Block
 
 MOST_DEVICES = 256
 MOST_COUNT = 10**19 - 1
@@ -102,6 +104,8 @@ class TextCapture:
 
     def blocks(self) -> Iterator[Block | LineEvent]:
         """The same as columns. Raises CaptureError."""
+        from sniff.engine.blocks import blocks_of
+
         return blocks_of(self.items())
 
     def completeness(self) -> Completeness:

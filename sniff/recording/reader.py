@@ -103,7 +103,7 @@ class McapCapture:
 
     def _searching_first(self, pieces: Iterator[Item | Reads]) -> Iterator[Item | Reads]:
         """What a recording gives that begins within a search for settings: the first of it says so."""
-        first = next(pieces, None)
+        first = next((piece for piece in pieces if not isinstance(piece, Reads) or len(piece)), None)
         if first is None:
             return
         change = None if isinstance(first, Reads) else settings_change(first)
