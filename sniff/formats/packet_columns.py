@@ -40,7 +40,7 @@ BARE = frozenset((OWN, USER0, USER1))
 @dataclass(frozen=True, slots=True)
 class Packets:
     """Records that follow one another: where the data of each begin in `window`, how long they are, ns since the epoch.
-    None has a comment.
+    No comment of theirs matters.
     """
 
     window: bytes

@@ -18,7 +18,7 @@ from sniff.engine.capture import CaptureError
 from sniff.engine.session import Completeness, Item, LineEvent, Session
 from sniff.formats.files import NewFile, open_capture
 from sniff.formats.linktypes import LINK_TYPES, USER1
-from sniff.formats.records import Record, RecordMaker, SearchMarks, foreign_session, items_of, protocol_of
+from sniff.formats.records import SEARCHED, Record, RecordMaker, SearchMarks, foreign_session, items_of, protocol_of
 
 if TYPE_CHECKING:
     from dissectors.columns import Reads
@@ -90,7 +90,7 @@ class PcapngCapture:
         self._say_what_was_passed_over()
 
     def blocks(self) -> Iterator[Block | LineEvent]:
-        """The same as columns, packets without comment without an object each."""
+        """The same as columns, without an object a packet but in a search."""
         from sniff.engine.blocks import blocks_of
 
         return blocks_of(self._pieces())
@@ -118,7 +118,7 @@ class PcapngCapture:
         marks = SearchMarks(self.session)
         interfaces: list[Interface] = []
         with open_capture(self.path) as stream:
-            walk = PcapngWalk(stream, LONGEST)
+            walk = PcapngWalk(stream, LONGEST, SEARCHED.encode())
             for one in walk.blocks():
                 if isinstance(one, OtherBlock):
                     record = self._record(one.order, one.kind, one.body, interfaces)
@@ -135,7 +135,7 @@ class PcapngCapture:
         self._say_what_was_passed_over()
 
     def _plain(self, packets: PlainPackets, interfaces: list[Interface], marks: SearchMarks) -> Iterator[Item | Reads]:
-        """What packets without options hold."""
+        """What packets hold whose comments do not matter."""
         from sniff.formats.packet_columns import LEAST_RUN, pieces_of
         from sniff.formats.pcapng_columns import alike
 

@@ -1,7 +1,7 @@
 """A pcapng file's packets found many at a time.
 
-Every word of a window may begin a packet that has no options; that it does is proved from where a block begins, each
-block saying where the next one is. What is no such packet is given by itself.
+Every word of a window may begin a packet; that it does is proved from where a block begins, each block saying where the
+next one is. What is no packet is given by itself.
 """
 
 from __future__ import annotations
@@ -28,8 +28,10 @@ TRAILER = 4
 
 @dataclass(frozen=True, slots=True)
 class PlainPackets:
-    """Enhanced packet blocks without options that follow one another. `begins`: of each in `window`. `heads`: words of
-    each: kind, size, interface, time (high, low), length kept, length on the wire.
+    """Enhanced packet blocks that follow one another, with no comment that matters.
+
+    `begins`: of each in `window`. `heads`: words of each: kind, size, interface, time (high, low), length kept, length
+    on the wire.
     """
 
     order: str
@@ -58,15 +60,16 @@ class OtherBlock:
 class PcapngWalk:
     """The whole blocks of a stream from its begin, up to a section in another byte order.
 
-    `longest`: octets of a block that is no damage. `at`: octet of the file behind the blocks that were given, `order`
-    of octets there.
+    `longest`: octets of a block that is no damage. `telling`: what a comment holds that matters. `at`: octet of the
+    file behind the blocks that were given, `order` of octets there.
     """
 
-    def __init__(self, stream: BinaryIO, longest: int) -> None:
+    def __init__(self, stream: BinaryIO, longest: int, telling: bytes) -> None:
         self.at = stream.tell()
         self.order = "<"
         self._stream = stream
         self._longest = longest
+        self._telling = telling
         self._wanted = WINDOW
         self._is_mixed = False
 
@@ -134,10 +137,13 @@ class PcapngWalk:
         return kind, size
 
     def _guess(self, window: bytes) -> tuple[Times, Times]:
-        """Where packets without options may begin in a window, and where they would end."""
+        """Where packets may begin in a window, and where they would end; those with options only where none matters."""
         words = np.frombuffer(window, f"{self.order}u4", len(window) // 4)
         places = np.flatnonzero(words[: max(0, len(words) - HEADER // 4 + 1)] == PACKET)
         sizes, kept = words[places + 1].astype(np.int64), words[places + 5].astype(np.int64)
-        plain = (sizes == HEADER + TRAILER + (kept + 3) // 4 * 4) & (sizes <= self._longest)
-        begins = places[plain] * 4
-        return begins, begins + sizes[plain]
+        spare = sizes - (HEADER + TRAILER) - kept
+        may = (sizes % 4 == 0) & (sizes <= self._longest) & (spare >= 0)
+        if self._telling in window:
+            may &= spare < 4
+        begins = places[may] * 4
+        return begins, begins + sizes[may]

@@ -51,7 +51,8 @@ def foreign_session(path: str, protocol: str | None, started: int, kind: str) ->
     )
 
 
-_SEARCHED = re.compile(r"heard while searching for the settings, with (\S+?)(?:;|$)")
+SEARCHED = "heard while searching for the settings, with "
+_SEARCHED = re.compile(rf"{SEARCHED}(\S+?)(?:;|$)")
 """What `describe` says of a row of a search, in the comment of its packet."""
 
 
