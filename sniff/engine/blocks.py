@@ -6,8 +6,9 @@ any other. A block is cut at a line event, which stands between two blocks at it
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,9 +17,13 @@ from dissectors.frame import Chunk, Mark
 from sniff.engine.capture import CaptureError
 from sniff.engine.session import Item, LineEvent
 
+if TYPE_CHECKING:
+    from dissectors.columns import Octets, Times
+
 BLOCK_OCTETS = 1 << 19
 BLOCK_READS = 1 << 16
-"""A block holds about so many octets or reads, whichever is first."""
+"""A block holds about so many octets or reads, whichever is first; never twice as many, but for a longer read."""
+_I64 = 1 << 63
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,41 +51,98 @@ class Block:
             at += length
 
 
-def block_of(chunks: list[Chunk]) -> Block:
-    """One block of chunks that hold octets, at least one."""
-    marks = {index: chunk.marks for index, chunk in enumerate(chunks) if chunk.marks}
-    marked = np.zeros(len(chunks), bool)
-    marked[list(marks)] = True
-    reads = Reads(
+def reads_of(chunks: Sequence[Chunk]) -> Reads:
+    """Chunks that hold octets, at least one, as columns."""
+    marked = np.array([bool(chunk.marks) for chunk in chunks], bool)
+    return Reads(
         np.frombuffer(b"".join([chunk.octets for chunk in chunks]), np.uint8),
-        np.array([chunk.time for chunk in chunks], np.int64),
+        _times([chunk.time for chunk in chunks]),
         np.array([len(chunk.octets) for chunk in chunks], np.int64),
         marked,
     )
-    return Block(reads, marks)
 
 
-def blocks_of(items: Iterable[Item]) -> Iterator[Block | LineEvent]:
-    """Any items as blocks; empty chunks, which only say that time passed, are left out. Raises CaptureError as
-    `items` does, when all before it was given."""
-    held: list[Chunk] = []
-    octets = 0
+def plain_reads(octets: Octets, times: Times, lengths: Times) -> Reads:
+    """Reads in which no line error was reported."""
+    return Reads(octets, times, lengths, np.zeros(len(times), bool))
+
+
+def blocks_of(items: Iterable[Item | Reads]) -> Iterator[Block | LineEvent]:
+    """Any items as blocks, and any columns without marks, none of which exceeds a block, between them. Empty chunks,
+    which only say that time passed, are left out. Raises CaptureError as `items` does, when all before it was given.
+    """
+    held = _Held()
     try:
         for item in items:
             if isinstance(item, LineEvent):
-                if held:
-                    yield block_of(held)
-                    held, octets = [], 0
+                if held.count:
+                    yield held.take()
                 yield item
-            elif item.octets:
-                held.append(item)
-                octets += len(item.octets)
-                if octets >= BLOCK_OCTETS or len(held) >= BLOCK_READS:
-                    yield block_of(held)
-                    held, octets = [], 0
+                continue
+            held.add(item)
+            if held.octets >= BLOCK_OCTETS or held.count >= BLOCK_READS:
+                yield held.take()
     except CaptureError:
-        if held:
-            yield block_of(held)
+        if held.count:
+            yield held.take()
         raise
-    if held:
-        yield block_of(held)
+    if held.count:
+        yield held.take()
+
+
+class _Held:
+    """Reads for one block: `count` of them with so many `octets`."""
+
+    def __init__(self) -> None:
+        self.count = self.octets = 0
+        self._pieces: list[Reads] = []
+        self._chunks: list[Chunk] = []  # after the pieces
+        self._marks: dict[int, tuple[Mark, ...]] = {}
+
+    def add(self, item: Chunk | Reads) -> None:
+        """Take the next."""
+        if isinstance(item, Chunk):
+            if not item.octets:
+                return
+            if item.marks:
+                self._marks[self.count] = item.marks
+            self._chunks.append(item)
+            self.count += 1
+            self.octets += len(item.octets)
+        elif len(item):
+            self._close_chunks()
+            self._pieces.append(item)
+            self.count += len(item)
+            self.octets += len(item.octets)
+
+    def take(self) -> Block:
+        """All of them; none are held any more."""
+        self._close_chunks()
+        block = Block(_joined(self._pieces), self._marks)
+        self.count = self.octets = 0
+        self._pieces, self._marks = [], {}
+        return block
+
+    def _close_chunks(self) -> None:
+        if self._chunks:
+            self._pieces.append(reads_of(self._chunks))
+            self._chunks = []
+
+
+def _joined(pieces: list[Reads]) -> Reads:
+    if len(pieces) == 1:
+        return pieces[0]
+    return Reads(
+        np.concatenate([piece.octets for piece in pieces]),
+        np.concatenate([piece.times for piece in pieces]),
+        np.concatenate([piece.lengths for piece in pieces]),
+        np.concatenate([piece.marked for piece in pieces]),
+    )
+
+
+def _times(times: list[int]) -> Times:
+    """Times, those of a file made to do harm as near as 64 bits come."""
+    try:
+        return np.array(times, np.int64)
+    except OverflowError:
+        return np.array([min(max(time, -_I64), _I64 - 1) for time in times], np.int64)

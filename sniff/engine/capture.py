@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
-from sniff.engine.session import Completeness, Item, Session
+from sniff.engine.session import Completeness, Item, LineEvent, Session
+
+if TYPE_CHECKING:
+    from sniff.engine.blocks import Block
 
 
 class CaptureError(Exception):
@@ -19,6 +22,11 @@ class Capture(Protocol):
 
     def items(self) -> Iterator[Item]:
         """Chunks and line events in order of time. A cut file ends early, without an exception."""
+        ...
+
+    def blocks(self) -> Iterator[Block | LineEvent]:
+        """The same as columns: what `blocks_of(self.items())` gives, but for where blocks are cut. Raises as `items`
+        does, when all before was given; `completeness` says the same after it."""
         ...
 
     def completeness(self) -> Completeness:

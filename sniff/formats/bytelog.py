@@ -25,14 +25,18 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from dissectors.frame import Chunk
 from dissectors.line import NS_PER_S
 from sniff.engine.capture import CaptureError
-from sniff.engine.session import Adapter, Completeness, Item, Session
+from sniff.engine.session import Adapter, Completeness, Item, LineEvent, Session
 from sniff.formats.files import explain, open_capture
 from sniff.formats.octet_table import columns, octets_of, seconds
 from sniff.formats.records import foreign_session
+
+if TYPE_CHECKING:
+    from sniff.engine.blocks import Block
 
 LONGEST_LINE = 1 << 20
 MOST_ROWS = 5_000_000
@@ -106,6 +110,12 @@ class ByteLog:
         self._passed = self._first_passed = 0
         give: Callable[[], Iterator[Item]] = self._table if self.kind == "CSV" else self._text
         return give()
+
+    def blocks(self) -> Iterator[Block | LineEvent]:
+        """The same as columns. Raises CaptureError."""
+        from sniff.engine.blocks import blocks_of
+
+        return blocks_of(self.items())
 
     def completeness(self) -> Completeness:
         """Whether every line was understood, as far as `items` has read; a text has no end mark."""

@@ -90,6 +90,24 @@ def _read_exported(record: bytes) -> Decoded | None:
     return None
 
 
+def exported_header(record: bytes) -> list[int] | None:
+    """Places of the octets that say what an exported PDU is and where its frame begins: tags, their lengths and the
+    dissector's name, but not addresses. None without an end of tags.
+    """
+    fixed: list[int] = []
+    at = 0
+    while at + 4 <= len(record):
+        tag, length = struct.unpack_from(">HH", record, at)
+        fixed += range(at, at + 4)
+        at += 4
+        if tag == TAG_END:
+            return fixed
+        if tag == TAG_NAME:
+            fixed += range(at, min(at + length, len(record)))
+        at += length
+    return None
+
+
 def _tag(number: int, value: bytes) -> bytes:
     padded = value + b"\0" * (-len(value) % 4)
     return struct.pack(">HH", number, len(padded)) + padded

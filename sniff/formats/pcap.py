@@ -8,15 +8,19 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import BinaryIO
+from typing import TYPE_CHECKING, BinaryIO
 
 from dissectors.frame import Chunk
 from sniff.engine.capture import CaptureError
-from sniff.engine.session import Completeness, Item, Session
+from sniff.engine.session import Completeness, Item, LineEvent, Session
 from sniff.formats.files import NewFile, open_capture
 from sniff.formats.linktypes import LINK_TYPES, OWN, USER1
 from sniff.formats.linktypes import protocol_of as protocol_of_link
 from sniff.formats.records import Record, RecordMaker, foreign_session, items_of, protocol_of
+
+if TYPE_CHECKING:
+    from dissectors.columns import Reads
+    from sniff.engine.blocks import Block
 
 MAGICS = {  # as read little-endian: (byte order, ns a tick)
     0xA1B2C3D4: ("<", 1000),
@@ -76,9 +80,29 @@ class PcapCapture:
             for record in self._records(stream):
                 yield from items_of(record, protocol)
 
+    def blocks(self) -> Iterator[Block | LineEvent]:
+        """The same as columns, without an object a record."""
+        from sniff.engine.blocks import blocks_of
+
+        return blocks_of(self._pieces())
+
     def completeness(self) -> Completeness:
         """Whether the last record was whole, as far as `items` has read."""
         return self._complete
+
+    def _pieces(self) -> Iterator[Item | Reads]:
+        from sniff.formats.packet_columns import pieces_of
+        from sniff.formats.pcap_walk import PcapWalk
+
+        protocol = self.session.protocol
+        with open_capture(self.path) as stream:
+            stream.seek(FILE_HEADER)
+            walk = PcapWalk(stream, self._order, self._tick, self._link_type, LONGEST)
+            for packets in walk.packets():
+                yield from pieces_of(packets, protocol)
+            stream.seek(walk.at)
+            for record in self._records(stream):  # of what is cut or damaged
+                yield from items_of(record, protocol)
 
     def _records(self, stream: BinaryIO) -> Iterator[Record]:
         self._complete = Completeness(True)

@@ -12,13 +12,18 @@ import struct
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import BinaryIO
+from typing import TYPE_CHECKING, BinaryIO
 
 from sniff.engine.capture import CaptureError
-from sniff.engine.session import Completeness, Item, Session
+from sniff.engine.session import Completeness, Item, LineEvent, Session
 from sniff.formats.files import NewFile, open_capture
 from sniff.formats.linktypes import LINK_TYPES, USER1
-from sniff.formats.records import Record, RecordMaker, SearchMarks, foreign_session, items_of, protocol_of
+from sniff.formats.records import SEARCHED, Record, RecordMaker, SearchMarks, foreign_session, items_of, protocol_of
+
+if TYPE_CHECKING:
+    from dissectors.columns import Reads
+    from sniff.engine.blocks import Block
+    from sniff.formats.pcapng_walk import PlainPackets
 
 SECTION, INTERFACE, SIMPLE, ENHANCED = 0x0A0D0D0A, 1, 3, 6
 BYTE_ORDER = 0x1A2B3C4D
@@ -32,7 +37,9 @@ SESSION_MARK = "sniff485 session: "
 
 
 @dataclass(frozen=True, slots=True)
-class _Interface:
+class Interface:
+    """What a section says of an interface."""
+
     link_type: int
     resolution: tuple[int, int] = (1000, 1)  # ns per tick as a fraction
     offset: int = 0  # s
@@ -68,7 +75,7 @@ class PcapngCapture:
         for record in self._records(stream):
             if record.link_type not in LINK_TYPES:
                 continue
-            if protocol_of(record) is not None:
+            if self._metadata or protocol_of(record) is not None:
                 return record
             fallback = fallback or record
         return fallback
@@ -79,35 +86,88 @@ class PcapngCapture:
         marks = SearchMarks(self.session)
         with open_capture(self.path) as stream:
             for record in self._records(stream):
-                found = False
-                yield from marks.before(record)
-                for item in items_of(record, self.session.protocol):
-                    found = True
-                    yield item
-                self._other += not found
-        if self._other and self._complete.whole:
-            self._complete = Completeness(True, f"complete; {self._other} records of other kinds were passed over")
+                yield from self._items(record, marks)
+        self._say_what_was_passed_over()
+
+    def blocks(self) -> Iterator[Block | LineEvent]:
+        """The same as columns, without an object a packet but in a search."""
+        from sniff.engine.blocks import blocks_of
+
+        return blocks_of(self._pieces())
 
     def completeness(self) -> Completeness:
         """Whether the last block was whole, as far as `items` has read."""
         return self._complete
 
+    def _items(self, record: Record, marks: SearchMarks) -> Iterator[Item]:
+        found = False
+        yield from marks.before(record)
+        for item in items_of(record, self.session.protocol):
+            found = True
+            yield item
+        self._other += not found
+
+    def _say_what_was_passed_over(self) -> None:
+        if self._other and self._complete.whole:
+            self._complete = Completeness(True, f"complete; {self._other} records of other kinds were passed over")
+
+    def _pieces(self) -> Iterator[Item | Reads]:
+        from sniff.formats.pcapng_walk import OtherBlock, PcapngWalk
+
+        self._other = 0
+        marks = SearchMarks(self.session)
+        interfaces: list[Interface] = []
+        with open_capture(self.path) as stream:
+            walk = PcapngWalk(stream, LONGEST, SEARCHED.encode())
+            for one in walk.blocks():
+                if isinstance(one, OtherBlock):
+                    record = self._record(one.order, one.kind, one.body, interfaces)
+                    if record is not None:
+                        yield from self._items(record, marks)
+                else:
+                    yield from self._plain(one, interfaces, marks)
+            stream.seek(walk.at)
+            self._complete = Completeness(True)
+            for order, kind, body in self._blocks(stream, walk.order):  # of what is cut or damaged
+                record = self._record(order, kind, body, interfaces)
+                if record is not None:
+                    yield from self._items(record, marks)
+        self._say_what_was_passed_over()
+
+    def _plain(self, packets: PlainPackets, interfaces: list[Interface], marks: SearchMarks) -> Iterator[Item | Reads]:
+        """What packets hold whose comments do not matter."""
+        from sniff.formats.packet_columns import LEAST_RUN, pieces_of
+        from sniff.formats.pcapng_columns import alike
+
+        for first, end, some in alike(packets, interfaces, self.session.protocol, LATEST):
+            if some is None or end - first < LEAST_RUN or marks.searching:
+                for index in range(first, end):
+                    record = _packet(packets.order, ENHANCED, packets.body(index), interfaces)
+                    if record is not None:
+                        yield from self._items(record, marks)
+            else:
+                self._other += yield from pieces_of(some, self.session.protocol)
+
     def _records(self, stream: BinaryIO) -> Iterator[Record]:
         self._complete = Completeness(True)
-        interfaces: list[_Interface] = []
+        interfaces: list[Interface] = []
         for order, kind, body in self._blocks(stream):
-            if kind == SECTION:
-                interfaces = []
-                self._take_session(order, body)
-            elif kind == INTERFACE and len(body) >= 8:
-                interfaces.append(_interface(order, body))
-            elif kind in (ENHANCED, SIMPLE):
-                record = _packet(order, kind, body, interfaces)
-                if record is not None:
-                    yield record
+            record = self._record(order, kind, body, interfaces)
+            if record is not None:
+                yield record
 
-    def _blocks(self, stream: BinaryIO) -> Iterator[tuple[str, int, bytes]]:
-        order = "<"
+    def _record(self, order: str, kind: int, body: bytes, interfaces: list[Interface]) -> Record | None:
+        """The record in a block; what others say of the section is taken."""
+        if kind == SECTION:
+            interfaces.clear()
+            self._take_session(order, body)
+        elif kind == INTERFACE and len(body) >= 8:
+            interfaces.append(_interface(order, body))
+        elif kind in (ENHANCED, SIMPLE):
+            return _packet(order, kind, body, interfaces)
+        return None
+
+    def _blocks(self, stream: BinaryIO, order: str = "<") -> Iterator[tuple[str, int, bytes]]:
         while head := stream.read(8):
             at = stream.tell() - len(head)
             if len(head) < 8:
@@ -145,7 +205,7 @@ class PcapngCapture:
                     self._metadata = {str(key): str(item) for key, item in found.items()}
 
 
-def _interface(order: str, body: bytes) -> _Interface:
+def _interface(order: str, body: bytes) -> Interface:
     resolution, offset = (1000, 1), 0
     for code, value in _options(order, body[8:]):
         if code == OPT_TSRESOL and value:
@@ -154,10 +214,10 @@ def _interface(order: str, body: bytes) -> _Interface:
             resolution = (1_000_000_000, ticks)
         elif code == OPT_TSOFFSET and len(value) == 8:
             offset = struct.unpack(order + "q", value)[0]
-    return _Interface(struct.unpack_from(order + "H", body)[0], resolution, offset)
+    return Interface(struct.unpack_from(order + "H", body)[0], resolution, offset)
 
 
-def _packet(order: str, kind: int, body: bytes, interfaces: list[_Interface]) -> Record | None:
+def _packet(order: str, kind: int, body: bytes, interfaces: list[Interface]) -> Record | None:
     if kind == SIMPLE:
         if len(body) < 4 or not interfaces:
             return None

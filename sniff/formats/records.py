@@ -51,7 +51,8 @@ def foreign_session(path: str, protocol: str | None, started: int, kind: str) ->
     )
 
 
-_SEARCHED = re.compile(r"heard while searching for the settings, with (\S+?)(?:;|$)")
+SEARCHED = "heard while searching for the settings, with "
+_SEARCHED = re.compile(rf"{SEARCHED}(\S+?)(?:;|$)")
 """What `describe` says of a row of a search, in the comment of its packet."""
 
 
@@ -61,6 +62,11 @@ class SearchMarks:
     def __init__(self, session: Session) -> None:
         self._session = session
         self._with: str | None = None
+
+    @property
+    def searching(self) -> bool:
+        """Whether the record before belonged to a search: the next one has something before it, or is of it too."""
+        return self._with is not None
 
     def before(self, record: Record) -> Iterator[LineEvent]:
         """What happened before a record."""

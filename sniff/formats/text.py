@@ -35,7 +35,7 @@ from collections.abc import Iterable, Iterator
 from datetime import timedelta
 from itertools import chain
 from pathlib import Path
-from typing import BinaryIO
+from typing import TYPE_CHECKING, BinaryIO
 
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
@@ -43,6 +43,9 @@ from sniff.engine.capture import CaptureError
 from sniff.engine.session import DEVICES_NOTE, Completeness, Item, LineEvent, Session, settings_change
 from sniff.formats.files import NewFile, explain, open_capture
 from sniff.formats.text_line import DEVICE, EPOCH, HEADER, LATEST, MAGIC, MARKS, VERSION, Line, is_device
+
+if TYPE_CHECKING:
+    from sniff.engine.blocks import Block
 
 MOST_DEVICES = 256
 MOST_COUNT = 10**19 - 1
@@ -98,6 +101,12 @@ class TextCapture:
                 chunk = reading.chunk(last, line)
                 last = chunk.time
                 yield chunk
+
+    def blocks(self) -> Iterator[Block | LineEvent]:
+        """The same as columns. Raises CaptureError."""
+        from sniff.engine.blocks import blocks_of
+
+        return blocks_of(self.items())
 
     def completeness(self) -> Completeness:
         """Always whole: a text capture that was cut has a bad line or cannot be told from a shorter one."""

@@ -196,12 +196,22 @@ class Batch:
         if body < 0:
             return None
         batch = cls(count, start, data)
-        return batch if sum(sum(lengths) for _, lengths in batch._columns()) == body else None
+        return batch if batch._octets() == body else None
 
     @property
     def octets(self) -> bytes:
         """The octets of all entries."""
         return self.data[_HEAD.size + 6 * self.count :]
+
+    @property
+    def steps(self) -> bytes:
+        """ns after `start`, of each entry, u32."""
+        return self.data[_HEAD.size : _HEAD.size + 4 * self.count]
+
+    @property
+    def sizes(self) -> bytes:
+        """Octets of each entry, u16."""
+        return self.data[_HEAD.size + 4 * self.count : _HEAD.size + 6 * self.count]
 
     def times(self) -> npt.NDArray[np.int64]:
         """ns since the epoch, of each entry."""
@@ -235,6 +245,13 @@ class Batch:
             ends = list(accumulate(lengths, initial=at))
             yield [start + step for step in steps], [data[first:end] for first, end in pairwise(ends)]
             at = ends[-1]
+
+    def _octets(self) -> int:
+        """How many octets the entries claim."""
+        lengths = _HEAD.size + 4 * self.count
+        if self.count <= _STEP:
+            return sum(struct.unpack_from(f"<{self.count}H", self.data, lengths))
+        return sum(sum(some) for _, some in self._columns())
 
     def _columns(self) -> Iterator[tuple[tuple[int, ...], tuple[int, ...]]]:
         steps = _HEAD.size
@@ -318,6 +335,14 @@ class Joiner:
             yield from self._joined(number, batch)
         else:
             yield from batch.chunks()
+
+    def follows(self, sequence: int, batch: Batch) -> bool:
+        """Take a /raw message whose entries are chunks as they are, with nothing before or between them; False, and it
+        is not taken, for any other."""
+        if self._order or self._events or self._told or (self.next is not None and self._number(sequence) != self.next):
+            return False
+        self._hole(sequence, batch)
+        return True
 
     def skip(self, sequence: int, batch: Batch) -> None:
         """Take a /raw message for its numbering only."""

@@ -13,16 +13,21 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, cast
 
+import numpy as np
+
+from dissectors.columns import Reads
+from sniff.engine.blocks import Block, blocks_of, plain_reads
 from sniff.engine.capture import CaptureError
 from sniff.engine.session import Completeness, Item, LineEvent, LineEventKind, Session, SettingsChange, settings_change
 from sniff.formats.files import explain, open_capture
 from sniff.formats.text import iso
 from sniff.recording import scan
 from sniff.recording.batch import Batch, Joiner, line_event
+from sniff.recording.clean_batches import CleanBatches
 from sniff.recording.frames import METADATA, SCHEMA, FrameBatch
-from sniff.recording.messages import MessagePass
+from sniff.recording.messages import Head, MessagePass
 from sniff.recording.topics import (
     FRAMES,
     LINE,
@@ -78,43 +83,68 @@ class McapCapture:
         `followed_by`: the parts of the recording after this one, given as one with it.
         Raises CaptureError only when the file cannot be read any more at all.
         """
-        items = self._items(since, followed_by)
-        if self._began.unknown:
-            items = self._searching_first(items)
+        pieces = self._pieces(since, followed_by, columns=False)
+        items = cast("Iterator[Item]", pieces)  # nothing else without columns
         return items if since is None else (item for item in items if item.time >= since)
 
-    def _searching_first(self, items: Iterator[Item]) -> Iterator[Item]:
-        """Items of a recording that begins within a search for settings: the first one says so."""
-        first = next(items, None)
+    def blocks(self, since: int | None = None, followed_by: Sequence[McapCapture] = ()) -> Iterator[Block | LineEvent]:
+        """The same as columns: batches that nothing happened to without an object a read. Parameters as of `items`.
+        Raises CaptureError.
+        """
+        pieces = self._pieces(since, followed_by, columns=True)
+        return blocks_of(pieces if since is None else _from(since, pieces))
+
+    def _pieces(
+        self, since: int | None, followed_by: Sequence[McapCapture], *, columns: bool
+    ) -> Iterator[Item | Reads]:
+        """`columns`: give clean batches as columns."""
+        pieces = self._in_order(since, followed_by, columns)
+        return self._searching_first(pieces) if self._began.unknown else pieces
+
+    def _searching_first(self, pieces: Iterator[Item | Reads]) -> Iterator[Item | Reads]:
+        """What a recording gives that begins within a search for settings: the first of it says so."""
+        first = next((piece for piece in pieces if not isinstance(piece, Reads) or len(piece)), None)
         if first is None:
             return
-        change = settings_change(first)
+        change = None if isinstance(first, Reads) else settings_change(first)
         if change is None or not change.searching:
             began = SettingsChange(self._began.line, searching=True)
-            yield LineEvent(first.time, LineEventKind.SETTINGS, str(began))
+            time = int(first.times[0]) if isinstance(first, Reads) else first.time
+            yield LineEvent(time, LineEventKind.SETTINGS, str(began))
         yield first
-        yield from items
+        yield from pieces
 
-    def _items(self, since: int | None, followed_by: Sequence[McapCapture]) -> Iterator[Item]:
+    def _in_order(self, since: int | None, followed_by: Sequence[McapCapture], columns: bool) -> Iterator[Item | Reads]:
         joiner = self._joiner(since)
-        yield from self._joined(joiner, since, alone=since is None)
+        yield from self._joined(joiner, since, columns, alone=since is None)
         for part in followed_by:
-            yield from part._joined(joiner, since, alone=False)
+            yield from part._joined(joiner, since, columns, alone=False)
         yield from joiner.close()
 
-    def _joined(self, joiner: Joiner, since: int | None, *, alone: bool) -> Iterator[Item]:
+    def _joined(self, joiner: Joiner, since: int | None, columns: bool, *, alone: bool) -> Iterator[Item | Reads]:
         """What this file gives to a joiner; `alone`: which has seen no other file, so that it says what is missing."""
+        clean = CleanBatches()
         with self._pass(since) as one:
-            for topic, head, data in one.messages():
-                if topic == LINE:
-                    joiner.line(head[2], data)
-                elif topic == RAW and (batch := one.batch(head, data)) is not None:
+            try:
+                for head, batch in self._raw(one, joiner):
                     if one.jumped:
                         joiner.next, one.jumped = None, False
                     if since is not None and head[2] < since:
                         joiner.skip(head[1], batch)
+                    elif columns and clean.takes(batch) and joiner.follows(head[1], batch):
+                        if not clean.fits(batch):
+                            yield clean.take()
+                        clean.add(batch)
                     else:
+                        if clean:
+                            yield clean.take()
                         yield from joiner.raw(head[1], batch)
+            except OSError:
+                if clean:
+                    yield clean.take()
+                raise
+            if clean:
+                yield clean.take()
             if alone:
                 self._note(one, joiner)
 
@@ -124,11 +154,8 @@ class McapCapture:
             return self._completeness
         joiner = self._joiner(None)
         with self._pass() as one:
-            for topic, head, data in one.messages():
-                if topic == LINE:
-                    joiner.line(head[2], data)
-                elif topic == RAW and (batch := one.batch(head, data)) is not None:
-                    joiner.skip(head[1], batch)
+            for head, batch in self._raw(one, joiner):
+                joiner.skip(head[1], batch)
             return self._note(one, joiner)
 
     # what else is in the file
@@ -165,6 +192,15 @@ class McapCapture:
                     yield topic, head[2], data
 
     # inside
+
+    @staticmethod
+    def _raw(one: MessagePass, joiner: Joiner) -> Iterator[tuple[Head, Batch]]:
+        """Batches of a pass; what is on /line goes to the joiner."""
+        for topic, head, data in one.messages():
+            if topic == LINE:
+                joiner.line(head[2], data)
+            elif topic == RAW and (batch := one.batch(head, data)) is not None:
+                yield head, batch
 
     @contextmanager
     def _pass(self, since: int | None = None) -> Iterator[MessagePass]:
@@ -259,6 +295,19 @@ class McapCapture:
         self.first_chunk = _number(found.metadata.get("first_chunk"), 0)
         self.octets_before = _number(found.metadata.get("octets_before"), 0)
         return True
+
+
+def _from(since: int, pieces: Iterator[Item | Reads]) -> Iterator[Item | Reads]:
+    """Those at or after a time (ns)."""
+    for piece in pieces:
+        if not isinstance(piece, Reads):
+            if piece.time >= since:
+                yield piece
+        elif (late := piece.times >= since).all():
+            yield piece
+        else:
+            octets = piece.octets[np.repeat(late, piece.lengths)]
+            yield plain_reads(octets, piece.times[late], piece.lengths[late])
 
 
 def _topics(chunk: bytes) -> set[str]:

@@ -10,8 +10,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+from sniff.engine.blocks import Block
 from sniff.engine.capture import Capture
-from sniff.engine.session import Completeness, Item, Session
+from sniff.engine.session import Completeness, Item, LineEvent, Session
 from sniff.recording.reader import McapCapture
 
 
@@ -26,6 +27,10 @@ class RotatedCapture:
     def items(self) -> Iterator[Item]:
         """Chunks and line events of all parts, in order. Raises CaptureError."""
         return self.parts[0].items(followed_by=self.parts[1:])
+
+    def blocks(self) -> Iterator[Block | LineEvent]:
+        """The same as columns. Raises CaptureError."""
+        return self.parts[0].blocks(followed_by=self.parts[1:])
 
     def completeness(self) -> Completeness:
         """Whether all parts are whole; what is wrong, part by part."""
