@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING, Protocol
 
 from dissectors.profiles import Devices
 from sniff.analysis.points import PointReader
@@ -12,6 +13,9 @@ from sniff.engine.follow_settings import SessionEngine, dissector_for
 from sniff.engine.observer import Observer, TableObserver, observe, observe_tables
 from sniff.engine.session import Item, LineEvent, Session
 from sniff.engine.verdict_join import Settled, Settling, Wanted
+
+if TYPE_CHECKING:
+    from sniff.engine.blocks import Block
 
 
 def outputs(items: Iterable[Item], session: Session, pairing: bool = True) -> Iterator[Output | LineEvent]:
@@ -31,16 +35,27 @@ def outputs(items: Iterable[Item], session: Session, pairing: bool = True) -> It
     yield engine.close()
 
 
-def survey(items: Iterable[Item], session: Session, *observers: Observer, reference: bool = False) -> None:
+class Source(Protocol):
+    """Reads, one by one and in blocks."""
+
+    def items(self) -> Iterator[Item]:
+        """See `engine.capture.Capture`."""
+        ...
+
+    def blocks(self) -> Iterator[Block | LineEvent]:
+        """See `engine.capture.Capture`."""
+        ...
+
+
+def survey(capture: Source, session: Session, *observers: Observer, reference: bool = False) -> None:
     """Hand a whole capture to observers, many rows at a time. `reference`: one by one, for comparison; the same comes
-    of it. Raises CaptureError as `items` does, when all before the damage was handed on."""
+    of it. Raises CaptureError as the capture does, when all before the damage was handed on."""
     if reference or not all(isinstance(one, TableObserver) for one in observers):
-        observe(outputs(items, session), *observers)
+        observe(outputs(capture.items(), session), *observers)
         return
-    from sniff.engine.blocks import blocks_of
     from sniff.engine.bulk import tables
 
-    observe_tables(tables(blocks_of(items), session), *observers)
+    observe_tables(tables(capture.blocks(), session), *observers)
 
 
 def settled(

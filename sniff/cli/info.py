@@ -52,7 +52,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _summarise(capture: Capture, session: Session, reference: bool) -> tuple[Summary, list[LineEvent]]:
     summary, happened = Summary(session.line), _Happened()
-    survey(capture.items(), session, summary, happened, reference=reference)
+    survey(capture, session, summary, happened, reference=reference)
     return summary, happened.events
 
 

@@ -25,7 +25,7 @@ from sniff.cli import USAGE, Failure, arguments, tables
 from sniff.cli.rows import iso
 from sniff.cli.tables import Cell
 from sniff.devices import noted_devices
-from sniff.editing.merging import merged, merged_session
+from sniff.editing.merging import Merged, merged_session
 from sniff.engine.engine import Output
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import LineEvent
@@ -59,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
     captures = [capture for _, capture in opened]
     names = [name for name, _ in opened]
     session = arguments.settings_of(args, merged_session(captures, names), names[0])
-    items = merged(captures) if len(captures) > 1 else captures[0].items()
+    source = Merged(captures) if len(captures) > 1 else captures[0]
     if table == "ring":
         shown = dissector_for(session).ring
         if shown is None:
@@ -67,14 +67,14 @@ def run(args: argparse.Namespace) -> int:
             raise Failure(f"ring: {session.protocol} passes no token; this table is for {passing}", USAGE)
         from sniff.cli import ring
 
-        return ring.show(items, session, shown, args.style)
+        return ring.show(source.items(), session, shown, args.style)
     if table == "health":
         model = BusModel(session, dissector_for(session), noted_devices(session))
-        survey(items, session, model, reference=args.reference)
+        survey(source, session, model, reference=args.reference)
         tables.write(HEALTH_HEADINGS, _health(model.health(), station_word(session.protocol)), args.style)
         return 0
     summary, kinds = Summary(session.line), _Kinds()
-    survey(items, session, summary, kinds, reference=args.reference)
+    survey(source, session, summary, kinds, reference=args.reference)
     if table == "nodes":
         nodes = [_node(node) for node in summary.nodes.present()]
         if nodes or args.style != "text":

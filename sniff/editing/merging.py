@@ -7,9 +7,13 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import groupby, repeat
+from typing import TYPE_CHECKING
 
 from sniff.engine.capture import Capture, CaptureError
-from sniff.engine.session import Item, Session
+from sniff.engine.session import Item, LineEvent, Session
+
+if TYPE_CHECKING:
+    from sniff.engine.blocks import Block
 
 
 def merged_session(captures: Sequence[Capture], names: Sequence[str]) -> Session:
@@ -24,6 +28,23 @@ def merged_session(captures: Sequence[Capture], names: Sequence[str]) -> Session
             )
     worst = max((capture.session.adapter for capture in captures), key=lambda adapter: adapter.latency)
     return replace(first, started=min(capture.session.started for capture in captures), adapter=worst)
+
+
+class Merged:
+    """Several captures as one."""
+
+    def __init__(self, captures: Sequence[Capture]) -> None:
+        self._captures = captures
+
+    def items(self) -> Iterator[Item]:
+        """The items of all in order of time."""
+        return merged(self._captures)
+
+    def blocks(self) -> Iterator[Block | LineEvent]:
+        """The same as columns."""
+        from sniff.engine.blocks import blocks_of
+
+        return blocks_of(self.items())
 
 
 def merged(captures: Sequence[Capture], shared: Callable[[Item], None] | None = None) -> Iterator[Item]:
