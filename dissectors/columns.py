@@ -13,8 +13,10 @@ octets, any times, any lengths; it never raises.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING, NamedTuple, Protocol, Self, runtime_checkable
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, Self, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -209,6 +211,32 @@ class TransactionColumns:
     def take(self, which: slice | Masks | Times) -> TransactionColumns:
         """Some of them."""
         return replace(self, **{one.name: getattr(self, one.name)[which] for one in fields(self)[:-1]})
+
+
+def counted(*keys: npt.NDArray[np.integer[Any]]) -> Iterator[tuple[tuple[int, ...], int]]:
+    """How often each combination of numbers, 0 or more, stands in columns of one length; in ascending order."""
+    if not len(keys[0]):
+        return
+    sizes = [int(key.max()) + 1 for key in keys]
+    combined = np.zeros(len(keys[0]), np.int64)
+    for key, size in zip(keys, sizes, strict=True):
+        combined = combined * size + key
+    if math.prod(sizes) <= _DENSE:
+        counts = np.bincount(combined)
+        distinct = np.flatnonzero(counts)
+        counts = counts[distinct]
+    else:
+        distinct, counts = np.unique(combined, return_counts=True)
+    for value, count in zip(distinct.tolist(), counts.tolist(), strict=True):
+        parts = []
+        for size in reversed(sizes):
+            value, part = divmod(value, size)
+            parts.append(part)
+        yield tuple(reversed(parts)), count
+
+
+_DENSE = 1 << 22
+"""So many combinations are counted without sorting."""
 
 
 class Run(NamedTuple):

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from functools import cache
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     import numpy as np
@@ -42,19 +43,7 @@ class Histogram:
         """Count many values; the same as one after the other."""
         import numpy as np
 
-        if not len(values):
-            return
-        values = np.sort(np.maximum(values, 0))
-        distinct, counts = np.unique(values, return_counts=True)
-        for value, count in zip(distinct.tolist(), counts.tolist(), strict=True):
-            bucket = _bucket(value)
-            self.buckets[bucket] += count
-            self.tops[bucket] = max(value, self.tops.get(bucket, 0))
-        self.count += len(values)
-        self.total += int(values.sum())
-        least, most = int(values[0]), int(values[-1])
-        self.least = least if self.least is None else min(self.least, least)
-        self.most = most if self.most is None else max(self.most, most)
+        add_grouped(lambda group: self, np.zeros(len(values), np.int64), values)
 
     def merge(self, other: Histogram) -> Histogram:
         """Both together, as a new value."""
@@ -114,3 +103,47 @@ class Histogram:
 
 def _bucket(value: int) -> int:
     return 0 if value < 1 else 1 + int(math.log2(value) * _STEPS)
+
+
+def add_grouped(
+    of: Callable[[int], Histogram], groups: npt.NDArray[np.integer[Any]], values: npt.NDArray[np.int64]
+) -> None:
+    """Count each value in the histogram of its group; the same as one after the other. `groups`: 0 or more."""
+    import numpy as np
+
+    if not len(values):
+        return
+    values = np.maximum(values, 0)
+    keys = groups.astype(np.int64) * _BUCKETS + np.searchsorted(_edges(), values, side="right")
+    order = np.argsort(keys, kind="stable")
+    keys, values = keys[order], values[order]
+    begins = np.flatnonzero(np.append(True, keys[1:] != keys[:-1]))
+    counts = np.diff(np.append(begins, len(keys)))
+    columns = (keys[begins], counts, np.maximum.reduceat(values, begins), np.minimum.reduceat(values, begins))
+    sums = np.add.reduceat(values, begins)
+    for key, count, most, least, total in zip(*(column.tolist() for column in (*columns, sums)), strict=True):
+        histogram, bucket = of(key // _BUCKETS), key % _BUCKETS
+        histogram.buckets[bucket] += count
+        histogram.tops[bucket] = max(most, histogram.tops.get(bucket, 0))
+        histogram.count += count
+        histogram.total += total
+        histogram.least = least if histogram.least is None else min(histogram.least, least)
+        histogram.most = most if histogram.most is None else max(histogram.most, most)
+
+
+_BUCKETS = 1 << 12
+"""More than there are for any value of 64 bits."""
+
+
+@cache
+def _edges() -> npt.NDArray[np.int64]:
+    """The least value of each bucket but the first."""
+    import numpy as np
+
+    edges = []
+    for bucket in range(1, 63 * _STEPS):
+        edge = max(1, math.floor(2 ** ((bucket - 1) / _STEPS)) - 1)
+        while _bucket(edge) < bucket:
+            edge += 1
+        edges.append(edge)
+    return np.array(edges, np.int64)

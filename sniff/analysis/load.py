@@ -101,9 +101,8 @@ class Load:
         places, least = numbers - base, int(numbers.max()) - base + 1
 
         def summed(values: npt.NDArray[Any], at: npt.NDArray[np.int64] = places) -> list[int]:
-            whole = np.zeros(least, np.int64)
-            np.add.at(whole, at, values)
-            return whole.tolist()
+            whole: list[int] = np.bincount(at, values, least).astype(np.int64).tolist()
+            return whole  # exact: a second has less than 2**53 ns
 
         parts = zip(
             (a + b for a, b in zip(summed(late), summed(busy - late, places - 1), strict=True)),

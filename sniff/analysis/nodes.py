@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from dissectors.frame import Frame
-from dissectors.histogram import Histogram
+from dissectors.histogram import Histogram, add_grouped
 from dissectors.tracker import PASSING, Transaction, Verdict
 from sniff.engine.engine import Row
 
@@ -162,17 +162,14 @@ class NodeTable:
             node.last = int(frames.end[max(places)])
 
     def _add_transactions(self, closed: TransactionColumns) -> None:
-        import numpy as np
-
-        from dissectors.columns import NONE, VERDICTS
+        from dissectors.columns import NONE, VERDICTS, counted
 
         of_station = closed.station != NONE
         if not of_station.any():
             return
         stations = closed.station[of_station]
-        keys = np.stack((stations, closed.kind[of_station], closed.verdict[of_station], closed.error[of_station]))
-        distinct, counts = np.unique(keys, axis=1, return_counts=True)
-        for (address, kind, verdict, error), count in zip(distinct.T.tolist(), counts.tolist(), strict=True):
+        keys = (stations, closed.kind[of_station], closed.verdict[of_station], closed.error[of_station])
+        for (address, kind, verdict, error), count in counted(*keys):
             node, name = self._node(address), closed.names[kind]
             if name in PASSING:
                 node.passed += count
@@ -183,8 +180,7 @@ class NodeTable:
             if error:
                 node.errors[closed.names[error]] += count
         timed = of_station & (closed.latency != NONE) & (closed.verdict != VERDICTS.index(Verdict.DATA))
-        for address in np.unique(closed.station[timed]).tolist():
-            self._node(address).latency.add_many(closed.latency[timed & (closed.station == address)])
+        add_grouped(lambda address: self._node(address).latency, closed.station[timed], closed.latency[timed])
 
     def merge(self, other: NodeTable) -> NodeTable:
         """Both together, as a new value."""

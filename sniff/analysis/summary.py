@@ -92,7 +92,7 @@ class Summary:
     def _add_rows(self, table: Table) -> None:
         import numpy as np
 
-        from dissectors.columns import CHECKS, DAMAGES, FOUNDS
+        from dissectors.columns import CHECKS, DAMAGES, FOUNDS, counted
 
         frames, heard = table.frames, table.heard
         octets, is_frame = frames.length, table.is_frame & heard
@@ -111,8 +111,7 @@ class Summary:
             self.found[FOUNDS[code].value] += count
         for code, count in enumerate(np.bincount(frames.kind[is_frame]).tolist()):
             self.kinds[frames.names[code]] += count
-        pairs = np.unique(np.stack((frames.damage[bad], frames.check[bad])), axis=1, return_counts=True)
-        for (damage, check), count in zip(pairs[0].T.tolist(), pairs[1].tolist(), strict=True):
+        for (damage, check), count in counted(frames.damage[bad], frames.check[bad]):
             said = DAMAGES[damage]
             self.damages[said.value if said is not None else CHECKS[check].value] += count
         for counter in (self.found, self.kinds):

@@ -129,13 +129,10 @@ class _Kinds:
 
     def add_table(self, table: Table) -> None:
         """Count what closed."""
-        import numpy as np
-
-        from dissectors.columns import VERDICTS
+        from dissectors.columns import VERDICTS, counted
 
         closed = table.transactions
-        keys, counts = np.unique(np.stack((closed.kind, closed.verdict)), axis=1, return_counts=True)
-        for (kind, verdict), count in zip(keys.T.tolist(), counts.tolist(), strict=True):
+        for (kind, verdict), count in counted(closed.kind, closed.verdict):
             self.counts[closed.names[kind], VERDICTS[verdict]] += count
 
     def add_line_event(self, event: LineEvent) -> None:

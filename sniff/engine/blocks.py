@@ -20,8 +20,8 @@ from sniff.engine.session import Item, LineEvent
 if TYPE_CHECKING:
     from dissectors.columns import Octets, Times
 
-BLOCK_OCTETS = 1 << 19
-BLOCK_READS = 1 << 16
+BLOCK_OCTETS = 1 << 20
+BLOCK_READS = 1 << 17
 """A block holds about so many octets or reads, whichever is first; never twice as many, but for a longer read."""
 _I64 = 1 << 63
 
