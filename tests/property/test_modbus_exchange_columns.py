@@ -334,6 +334,18 @@ def test_of_a_station_that_is_not_there(repeats: int, timeout: int, jitter: int,
             assert by_columns >= 0.8 * total
 
 
+@pytest.mark.parametrize("late", [12, 25, 90, 400])
+def test_of_a_copy_that_comes_late(late: int) -> None:
+    """After many quick ones it is the request again; before them it would have been the answer."""
+    frames: list[tuple[bytes, int]] = []
+    for number in range(120):
+        write = rtu(bytes((1 + number % 2, 6, 0, 7, number, 9)))
+        frames += [(rtu(bytes((3, 3, 0, 1, 0, 1))), 10 * MS), (rtu(bytes((3, 3, 2, 0, number))), 4 * MS)]
+        frames += [(write, 10 * MS), (write, (late if number in (3, 60, 61, 90) else 4) * MS)]
+    for timing in TIMINGS:
+        assert_paired_equally(delivered(frames, timing), timing)
+
+
 def delivered(frames: list[tuple[bytes, int]], timing: Timing) -> list[Chunk]:
     """One read a frame, each held back a little where the adapter may do so."""
     chunks, now = [], 0
