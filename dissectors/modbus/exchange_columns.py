@@ -1,26 +1,20 @@
 """Pairing by columns: regular exchanges of a Modbus line, for all frames of a capture at once.
 
-Regular is what `ModbusTracker` decides by the octets of two neighbouring frames, as long as it waits for nothing:
+Regular is what `ModbusTracker` decides by the octets of neighbouring frames, as long as it waits for nothing:
 
     a request, and its answer or an exception directly behind it     reads, writes of several: shape tells which is what
+    a request, and another one directly behind it                    of the same: no answer, perhaps repeated
     a write of one register or coil, and its copy or an exception    by turns, behind a regular exchange
     a write to all stations                                          behind a regular exchange
 
 Regular exchanges directly behind one another are a *run*. The contract, held by a property test: if the tracker is at
 rest where an exchange of a run begins (nothing is open, waits or is doubted, and what closed last was answered), it
-gives that exchange and those behind it, as far as `holding` says, exactly as `placed` has them. All else goes through
-the tracker: what is unanswered, damaged, late, repeated, said twice the same, and functions that few use.
-
-What the tracker learns decides three things of a regular exchange, so `holding` asks for it (`Known`): no answer may
-come later than 4/5 of the master's timeout; a copy that comes at once is no echo; and the copy of a write comes in time
-by the station's last 16 writes. As soon as the run itself has shown enough, that is known here. `passed` says what the
-tracker would remember of exchanges that went by without it.
+gives that exchange and those behind it, as far as `exchange_memory.holding` says, exactly as `placed` has them. All
+else goes through the tracker: what is damaged, late, said twice the same, and functions that few use.
 """
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Final
 
@@ -40,78 +34,44 @@ from dissectors.columns import (
 from dissectors.frame import Role
 from dissectors.line import NS_PER_S, Timing
 from dissectors.modbus.functions import EXCEPTION_BIT
-from dissectors.modbus.learnt import READ, UNLEARNT_LIMIT, WRITE, Learnt
+from dissectors.modbus.learnt import Learnt
 from dissectors.modbus.length_columns import PADDING, answer_lengths, of_codes
 from dissectors.tracker import Verdict
 
 SAMPLES: Final = 16
 """Response times that the tracker keeps of each station and pace."""
 
-ANSWERED: Final = 4
-"""Exchanges that it keeps of those that were answered."""
-
-PAUSES: Final = 32
-"""Pauses that it keeps of the master."""
-
-VOTES: Final = 5
-"""So many sure answers without an echo before them, and the bus has none, whatever was thought before."""
-
-HORIZON: Final = 1 << 14
-"""Exchanges looked at in one go: a run that goes on is taken up again."""
-
-_GIVE_UP: Final = 5 * NS_PER_S
-_REQUEST, _RESPONSE, _EITHER, _TO_ALL = (
+GIVE_UP: Final = 5 * NS_PER_S
+_AT_ONCE: Final = 1 << 14  # copies looked at together
+_REQUEST, _RESPONSE, _EITHER, TO_ALL = (
     ROLES.index(role) for role in (Role.REQUEST, Role.RESPONSE, Role.EITHER, Role.BROADCAST)
 )
-_ANSWERED, _EXCEPTION, _BROADCAST = (
-    VERDICTS.index(verdict) for verdict in (Verdict.ANSWERED, Verdict.EXCEPTION, Verdict.BROADCAST)
+_ANSWERED, _RETRY, _EXCEPTION, _BROADCAST, _NO_RESPONSE = (
+    VERDICTS.index(verdict)
+    for verdict in (Verdict.ANSWERED, Verdict.RETRY, Verdict.EXCEPTION, Verdict.BROADCAST, Verdict.NO_RESPONSE)
 )
+_SHORT: Final = 8
 _PAIRED: Final = frozenset((0x01, 0x02, 0x03, 0x04, 0x0F, 0x10, 0x17))
 _COPIED: Final = frozenset((0x05, 0x06))
 _RANGES: Final = frozenset((0x0F, 0x10))
 
 
 @dataclass(frozen=True, slots=True)
-class Known:
-    """What the tracker has learnt where a run begins.
-
-    `timeout`: the master's, ns, or None. `echoing`: whether the bus repeats requests at once; None while unlearnt.
-    `writes`: the newest response times of writes, ns, by station; that of a copy which closed last among them.
-    """
-
-    timeout: int | None
-    echoing: bool | None
-    writes: Mapping[int, Sequence[int]]
-
-
-@dataclass(frozen=True, slots=True)
-class Passed:
-    """What the tracker would remember of exchanges that went by without it, beside the first request's pause.
-
-    `times`: the newest response times of each station and pace, ns, in order. `pauses`: the master's newest, ns, each
-    with the time since the request before. `sure`: answers that had no echo before them. `answered`: places of the
-    newest exchanges that were answered, in order. `units`: stations that answered.
-    """
-
-    times: Mapping[tuple[int, int], Sequence[int]]
-    pauses: Sequence[tuple[int, int]]
-    sure: int
-    answered: Sequence[int]
-    units: frozenset[int]
-
-
-@dataclass(frozen=True, slots=True)
 class Exchanges:
     """Regular exchanges in order, one entry an exchange.
 
-    `request`: its first row. `answered`: False of a write to all stations, which has but one row. `run`: number of its
-    run. `unit`: station asked. `gap`: ns from request to answer, 0 where none is. `sure`: its frames can be nothing
-    else. `copy`: answered by the copy of its request. `writes`: whether it stores something. `at_once`: its copy comes
-    so soon that it could be an echo. `samples`: of a copy, response times of writes of its station in this run before.
+    `request`: its first row. `answered`: whether the next row is its answer; else it has but one. `unanswered`: the
+    next row is another request; else, without an answer, it is a write to all stations. `repeat`: it says what the
+    unanswered one directly before it said. `run`: number of its run. `unit`: station asked. `gap`: ns from request to
+    answer, or to the next request of one unanswered. `sure`: its frames can be nothing else. `copy`: answered by the
+    copy of its request. `writes`: whether it stores something. `at_once`: its copy comes so soon that it could be an
+    echo. `samples`: of a copy, response times of writes of its station in this run before.
     """
 
     request: Times
     answered: Masks
+    unanswered: Masks
+    repeat: Masks
     run: Times
     unit: Times
     gap: Times
@@ -137,27 +97,34 @@ class Exchanges:
 def exchanges(frames: FrameColumns, octets: Octets, timing: Timing, slack: Times | None = None) -> Exchanges:
     """The regular exchanges among frames. `octets`: of all reads. `slack`: of each frame, ns; the latency if None."""
     octets = np.concatenate((octets, np.zeros(PADDING, np.uint8)))
-    request, answered = _candidates(frames, octets)
+    request, answered, unanswered = _candidates(frames, octets)
     run = _runs(frames, octets, request, answered)
-    request, answered, run = request[run >= 0], answered[run >= 0], run[run >= 0]
+    left = run >= 0
+    request, answered, unanswered, run = request[left], answered[left], unanswered[left], run[left]
     last = request + answered
     unit = octets[frames.offset[request]].astype(np.int64)
-    gap = np.where(answered, np.maximum(frames.start[last] - frames.end[request], 0), 0)
+    waits = answered | unanswered
+    gap = np.where(waits, np.maximum(frames.start[request + waits] - frames.end[request], 0), 0)
+    repeat = np.zeros(len(run), bool)
+    said = _word(octets, frames.offset[request])
+    repeat[1:] = unanswered[:-1] & (run[1:] == run[:-1]) & (said[1:] == said[:-1])
     sure = frames.role[request] == _REQUEST
     copy = answered & ~sure & (frames.role[last] == _EITHER)
     writes = of_codes(_COPIED | _RANGES, False)[frames.function[request]]
     limit = max(7 * timing.char // 2, timing.char + timing.latency)
     at_once = copy & (np.maximum(gap - _slack(frames, timing, slack)[last], 0) <= limit)
-    found = Exchanges(request, answered, run, unit, gap, sure, copy, writes, at_once, np.zeros(len(run), np.int64))
-    return _in_time(found, Learnt(timing).tolerance)
+    none = np.zeros(len(run), np.int64)
+    found = Exchanges(request, answered, unanswered, repeat, run, unit, gap, sure, copy, writes, at_once, none)
+    too_soon = repeat & answered & (gap < 7 * timing.char // 2)  # the answer of an attempt before
+    return _in_time(_cut(found, too_soon), Learnt(timing).tolerance)
 
 
 def _slack(frames: FrameColumns, timing: Timing, slack: Times | None) -> Times:
     return np.full(len(frames), timing.latency) if slack is None else slack
 
 
-def _candidates(frames: FrameColumns, octets: Octets) -> tuple[Times, Masks]:
-    """First rows of what is an exchange if nothing is open before it, and whether it has an answer."""
+def _candidates(frames: FrameColumns, octets: Octets) -> tuple[Times, Masks, Masks]:
+    """First rows of what is an exchange if nothing is open before it; whether it is answered, or another follows."""
     count = len(frames)
     chained = frames.chained
     fine = (frames.damage == 0) & frames.ok
@@ -166,7 +133,7 @@ def _candidates(frames: FrameColumns, octets: Octets) -> tuple[Times, Masks]:
     copied = of_codes(_COPIED, False)[code] & fine
     asks = paired & (frames.role == _REQUEST) & (frames.destination > 0) & (frames.error == 0)
     either = copied & (frames.role == _EITHER) & (frames.error == 0)
-    to_all = (paired | copied) & (frames.role == _TO_ALL) & (frames.error == 0)
+    to_all = (paired | copied) & (frames.role == TO_ALL) & (frames.error == 0)
     answers = np.zeros(count, bool)
     copies = np.zeros(count, bool)
     at = np.flatnonzero((asks | either)[:-1] & chained[1:] & fine[1:])
@@ -177,7 +144,7 @@ def _candidates(frames: FrameColumns, octets: Octets) -> tuple[Times, Masks]:
     right = (frames.length[behind] == length) & (frames.error[behind] == 0)
     ranged = of_codes(_RANGES, False)[code[at]]
     right &= ~ranged | ((frames.address[at] == frames.address[behind]) & (frames.count[at] == frames.count[behind]))
-    soon = frames.start[behind] - frames.end[at] < _GIVE_UP
+    soon = frames.start[behind] - frames.end[at] < GIVE_UP
     answers[at] = same & soon & (frames.role[behind] == _RESPONSE) & (refused | (asks[at] & right))
     eights = np.zeros(len(at), bool)
     both = np.flatnonzero(either[at] & either[behind] & same & soon)
@@ -187,8 +154,12 @@ def _candidates(frames: FrameColumns, octets: Octets) -> tuple[Times, Masks]:
     begins = either & ~np.append(False, either[:-1] & chained[1:])
     turn = number - np.maximum.accumulate(np.where(begins, number, 0))
     whole = (asks & answers) | (either & (answers | copies) & (turn & 1 == 0))
-    first = np.flatnonzero(whole | to_all)
-    return first, whole[first]
+    unanswered = np.zeros(count, bool)
+    at = np.flatnonzero(asks[:-1] & asks[1:] & chained[1:])
+    long = (frames.length[at] > _SHORT) | (frames.length[at + 1] > _SHORT)
+    unanswered[at] = ~long | (_word(octets, place[at]) != _word(octets, place[at + 1]))  # of longer ones only that
+    first = np.flatnonzero(whole | to_all | unanswered)
+    return first, whole[first], unanswered[first]
 
 
 def _word(octets: Octets, place: Times) -> Times:
@@ -227,8 +198,8 @@ def _in_time(found: Exchanges, tolerance: int) -> Exchanges:
     order, rank = _by_station(found, told)
     gaps = found.gap[order]
     full = np.flatnonzero((rank >= SAMPLES) & found.copy[order])
-    for begin in range(0, len(full), HORIZON):
-        at = full[begin : begin + HORIZON]
+    for begin in range(0, len(full), _AT_ONCE):
+        at = full[begin : begin + _AT_ONCE]
         window = gaps[at[:, None] - np.arange(1, SAMPLES + 1)]
         slowest = np.partition(window, SAMPLES - 2, axis=1)[:, SAMPLES - 2]
         late[order[at]] = gaps[at] > slowest + slowest // 2 + tolerance
@@ -253,101 +224,15 @@ def _by_station(found: Exchanges, told: Masks) -> tuple[Times, Times]:
 
 def _cut(found: Exchanges, late: Masks) -> Exchanges:
     """Without some of them: a run ends there, and the next begins with what is sure."""
+    if not late.any():
+        return found
     follows = np.append(False, found.run[1:] == found.run[:-1])[: len(found)]
     run = _numbered(found.sure & ~late, follows & ~late)
     left = run >= 0
     return replace(found.take(left), run=run[left])
 
 
-# --- from a state that is known --------------------------------------------------------------------------------------
-
-
-def holding(found: Exchanges, place: int, known: Known, tolerance: int, since: int | None = None) -> int:
-    """Place behind the last exchange that stands, where the tracker is at rest before the one at `place`.
-
-    `known`: what it has learnt. `tolerance`: `Learnt.tolerance`. `since`: from which exchange of the run on it has
-    gone by or tracked all; `place` if not given. At most HORIZON exchanges are looked at.
-    """
-    end = min(int(np.searchsorted(found.run, found.run[place], side="right")), place + HORIZON)
-    if known.timeout is not None:
-        end = _first(5 * found.gap[place:end] > 4 * known.timeout, place, end)
-    if known.echoing is not False:
-        sure = np.cumsum(found.sure[place:end] & found.answered[place:end])
-        end = _first(found.at_once[place:end] & (sure < (VOTES if known.echoing else 1)), place, end)
-    begin = int(np.searchsorted(found.run, found.run[place]))
-    warm = SAMPLES + (place if since is None else since) - begin
-    return _first_late(found, place, end, warm, known, tolerance)
-
-
-def _first(which: Masks, place: int, end: int) -> int:
-    """Place of the first of them, counted from `place`; `end` if there is none."""
-    at = int(np.argmax(which)) if len(which) else 0
-    return place + at if len(which) and which[at] else end
-
-
-def _first_late(found: Exchanges, place: int, end: int, warm: int, known: Known, tolerance: int) -> int:
-    """Place of the first copy that does not surely come in time; looks one by one at those with few before them."""
-    part = slice(place, end)
-    doubtful = found.copy[part] & (found.samples[part] < warm)
-    if not doubtful.any():
-        return end
-    last = place + int(np.flatnonzero(doubtful)[-1])
-    times: dict[int, deque[int]] = {}
-    for at in (place + np.flatnonzero(found.writes[part] & found.answered[part])).tolist():
-        if at > last:
-            break
-        unit, gap = int(found.unit[at]), int(found.gap[at])
-        if unit not in times:
-            times[unit] = deque(known.writes.get(unit, ()), maxlen=SAMPLES)
-        if found.copy[at]:
-            limit = _limit(times[unit], tolerance)
-            if gap > (UNLEARNT_LIMIT if limit is None and known.timeout is None else limit or gap):
-                return at
-        elif not found.sure[at]:
-            continue
-        times[unit].append(gap)
-    return end
-
-
-def _limit(times: Sequence[int], tolerance: int) -> int | None:
-    """As `Learnt.response_limit`, less what the master's timeout does to it."""
-    if len(times) < 2:
-        return None
-    ordered = sorted(times)
-    slowest = ordered[-2] if len(ordered) > 3 else ordered[-1]
-    return slowest + slowest // 2 + tolerance
-
-
-def passed(found: Exchanges, frames: FrameColumns, place: int, end: int) -> Passed:
-    """What the tracker would remember of exchanges [place, end)."""
-    part = slice(place, end)
-    answered, unit = found.answered[part], found.unit[part]
-    told = answered & (found.sure[part] | found.copy[part])
-    if end > place and found.copy[end - 1]:
-        told[-1] = False  # a copy teaches when the next request has come
-    at = np.flatnonzero(told)
-    key = unit[at] << 1 | found.writes[part][at]
-    order = np.argsort(key, kind="stable")
-    gaps, key = found.gap[part][at[order]].tolist(), key[order]
-    ends = np.append(np.flatnonzero(key[1:] != key[:-1]) + 1, len(key)).tolist()
-    times, begin = {}, 0
-    for behind in ends if gaps else ():
-        one = int(key[begin])
-        times[one >> 1, WRITE if one & 1 else READ] = gaps[max(begin, behind - SAMPLES) : behind]
-        begin = behind
-    asks = answered[:-1] & (found.sure[part][1:] | (frames.role[found.request[part][1:]] == _TO_ALL))
-    asks |= answered[:-1] & (unit[1:] != unit[:-1])
-    at = place + 1 + np.flatnonzero(asks)[-PAUSES:]
-    start = frames.start[found.request[at]]
-    pause = np.maximum(start - frames.end[found.request[at - 1] + found.answered[at - 1]], 0)
-    cycle = start - frames.start[found.request[at - 1]]
-    return Passed(
-        times,
-        list(zip(pause.tolist(), cycle.tolist(), strict=True)),
-        int((found.sure[part] & answered).sum()),
-        (place + np.flatnonzero(answered)[-ANSWERED:]).tolist(),
-        frozenset(np.flatnonzero(np.bincount(unit[answered])).tolist()),
-    )
+# --- as the tracker gives them ---------------------------------------------------------------------------------------
 
 
 def placed(
@@ -367,30 +252,35 @@ def placed(
     last, count = request + answered, len(request)
     held_back = _slack(frames, timing, slack)
     gap = found.gap[which]
-    refused = answered & (frames.error[last] != 0)
-    number = np.arange(tx, tx + count)
+    place = np.arange(count)
+    first = np.maximum.accumulate(np.where(found.repeat[which] & (place > 0), 0, place))
+    attempt = 1 + place - first
+    verdict = np.where(found.unanswered[which], _NO_RESPONSE, _BROADCAST)
+    verdict[answered] = np.where(attempt > 1, _RETRY, _ANSWERED)[answered]
+    verdict[answered & (frames.error[last] != 0)] = _EXCEPTION
+    number = tx + place
     transactions = TransactionColumns(
         number,
         unit.astype(np.int16),
         frames.kind[request],
         numbers[request],
         np.where(answered, numbers[last], NONE),
-        np.where(answered, np.where(refused, _EXCEPTION, _ANSWERED), _BROADCAST).astype(np.uint8),
+        verdict.astype(np.uint8),
         frames.start[request],
         np.maximum(frames.end[request], frames.end[last]),
         np.where(answered, gap, NONE),
         np.where(answered, np.maximum(gap - held_back[last], 0), NONE),
         np.where(answered, gap + held_back[request], NONE),
-        np.ones(count, np.int32),
-        np.full(count, NONE, np.int64),
+        attempt.astype(np.int32),
+        np.where(attempt > 1, tx + first, NONE),
         np.where(answered, frames.error[last], 0).astype(np.uint16),
         frames.names,
     )
     rows = 1 + answered.astype(np.int64)
-    exchange = np.repeat(np.arange(count), rows)
+    exchange = np.repeat(place, rows)
     is_answer = np.arange(len(exchange)) != (np.cumsum(rows) - rows)[exchange]
     station = unit[exchange].astype(np.int16)
-    asked = np.where(answered, _REQUEST, _TO_ALL)[exchange]
+    asked = np.where(answered | found.unanswered[which], _REQUEST, TO_ALL)[exchange]
     placements = PlacementColumns(
         number[exchange],
         np.where(is_answer, _RESPONSE, asked).astype(np.uint8),

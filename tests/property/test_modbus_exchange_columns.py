@@ -18,7 +18,8 @@ from dissectors.line import LineSettings, Timing
 from dissectors.modbus import RTU
 from dissectors.modbus.adu import readable_adu
 from dissectors.modbus.exchange import Exchange, Seen
-from dissectors.modbus.exchange_columns import Exchanges, Known, Passed, exchanges, holding, passed, placed
+from dissectors.modbus.exchange_columns import Exchanges, exchanges, placed
+from dissectors.modbus.exchange_memory import Known, Passed, holding, passed
 from dissectors.modbus.learnt import WRITE
 from dissectors.modbus.tracker import ModbusTracker
 from dissectors.tracker import Interval, Placement, Transaction
@@ -42,29 +43,39 @@ def is_at_rest(tracker: ModbusTracker) -> bool:
     return not waits and (tracker._last is None or tracker._last.answered)
 
 
-def known_of(tracker: ModbusTracker) -> Known:
-    """What it has learnt that a regular exchange may depend on."""
+def known_of(tracker: ModbusTracker, start: int) -> Known:
+    """What it has learnt that a regular exchange may depend on; `start`: of the first request."""
+    learnt, pauses = tracker.learnt, list(tracker.learnt._pauses)
+    slowest = learnt._slowest()
+    if tracker._last_end is not None:
+        pauses.append(start - tracker._last_end)
     writes = {unit: tuple(times) for (unit, pace), times in tracker.learnt._times.items() if pace == WRITE}
     last = tracker._last
     if last is not None and last.copied is not None and last.pace == WRITE:  # it teaches with the next request
         writes[last.unit] = (*writes.get(last.unit, ()), last.copied)
-    return Known(tracker.timeout, tracker._echoing, writes)
+        slowest = max(slowest, last.copied)
+    return Known(tracker.timeout, tracker._echoing, writes, tuple(learnt._unanswered), slowest, max(pauses, default=0))
 
 
 def let_pass(
-    tracker: ModbusTracker, went: Passed, first: Seen, newest: list[Exchange], last_end: int, count: int
+    tracker: ModbusTracker, went: Passed, first: Seen, newest: list[Exchange], last_end: int, place: int, count: int
 ) -> None:
     """Put it into the state that it would have behind exchanges that went by."""
     sure = first.header.role.value != "either"
+    given_up = {one - place for one in went.given_up}
     tracker._learn_from_next(first, sure)
     for key, times in went.times.items():
         for time in times:
             tracker.learnt.answered(*key, time)
     for pause, cycle in went.pauses:
         tracker.learnt.paused(pause, cycle)
+    tracker.learnt._unanswered.extend(went.unanswered)
+    if went.unanswered:
+        tracker.learnt._timeout = tracker.learnt._agreed()
     for _ in range(min(went.sure, 2 * 4)):
         tracker._learn_echo(False)
-    tracker._answered.extend(exchange for exchange in newest if exchange.answered)
+    tracker._answered.extend([exchange for exchange in newest if exchange.answered][-4:])
+    tracker._given_up.extend([exchange for exchange in newest if exchange.tx - tracker._next_tx in given_up])
     tracker._last, tracker._last_end, tracker._last_was_answer = newest[-1], last_end, newest[-1].answered
     tracker._mute -= went.units
     tracker._only = b""
@@ -156,7 +167,7 @@ def assert_paired_equally(chunks: list[Chunk], timing: Timing) -> tuple[int, int
             tracker.track(at, event, RTU.peek(event) if isinstance(event, Frame) else None)
             at += 1
             continue
-        end = holding(found, place, known_of(tracker), tracker.learnt.tolerance)
+        end = holding(found, frames, place, known_of(tracker, int(frames.start[rows[at]])), timing)
         while end > place and not _is_framed(rows, at, found, place, end):
             end -= 1
         if end == place:
@@ -207,7 +218,7 @@ def _compare(
     assert [closed for one in tracked for closed in one.closed] == transactions_of(transactions)
     went = passed(found, frames, place, end)
     newest = []
-    for one in sorted({*went.answered, end - 1}):
+    for one in sorted({*went.answered, *went.given_up, end - 1}):
         request = Exchange(
             before._next_tx + one - place, seen[int(found.request[one]) - first + at], bool(found.sure[one])
         )
@@ -215,7 +226,7 @@ def _compare(
         newest.append(request)
     if found.copy[end - 1]:
         newest[-1].copied = int(found.gap[end - 1])
-    let_pass(before, went, seen[at], newest, int(frames.end[last]), end - place)
+    let_pass(before, went, seen[at], newest, int(frames.end[last]), place, end - place)
     mine, its = memory(before), memory(tracker)
     mine["answered"], its["answered"] = _without_copied(mine["answered"]), _without_copied(its["answered"])
     assert mine == its
@@ -289,6 +300,50 @@ def said(seed: int, count: int, *, lost: float = 0.0, spread: int = 6) -> list[t
         elif fault == 5:
             frames.append((rtu(bytes((9,)) + answered[1:]), wait))
     return frames
+
+
+def with_dead_station(seed: int, count: int, repeats: int, timeout: int, jitter: int) -> list[tuple[bytes, int]]:
+    """Polls of which one in seven is for a station that is not there."""
+    dice, frames = random.Random(seed), []
+    for number in range(count):
+        unit = 1 + number % 7
+        asked = bytes((unit, 3, 0, dice.randrange(40), 0, 2))
+        if unit == 5:
+            frames += [
+                (rtu(asked), (dice.randint(8, 12) if n == 0 else timeout + dice.randint(0, jitter)) * MS)
+                for n in range(repeats)
+            ]
+            frames.append((rtu(bytes((6, 3, 0, 0, 0, 2))), (timeout + dice.randint(0, jitter)) * MS))
+        elif unit == 6 and dice.random() < 0.3:
+            frames += [(rtu(bytes((1, 6, 0, 7)) + dice.randbytes(2)), 10 * MS)] * 2
+            continue
+        elif unit != 6:
+            frames.append((rtu(asked), dice.randint(8, 12) * MS))
+        if unit != 5:
+            frames.append((rtu(bytes((unit, 3, 4)) + dice.randbytes(4)), dice.randint(3, 9) * MS))
+    return frames
+
+
+@pytest.mark.parametrize("timing", TIMINGS, ids=str)
+@pytest.mark.parametrize(("repeats", "timeout", "jitter"), [(1, 200, 5), (3, 300, 2), (2, 60, 40), (3, 1000, 900)])
+def test_of_a_station_that_is_not_there(repeats: int, timeout: int, jitter: int, timing: Timing) -> None:
+    for seed in range(3):
+        frames = with_dead_station(seed, 500, repeats, timeout, jitter)
+        by_columns, total = assert_paired_equally(delivered(frames, timing), timing)
+        if jitter < 10:
+            assert by_columns >= 0.8 * total
+
+
+@pytest.mark.parametrize("late", [12, 25, 90, 400])
+def test_of_a_copy_that_comes_late(late: int) -> None:
+    """After many quick ones it is the request again; before them it would have been the answer."""
+    frames: list[tuple[bytes, int]] = []
+    for number in range(120):
+        write = rtu(bytes((1 + number % 2, 6, 0, 7, number, 9)))
+        frames += [(rtu(bytes((3, 3, 0, 1, 0, 1))), 10 * MS), (rtu(bytes((3, 3, 2, 0, number))), 4 * MS)]
+        frames += [(write, 10 * MS), (write, (late if number in (3, 60, 61, 90) else 4) * MS)]
+    for timing in TIMINGS:
+        assert_paired_equally(delivered(frames, timing), timing)
 
 
 def delivered(frames: list[tuple[bytes, int]], timing: Timing) -> list[Chunk]:

@@ -369,6 +369,34 @@ def test_no_cut_of_blocks_matters_to_what_is_said(data: st.DataObject, timing: T
             assert told[offset + base] == (start, end)
 
 
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 99), st.integers(8, 40), st.sampled_from((HELD_BACK, replace(FAST, latency=FTDI_LATENCY))))
+def test_blocks_that_begin_behind_the_last_frame_told(seed: int, size: int, timing: Timing) -> None:
+    """As whoever reads a capture in blocks: what a block left over goes before the next, perhaps from within a read."""
+    whole_reads = reads_of(ftdi(laid_out(bus(seed, 60, (3, 6, 16)), timing, 3 * MS)))
+    whole = kernel(whole_reads, timing)
+    told = dict(zip(whole.offset.tolist(), zip(whole.start.tolist(), whole.end.tolist(), strict=True), strict=True))
+    begins, base, before, frames = whole_reads.begins, 0, None, 0
+    for end in [*range(size, len(whole_reads), size), len(whole_reads)]:
+        first = int(np.searchsorted(begins, base, side="right")) - 1
+        lengths_left = whole_reads.lengths[first:end].copy()
+        lengths_left[0] -= base - begins[first]
+        block = Reads(
+            whole_reads.octets[base : begins[end]],
+            whole_reads.times[first:end],
+            lengths_left,
+            whole_reads.marked[first:end],
+            before,
+        )
+        part = kernel(block, timing)
+        for offset, start, stop in zip(part.offset.tolist(), part.start.tolist(), part.end.tolist(), strict=True):
+            assert told[offset + base] == (start, stop)
+        frames += len(part)
+        if len(part) and part.offset[-1] + part.length[-1] < len(block.octets):
+            base, before = base + int(part.offset[-1] + part.length[-1]), int(part.end[-1])
+    assert frames >= 0.7 * len(whole)
+
+
 # --- tables ----------------------------------------------------------------------------------------------------------
 
 
