@@ -81,3 +81,11 @@ def is_encoded(frame_type: int) -> bool:
 def total(length: int) -> int:
     """Octets of a whole frame with that length field, trailing pad not counted."""
     return HEADER + length + 2 if length else HEADER
+
+
+def data_length(octets: bytes) -> int:
+    """The length field of the header that begins `octets`: octets of data, its CRC not counted. Seven octets at least.
+
+    ASHRAE 135, 9.3: high octet first, behind preamble, type and both addresses.
+    """
+    return octets[5] << 8 | octets[6]

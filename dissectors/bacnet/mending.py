@@ -10,7 +10,7 @@ from __future__ import annotations
 import struct
 
 from dissectors.bacnet import cobs
-from dissectors.bacnet.frame_types import HEADER, PREAMBLE, FrameType, is_encoded, total
+from dissectors.bacnet.frame_types import HEADER, PREAMBLE, FrameType, data_length, is_encoded, total
 from dissectors.bacnet.limits import MAX_DATA, MAX_ENCODED
 from dissectors.checksums import crc8_mstp, crc16_x25
 from dissectors.frame import Damage, Flaw, Repair
@@ -88,7 +88,7 @@ def mended(octets: bytes, damage: Damage | None) -> Repair | None:
         return _wrong_length(octets)
     if not header_is_good(octets[:HEADER]):
         return None
-    return _wrong_end(octets, octets[5] << 8 | octets[6])
+    return _wrong_end(octets, data_length(octets))
 
 
 def _short_header(octets: bytes) -> Repair | None:

@@ -8,7 +8,7 @@ from dissectors.bacnet import apdu as apdus
 from dissectors.bacnet import cobs, codec, services
 from dissectors.bacnet import npdu as npdus
 from dissectors.bacnet.apdu import Apdu
-from dissectors.bacnet.frame_types import CARRIES_NPDU, HEADER, is_encoded
+from dissectors.bacnet.frame_types import CARRIES_NPDU, HEADER, data_length, is_encoded
 from dissectors.bacnet.npdu import Npdu
 from dissectors.frame import Assembly, Check, Damage, Frame
 
@@ -41,7 +41,7 @@ class Message:
 
 def data_of(octets: bytes) -> bytes | None:
     """The data that a frame's octets carry, without CRC, decoded; None when they are not whole or not decodable."""
-    length = octets[5] << 8 | octets[6]
+    length = data_length(octets)
     if not length:
         return b""
     body = octets[HEADER : HEADER + length + 2]
@@ -61,7 +61,7 @@ def read(frame: Frame, *, trusting: bool = False) -> Message | None:
     source = octets[4] if len(octets) > 4 else None
     if len(octets) < HEADER:
         return Message(octets[2], octets[3], source)
-    frame_type, length = octets[2], octets[5] << 8 | octets[6]
+    frame_type, length = octets[2], data_length(octets)
     sound = (
         frame.check is Check.GOOD
         or frame.repair is not None

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dissectors.bacnet import apdu as apdus
 from dissectors.bacnet import npdu as npdus
+from dissectors.bacnet.frame_types import data_length
 from dissectors.bacnet.tags import header_at
 from dissectors.checksums import crc8_mstp, crc16_x25
 from dissectors.frame import Frame
@@ -38,7 +39,7 @@ class MstpRenamer:
         header = bytes([octets[2], address(octets[3]), address(octets[4]), octets[5], octets[6]])
         check = octets[7] ^ crc8_mstp(octets[2:7]) ^ crc8_mstp(header)  # linear: the error in it stays what it was
         head = octets[:2] + header + bytes([check])
-        length = octets[5] << 8 | octets[6]
+        length = data_length(octets)
         if not intact or not length:
             return head + octets[8:]
         if octets[2] >= 32:  # encoded: its length would not survive a change of its content; the frame reads damaged

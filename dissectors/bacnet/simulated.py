@@ -14,7 +14,7 @@ from enum import Enum, auto
 from dissectors.bacnet.application import Application, Device, Outgoing, Poller, Quiet
 from dissectors.bacnet.f510 import f510
 from dissectors.bacnet.frame_making import frame, npdu_frame
-from dissectors.bacnet.frame_types import CARRIES_NPDU, EXPECTING, HEADER, FrameType, total
+from dissectors.bacnet.frame_types import CARRIES_NPDU, EXPECTING, HEADER, FrameType, data_length, total
 from dissectors.bacnet.framing import MstpFramer, body_is_good, header_is_good
 from dissectors.bacnet.limits import (
     BROADCAST,
@@ -307,7 +307,7 @@ class Node:
 def _frames(octets: bytes, now: int, timing: Timing) -> list[bytes]:
     """The good frames in a burst."""
     if header_is_good(octets):
-        length = octets[5] << 8 | octets[6]
+        length = data_length(octets)
         if len(octets) == total(length) and body_is_good(octets[2], length, octets[HEADER:]):
             return [octets]
     framer = MstpFramer(timing)

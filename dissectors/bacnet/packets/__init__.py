@@ -14,7 +14,7 @@ from contextlib import suppress
 
 from scapy.packet import Packet, Raw
 
-from dissectors.bacnet.frame_types import HEADER, is_encoded, total
+from dissectors.bacnet.frame_types import HEADER, data_length, is_encoded, total
 from dissectors.bacnet.framing import body_is_good
 from dissectors.bacnet.packets.apdus import (
     Abort,
@@ -96,7 +96,7 @@ def dissect(octets: bytes) -> Packet:
 def _is_whole(octets: bytes) -> bool:
     if len(octets) < HEADER:
         return False
-    length = octets[5] << 8 | octets[6]
+    length = data_length(octets)
     end = total(length)
     if len(octets) < end:
         return False

@@ -19,7 +19,7 @@ from scapy.fields import (
 from scapy.packet import Packet, Raw
 
 from dissectors.bacnet import cobs, frame_types
-from dissectors.bacnet.frame_types import CARRIES_NPDU, HEADER, PROPRIETARY, is_encoded, total
+from dissectors.bacnet.frame_types import CARRIES_NPDU, HEADER, PROPRIETARY, data_length, is_encoded, total
 from dissectors.bacnet.packets.network import NPDU
 from dissectors.checksums import crc8_mstp, crc16_x25
 
@@ -66,7 +66,7 @@ class MSTP(Packet):
     def pre_dissect(self, s: bytes) -> bytes:
         """Encoded data are decoded first, so that what follows the header is plain."""
         if len(s) >= HEADER and is_encoded(s[2]):
-            length = s[5] << 8 | s[6]
+            length = data_length(s)
             data = cobs.decode_body(s[HEADER : HEADER + length + 2])
             if data is not None:
                 return s[:HEADER] + data + s[total(length) :]
