@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, Self, runtime_check
 import numpy as np
 import numpy.typing as npt
 
-from dissectors.frame import Check, Damage, Found, Role
+from dissectors.frame import Check, Damage, Found, Frame, Header, Role
 from dissectors.line import Timing
 from dissectors.tracker import Verdict
 
@@ -46,6 +46,12 @@ DAMAGES = (None, *Damage)
 ROLES = tuple(Role)
 VERDICTS = tuple(Verdict)
 """What the codes in `check`, `found`, `damage`, `role` and `verdict` stand for: the member at that place."""
+
+
+def some(value: np.integer[Any]) -> int | None:
+    """An optional number; None for `NONE`."""
+    number = int(value)
+    return None if number == NONE else number
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,6 +164,37 @@ class FrameColumns:
     def take(self, which: slice | Masks | Times) -> FrameColumns:
         """Some of them."""
         return replace(self, **{one.name: getattr(self, one.name)[which] for one in fields(self)[:-1]})
+
+    def frame(self, row: int, octets: Octets, protocol: str, slack: int) -> Frame:
+        """The frame that a row stands for. `octets`: where `offset` counts. `slack`: ns."""
+        begin = int(self.offset[row])
+        return Frame(
+            protocol,
+            octets[begin : begin + int(self.length[row])].tobytes(),
+            int(self.start[row]),
+            int(self.end[row]),
+            CHECKS[self.check[row]],
+            FOUNDS[self.found[row]],
+            DAMAGES[self.damage[row]],
+            some(self.expected[row]),
+            0,
+            slack,
+        )
+
+    def header(self, row: int, protocol: str) -> Header:
+        """What `peek` says of it."""
+        return Header(
+            protocol,
+            some(self.source[row]),
+            some(self.destination[row]),
+            ROLES[self.role[row]],
+            self.names[self.kind[row]],
+            some(self.function[row]),
+            some(self.address[row]),
+            some(self.count[row]),
+            bool(self.ok[row]),
+            self.names[self.error[row]] if self.error[row] else None,
+        )
 
     @property
     def chained(self) -> Masks:

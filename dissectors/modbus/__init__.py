@@ -33,6 +33,7 @@ __all__ = [
 
 packet = on_first_use("dissectors.modbus.packets:dissect")
 kernel = on_first_use("dissectors.modbus.kernel:kernel")
+pairing = on_first_use("dissectors.modbus.block_pairing:pairing")
 
 
 def rtu_bits(frame: Frame) -> float:
@@ -72,6 +73,7 @@ RTU = Dissector(
     readings=readings,
     refusal=refusal,
     kernel=kernel,
+    pairing=pairing,
 )
 
 ASCII = Dissector(

@@ -87,6 +87,9 @@ class Doubts:
         self._learnt = learnt
         self._kept: deque[_Doubt] = deque()
 
+    def __bool__(self) -> bool:
+        return bool(self._kept)
+
     def add(self, exchange: Exchange) -> None:
         """Keep one until more is known."""
         self._kept.append(_Doubt(exchange, exchange.gap(exchange.copies[0].frame.start), exchange.last_end))

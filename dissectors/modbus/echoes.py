@@ -11,8 +11,12 @@ from dissectors.modbus.functions import BROADCAST
 from dissectors.modbus.learnt import Learnt
 from dissectors.modbus.promptness import AT_ONCE
 
-_ECHO_VOTES = 4
+ECHO_VOTES = 4
 """Answered requests with an echo, or without, that count at most against what is seen now."""
+
+
+MOST_VOTES = 2 * ECHO_VOTES
+"""More answers without an echo than these decide nothing."""
 
 
 class Echoes:
@@ -65,6 +69,6 @@ class Echoes:
         many were otherwise: a late read puts a repeat directly behind the request."""
         if self.usual is None or (echoed and not self._votes):
             self.usual = echoed
-        self._votes = max(-_ECHO_VOTES, min(_ECHO_VOTES, self._votes + (1 if echoed else -1)))
+        self._votes = max(-ECHO_VOTES, min(ECHO_VOTES, self._votes + (1 if echoed else -1)))
         if self._votes:
             self.usual = self._votes > 0

@@ -40,6 +40,24 @@ class Exchanges:
         self.chain: list[Exchange] = []
         self.only: bytes | None = None
 
+    @property
+    def is_at_rest(self) -> bool:
+        """Whether nothing waits, and what closed last was answered."""
+        waits = self.open is not None or self.chain or self._doubts
+        return not waits and (self.last is None or self.last.answered)
+
+    @property
+    def next_tx(self) -> int:
+        """The number that the next transaction will have."""
+        return self._next_tx
+
+    def pass_by(self, newest: list[Exchange], given_up: list[Exchange], count: int) -> None:
+        """So many transactions went by; `newest`: the last exchanges that were answered, and the last of all."""
+        self.answered.extend([exchange for exchange in newest if exchange.answered])
+        self.given_up.extend(given_up)
+        self.last, self.only = newest[-1], b""
+        self._next_tx += count
+
     def expire(self, now: int) -> None:
         """Close the open request when nothing has come until `now`, well beyond the master's timeout."""
         limit = GIVE_UP if self._learnt.timeout is None else self._learnt.timeout * 3 // 2

@@ -7,6 +7,7 @@ a bus that changes is learnt anew. All times are int ns, as they were measured (
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Sequence
 from itertools import pairwise
 
 from dissectors.line import Timing
@@ -159,6 +160,33 @@ class Learnt:
     def too_soon(self, silence: int) -> int:
         """The gap below which a frame after an answer is not the master's next request; `silence` while unlearnt."""
         return max(silence, min(self._pauses) // 2) if len(self._pauses) >= 4 else silence
+
+    # ---- for who lets exchanges go by the tracker (seam.py)
+
+    @property
+    def waits(self) -> tuple[int, ...]:
+        """How long the master waited for the last unanswered requests, ns."""
+        return tuple(self._unanswered)
+
+    @property
+    def pauses(self) -> tuple[int, ...]:
+        """The master's newest pauses, ns."""
+        return tuple(self._pauses)
+
+    @property
+    def slowest(self) -> int:
+        """The longest of all response times kept, ns."""
+        return self._slowest()
+
+    def write_times(self) -> dict[int, tuple[int, ...]]:
+        """The newest response times of what stations have to store, ns, by unit."""
+        return {unit: tuple(times) for (unit, pace), times in self._times.items() if pace == WRITE}
+
+    def waited(self, waits: Sequence[int]) -> None:
+        """Unanswered requests of which it is certain already that the master waited its time."""
+        if waits:
+            self._unanswered.extend(waits)
+            self._timeout = self._agreed()
 
     def _slowest(self) -> int:
         return max((max(each) for each in self._times.values()), default=0)

@@ -18,21 +18,25 @@ may still answer. (Some battery systems are asked at one address and always answ
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 from dissectors.frame import Event, Header, Noise, Reason, Role
 from dissectors.line import Timing
 from dissectors.modbus.adu import readable_adu
 from dissectors.modbus.damaged_unit import names_another, unit_of
 from dissectors.modbus.doubts import is_full
-from dissectors.modbus.echoes import Echoes
+from dissectors.modbus.echoes import MOST_VOTES, Echoes
 from dissectors.modbus.exchange import Exchange, Garble, Seen, answer_apart, echo_of
 from dissectors.modbus.exchanges import FIRST_SEEN, Exchanges
 from dissectors.modbus.functions import BROADCAST
-from dissectors.modbus.learnt import Learnt
+from dissectors.modbus.learnt import WRITE, Learnt
 from dissectors.modbus.pairing import another_function, is_listen_only, is_restart, mismatch
 from dissectors.modbus.promptness import Promptness
 from dissectors.tracker import Placement, Tracked, Transaction, Verdict
+
+if TYPE_CHECKING:
+    from dissectors.modbus.exchange_memory import Known, Passed
 
 _IMPATIENT = "the master went on long before its timeout: the answer may have been missed at this tap"
 _PERHAPS_ANSWER = "the master went on long before its timeout: perhaps an answer whose request was missed at this tap"
@@ -43,6 +47,21 @@ _TURNAROUND = 90_000_000
 _CHAIN_MOST = 8  # equal requests in a row whose verdicts wait for each other
 _GARBLE = 3  # so many octets of noise in place of an answer are a damaged answer
 _QUIET_NOISE = frozenset((Reason.ZEROS, Reason.BREAK, Reason.PAD))
+
+
+@dataclass(frozen=True, slots=True)
+class PassedBy:
+    """Exchanges that went by the tracker. `first`: the request of the first. `newest`: the last that were answered, and
+    the last of all; `given_up`: the last that were not. `count`: of all. `end`: ns, of the last frame. `units`: that
+    were asked.
+    """
+
+    first: Seen
+    newest: list[Exchange]
+    given_up: list[Exchange]
+    count: int
+    end: int
+    units: set[int]
 
 
 class ModbusTracker:
@@ -360,6 +379,44 @@ class ModbusTracker:
             self._mute.add(request.unit)
         elif request.unit in self._mute:
             request.remark = f"unit {request.unit} was put into listen-only mode"
+
+    # ---- exchanges that went by without it (seam.py)
+
+    def known(self, start: int) -> Known | None:
+        """What it has learnt that a regular exchange depends on whose request begins at `start`; None: it waits."""
+        from dissectors.modbus.exchange_memory import Known
+
+        held = self._held
+        if not held.is_at_rest:
+            return None
+        writes, slowest, last = self.learnt.write_times(), self.learnt.slowest, held.last
+        if last is not None and last.copied is not None and last.pace == WRITE:  # it teaches with the next request
+            writes[last.unit] = (*writes.get(last.unit, ()), last.copied)
+            slowest = max(slowest, last.copied)
+        pauses = self.learnt.pauses if self._last_end is None else (*self.learnt.pauses, start - self._last_end)
+        return Known(self.timeout, self._echoes.usual, writes, self.learnt.waits, slowest, max(pauses, default=0))
+
+    @property
+    def next_tx(self) -> int:
+        """The number that the next transaction will have."""
+        return self._held.next_tx
+
+    def pass_by(self, went: Passed, by: PassedBy) -> None:
+        """Go on as if it had tracked exchanges that went by."""
+        first = by.first
+        self._learn_from_next(first, first.header.role is not Role.EITHER)
+        for (unit, pace), times in went.times.items():
+            for time in times:
+                self.learnt.answered(unit, pace, time)
+        for pause, cycle in went.pauses:
+            self.learnt.paused(pause, cycle)
+        self.learnt.waited(went.unanswered)
+        for _ in range(min(went.sure, MOST_VOTES)):
+            self._echoes.learn(False)
+        self._held.pass_by(by.newest, by.given_up, by.count)
+        self._last_end, self._last_was_answer = by.end, by.newest[-1].answered
+        self._mute -= went.units
+        self._units |= by.units
 
     # ---- closing
 

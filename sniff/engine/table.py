@@ -26,8 +26,9 @@ from dissectors.columns import (
     PlacementColumns,
     Times,
     TransactionColumns,
+    some,
 )
-from dissectors.frame import Check, Frame, Header
+from dissectors.frame import Check, Frame
 from dissectors.tracker import Interval, Placement, Transaction
 from sniff.engine.engine import Output, Row
 
@@ -123,33 +124,8 @@ class Table:
         odd = self.odd.get(place)
         if odd is not None:
             return odd
-        frames, no = self.frames, self.first + place
-        begin, length = int(frames.offset[place]), int(frames.length[place])
-        frame = Frame(
-            self.protocol,
-            self.octets[begin : begin + length].tobytes(),
-            int(frames.start[place]),
-            int(frames.end[place]),
-            CHECKS[frames.check[place]],
-            FOUNDS[frames.found[place]],
-            DAMAGES[frames.damage[place]],
-            _some(frames.expected[place]),
-            0,
-            int(self.slack[place]),
-        )
-        header = Header(
-            self.protocol,
-            _some(frames.source[place]),
-            _some(frames.destination[place]),
-            ROLES[frames.role[place]],
-            frames.names[frames.kind[place]],
-            _some(frames.function[place]),
-            _some(frames.address[place]),
-            _some(frames.count[place]),
-            bool(frames.ok[place]),
-            frames.names[frames.error[place]] if frames.error[place] else None,
-        )
-        return Row(no, frame, header, self._placement(place))
+        frame = self.frames.frame(place, self.octets, self.protocol, int(self.slack[place]))
+        return Row(self.first + place, frame, self.frames.header(place, self.protocol), self._placement(place))
 
     def rows(self) -> Iterator[Row]:
         """All rows as objects."""
@@ -171,7 +147,7 @@ class Table:
         tx = int(placed.tx[place])
         if not tx:
             return None
-        source, destination = _some(placed.source[place]), _some(placed.destination[place])
+        source, destination = some(placed.source[place]), some(placed.destination[place])
         return Placement(self.first + place, tx, ROLES[placed.role[place]], source, destination)
 
     def transaction(self, place: int) -> Transaction:
@@ -182,16 +158,16 @@ class Table:
             latency = Interval(int(held.latency[place]), int(held.least[place]), int(held.most[place]))
         return Transaction(
             int(held.id[place]),
-            _some(held.station[place]),
+            some(held.station[place]),
             held.names[held.kind[place]],
-            _some(held.request[place]),
-            _some(held.response[place]),
+            some(held.request[place]),
+            some(held.response[place]),
             VERDICTS[held.verdict[place]],
             int(held.start[place]),
             int(held.end[place]),
             latency,
             int(held.attempt[place]),
-            _some(held.of[place]),
+            some(held.of[place]),
             held.names[held.error[place]] if held.error[place] else None,
         )
 
@@ -256,11 +232,6 @@ def _is_plain(row: Row) -> bool:
     return header.error != "" and all(
         value is None or 0 <= value <= most for value, most in zip(numbers, _MOST, strict=True)
     )
-
-
-def _some(value: np.signedinteger) -> int | None:
-    number = int(value)
-    return None if number == NONE else number
 
 
 def _clip(time: int) -> int:

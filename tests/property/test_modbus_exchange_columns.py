@@ -19,9 +19,8 @@ from dissectors.modbus import RTU
 from dissectors.modbus.adu import readable_adu
 from dissectors.modbus.exchange import Exchange, Seen
 from dissectors.modbus.exchange_columns import Exchanges, exchanges, placed
-from dissectors.modbus.exchange_memory import Known, Passed, holding, passed
-from dissectors.modbus.learnt import WRITE
-from dissectors.modbus.tracker import ModbusTracker
+from dissectors.modbus.exchange_memory import holding, passed
+from dissectors.modbus.tracker import ModbusTracker, PassedBy
 from dissectors.tracker import Interval, Placement, Transaction
 from sniff import formats
 from tests.bench import bulk_rtu
@@ -37,51 +36,6 @@ TIMINGS = (EXACT, HELD_BACK, replace(EXACT, latency=2 * MS))
 # --- the tracker's memory, as this test knows it ---------------------------------------------------------------------
 
 
-def is_at_rest(tracker: ModbusTracker) -> bool:
-    """Whether it waits for nothing."""
-    waits = tracker._open is not None or tracker._chain or tracker._doubts._kept
-    return not waits and (tracker._last is None or tracker._last.answered)
-
-
-def known_of(tracker: ModbusTracker, start: int) -> Known:
-    """What it has learnt that a regular exchange may depend on; `start`: of the first request."""
-    learnt, pauses = tracker.learnt, list(tracker.learnt._pauses)
-    slowest = learnt._slowest()
-    if tracker._last_end is not None:
-        pauses.append(start - tracker._last_end)
-    writes = {unit: tuple(times) for (unit, pace), times in tracker.learnt._times.items() if pace == WRITE}
-    last = tracker._last
-    if last is not None and last.copied is not None and last.pace == WRITE:  # it teaches with the next request
-        writes[last.unit] = (*writes.get(last.unit, ()), last.copied)
-        slowest = max(slowest, last.copied)
-    return Known(tracker.timeout, tracker._echoing, writes, tuple(learnt._unanswered), slowest, max(pauses, default=0))
-
-
-def let_pass(
-    tracker: ModbusTracker, went: Passed, first: Seen, newest: list[Exchange], last_end: int, place: int, count: int
-) -> None:
-    """Put it into the state that it would have behind exchanges that went by."""
-    sure = first.header.role.value != "either"
-    given_up = {one - place for one in went.given_up}
-    tracker._learn_from_next(first, sure)
-    for key, times in went.times.items():
-        for time in times:
-            tracker.learnt.answered(*key, time)
-    for pause, cycle in went.pauses:
-        tracker.learnt.paused(pause, cycle)
-    tracker.learnt._unanswered.extend(went.unanswered)
-    if went.unanswered:
-        tracker.learnt._timeout = tracker.learnt._agreed()
-    for _ in range(min(went.sure, 2 * 4)):
-        tracker._learn_echo(False)
-    tracker._answered.extend([exchange for exchange in newest if exchange.answered][-4:])
-    tracker._given_up.extend([exchange for exchange in newest if exchange.tx - tracker._next_tx in given_up])
-    tracker._last, tracker._last_end, tracker._last_was_answer = newest[-1], last_end, newest[-1].answered
-    tracker._mute -= went.units
-    tracker._only = b""
-    tracker._next_tx += count
-
-
 def memory(tracker: ModbusTracker) -> dict[str, object]:
     """All that it remembers, in values that compare."""
 
@@ -95,13 +49,13 @@ def memory(tracker: ModbusTracker) -> dict[str, object]:
         "cycles": list(learnt._cycles),
         "unanswered": list(learnt._unanswered),
         "timeout": learnt.timeout,
-        "open": of(tracker._open),
-        "last": of(tracker._last),
+        "open": of(tracker._held.open),
+        "last": of(tracker._held.last),
         "last end": (tracker._last_end, tracker._last_was_answer),
-        "answered": [of(one) for one in tracker._answered],
-        "given up": [of(one) for one in tracker._given_up],
-        "echoes": (tracker._echoing, tracker._echo_votes),
-        "others": (tracker._mute, tracker._only, tracker._next_tx),
+        "answered": [of(one) for one in tracker._held.answered],
+        "given up": [of(one) for one in tracker._held.given_up],
+        "echoes": (tracker._echoes.usual, tracker._echoes._votes),
+        "others": (tracker._mute, tracker._units, tracker._held.only, tracker.next_tx),
     }
 
 
@@ -162,12 +116,12 @@ def assert_paired_equally(chunks: list[Chunk], timing: Timing) -> tuple[int, int
     at, by_columns = 0, 0
     while at < len(events):
         place = begins.get(rows[at])
-        if place is None or not is_at_rest(tracker):
+        if place is None or (known := tracker.known(int(frames.start[rows[at]]))) is None:
             _, event = events[at]
             tracker.track(at, event, RTU.peek(event) if isinstance(event, Frame) else None)
             at += 1
             continue
-        end = holding(found, frames, place, known_of(tracker, int(frames.start[rows[at]])), timing)
+        end = holding(found, frames, place, known, timing)
         while end > place and not _is_framed(rows, at, found, place, end):
             end -= 1
         if end == place:
@@ -210,23 +164,31 @@ def _compare(
     before = deepcopy(tracker)
     first, last = int(found.request[place]), int(found.last[end - 1])
     numbers = np.arange(len(frames)) + (at - first)
-    placements, transactions = placed(found, frames, slice(place, end), numbers, tracker._next_tx, timing)
+    placements, transactions = placed(found, frames, slice(place, end), numbers, tracker.next_tx, timing)
     span = range(at, at + last - first + 1)
     seen = {no: _seen(no, events[no][1]) for no in span}
     tracked = [tracker.track(no, events[no][1], seen[no].header) for no in span]
     assert [one.placement for one in tracked] == placements_of(placements, list(span))
     assert [closed for one in tracked for closed in one.closed] == transactions_of(transactions)
     went = passed(found, frames, place, end)
-    newest = []
+    newest = {}
     for one in sorted({*went.answered, *went.given_up, end - 1}):
         request = Exchange(
-            before._next_tx + one - place, seen[int(found.request[one]) - first + at], bool(found.sure[one])
+            before.next_tx + one - place, seen[int(found.request[one]) - first + at], bool(found.sure[one])
         )
         request.answered = bool(found.answered[one])
-        newest.append(request)
+        newest[one] = request
     if found.copy[end - 1]:
-        newest[-1].copied = int(found.gap[end - 1])
-    let_pass(before, went, seen[at], newest, int(frames.end[last]), place, end - place)
+        newest[end - 1].copied = int(found.gap[end - 1])
+    by = PassedBy(
+        seen[at],
+        [one for place_of, one in newest.items() if place_of in went.answered or place_of == end - 1],
+        [newest[one] for one in went.given_up],
+        end - place,
+        int(frames.end[last]),
+        {int(unit) for unit in found.unit[place:end]} - {0},
+    )
+    before.pass_by(went, by)
     mine, its = memory(before), memory(tracker)
     mine["answered"], its["answered"] = _without_copied(mine["answered"]), _without_copied(its["answered"])
     assert mine == its

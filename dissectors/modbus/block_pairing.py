@@ -1,0 +1,81 @@
+"""The bulk form of the Modbus RTU tracker, as the engine asks for it (`dissectors.columns.Pairing`)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dissectors.columns import FrameColumns, Octets, Run, Times
+from dissectors.line import Timing
+from dissectors.modbus.adu import readable_adu
+from dissectors.modbus.exchange import Exchange, Seen
+from dissectors.modbus.exchange_columns import exchanges, placed
+from dissectors.modbus.exchange_memory import holding, passed
+from dissectors.modbus.tracker import ModbusTracker, PassedBy
+from dissectors.tracker import Tracker
+
+PROTOCOL = "modbus-rtu"
+
+
+class RtuBlockPairing:
+    """Runs of regular exchanges among some frames."""
+
+    def __init__(
+        self, tracker: ModbusTracker, frames: FrameColumns, octets: Octets, timing: Timing, slack: Times
+    ) -> None:
+        self._tracker = tracker
+        self._frames, self._octets, self._timing, self._slack = frames, octets, timing, slack
+        self._found = exchanges(frames, octets, timing, slack)
+        self._numbers: Times | None = None
+
+    def run(self, begin: int, no: int) -> Run | None:
+        """See `dissectors.columns.BlockPairing`."""
+        found, frames = self._found, self._frames
+        place = int(np.searchsorted(found.request, begin))
+        if place == len(found) or found.request[place] != begin:
+            return None
+        known = self._tracker.known(int(frames.start[begin]))
+        if known is None:
+            return None
+        end = holding(found, frames, place, known, self._timing)
+        if end == place:
+            return None
+        if self._numbers is None:
+            self._numbers = np.arange(len(frames)) + (no - begin)
+        which, last = slice(place, end), int(found.last[end - 1])
+        tx = self._tracker.next_tx
+        placements, transactions = placed(found, frames, which, self._numbers, tx, self._timing, self._slack)
+        self._let_pass(place, end, no - begin)
+        closed_by = found.last[which].copy()
+        closed_by[:-1] = np.where(found.unanswered[which][:-1], found.request[which][1:], closed_by[:-1])
+        return Run(begin, last + 1, placements, transactions, closed_by)
+
+    def _let_pass(self, place: int, end: int, to_number: int) -> None:
+        """Put the tracker behind exchanges [place, end)."""
+        found, went = self._found, passed(self._found, self._frames, place, end)
+        tx = self._tracker.next_tx
+        made: dict[int, Exchange] = {}
+        for one in sorted({*went.answered, *went.given_up, end - 1}):
+            request = Exchange(tx + one - place, self._seen(int(found.request[one]), to_number), bool(found.sure[one]))
+            request.answered = bool(found.answered[one])
+            made[one] = request
+        if found.copy[end - 1]:
+            made[end - 1].copied = int(found.gap[end - 1])
+        by = PassedBy(
+            first=self._seen(int(found.request[place]), to_number),
+            newest=[one for at, one in made.items() if at in went.answered or at == end - 1],
+            given_up=[made[at] for at in went.given_up],
+            count=end - place,
+            end=int(self._frames.end[found.last[end - 1]]),
+            units=set(np.flatnonzero(np.bincount(found.unit[place:end])).tolist()) - {0},
+        )
+        self._tracker.pass_by(went, by)
+
+    def _seen(self, row: int, to_number: int) -> Seen:
+        frame = self._frames.frame(row, self._octets, PROTOCOL, int(self._slack[row]))
+        return Seen(row + to_number, frame, self._frames.header(row, PROTOCOL), readable_adu(frame))
+
+
+def pairing(tracker: Tracker, frames: FrameColumns, octets: Octets, timing: Timing, slack: Times) -> RtuBlockPairing:
+    """For the manifest."""
+    assert isinstance(tracker, ModbusTracker)
+    return RtuBlockPairing(tracker, frames, octets, timing, slack)
