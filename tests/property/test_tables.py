@@ -2,22 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
 from itertools import chain
 from pathlib import Path
 
 import pytest
 
+from dissectors.columns import Reads
+from dissectors.line import Timing
 from dissectors.tracker import Transaction
 from sniff.analysis.summary import Summary
 from sniff.bus.offline import outputs
-from sniff.engine.blocks import blocks_of
+from sniff.engine.blocks import Block, blocks_of
 from sniff.engine.bulk import tables
 from sniff.engine.capture import CaptureError
 from sniff.engine.engine import Output, Row
 from sniff.engine.observer import observe
-from sniff.engine.session import LineEvent
+from sniff.engine.session import Adapter, LineEvent, Session
 from sniff.engine.table import Table
 from sniff.formats import read
+from tests.bench import bulk_mstp, bulk_rtu
+
+Bus = Callable[[float], tuple[Session, Reads]]
 
 CAPTURES = Path(__file__).parents[2] / "captures"
 SHARED = Path(__file__).parents[3] / "shared" / "captures"
@@ -84,3 +92,43 @@ def test_a_capture_gives_the_same_rows_as_tables(path: Path) -> None:
         assert row == expected
     assert closed == expected_closed
     assert events == expected_events
+
+
+def _mstp(damaged: float) -> tuple[Session, Reads]:
+    return Session("x", bulk_mstp.LINE, "mstp"), bulk_mstp.reads(12_000, damaged=damaged)
+
+
+def _rtu(damaged: float, timing: Timing = bulk_rtu.TIMING) -> tuple[Session, Reads]:
+    table, length = bulk_rtu.frames(12_000)
+    spoilt = bulk_rtu.damaged(table, length, damaged) if damaged else table
+    session = Session("x", timing.line, "modbus-rtu", adapter=Adapter(latency=timing.latency))
+    return session, bulk_rtu.bus(spoilt, length, timing)
+
+
+def _hidden(damaged: float) -> tuple[Session, Reads]:
+    """An adapter that holds octets back and does not say so."""
+    session, reads = _rtu(damaged, bulk_rtu.HELD_BACK)
+    return replace(session, adapter=Adapter()), reads
+
+
+@pytest.mark.parametrize("damaged", [0.0, 0.01])
+@pytest.mark.parametrize("bus", [_mstp, _rtu, partial(_rtu, timing=bulk_rtu.HELD_BACK), _hidden])
+def test_long_buses_give_the_same_rows_as_tables(bus: Bus, damaged: float) -> None:
+    """With seams between blocks, and between columns and the reference."""
+    session, reads = bus(damaged)
+    begins, blocks = reads.begins, []
+    for begin in range(0, len(reads), 5000):
+        end = min(begin + 5000, len(reads))
+        octets = reads.octets[begins[begin] : begins[end]]
+        blocks.append(Block(Reads(octets, reads.times[begin:end], reads.lengths[begin:end], reads.marked[begin:end])))
+    rows: list[Row] = []
+    closed: list[Transaction] = []
+    for table in tables(blocks, session):
+        assert isinstance(table, Table)
+        rows += table.rows()
+        closed += [table.transaction(place) for place in range(len(table.transactions))]
+    by_reference = list(outputs(chain.from_iterable(block.chunks() for block in blocks), session))
+    expected = [row for output in by_reference if isinstance(output, Output) for row in output.rows]
+    for row, other in zip(rows, expected, strict=True):
+        assert row == other
+    assert closed == [one for output in by_reference if isinstance(output, Output) for one in output.transactions]
