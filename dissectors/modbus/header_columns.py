@@ -7,7 +7,7 @@ Reads, writes and exceptions by table and gather; other functions, and requests 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -40,7 +40,7 @@ _MOST_NAMES: Final = np.iinfo(np.uint16).max
 
 @dataclass(frozen=True, slots=True)
 class HeaderColumns:
-    """Headers as in `FrameColumns`. `known`: False where there was no room for one more name."""
+    """Headers as in `FrameColumns`, less their names. `known`: False where there was no room for one more name."""
 
     expected: Numbers
     source: Small
@@ -53,10 +53,9 @@ class HeaderColumns:
     ok: Masks
     error: Names
     known: Masks
-    names: tuple[str, ...]
 
 
-class _Names:
+class Words:
     """Words by number; 0 is none."""
 
     def __init__(self) -> None:
@@ -72,19 +71,25 @@ class _Names:
 
     @property
     def words(self) -> tuple[str, ...]:
+        """All of them, by number."""
         return tuple(self._places)
 
 
 def headers(
-    octets: Octets, places: Times, lengths: Times, request: Masks, response: Masks, damage: Codes
+    octets: Octets,
+    places: Times,
+    lengths: Times,
+    request: Masks,
+    response: Masks,
+    damage: Codes,
+    names: Words,
 ) -> HeaderColumns:
     """The headers of frames of a predicted length, good or (damage: check) with a wrong CRC.
 
-    `request`, `response`: the directions that have this length.
+    `request`, `response`: the directions that have this length. `names`: where their names are kept.
     """
     size = len(places)
     codes, units = octets[places + 1], octets[places]
-    names = _Names()
     role = _roles(octets, places, codes, request, response)
     role[(role == EITHER) & (units == BROADCAST)] = TO_ALL
     role[(role == REQUEST) & (units == BROADCAST) & _table(lambda function: function.writes)[codes]] = TO_ALL
@@ -113,11 +118,10 @@ def headers(
         damage == 0,
         error,
         np.ones(size, bool),
-        (),
     )
     rare = ~common()[codes] | _contradicts_itself(octets, places, codes, role) | (damage != 0)
     _scatter_peeks(columns, np.flatnonzero(rare), octets, places, lengths, damage, names)
-    return replace(columns, names=names.words)
+    return columns
 
 
 def _table(says: Callable[[Function], bool]) -> Masks:
@@ -180,7 +184,7 @@ def _scatter_peeks(
     places: Times,
     lengths: Times,
     damage: Codes,
-    names: _Names,
+    names: Words,
 ) -> None:
     """Headers by `peek_rtu`, once for each different frame, put where they belong."""
     told: dict[tuple[bytes, bool], tuple[int, ...]] = {}
@@ -199,7 +203,7 @@ def _scatter_peeks(
         columns.kind[row], columns.error[row] = max(kind, 0), max(error, 0)
 
 
-def _peeked(whole: bytes, good: bool, names: _Names) -> tuple[int, ...]:
+def _peeked(whole: bytes, good: bool, names: Words) -> tuple[int, ...]:
     expected = None if good and is_open_length(whole) else len(whole)
     frame = Frame(
         RTU_NAME,

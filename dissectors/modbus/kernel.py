@@ -15,6 +15,7 @@ here it would give whatever it remembers.
 
 from __future__ import annotations
 
+from dataclasses import fields, replace
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -23,7 +24,7 @@ from dissectors.columns import CHECKS, DAMAGES, FOUNDS, FrameColumns, OctetTimes
 from dissectors.frame import Check, Damage, Found
 from dissectors.modbus import damaged_columns, run_columns
 from dissectors.modbus.functions import MAX_FRAME
-from dissectors.modbus.header_columns import headers
+from dissectors.modbus.header_columns import Words, headers
 from dissectors.modbus.length_columns import PADDING
 from dissectors.modbus.stretch_crc import StretchCrc
 from dissectors.modbus.stretch_rows import Rows, Stretches
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
 BLOCK: Final = 1 << 20
 """Octets looked at in one go, so that what is computed of each octet stays small."""
 
+_AT_ONCE: Final = 1 << 16  # rows of which the columns are made together
 _GOOD, _BAD = (np.uint8(CHECKS.index(check)) for check in (Check.GOOD, Check.BAD))
 _CHECK = np.uint8(DAMAGES.index(Damage.CHECK))
 _GAP, _LENGTH, _SPLIT = (np.uint8(FOUNDS.index(found)) for found in (Found.GAP, Found.LENGTH, Found.SPLIT))
@@ -81,9 +83,30 @@ def _without_others_inside(frames: Rows, candidates: Rows, stretches: Stretches,
 
 
 def _columns(octets: Octets, rows: Rows, stretches: Stretches, times: OctetTimes, timing: Timing) -> FrameColumns:
+    """The columns, made some rows at a time."""
+    names, gaps = Words(), times.gaps()
+    parts = [
+        _some_columns(octets, rows.take(slice(begin, begin + _AT_ONCE)), stretches, times, gaps, timing, names)
+        for begin in range(0, max(len(rows), 1), _AT_ONCE)
+    ]
+    joined = {
+        one.name: np.concatenate([getattr(part, one.name) for part in parts]) for one in fields(FrameColumns)[:-1]
+    }
+    return replace(parts[0], **joined, names=names.words)
+
+
+def _some_columns(
+    octets: Octets,
+    rows: Rows,
+    stretches: Stretches,
+    times: OctetTimes,
+    gaps: Times,
+    timing: Timing,
+    names: Words,
+) -> FrameColumns:
     damage = rows.damaged * _CHECK
     length = rows.length.astype(np.int64)
-    header = headers(octets, rows.start, length, rows.request, rows.response, damage)
+    header = headers(octets, rows.start, length, rows.request, rows.response, damage, names)
     first, last = _reads_of(rows, stretches, times)
     columns = FrameColumns(
         rows.start,
@@ -91,7 +114,7 @@ def _columns(octets: Octets, rows: Rows, stretches: Stretches, times: OctetTimes
         _starts(rows.start, first, times),
         _ends(rows.end - 1, last, times),
         np.where(rows.damaged, _BAD, _GOOD),
-        _found(rows, first, last, stretches, times, timing),
+        _found(rows, first, last, stretches, times, gaps, timing),
         damage,
         header.expected,
         header.source,
@@ -103,7 +126,6 @@ def _columns(octets: Octets, rows: Rows, stretches: Stretches, times: OctetTimes
         header.count,
         header.ok,
         header.error,
-        header.names,
     )
     return columns if header.known.all() else columns.take(header.known)
 
@@ -130,17 +152,22 @@ def _starts(octets: Times, reads: Times, times: OctetTimes) -> Times:
     return np.maximum(times.floors[reads], times.times[reads] - behind * times.char)
 
 
-def _found(rows: Rows, first: Times, last: Times, stretches: Stretches, times: OctetTimes, timing: Timing) -> Codes:
+def _found(
+    rows: Rows, first: Times, last: Times, stretches: Stretches, times: OctetTimes, gaps: Times, timing: Timing
+) -> Codes:
     """How the limits were found: between silences, next to others, or by their length alone."""
     found = np.full(len(rows), _GAP, np.uint8)
     runs = np.flatnonzero(~rows.whole)
     if not len(runs):
         return found
     stretch, start, end = rows.stretch[runs], rows.start[runs], rows.end[runs]
-    gaps = times.gaps()
     before = np.where(times.begins[first[runs]] == start, gaps[first[runs]], 0)
     following = last[runs] + 1
-    behind = np.where(times.begins[following] == end, np.append(gaps, 0)[following], 0)
+    behind = np.where(
+        times.begins[following] == end,
+        np.where(following < len(gaps), gaps[np.minimum(following, len(gaps) - 1)], 0),
+        0,
+    )
     closed = (stretches.end[stretch] == end) & stretches.closed[stretch]
     proved = closed & (stretches.begin[stretch] == start) & stretches.proved[stretch]
     touched = (before < timing.t15) | (~closed & (behind < timing.t15))

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 
 _HOPED_SHAPE = 4  # of a short reading that is not complete
 
+_AT_ONCE = 1 << 16  # rows looked at together
 _PLAIN = WHOLE_STRETCH - CRC_BITS
 """Bits of a whole stretch from which on it is its function's frame even if octets are held before it; others are so
 where it is sure that none are."""
@@ -108,8 +109,9 @@ def certain(octets: Octets, rows: Rows, stretches: Stretches, sound: Masks) -> M
     """
     by_the_one_before = rows.whole & sound
     free = by_the_one_before & ~rows.damaged
-    at = np.flatnonzero(free)
-    free[at] = frame_bits(octets, rows.start[at], rows.request[at], rows.response[at]) >= _PLAIN
+    for begin in range(0, len(rows), _AT_ONCE):
+        at = begin + np.flatnonzero(free[begin : begin + _AT_ONCE])
+        free[at] = frame_bits(octets, rows.start[at], rows.request[at], rows.response[at]) >= _PLAIN
     runs = np.flatnonzero(~rows.whole)
     if len(runs):
         free[runs], by_the_one_before[runs] = _weighed(octets, rows, runs, stretches)

@@ -76,7 +76,7 @@ class Rows:
         """Place behind the last octet."""
         return self.start + self.length
 
-    def take(self, which: Masks | Times) -> Self:
+    def take(self, which: slice | Masks | Times) -> Self:
         """Some of them."""
         return type(self)(*(getattr(self, one.name)[which] for one in fields(self)))
 
