@@ -46,7 +46,14 @@ def test_a_bus_with_dead_stations_and_damage() -> None:
     assert by_columns > 0.9 * total
 
 
-@pytest.mark.parametrize("seed", range(30))
+def test_a_request_is_forgotten_behind_many_others() -> None:
+    """Invoke ids come again after some hundred requests: no repeat, though soon and with the same octets."""
+    chunks = buses.chunks_of_reads(bulk_mstp.reads(20_000, seed=5, answered=0.3))
+    by_columns, total = assert_paired_alike(chunks, bulk_mstp.TIMING)
+    assert by_columns > 0.98 * total
+
+
+@pytest.mark.parametrize("seed", range(40))
 def test_any_conversation(seed: int) -> None:
     """Few stations and invoke ids that say anything, so that repeats and late answers abound."""
     dice = random.Random(seed)
