@@ -76,13 +76,13 @@ class PastExchanges(OrderedDict[Key, Entry]):
             self[key] = entry
 
     def add(self, rows: PairedRows, codes: list[int], places: list[int], most: int) -> None:
-        """Exchanges of a run, the latest last; at most so many are kept."""
+        """Exchanges of a run, the latest last; of all at most so many are kept."""
         entries = self._entries
         for code, row in zip(codes, places, strict=True):
             entries[code] = rows, row
             entries.move_to_end(code)
-            if len(entries) > most:
-                entries.popitem(last=False)
+        while len(entries) > most:
+            entries.popitem(last=False)
 
     def failed_at(self, code: int) -> int | None:
         """When the newest exchange with that key was over, if it had no answer or a damaged one; else None."""
