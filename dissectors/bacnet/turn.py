@@ -34,7 +34,6 @@ _ANY_COST, _SPOILT, _A_BIT, _LOST, _TOO_MANY = 2, 4, 3, 4, 5
 to miss one, to have one too many."""
 
 _UNLIKELY, _STRANGE = 3, 6
-_MOST = 1 << 30
 
 
 class Speaker(NamedTuple):
@@ -105,12 +104,9 @@ class Turn:
         octets = frame.octets[: HEADER + 2]
         best: tuple[int, _Guess] | None = None
         for guess in guesses:
-            room = _MOST if best is None else best[0] - guess.cost
-            if room <= 0:
-                continue
-            distance = _distance(octets, _expected(guess), room)
-            if distance < room:
-                best = guess.cost + distance, guess
+            cost = guess.cost + _distance(octets, _expected(guess))
+            if best is None or cost < best[0]:
+                best = cost, guess
         if best is None:
             return None
         _, guess = best
@@ -184,11 +180,8 @@ def _expected(guess: _Guess) -> tuple[int, ...]:
     return (*PREAMBLE, guess.frame_type, guess.destination, guess.source, _ANY, _ANY, _ANY)
 
 
-def _distance(octets: bytes, header: tuple[int, ...], room: int) -> int:
-    """What it costs to take the begin of `octets` for that header; octets after it cost nothing.
-
-    From `room` on only that it is so much or more.
-    """
+def _distance(octets: bytes, header: tuple[int, ...]) -> int:
+    """What it costs to take the begin of `octets` for that header; octets after it cost nothing."""
     row = [at * _TOO_MANY for at in range(len(octets) + 1)]
     for wanted in header:
         before, row = row, [row[0] + _LOST]
@@ -199,12 +192,5 @@ def _distance(octets: bytes, header: tuple[int, ...], room: int) -> int:
                 same = _ANY_COST
             else:
                 same = _A_BIT if (wanted ^ octet).bit_count() == 1 else _SPOILT
-            least = before[at] + same
-            if before[at + 1] + _LOST < least:
-                least = before[at + 1] + _LOST
-            if row[at] + _TOO_MANY < least:
-                least = row[at] + _TOO_MANY
-            row.append(least)
-        if min(row) >= room:  # it only grows from here on
-            break
+            row.append(min(before[at] + same, before[at + 1] + _LOST, row[at] + _TOO_MANY))
     return min(row)
