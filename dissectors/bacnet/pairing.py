@@ -71,12 +71,17 @@ class _Stretch:
 class Pairing:
     """Frames of a block, paired by columns wherever a tracker need not see them.
 
-    `octets`: where `frames.offset` counts. `nets`: of the tracker that will be moved (`prepare`).
+    `octets`: where `frames.offset` counts. `nets`: of the tracker that will be moved (`prepare`). `slack`: ns, of each
+    frame, where reads came late; the adapter's latency where it is left out.
     """
 
-    def __init__(self, frames: FrameColumns, octets: Octets, timing: Timing, nets: Nets) -> None:
-        self.frames, self.octets, self._timing, self._nets = frames, octets, timing, nets
-        self._rows = PlacedRows(frames, octets, timing, nets)
+    def __init__(
+        self, frames: FrameColumns, octets: Octets, timing: Timing, nets: Nets, slack: Times | None = None
+    ) -> None:
+        if slack is None:
+            slack = np.full(len(frames), timing.latency, np.int64)
+        self.frames, self.octets, self._slack, self._nets = frames, octets, slack, nets
+        self.rows = PlacedRows(frames, octets, timing, nets, slack)
 
     def run(self, tracker: MstpTracker, begin: int, no: int) -> Run | None:
         """Decide rows from `begin` on, which has the number `no`, and move the tracker behind them.
@@ -84,7 +89,7 @@ class Pairing:
         The tracker has just taken the row before, which had the number before. None where `begin` is doubtful: then it
         must take that row too.
         """
-        rows = self._rows
+        rows = self.rows
         if not rows.sure[begin]:
             return None
         standing = tracker.standing()
@@ -110,12 +115,12 @@ class Pairing:
 
     def _is_local(self, waiting: Exchange | None, begin: int, no: int) -> bool:
         """Whether the tracker waits for just what the row before says."""
-        kind = int(self._rows.kinds[begin - 1])
+        kind = int(self.rows.kinds[begin - 1])
         if not WAITS[kind]:
             return waiting is None
         if waiting is None or waiting.no != no - 1:
             return False
-        return kind == REQUEST or waiting.attempt == int(self._rows.attempt[begin - 1])
+        return kind == REQUEST or waiting.attempt == int(self.rows.attempt[begin - 1])
 
     def _before_postponed(self, standing: Standing, begin: int, end: int) -> int:
         """Where postponed exchanges are asked for again, or over by time."""
@@ -126,14 +131,14 @@ class Pairing:
             for exchange in standing.postponed.values()
         )
         codes = [self._nets.code(key) for key in standing.postponed]
-        stops = np.isin(self._rows.keys[begin:end], codes) & (self._rows.kinds[begin:end] == REQUEST)
+        stops = np.isin(self.rows.keys[begin:end], codes) & (self.rows.kinds[begin:end] == REQUEST)
         stops |= self.frames.start[begin:end] >= over
         found = np.flatnonzero(stops)
         return begin + int(found[0]) if len(found) else end
 
     def _before_repeats(self, past: PastExchanges, begin: int, end: int, first: int, beyond: int) -> int:
         """Where a request may repeat one from before the stretch that had no answer."""
-        rows = self._rows
+        rows = self.rows
         if rows.kinds[begin - 1] == REQUEST and not rows.answered[begin]:
             again = np.flatnonzero(rows.earlier[first:beyond] == first - 1)
             if len(again):
@@ -150,7 +155,7 @@ class Pairing:
     def _attempts(self, first: int, beyond: int, base: int) -> dict[int, tuple[int, int]]:
         """Requests that repeat one of the same stretch."""
         attempts: dict[int, tuple[int, int]] = {}
-        rows = self._rows
+        rows = self.rows
         begin, end = np.searchsorted(rows.repeating, (first, beyond)).tolist()
         for place in rows.repeating[begin:end].tolist():
             earlier = int(rows.earlier[place])
@@ -163,13 +168,13 @@ class Pairing:
 
     def _placements(self, stretch: _Stretch) -> PlacementColumns:
         rows = slice(stretch.begin, stretch.end)
-        role = np.where(self._rows.answered[rows], _RESPONSE, self.frames.role[rows])
-        tx = self._rows.opened[rows] + stretch.base
+        role = np.where(self.rows.answered[rows], _RESPONSE, self.frames.role[rows])
+        tx = self.rows.opened[rows] + stretch.base
         return PlacementColumns(tx, role, self.frames.source[rows], self.frames.destination[rows])
 
     def _transactions(self, stretch: _Stretch) -> TransactionColumns:
-        first, beyond = np.searchsorted(self._rows.closing, (stretch.begin, stretch.end)).tolist()
-        closed, told = slice(first, beyond), self._rows.transactions
+        first, beyond = np.searchsorted(self.rows.closing, (stretch.begin, stretch.end)).tolist()
+        closed, told = slice(first, beyond), self.rows.transactions
         response, of = told.response[closed], told.of[closed]
         transactions = TransactionColumns(
             id=told.id[closed] + stretch.base,
@@ -188,7 +193,7 @@ class Pairing:
             error=told.error[closed],
             names=told.names,
         )
-        self._say_attempts(transactions, self._rows.owner[closed], stretch)
+        self._say_attempts(transactions, self.rows.owner[closed], stretch)
         return transactions
 
     def _say_attempts(self, transactions: TransactionColumns, owners: Times, stretch: _Stretch) -> None:
@@ -201,13 +206,13 @@ class Pairing:
                 continue  # still waits
             transactions.attempt[place], transactions.of[place] = attempt, of
             answered = transactions.verdict[place] == CODE[Verdict.ANSWERED]
-            if answered and attempt > 1 and self._rows.kinds[row] == REQUEST:
+            if answered and attempt > 1 and self.rows.kinds[row] == REQUEST:
                 transactions.verdict[place] = CODE[Verdict.RETRY]
 
     # Where the tracker stands behind it
 
     def _move(self, standing: Standing, past: PastExchanges, stretch: _Stretch) -> None:
-        rows, last = self._rows, stretch.end - 1
+        rows, last = self.rows, stretch.end - 1
         self._remember(past, stretch)
         for key in standing.reassembler.open_keys:  # what a request or an Abort ends
             of_key = np.flatnonzero(rows.keys[stretch.begin : stretch.end] == self._nets.code(key))
@@ -221,7 +226,7 @@ class Pairing:
 
     def _remember(self, past: PastExchanges, stretch: _Stretch) -> None:
         """What is over and has a key, for who comes late or asks again."""
-        rows, waiting = self._rows, stretch.waiting
+        rows, waiting = self.rows, stretch.waiting
         if waiting is not None and waiting.key is not None:
             past[waiting.key] = self.over(waiting, stretch.begin, stretch)
             past.move_to_end(waiting.key)
@@ -235,7 +240,7 @@ class Pairing:
 
     def _teach(self, turn: Turn, begin: int, end: int, frame: Frame) -> None:
         """Who spoke to whom; the last four rows say whose turn it is. `frame`: the last."""
-        rows = self._rows
+        rows = self.rows
         if end - begin > _FEW:
             kinds = rows.kinds[begin:end]
             passed = begin + np.flatnonzero((kinds == TOKEN) | (kinds == POLL_REPLY))
@@ -272,12 +277,12 @@ class Pairing:
             None,
             int(frames.expected[row]),
             0,
-            self._timing.latency,
+            int(self._slack[row]),
         )
 
     def exchange(self, row: int, stretch: _Stretch) -> Exchange:
         """What a row of a stretch opened, as the tracker holds it."""
-        frames, rows = self.frames, self._rows
+        frames, rows = self.frames, self.rows
         end = int(frames.end[row])
         exchange = Exchange(
             stretch.base + int(rows.opened[row]),
@@ -287,7 +292,7 @@ class Pairing:
             int(frames.destination[row]),
             int(frames.start[row]),
             end,
-            self._timing.latency,
+            int(self._slack[row]),
             self._octets_of(row),
             last=end,
         )
@@ -301,11 +306,11 @@ class Pairing:
 
     def over(self, exchange: Exchange, closing: int, stretch: _Stretch) -> Entry:
         """An exchange as the row `closing` left it."""
-        if not self._rows.answered[closing]:
+        if not self.rows.answered[closing]:
             return exchange, Verdict.NO_RESPONSE, exchange.last
         frames = self.frames
         gap = max(0, int(frames.start[closing]) - exchange.end)
-        slack = self._timing.latency
+        slack = int(self._slack[closing])
         exchange.response, exchange.last = closing + stretch.to_number, int(frames.end[closing])
         exchange.latency = Interval(gap, max(0, gap - slack), gap + exchange.slack)
         verdict = Verdict.RETRY if exchange.attempt > 1 else Verdict.ANSWERED
@@ -313,7 +318,7 @@ class Pairing:
 
     def had_no_answer(self, row: int) -> bool:
         """Whether the row behind a request, of the same stretch, does not answer it."""
-        return not self._rows.answered[row + 1]
+        return not self.rows.answered[row + 1]
 
 
 class _PairedRows:

@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from random import Random
+
+import numpy as np
 
 from dissectors.bacnet import MSTP
 from dissectors.bacnet.exchange import Exchange, Key
@@ -63,9 +67,12 @@ def placements_of(run: Run, no: int) -> list[Placement]:
     ]
 
 
-def assert_paired_alike(chunks: Sequence[Chunk], timing: Timing) -> tuple[int, int]:
-    """The tracker over all events, and pairing with a tracker for the rest: the same; (rows by columns, frames)."""
-    events = events_of(MSTP, chunks, timing)
+def assert_paired_alike(chunks: Sequence[Chunk], timing: Timing, late: Random | None = None) -> tuple[int, int]:
+    """The tracker over all events, and pairing with a tracker for the rest: the same; (rows by columns, frames).
+
+    `late`: gives some frames more slack, as where reads came late.
+    """
+    events = [(offset, _late(event, late)) for offset, event in events_of(MSTP, chunks, timing)]
     reference = MstpTracker(timing)
     total = sum(isinstance(event, Frame) for _, event in events)
     octets = b"".join(chunk.octets for chunk in chunks)
@@ -74,13 +81,15 @@ def assert_paired_alike(chunks: Sequence[Chunk], timing: Timing) -> tuple[int, i
     reads = reads_of(chunks)
     columns = kernel(reads, timing)
     tracker = MstpTracker(timing)
-    pairing = Pairing(columns, reads.octets, timing, prepare(tracker))
+    slacks = {offset: event.slack for offset, event in events if isinstance(event, Frame)}
+    slack = np.array([slacks.get(offset, timing.latency) for offset in columns.offset.tolist()], np.int64)
+    pairing = Pairing(columns, reads.octets, timing, prepare(tracker), slack if late else None)
     rows = {int(offset): row for row, offset in enumerate(columns.offset)}
     place, before, by_columns = 0, NONE, 0
     while place < len(events):
         offset, event = events[place]
         row = rows.get(offset, NONE)
-        if row != NONE and frame_at(columns, row, octets, "mstp", timing.latency)[0] != event:
+        if row != NONE and frame_at(columns, row, octets, "mstp", int(slack[row]))[0] != event:
             row = NONE  # a chain that the reference does not take up
         no = place + FIRST
         run = pairing.run(tracker, row, no) if row > 0 and row - 1 == before else None
@@ -98,6 +107,12 @@ def assert_paired_alike(chunks: Sequence[Chunk], timing: Timing) -> tuple[int, i
     assert tracker.close() == reference.close()
     assert list(_past(tracker)) == list(_past(reference))
     return by_columns, total
+
+
+def _late(event: Event, dice: Random | None) -> Event:
+    if dice is None or not isinstance(event, Frame) or dice.random() < 0.5:
+        return event
+    return replace(event, slack=event.slack + dice.randrange(50_000_000))
 
 
 def _track(tracker: MstpTracker, no: int, event: Event) -> Tracked:

@@ -63,6 +63,14 @@ def test_any_conversation(seed: int) -> None:
     assert_paired_alike(buses.conversation(dice, 400), timing)
 
 
+@pytest.mark.parametrize("seed", range(12))
+def test_frames_of_late_reads(seed: int) -> None:
+    """Each frame has a slack of its own."""
+    dice = random.Random(seed)
+    timing = Timing(buses.LINE, dice.choice(LATENCIES))
+    assert_paired_alike(buses.conversation(dice, 300), timing, dice)
+
+
 @settings(max_examples=150, deadline=None)
 @given(st.data(), buses.timings)
 def test_any_traffic(data: st.DataObject, timing: Timing) -> None:
