@@ -29,6 +29,8 @@ from dissectors.frame import Frame, Role
 from dissectors.tracker import Interval, Verdict
 
 if TYPE_CHECKING:
+    from collections.abc import Sized
+
     from dissectors.bacnet.tracker import Standing
     from dissectors.bacnet.turn import Turn
     from dissectors.columns import Octets, Times
@@ -324,10 +326,11 @@ class Pairing:
 class _PairedRows:
     """Exchanges of a stretch that are over, made when somebody asks; keeps the columns of its block alive."""
 
-    __slots__ = ("_pairing", "_stretch")
+    __slots__ = ("_pairing", "_stretch", "block")
 
     def __init__(self, pairing: Pairing, stretch: _Stretch) -> None:
         self._pairing, self._stretch = pairing, stretch
+        self.block: Sized = pairing.frames
 
     def entry(self, row: int) -> Entry:
         """The exchange that a row opened, how it ended and when."""

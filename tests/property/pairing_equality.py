@@ -67,10 +67,12 @@ def placements_of(run: Run, no: int) -> list[Placement]:
     ]
 
 
-def assert_paired_alike(chunks: Sequence[Chunk], timing: Timing, late: Random | None = None) -> tuple[int, int]:
+def assert_paired_alike(
+    chunks: Sequence[Chunk], timing: Timing, late: Random | None = None, block: int = 1_000_000
+) -> tuple[int, int]:
     """The tracker over all events, and pairing with a tracker for the rest: the same; (rows by columns, frames).
 
-    `late`: gives some frames more slack, as where reads came late.
+    `late`: gives some frames more slack, as where reads came late. `block`: rows after which pairing begins anew.
     """
     events = [(offset, _late(event, late)) for offset, event in events_of(MSTP, chunks, timing)]
     reference = MstpTracker(timing)
@@ -85,13 +87,16 @@ def assert_paired_alike(chunks: Sequence[Chunk], timing: Timing, late: Random | 
     slack = np.array([slacks.get(offset, timing.latency) for offset in columns.offset.tolist()], np.int64)
     pairing = Pairing(columns, reads.octets, timing, prepare(tracker), slack if late else None)
     rows = {int(offset): row for row, offset in enumerate(columns.offset)}
-    place, before, by_columns = 0, NONE, 0
+    place, before, by_columns, begins_anew = 0, NONE, 0, block
     while place < len(events):
         offset, event = events[place]
         row = rows.get(offset, NONE)
         if row != NONE and frame_at(columns, row, octets, "mstp", int(slack[row]))[0] != event:
             row = NONE  # a chain that the reference does not take up
         no = place + FIRST
+        if place >= begins_anew:
+            begins_anew += block
+            pairing = Pairing(columns, reads.octets, timing, prepare(tracker), slack if late else None)
         run = pairing.run(tracker, row, no) if row > 0 and row - 1 == before else None
         count = 1 if run is None else run.end - run.begin
         expected = [_track(reference, place + at + FIRST, events[place + at][1]) for at in range(count)]

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from dissectors.bacnet import past_exchanges
 from dissectors.bacnet.frame_making import frame
 from dissectors.frame import Chunk
 from dissectors.line import Timing
@@ -61,6 +62,15 @@ def test_any_conversation(seed: int) -> None:
     dice = random.Random(seed)
     timing = Timing(buses.LINE, dice.choice(LATENCIES))
     assert_paired_alike(buses.conversation(dice, 400), timing)
+
+
+def test_blocks_that_are_no_longer_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Exchanges of columns are made before their rows go, and are the same."""
+    monkeypatch.setattr(past_exchanges, "_KEPT_MOST", 0)
+    timing = Timing(buses.LINE)
+    chunks = [buses.conversation(random.Random(seed), 300) for seed in range(3)]
+    for seed, one in enumerate(chunks):
+        assert_paired_alike(one, timing, random.Random(seed), block=40)
 
 
 @pytest.mark.parametrize("seed", range(12))
