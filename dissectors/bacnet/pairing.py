@@ -29,6 +29,8 @@ from dissectors.frame import Frame, Role
 from dissectors.tracker import Interval, Verdict
 
 if TYPE_CHECKING:
+    from collections.abc import Sized
+
     from dissectors.bacnet.tracker import Standing
     from dissectors.bacnet.turn import Turn
     from dissectors.columns import Octets, Times
@@ -71,12 +73,17 @@ class _Stretch:
 class Pairing:
     """Frames of a block, paired by columns wherever a tracker need not see them.
 
-    `octets`: where `frames.offset` counts. `nets`: of the tracker that will be moved (`prepare`).
+    `octets`: where `frames.offset` counts. `nets`: of the tracker that will be moved (`prepare`). `slack`: ns, of each
+    frame, where reads came late; the adapter's latency where it is left out.
     """
 
-    def __init__(self, frames: FrameColumns, octets: Octets, timing: Timing, nets: Nets) -> None:
-        self.frames, self.octets, self._timing, self._nets = frames, octets, timing, nets
-        self.rows = PlacedRows(frames, octets, timing, nets)
+    def __init__(
+        self, frames: FrameColumns, octets: Octets, timing: Timing, nets: Nets, slack: Times | None = None
+    ) -> None:
+        if slack is None:
+            slack = np.full(len(frames), timing.latency, np.int64)
+        self.frames, self.octets, self._slack, self._nets = frames, octets, slack, nets
+        self.rows = PlacedRows(frames, octets, timing, nets, slack)
 
     def run(self, tracker: MstpTracker, begin: int, no: int) -> Run | None:
         """Decide rows from `begin` on, which has the number `no`, and move the tracker behind them.
@@ -272,7 +279,7 @@ class Pairing:
             None,
             int(frames.expected[row]),
             0,
-            self._timing.latency,
+            int(self._slack[row]),
         )
 
     def exchange(self, row: int, stretch: _Stretch) -> Exchange:
@@ -287,7 +294,7 @@ class Pairing:
             int(frames.destination[row]),
             int(frames.start[row]),
             end,
-            self._timing.latency,
+            int(self._slack[row]),
             self._octets_of(row),
             last=end,
         )
@@ -305,7 +312,7 @@ class Pairing:
             return exchange, Verdict.NO_RESPONSE, exchange.last
         frames = self.frames
         gap = max(0, int(frames.start[closing]) - exchange.end)
-        slack = self._timing.latency
+        slack = int(self._slack[closing])
         exchange.response, exchange.last = closing + stretch.to_number, int(frames.end[closing])
         exchange.latency = Interval(gap, max(0, gap - slack), gap + exchange.slack)
         verdict = Verdict.RETRY if exchange.attempt > 1 else Verdict.ANSWERED
@@ -319,10 +326,11 @@ class Pairing:
 class _PairedRows:
     """Exchanges of a stretch that are over, made when somebody asks; keeps the columns of its block alive."""
 
-    __slots__ = ("_pairing", "_stretch")
+    __slots__ = ("_pairing", "_stretch", "block")
 
     def __init__(self, pairing: Pairing, stretch: _Stretch) -> None:
         self._pairing, self._stretch = pairing, stretch
+        self.block: Sized = pairing.frames
 
     def entry(self, row: int) -> Entry:
         """The exchange that a row opened, how it ended and when."""

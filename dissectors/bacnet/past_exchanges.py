@@ -7,6 +7,7 @@ exchange may be kept as a place among the rows of a run.
 from __future__ import annotations
 
 from collections import OrderedDict
+from collections.abc import Sized
 from typing import Any, Protocol
 
 from dissectors.bacnet.exchange import Exchange, Key, Party
@@ -14,6 +15,9 @@ from dissectors.tracker import Verdict
 
 NO_KEY = -1
 _NETS_MAX = 1 << 15
+_KEPT_MOST = 1 << 17
+"""Rows of blocks that are kept for exchanges nobody asked for."""
+
 _FAILED = frozenset((Verdict.NO_RESPONSE, Verdict.DAMAGED_ANSWER))
 
 Entry = tuple[Exchange, Verdict, int]
@@ -51,7 +55,9 @@ class Nets:
 
 
 class PairedRows(Protocol):
-    """Exchanges of a run of rows that are over."""
+    """Exchanges of a run of rows that are over. `block`: the rows of a block, which it keeps."""
+
+    block: Sized
 
     def entry(self, row: int) -> Entry:
         """The exchange that a row opened, how it ended and when."""
@@ -72,17 +78,22 @@ class PastExchanges(OrderedDict[Key, Entry]):
         super().__init__()
         self.nets = Nets()
         self._entries: OrderedDict[int | Key, Entry | tuple[PairedRows, int]] = OrderedDict()
+        self._newest: Sized = ()  # block of the newest run
+        self._kept = 0  # rows of blocks that may be kept
         for key, entry in entries.items():
             self[key] = entry
 
     def add(self, rows: PairedRows, codes: list[int], places: list[int], most: int) -> None:
-        """Exchanges of a run, the latest last; at most so many are kept."""
+        """Exchanges of a run, the latest last; of all at most so many are kept."""
+        if rows.block is not self._newest:
+            self._newest = rows.block
+            self._kept += len(rows.block)
         entries = self._entries
         for code, row in zip(codes, places, strict=True):
             entries[code] = rows, row
             entries.move_to_end(code)
-            if len(entries) > most:
-                entries.popitem(last=False)
+        while len(entries) > most:
+            entries.popitem(last=False)
 
     def failed_at(self, code: int) -> int | None:
         """When the newest exchange with that key was over, if it had no answer or a damaged one; else None."""
@@ -94,7 +105,10 @@ class PastExchanges(OrderedDict[Key, Entry]):
         return entry[2] if entry[1] in _FAILED else None
 
     def settle(self) -> None:
-        """Make all exchanges that are still places in a run, so that its rows can be forgotten."""
+        """Make all exchanges that are still places in a run, where these keep so many rows that it is time to."""
+        if self._kept < _KEPT_MOST:
+            return
+        self._kept, self._newest = 0, ()
         for place, entry in self._entries.items():
             if len(entry) == 2:
                 self._entries[place] = entry[0].entry(entry[1])

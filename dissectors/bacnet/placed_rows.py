@@ -34,7 +34,7 @@ _CRC = 2
 class PlacedRows:
     """Rows of some columns, placed by what each says and by the one before it.
 
-    `octets`: where `frames.offset` counts. `nets`: numbers of addresses behind routers.
+    `octets`: where `frames.offset` counts. `nets`: numbers of addresses behind routers. `slack`: ns, of each frame.
 
     One entry a row: `kinds`, what it is (above); `keys`, of the exchange that it asks for or answers; `answered`,
     whether it answers the row before; `attempt`, of tokens passed again; `opened`, transactions opened up to it, it
@@ -44,8 +44,8 @@ class PlacedRows:
     and opened it; `transactions`, with places among `opened` for ids and rows for numbers.
     """
 
-    def __init__(self, frames: FrameColumns, octets: Octets, timing: Timing, nets: Nets) -> None:
-        self.frames, self.octets, self._timing, self._nets = frames, octets, timing, nets
+    def __init__(self, frames: FrameColumns, octets: Octets, timing: Timing, nets: Nets, slack: Times) -> None:
+        self.frames, self.octets, self._timing, self._nets, self._slack = frames, octets, timing, nets, slack
         self.source, self.destination = frames.source.astype(np.int64), frames.destination.astype(np.int64)
         self.kinds, self.keys, self._verdict_alone = self._classes()
         self._relate()
@@ -154,7 +154,6 @@ class PlacedRows:
         verdict = np.where(single, self._verdict_alone[owner], verdict)
         timed = answered | (kind == TOKEN) & self._used[closing]
         latency = np.maximum(frames.start[closing] - frames.end[owner], 0)
-        slack = self._timing.latency
         self.closing, self.owner = closing, owner
         self.transactions = TransactionColumns(
             id=self.opened[owner],
@@ -166,8 +165,8 @@ class PlacedRows:
             start=frames.start[owner],
             end=np.where(answered, frames.end[closing], frames.end[owner]),
             latency=np.where(timed, latency, NONE),
-            least=np.where(timed, np.maximum(latency - slack, 0), NONE),
-            most=np.where(timed, latency + slack, NONE),
+            least=np.where(timed, np.maximum(latency - self._slack[closing], 0), NONE),
+            most=np.where(timed, latency + self._slack[owner], NONE),
             attempt=self.attempt[owner],
             of=np.where(self.attempt[owner] > 1, self.opened[owner] - 1, NONE),
             error=np.where(single | answered & (kind == REQUEST) & negative, frames.error[closing], 0).astype(

@@ -137,7 +137,7 @@ class MstpTracker:
 
     def _let_go(self, waiting: Exchange, closed: list[Transaction]) -> None:
         """No answer came at once: that is no answer, but to a segment that more follow it is nothing yet."""
-        if waiting.more_follows:
+        if waiting.more_follows and waiting.key is not None:
             self._waiting = None
             self._keep(waiting, closed)
         else:

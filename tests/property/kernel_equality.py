@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from dissectors.columns import CHECKS, DAMAGES, FOUNDS, NONE, ROLES, FrameColumns, Reads
+from dissectors.columns import CHECKS, DAMAGES, FOUNDS, NONE, ROLES, FrameColumns, Octets, Reads
 from dissectors.frame import Chunk, Event, Frame, Header
 from dissectors.line import Timing
 from dissectors.manifest import Dissector
@@ -34,7 +34,9 @@ def events_of(dissector: Dissector, chunks: Sequence[Chunk], timing: Timing) -> 
     return placed
 
 
-def frame_at(columns: FrameColumns, row: int, octets: bytes, protocol: str, latency: int) -> tuple[Frame, Header]:
+def frame_at(
+    columns: FrameColumns, row: int, octets: bytes | Octets, protocol: str, latency: int
+) -> tuple[Frame, Header]:
     """A row of columns as the values it stands for."""
 
     def some(value: int) -> int | None:
@@ -44,7 +46,7 @@ def frame_at(columns: FrameColumns, row: int, octets: bytes, protocol: str, late
     error = columns.names[columns.error[row]] if columns.error[row] else None
     frame = Frame(
         protocol,
-        octets[offset : offset + length],
+        bytes(octets[offset : offset + length]),
         int(columns.start[row]),
         int(columns.end[row]),
         CHECKS[columns.check[row]],

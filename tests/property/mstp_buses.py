@@ -202,6 +202,7 @@ def conversation(dice: random.Random, frames: int) -> list[Chunk]:
     """Stations that ask, answer, repeat, postpone, pass tokens and fall silent in any order, some behind a router."""
     now, chunks = START, []
     asked: list[tuple[int, int, int, bytes, bytes]] = []
+    stations = dice.choice(((1, 2), (1, 2, 3, 9)))
     pauses = (0, 1, 2, 3, 5, 10, 20, 30)
     odd_pauses = (300, 499, 500, 501, 900, 2_500, 11_000, 61_000)
 
@@ -235,7 +236,7 @@ def conversation(dice: random.Random, frames: int) -> list[Chunk]:
 
     said = frame(0, 1, 2)
     while len(chunks) < frames:
-        station, other = dice.sample((1, 2, 3, 9), 2)
+        station, other = dice.sample(stations, 2)
         choice = dice.randrange(20)
         if choice < 5:
             said = frame(0, other, station)
@@ -279,7 +280,7 @@ def data_of_any_form(dice: random.Random, count: int) -> list[bytes]:
         b"\x0a\x01\x00",
         b"\x0c\x00\x00\x00\x01",
         b"\x0d\x01\x01",
-        b"\x0d\x01\x01\x02\x03",
+        b"\x0d\x01\x01\x02\x03\x04",
         b"\x08",
     )
     addresses_there = (b"\x00\x05\x00", b"\x00\x05\x01\x09", b"\xff\xff\x00", b"\x00\x05\x06\x01\x02\x03\x04\x05\x06")
@@ -290,6 +291,8 @@ def data_of_any_form(dice: random.Random, count: int) -> list[bytes]:
             kind = dice.randrange(4)
             if kind == 0:
                 made += _object(dice.choice((0x0C, 0xC4, 0x1C, 0x2C)), dice.randrange(1 << 22))
+            elif kind == 1:
+                made += dice.choice(processes) + _object(dice.choice((0x1C, 0x2C)), dice.randrange(1 << 22))
             else:
                 made += dice.choice((errors, processes, (dice.randbytes(3),))[kind - 1])
         return made
@@ -311,7 +314,7 @@ def data_of_any_form(dice: random.Random, count: int) -> list[bytes]:
             control |= dice.choice((0x80, dice.randrange(256)))
         npdu = bytes((1 if dice.random() < 0.98 else dice.randrange(3), control)) + routed + apdu
         if dice.random() < 0.4:
-            npdu = npdu[: dice.randrange(len(npdu) + 1)]
+            npdu = npdu[: len(npdu) - min(dice.choice((1, 1, 2, dice.randrange(len(npdu) + 1))), len(npdu))]
         kind = dice.choice((5, 5, 6, 6, 6, 32, 33, dice.randrange(256)))
         frames.append(frame(kind, dice.choice((255, dice.randrange(256))), dice.randrange(256), npdu))
     return frames

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from dissectors.bacnet import MSTP
 from dissectors.bacnet.frame_making import frame
 from dissectors.bacnet.kernel import kernel
+from dissectors.checksums import crc8_mstp
 from dissectors.columns import Reads
 from dissectors.frame import Chunk
 from dissectors.line import Timing
@@ -86,14 +87,23 @@ def test_a_good_header_behind_a_pause_ends_the_frame_around_it() -> None:
 def test_a_header_at_the_end_of_a_block_may_end_the_damaged_frame_before_it() -> None:
     """What is said of a block must hold whatever follows."""
     token = frame(0, 1, 2)
-    damaged = bytearray(frame(6, 1, 2, b"\x01\x00\x10\x08\x00\x55"))
-    for octets in (bytes(damaged[:-2]) + token, bytes(damaged[:-1]) + token):
+    damaged = frame(6, 1, 2, b"\x01\x00\x10\x08\x00\x55")
+    bad_header = damaged[:4] + b"\x03" + damaged[5:]
+    for octets in (damaged[:-2] + token, damaged[:-1] + token, bad_header[:-1] + token, bad_header[:-3] + token):
         whole = token + octets + token + token
         for cut in range(1, len(whole)):
             known = kernel(reads_of([Chunk(buses.START, whole[:cut])]), Timing(buses.LINE))
             later = kernel(reads_of([Chunk(buses.START, whole)]), Timing(buses.LINE))
             for offset, length in zip(known.offset.tolist(), known.length.tolist(), strict=True):
                 assert (offset, length) in set(zip(later.offset.tolist(), later.length.tolist(), strict=True))
+
+
+def test_a_bad_header_with_a_length_over_the_limit_is_eight_octets() -> None:
+    for kind, length in ((6, 502), (6, 600), (32, 2044)):
+        header = bytes((0x55, 0xFF, kind, 1, 2, length >> 8, length & 255))
+        bad = header + bytes((crc8_mstp(header[2:]) ^ 1,))
+        octets = frame(0, 1, 2) * 2 + bad + bytes(length + 2) + frame(0, 1, 2) * 2
+        assert_equal(MSTP, [Chunk(buses.START, octets)], Timing(buses.LINE))
 
 
 @settings(max_examples=200, deadline=None)

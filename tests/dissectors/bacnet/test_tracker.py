@@ -369,3 +369,10 @@ def test_live_and_saved_give_the_same(steps: list[tuple[float, bytes]], data: st
         no += 1
     closed += live.close()
     assert sorted(closed, key=lambda t: t.id) == sorted(track(*steps).closed, key=lambda t: t.id)
+
+
+def test_a_segment_cut_in_its_header_is_a_request_that_nobody_answered():
+    """It says that more follow and has no invoke id: nothing can follow it."""
+    for pause in (5, 600):
+        run = track((5, TOKEN_52), (5, frame(5, 5, 2, b"\x01\x04\x0c")), (pause, TOKEN_25), (5, TOKEN_52))
+        assert [transaction.request for transaction in run.of(Verdict.NO_RESPONSE)] == [1]
