@@ -75,4 +75,5 @@ MSTP = Dissector(
     packet_file=PacketFile((165, 252), "mstp", least=8, longer=True),
     renamer=MstpRenamer,
     makers={"mstp": frame},
+    scenarios=on_first_use("dissectors.bacnet.scenario:scenarios"),
 )
