@@ -12,6 +12,12 @@ LONGEST = 120
 """Characters of an error that are shown."""
 
 
+class FailedHeader(Header):
+    """What stands for the header that a plug-in failed to give; its `error` says how."""
+
+    __slots__ = ()
+
+
 def guarded(dissector: Dissector) -> Dissector:
     """The same protocol, whose `peek`, `text`, `fields` and `packet` never raise."""
 
@@ -19,18 +25,16 @@ def guarded(dissector: Dissector) -> Dissector:
         said = "".join(c if c.isprintable() else "." for c in str(error))[:LONGEST]
         return f"{function} of plug-in {dissector.name!r} failed: {type(error).__name__}{': ' if said else ''}{said}"
 
-    failed_peek = f"peek of plug-in {dissector.name!r} failed: "
-
     def peek(frame: Frame) -> Header:
         try:
             return dissector.peek(frame)
         except Exception as error:
             words = failed("peek", error)
-            return Header(dissector.name, None, None, Role.UNKNOWN, "unknown", ok=frame.ok, error=words)
+            return FailedHeader(dissector.name, None, None, Role.UNKNOWN, "unknown", ok=frame.ok, error=words)
 
     def text(frame: Frame, header: Header, role: Role) -> str:
-        if header.error is not None and header.error.startswith(failed_peek):
-            return header.error
+        if isinstance(header, FailedHeader):
+            return header.error or ""
         try:
             return dissector.text(frame, header, role)
         except Exception as error:
