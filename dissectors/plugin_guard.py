@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from dissectors.frame import Frame, Header, Role
 from dissectors.manifest import Dissector
+
+if TYPE_CHECKING:
+    from dissectors.simulated import SimulatedBus
 
 LONGEST = 120
 """Characters of an error that are shown."""
@@ -54,4 +58,10 @@ def guarded(dissector: Dissector) -> Dissector:
 
             return Raw(frame.octets)
 
-    return replace(dissector, peek=peek, text=text, fields=fields, packet=packet)
+    def scenarios() -> Mapping[str, SimulatedBus]:
+        try:
+            return dissector.scenarios()
+        except Exception:
+            return {}  # its buses cannot be had; those of others can
+
+    return replace(dissector, peek=peek, text=text, fields=fields, packet=packet, scenarios=scenarios)

@@ -76,8 +76,12 @@ def scenario(name: str, seed: int = 0, faults: bool = True, line: LineSettings |
 
 
 def _known() -> Mapping[str, tuple[Dissector, SimulatedBus]]:
-    """Every scenario with its protocol, by name."""
-    return {name: (one, bus) for one in registry.usable() for name, bus in one.scenarios().items()}
+    """Every scenario with its protocol, by name; of one that two protocols bring, the first one's."""
+    known: dict[str, tuple[Dissector, SimulatedBus]] = {}
+    for one in registry.usable():
+        for name, bus in one.scenarios().items():
+            known.setdefault(name, (one, bus))
+    return known
 
 
 def simulate(plan: Scenario, seconds: float, tap: TapModel = EXACT, started: int = 0) -> tuple[Session, Iterator[Item]]:
