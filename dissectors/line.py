@@ -6,6 +6,8 @@ import re
 from dataclasses import dataclass
 
 NS_PER_S = 1_000_000_000
+MS = 1_000_000
+"""ns in a millisecond."""
 
 _TOKEN = re.compile(r"(?P<baud>\d{2,8})(?:,(?P<data>[5-8])(?P<parity>[NEOMS])(?P<stop>1\.5|1|2))?", re.IGNORECASE)
 

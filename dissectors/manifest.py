@@ -21,8 +21,10 @@ from dissectors.readings import Readings, Refusal
 from dissectors.token_ring import TokenRing
 from dissectors.tracker import Tracker
 
-if TYPE_CHECKING:  # columns need numpy, which takes longer to import than a small capture to read
+if TYPE_CHECKING:
+    # columns need numpy, which takes longer to import than a small capture to read; simulated buses are seldom wanted
     from dissectors.columns import Kernel, Pairing
+    from dissectors.simulated import SimulatedBus
 
 RARE_BITS = 8.0
 """Evidence of a good frame where its protocol does not say: one in 256 of random octets."""
@@ -69,6 +71,7 @@ class Dissector:
     `kernel`: framer and peek for clean stretches of many frames at once (`dissectors/columns.py`).
     `pairing`: the same for the tracker.
     `makers`: whole frames from their parts, checks included, by the kind of frame; parts are keywords.
+    `scenarios()`: simulated buses by name, for demonstrations and tests; the protocol's own name for the usual one.
     """
 
     name: str
@@ -92,6 +95,7 @@ class Dissector:
     packet_file: PacketFile | None = None
     renamer: Callable[[], Renamer] | None = None
     makers: Mapping[str, Callable[..., bytes]] = field(default_factory=dict)
+    scenarios: Callable[[], Mapping[str, SimulatedBus]] = dict
     kernel: Kernel | None = None
     pairing: Pairing | None = None
 

@@ -2,14 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from dissectors.frame import Frame, Header, Role
 from dissectors.manifest import Dissector
 
+if TYPE_CHECKING:
+    from dissectors.simulated import SimulatedBus
+
 LONGEST = 120
 """Characters of an error that are shown."""
+
+
+class FailedHeader(Header):
+    """What stands for the header that a plug-in failed to give; its `error` says how."""
+
+    __slots__ = ()
 
 
 def guarded(dissector: Dissector) -> Dissector:
@@ -19,18 +29,16 @@ def guarded(dissector: Dissector) -> Dissector:
         said = "".join(c if c.isprintable() else "." for c in str(error))[:LONGEST]
         return f"{function} of plug-in {dissector.name!r} failed: {type(error).__name__}{': ' if said else ''}{said}"
 
-    failed_peek = f"peek of plug-in {dissector.name!r} failed: "
-
     def peek(frame: Frame) -> Header:
         try:
             return dissector.peek(frame)
         except Exception as error:
             words = failed("peek", error)
-            return Header(dissector.name, None, None, Role.UNKNOWN, "unknown", ok=frame.ok, error=words)
+            return FailedHeader(dissector.name, None, None, Role.UNKNOWN, "unknown", ok=frame.ok, error=words)
 
     def text(frame: Frame, header: Header, role: Role) -> str:
-        if header.error is not None and header.error.startswith(failed_peek):
-            return header.error
+        if isinstance(header, FailedHeader):
+            return header.error or ""
         try:
             return dissector.text(frame, header, role)
         except Exception as error:
@@ -50,4 +58,10 @@ def guarded(dissector: Dissector) -> Dissector:
 
             return Raw(frame.octets)
 
-    return replace(dissector, peek=peek, text=text, fields=fields, packet=packet)
+    def scenarios() -> Mapping[str, SimulatedBus]:
+        try:
+            return dissector.scenarios()
+        except Exception:
+            return {}  # its buses cannot be had; those of others can
+
+    return replace(dissector, peek=peek, text=text, fields=fields, packet=packet, scenarios=scenarios)

@@ -21,8 +21,12 @@ Rules for both sides:
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Protocol
+
+from dissectors.line import LineSettings, Timing
+from dissectors.simulated_faults import Fault
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,3 +55,35 @@ class Station(Protocol):
     def next_wake(self) -> int | None:
         """When to call `wake` next (ns), or None to wait for traffic only. A time in the past means at once."""
         ...
+
+
+@dataclass(frozen=True, slots=True)
+class Party:
+    """Somebody on the bus. `answers`: speaks only when asked, so "lost response" and the like can strike it."""
+
+    name: str
+    station: Station
+    answers: bool = True
+
+
+def no_gap(timing: Timing) -> int:
+    """The silence before a frame of a protocol that wants none."""
+    return 0
+
+
+@dataclass(frozen=True, slots=True)
+class SimulatedBus:
+    """A bus to listen to in demonstrations and tests: who is on it and what usually goes wrong there.
+
+    `parties(line, faults)`: makes them afresh for each run, in any process, so it is a function of a module (or a
+    `partial` of one); `faults`: whether stations may misbehave, too. `line`: the settings of this bus; where empty, the
+    protocol's usual ones. `gap`: ns of silence that the framing wants before a frame. `devices`: device profiles by
+    address. `text`: who is there and what is wrong, in a line for people.
+    """
+
+    parties: Callable[[LineSettings, bool], Sequence[Party]]
+    text: str = ""
+    line: str = ""
+    faults: tuple[Fault, ...] = ()
+    gap: Callable[[Timing], int] = no_gap
+    devices: Mapping[int, str] = field(default_factory=dict)

@@ -79,4 +79,5 @@ MSTP = Dissector(
     makers={"mstp": frame},
     kernel=kernel,
     pairing=pairing,
+    scenarios=on_first_use("dissectors.bacnet.scenario:scenarios"),
 )

@@ -12,20 +12,17 @@ from dissectors.tracker import Tracker
 
 
 class MstpBlockPairing:
-    """Runs of some frames; none where reads came late, since intervals are taken as wide as the adapter makes them."""
+    """Runs of some frames."""
 
     def __init__(
         self, tracker: MstpTracker, frames: FrameColumns, octets: Octets, timing: Timing, slack: Times
     ) -> None:
         self._tracker = tracker
-        late = bool((slack > timing.latency).any())
-        self._pairing = None if late else Pairing(frames, octets, timing, prepare(tracker))
+        self._pairing = Pairing(frames, octets, timing, prepare(tracker), slack)
 
     def run(self, begin: int, no: int) -> Run | None:
         """See `dissectors.columns.BlockPairing`."""
-        if self._pairing is None or not begin:
-            return None
-        made = self._pairing.run(self._tracker, begin, no)
+        made = self._pairing.run(self._tracker, begin, no) if begin else None
         if made is None:
             return None
         closing = self._pairing.rows.closing

@@ -210,7 +210,7 @@ class RtuWindow:
             return
         whole = good + bytes(min(count, 2))
         for reading in readings(whole, 0, len(whole)):
-            if reading.length > len(good) and octet_bits(whole, 0, reading) >= SHORT_FRAME:
+            if len(good) < reading.length <= len(whole) and octet_bits(whole, 0, reading) >= SHORT_FRAME:
                 return
         self.past.note_stray_zero()
 

@@ -56,4 +56,5 @@ N2 = Dissector(
     refusal=refusal,
     renamer=N2Renamer,
     makers={"n2": make_command, "n2-answer": make_answer},
+    scenarios=on_first_use("dissectors.n2.scenario:scenarios"),
 )

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from dissectors.frame import Check
-from dissectors.line import LineSettings
+from dissectors.line import MS, LineSettings
 from dissectors.n2.commands import VENDOR_DEVICE, Command, fields_of, parse_command
 from dissectors.n2.envelope import make_answer, make_command
 from dissectors.n2.f510 import POINTS, Point
@@ -21,7 +21,6 @@ from dissectors.n2.framing import MAX_LENGTH, judge
 from dissectors.n2.objects import ATTRIBUTES, REGIONS, Encoding, decode, encode, holds_current_value
 from dissectors.simulated import Send
 
-MS = 1_000_000
 REPORT_MAX = 200
 """Most characters of a change report (Danfoss MG.11.G1); the rest waits for the next poll."""
 

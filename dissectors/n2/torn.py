@@ -12,12 +12,11 @@ from collections import deque
 from typing import Final
 
 from dissectors.frame import Event, Frame
-from dissectors.line import Timing
+from dissectors.line import MS, Timing
 from dissectors.n2.envelope import is_good
 from dissectors.n2.header import meant
 from dissectors.n2.record import Damages
 
-MS: Final = 1_000_000
 PIECES: Final = 8
 """Most rows that one torn frame is."""
 

@@ -7,14 +7,13 @@ from dataclasses import dataclass, replace
 
 from dissectors.findings import Finding, Severity, Tally, counted, times
 from dissectors.frame import Flaw
-from dissectors.line import NS_PER_S
+from dissectors.line import MS, NS_PER_S
 from dissectors.n2.blame import blamed
 from dissectors.n2.commands import error_name
 from dissectors.n2.objects import attribute_name, number, object_name
 from dissectors.n2.record import Damages, Station
 from dissectors.n2.rules import RULES
 
-MS = 1_000_000
 SLOW = 250 * MS
 """Shortest message timeout that an NAE can be given, ns (JCI help, N2 trunk)."""
 

@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
+from dissectors.line import MS
 from dissectors.profiles.checked import ProfileError, Table
 from dissectors.profiles.model import Access, Bit, Entry, Kind, Limits, Part, Profile, Role, Sign
 
-MILLISECOND = 1_000_000
 REGISTER_TABLES = ("holding", "input")
 BIT_TABLES = ("coil", "discrete")
 N2_REGIONS = ("AI", "BI", "AO", "BO", "ADF", "ADI", "BD")
@@ -235,7 +235,7 @@ def _limits(table: Table) -> Limits:
     if (frame is not None and frame < 1) or (response is not None and response <= 0):
         raise table.error("", "expected numbers above 0")
     table.finish()
-    return Limits(frame, None if response is None else int(response * MILLISECOND))
+    return Limits(frame, None if response is None else int(response * MS))
 
 
 def _sign(table: Table, modbus: Table) -> Sign:

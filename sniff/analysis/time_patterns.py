@@ -16,7 +16,7 @@ from itertools import pairwise
 from dissectors.findings import Finding, Tally, counted, found
 from dissectors.frame import Chunk, Event, Frame, LineError
 from dissectors.histogram import Histogram
-from dissectors.line import NS_PER_S
+from dissectors.line import MS, NS_PER_S
 from dissectors.tracker import Transaction
 from dissectors.words import milliseconds
 from sniff.analysis.line_rules import LINE_RULES as RULES
@@ -25,7 +25,6 @@ from sniff.analysis.other_settings import Fit, what_fits
 from sniff.analysis.slower_bus import slower_by
 from sniff.engine.session import LineEvent, Session
 
-MS = 1_000_000
 MAINS = {20 * MS: "50 Hz", 10 * MS: "twice 50 Hz", 50 * MS // 3: "60 Hz", 25 * MS // 3: "twice 60 Hz"}
 """Periods, ns: once a wave, and twice (each half wave, as of a dimmer)."""
 

@@ -18,11 +18,9 @@ from dataclasses import dataclass
 from random import Random
 
 from dissectors.frame import Chunk, LineError, Mark
-from dissectors.line import LineSettings
+from dissectors.line import MS, LineSettings
 from sniff.engine.session import Adapter, Item, LineEvent, LineEventKind
 from sniff.simulation.wire import Burst
-
-MS = 1_000_000
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,18 +18,10 @@ from random import Random
 
 from dissectors.frame import LineError, Mark
 from dissectors.line import LineSettings
-from dissectors.simulated import Send, Station
-from sniff.simulation.faults import NOISE, Fault, Transmission
+from dissectors.simulated import Party as Party
+from dissectors.simulated import Send
+from dissectors.simulated_faults import NOISE, Fault, Transmission
 from sniff.simulation.line_mix import Received, low_times, receive
-
-
-@dataclass(frozen=True, slots=True)
-class Party:
-    """Somebody on the bus. `answers`: speaks only when asked, so "lost response" and the like can strike it."""
-
-    name: str
-    station: Station
-    answers: bool = True
 
 
 @dataclass(frozen=True, slots=True)

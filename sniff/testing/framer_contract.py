@@ -23,10 +23,9 @@ from hypothesis import strategies as st
 
 from dissectors.frame import Check, Chunk, Event, Frame, LineError, Mark, Noise
 from dissectors.framer import Framer
-from dissectors.line import LineSettings, Timing
+from dissectors.line import MS, LineSettings, Timing
 from sniff.testing.driving import drive
 
-MS = 1_000_000
 EPOCH = 1_767_225_600 * 1_000_000_000
 LONGEST_DELAY = 6_000 * MS
 MOST_HELD = 4096

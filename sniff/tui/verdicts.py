@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dissectors.tracker import Interval, Transaction, Verdict
-from dissectors.words import milliseconds
+from dissectors.words import bare_milliseconds
 from sniff.tui.columns import Cell
 
 SHORT: dict[Verdict, str] = {
@@ -49,10 +49,10 @@ def latency_cell(latency: Interval | None, held: int) -> Cell:
     if latency is None:
         return Cell("")
     more = max(latency.nominal - latency.low, latency.high - latency.nominal) > held
-    return Cell(milliseconds(latency.nominal).removesuffix(" ms") + ("?" if more else ""))
+    return Cell(bare_milliseconds(latency.nominal) + ("?" if more else ""))
 
 
 def latency_title(held: int, roomy: bool = False) -> str:
     """Title of that column; `held`: how long the adapter may hold octets back, ns: the most that a time is wrong."""
     title = "latency ms" if roomy or not held else "ms"
-    return f"{title} ±{milliseconds(held).removesuffix(' ms').removesuffix('.0')}" if held else title
+    return f"{title} ±{bare_milliseconds(held).removesuffix('.0')}" if held else title

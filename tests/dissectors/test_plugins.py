@@ -12,6 +12,7 @@ import pytest
 
 from dissectors import registry
 from sniff.cli import main
+from sniff.simulation import scenarios
 
 Command = Callable[..., tuple[int, str, str]]
 
@@ -78,6 +79,15 @@ def test_a_packet_that_fails_is_raw(plug: Callable[..., None], show: Command) ->
     rtu = registry.get("modbus-rtu")
     plug("half", lambda: replace(rtu, name="half", packet=fails))
     assert show("show", "-p", "half", "-V")[0] == 0
+
+
+def test_simulated_buses_of_others_outlive_one_that_fails_or_takes_their_name(plug: Callable[..., None]) -> None:
+    usual = scenarios.names()
+    rtu = registry.get("modbus-rtu")
+    plug("half", lambda: replace(rtu, name="half", scenarios=fails))
+    assert scenarios.names() == usual
+    plug("other", lambda: replace(rtu, name="other"))
+    assert scenarios.scenario("modbus-rtu").protocol == "modbus-rtu"
 
 
 def test_a_plug_in_stays_the_same_value(plug: Callable[..., None]) -> None:

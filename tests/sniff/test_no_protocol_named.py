@@ -9,13 +9,9 @@ import pytest
 
 SNIFF = Path(__file__).parents[2] / "sniff"
 NAMES = re.compile(r"modbus|bacnet|\bms/?tp\b|\bmstp|metasys|\bn2\b|profibus|\brtu\b", re.IGNORECASE)
-ELSEWHERE = ("simulation", "tui/screenshots.py")
-"""Buses that are simulated for demonstration and pictures are chosen by name."""
 
 
 @pytest.mark.parametrize("path", sorted(SNIFF.rglob("*.py")), ids=lambda path: str(path.relative_to(SNIFF)))
 def test_no_module_names_a_protocol(path: Path) -> None:
-    if str(path.relative_to(SNIFF)).startswith(ELSEWHERE):
-        pytest.skip("simulated buses are chosen by name")
     named = [f"{no}: {line.strip()}" for no, line in enumerate(path.read_text().splitlines(), 1) if NAMES.search(line)]
     assert named == []

@@ -12,7 +12,7 @@ from textual.containers import VerticalScroll
 from textual.widgets import Static
 
 from dissectors.frame import LineError
-from dissectors.line import NS_PER_S
+from dissectors.line import MS, NS_PER_S
 from dissectors.words import milliseconds
 from sniff.bus.feed import FeedStatus
 from sniff.bus.rows import Store
@@ -23,7 +23,6 @@ from sniff.tui.plain import plain
 from sniff.tui.screens.base import ViewScreen
 from sniff.tui.times import clock, date_and_clock, size
 
-MS = 1_000_000
 GAP_EDGES = tuple(edge * MS // 10 for edge in (1, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000))
 """0.1 ms … 1 s."""
 EVENTS_SHOWN = 200

@@ -35,6 +35,14 @@ settings.load_profile("first")
 """The first failing example is enough here: finding the smallest takes seconds."""
 
 
+USE = """
+from sniff.simulation.scenarios import bursts, scenario
+from sniff.testing.crafting import craft
+print(craft("nmea", body=b"SDDBT,12.0").decode().strip())
+print(sum(len(burst.sent) for burst in bursts(scenario("nmea", faults=False), 1.99)))
+"""
+
+
 @pytest.fixture
 def installed(tmp_path: Path) -> Path:
     """A folder with the plug-in as an installer would leave it: modules, and a record of its entry points."""
@@ -91,6 +99,12 @@ def test_commands_know_the_protocol(run: Run, installed: Path) -> None:
     assert written.returncode == 0, written.stderr
     assert "DAMAGED check" in (installed / "boat.expect.txt").read_text()
     assert "nmea" in run("sniff", "show", "-p", "no-such", "boat.cap.txt").stderr
+
+
+def test_it_is_simulated_and_crafted(run: Run, installed: Path) -> None:
+    (installed / "use.py").write_text(USE)
+    ran = run("use")
+    assert ran.stdout.split() == ["$SDDBT,12.0*74", "20"], ran.stderr
 
 
 @pytest.mark.parametrize("command", ["show", "info", "stats", "check", "points", "snapshot", "diff", "anonymise"])

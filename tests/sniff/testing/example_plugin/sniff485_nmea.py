@@ -6,14 +6,17 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from functools import reduce
 from operator import xor
 from typing import Any
 
 from dissectors.frame import Check, Damage, Frame, Header, Role
-from dissectors.line import Timing
+from dissectors.line import NS_PER_S, LineSettings, Timing
 from dissectors.manifest import Dissector
 from dissectors.plain_framers import Delimited, DelimitedFramer
+from dissectors.simulated import Party, Send, SimulatedBus
+from dissectors.simulated_faults import BitFlips
 from dissectors.tracker import Announcements
 
 SENTENCE = re.compile(rb"\$([A-Z]{2}[A-Z]{3})((?:,[ -)+-~]*)*)\*([0-9A-F]{2})\r\n")
@@ -68,4 +71,44 @@ def bits(frame: Frame) -> float:
     return 2.0 * len(frame.octets)
 
 
-NMEA = Dissector("nmea", "NMEA 0183", framer, peek, Announcements, text, fields, packet, "4800,8N1", bits=bits)
+def make(body: bytes) -> bytes:
+    """A sentence with its check; `body` is what stands between `$` and `*`."""
+    return b"$%s*%02X\r\n" % (body, check_of(body))
+
+
+class Sounder:
+    """A depth sounder: speaks ten times a second, hears nobody."""
+
+    def __init__(self) -> None:
+        self._next = 0
+
+    def hear(self, now: int, octets: bytes, quiet: bool) -> tuple[Send, ...]:
+        """Nothing anybody says matters to it."""
+        return ()
+
+    def wake(self, now: int) -> tuple[Send, ...]:
+        """Say the depth when it is time."""
+        if now < self._next:
+            return ()
+        self._next = now + NS_PER_S // 10
+        return (Send(now, make(b"SDDBT,12.0")),)
+
+    def next_wake(self) -> int:
+        """When it speaks next."""
+        return self._next
+
+
+def parties(line: LineSettings, faults: bool) -> list[Party]:
+    """Who is on the simulated bus."""
+    return [Party("sounder", Sounder(), answers=False)]
+
+
+def scenarios() -> Mapping[str, SimulatedBus]:
+    """A boat at anchor."""
+    return {"nmea": SimulatedBus(parties, "a depth sounder", faults=(BitFlips(1e-4),))}
+
+
+NMEA = Dissector(
+    "nmea", "NMEA 0183", framer, peek, Announcements, text, fields, packet, "4800,8N1",
+    bits=bits, makers={"nmea": make}, scenarios=scenarios,
+)  # fmt: skip

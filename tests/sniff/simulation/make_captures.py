@@ -1,4 +1,4 @@
-"""Makes the simulated captures of the project: `python -m sniff.simulation.make_captures FOLDER`.
+"""Makes the simulated captures of the project: `python -m tests.sniff.simulation.make_captures FOLDER`.
 
 Each is a scenario of the virtual bus with the same seed every time, so the files change only when the simulation does.
 After a change: `pytest --sniff-update captures`, and read the diff.
@@ -11,9 +11,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from dissectors.line import NS_PER_S
 from sniff.formats import create
 from sniff.simulation.faults import BitFlips, Break, DuplicateAddress, EarlyRelease, Fault, LostResponse, NoiseInGaps
-from sniff.simulation.scenarios import NS_PER_S, scenario, simulate
+from sniff.simulation.scenarios import scenario, simulate
 from sniff.simulation.tap import EXACT, FTDI, UART, TapModel
 
 STARTED = 1_772_359_200 * 1_000_000_000

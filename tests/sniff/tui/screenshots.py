@@ -1,4 +1,4 @@
-"""Pictures of the screens from simulated buses: `python -m sniff.tui.screenshots captures/pictures`.
+"""Pictures of the screens from simulated buses: `python -m tests.sniff.tui.screenshots captures/pictures`.
 
 The same program gives the same pictures: seeds, times and zone are fixed. They need no fonts from anywhere.
 """
@@ -136,5 +136,5 @@ def main(folder: str, write: Callable[[str], object] = sys.stdout.write) -> None
 
 if __name__ == "__main__":
     if len(sys.argv) != 2:
-        sys.exit("usage: python -m sniff.tui.screenshots FOLDER")
+        sys.exit("usage: python -m tests.sniff.tui.screenshots FOLDER")
     main(sys.argv[1])
