@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import cache
 
 from dissectors.findings import Finding, Severity, Tally, counted, found, times
 from dissectors.frame import Chunk, Damage, Event, Frame, LineError, Noise, Place, Reason, Role
@@ -43,6 +44,7 @@ class LineFindings:
 
     def __init__(self, session: Session) -> None:
         self._session = session
+        self._nouns = cache(station_word)  # to ask for the installed protocols takes longer than a frame may
         self._patterns = TimePatterns(session)
         self._use = LineUse(session.line)
         adapter = session.adapter
@@ -141,7 +143,7 @@ class LineFindings:
 
     def _see_frame(self, row: Row, frame: Frame) -> str:
         """Gives the sender."""
-        sender = _sender(row)
+        sender = _sender(row, self._nouns)
         role = row.placement.role if row.placement is not None else Role.UNKNOWN
         if role is Role.RESPONSE and not frame.ok and not self._awaiting:
             sender = "bus"  # nobody was asked: it may be anything
@@ -339,13 +341,13 @@ class LineFindings:
         return Severity.NOTE if count == 1 or (count <= 2 * minutes and 100 * count < of) else None
 
 
-def _sender(row: Row) -> str:
-    """Whose frame it is, as a subject; a damaged header names nobody."""
+def _sender(row: Row, nouns: Callable[[str], str]) -> str:
+    """Whose frame it is, as a subject; a damaged header names nobody. `nouns`: for a station, by protocol."""
     if isinstance(row.event, Frame) and row.event.damage is Damage.HEADER:
         return "bus"
     placement, header = row.placement, row.header
     source = placement.source if placement is not None else header.source if header is not None else None
     if source is not None:
-        return f"{station_word(header.protocol) if header is not None else 'station'} {source}"
+        return f"{nouns(header.protocol) if header is not None else 'station'} {source}"
     role = placement.role if placement is not None else header.role if header is not None else Role.UNKNOWN
     return "master" if role in (Role.REQUEST, Role.BROADCAST) else "bus"

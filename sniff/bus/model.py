@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from dissectors.findings import Finding
 from dissectors.manifest import Dissector
@@ -14,6 +14,9 @@ from sniff.analysis.points import PointReader, PointTable, Sample
 from sniff.analysis.summary import Summary
 from sniff.engine.engine import Output
 from sniff.engine.session import LineEvent, Session
+
+if TYPE_CHECKING:
+    from sniff.engine.table import Table
 
 
 class BusModel:
@@ -57,6 +60,15 @@ class BusModel:
         self.judging.add(output)
         self.samples = self.reader.add(output)
         self.points.add(self.samples)
+
+    def add_table(self, table: Table) -> None:
+        """Take many rows at once: counted as columns, judged row by row."""
+        self.version += 1
+        self.summary.add_table(table)
+        for output in table.outputs():
+            self.judging.add(output)
+            self.samples = self.reader.add(output)
+            self.points.add(self.samples)
 
     def add_line_event(self, event: LineEvent) -> None:
         """Take something that happened to the line."""

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from dissectors.findings import Finding, Severity
 from sniff.bus.live import LiveItem
 from sniff.bus.model import BusModel
-from sniff.bus.offline import outputs
+from sniff.bus.offline import survey
 from sniff.cli import INTERRUPTED, PORT_TROUBLE, UNREADABLE, USAGE, Failure, arguments, check_output
 from sniff.cli.check_output import Checked
 from sniff.engine.capture import Capture
@@ -26,6 +26,7 @@ from sniff.formats import READERS
 
 if TYPE_CHECKING:
     from sniff.bus.live import LiveBus
+    from sniff.engine.table import Table
 
 DEFAULT_DURATION = 30.0
 _EARLIEST, _LATEST = -(1 << 63), (1 << 63) - 1
@@ -36,6 +37,7 @@ SEVERITIES = tuple(severity.label for severity in Severity)
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Options of `check`."""
+    arguments.add_reference(parser)
     parser.add_argument("sources", nargs="+", metavar="FILE|PORT", help="captures, or one port or configured bus")
     arguments.add_line(parser, auto=True)
     arguments.add_devices(parser)
@@ -94,7 +96,7 @@ def _read(source: str, capture: Capture, args: argparse.Namespace) -> Checked:
     """What was found in a capture."""
     session = arguments.settings_of(args, capture.session, source)
     run_of = Checking(BusModel(session, dissector_for(session), arguments.noted_devices(args, session)))
-    observe(outputs(capture.items(), session), run_of.model, run_of)
+    survey(capture, session, run_of.model, run_of, reference=args.reference)
     complete = capture.completeness()
     notes = [] if complete.whole else [complete.text]
     if session.unknown:
@@ -162,6 +164,10 @@ class Checking:
     def add(self, output: Output) -> None:
         """Remember when rows began."""
         self._starts.extend(min(max(row.event.start, _EARLIEST), _LATEST) for row in output.rows)
+
+    def add_table(self, table: Table) -> None:
+        """The same of many rows."""
+        self._starts.extend(table.frames.start.tolist())
 
     def add_line_event(self, event: LineEvent) -> None:
         """Nothing of it is kept here."""

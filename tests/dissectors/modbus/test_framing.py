@@ -407,3 +407,12 @@ def test_every_frame_printed_with_a_wrong_check_is_bad() -> None:
     for frame in frames:
         (event,) = read((0, frame))
         assert brief([event]) == [(Damage.CHECK, frame, Check.BAD, len(frame))]
+
+
+def test_zeros_behind_a_frame_that_another_length_would_take_up_raise_nothing() -> None:
+    """What would have to be longer than the octets that are there was looked up all the same."""
+    framer = RtuFramer(Timing(LineSettings.parse("115200,8N1")))
+    events = framer.feed(Chunk(7_789_000_000, bytes.fromhex("3f836d1e09e77a7a")))
+    events += framer.feed(Chunk(9_449_000_000, bytes.fromhex("3f03504100")))
+    events += framer.close()
+    assert b"".join(event.octets for event in events) == bytes.fromhex("3f836d1e09e77a7a3f03504100")
