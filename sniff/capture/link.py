@@ -352,7 +352,7 @@ class CaptureLink:
             code = None
         if code in (0, LOSSY):
             lost = "; not everything was recorded" if code else ""
-            return Ended(f"ended, but its last words did not arrive{lost}", lossy=bool(code))
+            return Ended(f"ended, but its last words did not arrive{lost}", lossy=bool(code), unheard=True)
         return Ended(self._why_dead(), clean=False)
 
     def _why_dead(self) -> str:

@@ -93,12 +93,14 @@ NOTHING_MORE = "nothing more to read"
 class Ended:
     """The capture is over and its files are closed, unless `clean` is False.
 
-    `lossy`: it recorded less than it heard; without this its last `Status` says whether it did.
+    `lossy`: it recorded less than it heard; without this its last `Status` says whether it did. `unheard`: this side
+    was too slow for its last words, and nobody knows how many octets went with them (they are recorded).
     """
 
     reason: str
     clean: bool = True
     lossy: bool = False
+    unheard: bool = False
 
 
 Message = Received | Tick | Status | Ended

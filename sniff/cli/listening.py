@@ -371,6 +371,9 @@ def say_recorded(live: LiveBus, where: bool = True) -> None:
     if live.unseen:
         kept = "; the recording has them" if live.link.paths else ""
         print(f"sniff485: {live.unseen} octets not looked at: this host did not keep up{kept}", file=sys.stderr)
+    if ended is not None and ended.unheard:
+        what = "the last octets were not looked at, nobody knows how many: this host was too slow for them"
+        print(f"sniff485: {what}{'; the recording has them' if live.link.paths else ''}", file=sys.stderr)
     lost = status.lost
     if ended is not None and not ended.clean and status.unwritten:
         lost += status.unwritten

@@ -1,0 +1,35 @@
+"""What is said at the end of a capture whose front was too slow to hear its end."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from sniff.capture.link import CaptureLink
+from sniff.capture.wire import Ended, Status
+from sniff.cli.listening import say_recorded
+
+
+@pytest.mark.parametrize("code", [0, 3])
+def test_an_end_that_did_not_arrive_says_that_octets_went_with_it(code: int) -> None:
+    link: Any = SimpleNamespace(_process=SimpleNamespace(wait=lambda timeout: code))
+    ended = CaptureLink._how_it_ended(link)
+    assert ended.unheard
+    assert ended.lossy == bool(code)
+
+
+@pytest.mark.parametrize("unheard", [False, True])
+def test_octets_that_nobody_counted_are_not_passed_over(unheard: bool, capsys: pytest.CaptureFixture[str]) -> None:
+    live: Any = SimpleNamespace(
+        status=Status(0, path="x.mcap"),
+        ended=Ended("ended", unheard=unheard),
+        unseen=0,
+        link=SimpleNamespace(paths=["x.mcap"]),
+        file_is_gone=False,
+    )
+    say_recorded(live)
+    said = capsys.readouterr().err
+    assert ("nobody knows how many" in said) == unheard
+    assert "recorded to x.mcap" in said
