@@ -67,7 +67,7 @@ def write_pcap(path: Path, reads: Reads, link_type: int = 165) -> None:
     heads[:, 0], heads[:, 1] = reads.times // _S, reads.times % _S
     heads[:, 2] = heads[:, 3] = reads.lengths
     head = struct.pack("<IHHiIII", 0xA1B23C4D, 2, 4, 0, 0, 262_144, link_type)
-    path.write_bytes(head + _laid(heads.view(np.uint8), reads, 0).tobytes())
+    path.write_bytes(head + laid(heads.view(np.uint8), reads, 0).tobytes())
 
 
 def write_pcapng(path: Path, reads: Reads, link_type: int = 165) -> None:
@@ -80,25 +80,25 @@ def write_pcapng(path: Path, reads: Reads, link_type: int = 165) -> None:
     section = struct.pack("<IIIHHqI", 0x0A0D0D0A, 28, 0x1A2B3C4D, 1, 0, -1, 28)
     resolution = struct.pack("<HHB3xHH", 9, 1, 9, 0, 0)
     interface = struct.pack("<IIHHI", 1, 32, link_type, 0, 0) + resolution + struct.pack("<I", 32)
-    laid = _laid(heads.view(np.uint8), reads, padding + 4)
+    body = laid(heads.view(np.uint8), reads, padding + 4)
     ends = np.cumsum(28 + reads.lengths + padding + 4)
     sizes = np.ascontiguousarray(heads[:, 1]).view(np.uint8).reshape(-1, 4)
     for at in range(4):
-        laid[ends - 4 + at] = sizes[:, at]
-    path.write_bytes(section + interface + laid.tobytes())
+        body[ends - 4 + at] = sizes[:, at]
+    path.write_bytes(section + interface + body.tobytes())
 
 
-def _laid(heads: Octets, reads: Reads, behind: Places | int) -> Octets:
+def laid(heads: Octets, reads: Reads, behind: Places | int) -> Octets:
     """Each head with its octets behind it, and so many zeros behind those."""
     size = heads.shape[1]
     whole = size + reads.lengths + behind
     begins = np.cumsum(whole) - whole
-    laid = np.zeros(int(whole.sum()), np.uint8)
+    whole_of = np.zeros(int(whole.sum()), np.uint8)
     for at in range(size):
-        laid[begins + at] = heads[:, at]
+        whole_of[begins + at] = heads[:, at]
     before = np.cumsum(reads.lengths) - reads.lengths
-    laid[np.repeat(begins + size - before, reads.lengths) + np.arange(len(reads.octets))] = reads.octets
-    return laid
+    whole_of[np.repeat(begins + size - before, reads.lengths) + np.arange(len(reads.octets))] = reads.octets
+    return whole_of
 
 
 # -- what reading costs ----------------------------------------------------------------------------------------
