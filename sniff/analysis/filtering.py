@@ -14,9 +14,9 @@ from __future__ import annotations
 import difflib
 import operator
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from dissectors import registry
 from dissectors.frame import Damage, Found, Frame, Role
@@ -25,9 +25,44 @@ from dissectors.tracker import Transaction, Verdict
 from sniff.analysis.wording import describe
 from sniff.engine.engine import Row
 
+if TYPE_CHECKING:
+    from dissectors.columns import Masks
+    from sniff.engine.table import Table
+
 Value = int | float | str
 Predicate = Callable[[Row, Transaction | None], bool]
+Accepts = Callable[[Value], bool]
 Getter = Callable[[Row, Transaction | None], tuple[Value, ...]]
+
+
+MaskOf = Callable[["Table"], "Masks"]
+"""Which plain rows of a table may be accepted."""
+
+
+@dataclass(frozen=True, slots=True)
+class Filter:
+    """A test of a row with its transaction. `columns`: the same for many rows at once, as far as a table holds what
+    is asked, None where it holds none of it; `exact`: whether that is all that is asked.
+    """
+
+    test: Predicate
+    columns: MaskOf | None = None
+    exact: bool = False
+
+    def __call__(self, row: Row, transaction: Transaction | None) -> bool:
+        """Whether the row is accepted."""
+        return self.test(row, transaction)
+
+    def candidates(self, table: Table) -> list[int] | None:
+        """Places of rows that may be accepted: all others are not. None: that takes a look at every row."""
+        if self.columns is None:
+            return None
+        import numpy as np
+
+        chosen = self.columns(table)
+        chosen[list(table.odd)] = True
+        places: list[int] = np.flatnonzero(chosen).tolist()
+        return places
 
 
 class FilterError(ValueError):
@@ -105,6 +140,9 @@ COLUMNS: dict[str, Getter] = {
     "attempt": lambda _, tx: (tx.attempt,) if tx is not None else (),
     "hex": lambda row, _: (row.event.octets.hex(),),
 }
+IN_TABLES = frozenset(COLUMNS) - {"verdict", "latency_ms", "attempt", "hex"}
+"""Those that a table holds as columns (`filter_masks.py`)."""
+
 ALIASES = {"frame.number": "no", "frame.len": "len", "tx.verdict": "verdict", "tx.latency_ms": "latency_ms"}
 FIELDS: tuple[str, ...] = (*COLUMNS, "text", *ALIASES)
 """Names for completion; the dotted fields of the protocol come on top."""
@@ -140,11 +178,11 @@ class _Token:
     column: int
 
 
-def compile_filter(text: str, dissector: Dissector) -> Predicate:
+def compile_filter(text: str, dissector: Dissector) -> Filter:
     """Turn a filter into a test of a row with its transaction. An empty filter is always true. Raises FilterError."""
     tokens = _lex(text)
     if len(tokens) == 1:
-        return lambda row, tx: True
+        return Filter(lambda row, tx: True)
     return _Parser(tokens, dissector).parse()
 
 
@@ -174,7 +212,7 @@ class _Parser:
         self.at = 0
         self.depth = 0
 
-    def parse(self) -> Predicate:
+    def parse(self) -> Filter:
         found = self._either()
         if self._now.kind != "end":
             raise FilterError(f"expected && or || before {self._now.text!r}", self._now.column)
@@ -190,26 +228,26 @@ class _Parser:
             return True
         return False
 
-    def _either(self) -> Predicate:
+    def _either(self) -> Filter:
         parts = [self._both()]
         while self._take("||"):
             parts.append(self._both())
-        return parts[0] if len(parts) == 1 else lambda row, tx: any(part(row, tx) for part in parts)
+        return parts[0] if len(parts) == 1 else _any_of(parts)
 
-    def _both(self) -> Predicate:
+    def _both(self) -> Filter:
         parts = [self._not()]
         while self._take("&&"):
             parts.append(self._not())
-        return parts[0] if len(parts) == 1 else lambda row, tx: all(part(row, tx) for part in parts)
+        return parts[0] if len(parts) == 1 else _all_of(parts)
 
-    def _not(self) -> Predicate:
+    def _not(self) -> Filter:
         self.depth += 1
         if self.depth > 200:
             raise FilterError("too deeply nested", self._now.column)
         try:
             if self._take("!"):
                 inner = self._not()
-                return lambda row, tx: not inner(row, tx)
+                return _none_of(inner)
             if self._take("("):
                 inner = self._either()
                 if not self._take(")"):
@@ -219,11 +257,11 @@ class _Parser:
         finally:
             self.depth -= 1
 
-    def _comparison(self) -> Predicate:
+    def _comparison(self) -> Filter:
         token = self._now
         if token.kind == "string":
             self.at += 1
-            return _contains(self._getter("text", token.column), _unquote(token.text))
+            return self._accepting("text", self._getter("text", token.column), _containing(_unquote(token.text)))
         if token.kind != "word":
             raise FilterError("expected a name such as dst, kind or latency_ms", token.column)
         get = self._getter(token.text, token.column)
@@ -232,7 +270,7 @@ class _Parser:
             compare = _COMPARE[self._now.text]
             self.at += 1
             wanted = self._value_of(token.text)
-            return lambda row, tx: any(_compare(compare, found, wanted) for found in get(row, tx))
+            return self._accepting(token.text, get, lambda found: _compare(compare, found, wanted))
         if (self._now.kind == "word" and self._now.text in {"contains", "matches", "in"}) or self._now.text == "~":
             how = self._now.text
             self.at += 1
@@ -240,17 +278,35 @@ class _Parser:
                 return self._among(token.text, get)
             column = self._now.column
             wanted_text = str(self._value())
-            return _contains(get, wanted_text) if how == "contains" else _matches(get, wanted_text, column)
-        return lambda row, tx: any(found not in (0, "") for found in get(row, tx))
+            accepts = _containing(wanted_text) if how == "contains" else _matching(wanted_text, column)
+            return self._accepting(token.text, get, accepts)
+        return self._accepting(token.text, get, lambda found: found not in (0, ""))
 
-    def _among(self, name: str, get: Getter) -> Predicate:
+    def _accepting(self, name: str, get: Getter, accepts: Accepts) -> Filter:
+        """Rows of which any value of that name is accepted."""
+        name = ALIASES.get(name, name)
+
+        def test(row: Row, tx: Transaction | None) -> bool:
+            return any(accepts(found) for found in get(row, tx))
+
+        if name not in IN_TABLES:
+            return Filter(test)
+
+        def columns(table: Table) -> Masks:
+            from sniff.analysis.filter_masks import accepted
+
+            return accepted(table, name, accepts)
+
+        return Filter(test, columns, exact=True)
+
+    def _among(self, name: str, get: Getter) -> Filter:
         if not self._take("{"):
             raise FilterError("expected { after in", self._now.column)
         values = [self._value_of(name)]
         while not self._take("}"):
             self._take(",")
             values.append(self._value_of(name))
-        return lambda row, tx: any(_compare(operator.eq, found, wanted) for found in get(row, tx) for wanted in values)
+        return self._accepting(name, get, lambda found: any(_compare(operator.eq, found, wanted) for wanted in values))
 
     def _value_of(self, name: str) -> Value:
         """The next value to compare a name with; a verdict may stand as people read it, "no answer"."""
@@ -327,14 +383,61 @@ def _compare(compare: Callable[[Any, Any], bool], found: Value, wanted: Value) -
     return compare(found, wanted)
 
 
-def _contains(get: Getter, wanted: str) -> Predicate:
+def _any_of(parts: Sequence[Filter]) -> Filter:
+    masks = [part.columns for part in parts if part.columns is not None]
+
+    def test(row: Row, tx: Transaction | None) -> bool:
+        return any(part(row, tx) for part in parts)
+
+    def columns(table: Table) -> Masks:
+        chosen = masks[0](table)
+        for mask in masks[1:]:
+            chosen |= mask(table)
+        return chosen
+
+    whole = len(masks) == len(parts)
+    return Filter(test, columns if whole else None, whole and all(part.exact for part in parts))
+
+
+def _all_of(parts: Sequence[Filter]) -> Filter:
+    masks = [part.columns for part in parts if part.columns is not None]
+
+    def test(row: Row, tx: Transaction | None) -> bool:
+        return all(part(row, tx) for part in parts)
+
+    def columns(table: Table) -> Masks:
+        chosen = masks[0](table)
+        for mask in masks[1:]:
+            chosen &= mask(table)
+        return chosen
+
+    exact = len(masks) == len(parts) and all(part.exact for part in parts)
+    return Filter(test, columns if masks else None, exact)
+
+
+def _none_of(inner: Filter) -> Filter:
+    mask = inner.columns
+
+    def test(row: Row, tx: Transaction | None) -> bool:
+        return not inner(row, tx)
+
+    def columns(table: Table) -> Masks:
+        assert mask is not None
+        chosen: Masks = ~mask(table)
+        return chosen
+
+    exact = mask is not None and inner.exact
+    return Filter(test, columns if exact else None, exact)
+
+
+def _containing(wanted: str) -> Accepts:
     lowered = wanted.lower()
-    return lambda row, tx: any(lowered in str(found).lower() for found in get(row, tx))
+    return lambda found: lowered in str(found).lower()
 
 
-def _matches(get: Getter, pattern: str, column: int) -> Predicate:
+def _matching(pattern: str, column: int) -> Accepts:
     try:
         compiled = re.compile(pattern, re.IGNORECASE)
     except re.error as error:
         raise FilterError(f"regular expression: {error}", column) from None
-    return lambda row, tx: any(compiled.search(str(found)) is not None for found in get(row, tx))
+    return lambda found: compiled.search(str(found)) is not None

@@ -12,13 +12,15 @@ from collections.abc import Iterable, Iterator
 
 from dissectors import registry
 from dissectors.manifest import Dissector
-from sniff.analysis.filtering import FilterError, Predicate, compile_filter
+from dissectors.profiles import Devices
+from sniff.analysis.filtering import Filter, FilterError, compile_filter
 from sniff.analysis.packet_tree import Field
 from sniff.analysis.row_tree import tree_of
-from sniff.bus.offline import settled
+from sniff.bus.offline import settled, settled_in_bulk
 from sniff.cli import USAGE, Failure, arguments, rows, writing
 from sniff.cli.tables import safe_cell
 from sniff.config import nearest
+from sniff.engine.capture import Capture
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import Session
 from sniff.engine.verdict_join import Settled
@@ -29,6 +31,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     arguments.add_files(parser)
     arguments.add_line(parser)
     arguments.add_devices(parser)
+    arguments.add_reference(parser)
     parser.add_argument("--json", action="store_true", help="one JSON object a frame")
     parser.add_argument("--fields", action="store_true", help="with --json: add every field under Wireshark's names")
     parser.add_argument("-V", dest="tree", action="store_true", help="full tree of each frame")
@@ -56,18 +59,26 @@ def run(args: argparse.Namespace) -> int:
         devices = arguments.noted_devices(args, session)
         wanted = _filter(args, dissector)
         spoken = devices if not args.table or "text" in args.names else None
-        left = _show(args, settled(capture.items(), session, spoken, wanted), session, dissector, left)
+        left = _show(args, _settled(args, capture, session, spoken, wanted), session, dissector, left)
         writing.say_incomplete(path, capture)
         if left == 0:
             break
     return 0
 
 
-def _filter(args: argparse.Namespace, dissector: Dissector) -> Predicate:
+def _filter(args: argparse.Namespace, dissector: Dissector) -> Filter:
     try:
         return compile_filter(args.filter, dissector)
     except FilterError as error:
         raise Failure(f"filter {args.filter!r}: {error}", USAGE) from None
+
+
+def _settled(
+    args: argparse.Namespace, capture: Capture, session: Session, devices: Devices | None, wanted: Filter
+) -> Iterator[Settled]:
+    if args.reference:
+        return settled(capture.items(), session, devices, wanted)
+    return settled_in_bulk(capture, session, devices, wanted)
 
 
 def _show(

@@ -7,18 +7,21 @@ from dataclasses import replace
 from functools import partial
 from itertools import chain
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from dissectors.columns import Reads
 from dissectors.line import Timing
 from dissectors.tracker import Transaction
+from sniff.analysis.filtering import compile_filter
 from sniff.analysis.summary import Summary
-from sniff.bus.offline import outputs
+from sniff.bus.offline import outputs, settled, settled_in_bulk
 from sniff.engine.blocks import Block, blocks_of
 from sniff.engine.bulk import tables
 from sniff.engine.capture import CaptureError
 from sniff.engine.engine import Output, Row
+from sniff.engine.follow_settings import dissector_for
 from sniff.engine.observer import observe
 from sniff.engine.session import Adapter, LineEvent, Session
 from sniff.engine.table import Table
@@ -132,3 +135,41 @@ def test_long_buses_give_the_same_rows_as_tables(bus: Bus, damaged: float) -> No
     for row, other in zip(rows, expected, strict=True):
         assert row == other
     assert closed == [one for output in by_reference if isinstance(output, Output) for one in output.transactions]
+
+
+FILTERS = (
+    "",
+    "dst == 3",
+    "src in {1, 2, 5} || !ok",
+    'kind contains "write" && func != 16',
+    'addr >= 2 && !(role == "response")',
+    'error matches "CRC|check" || noise',
+    'verdict == "no answer" && dst > 0',
+    "latency_ms > 5 || len < 9",
+    "register == 1 && count",
+    'found != "gap" and not damage',
+    'proto == "mstp" || marks || "token"',
+    "no in {1, 3, 5} || tx == 2",
+    'dst == "x" || dst != "x"',
+    "mstp.src == 1 && frame.len == 8",
+)
+
+
+@pytest.mark.parametrize("path", sorted(CAPTURES.rglob("*.cap.txt")), ids=lambda path: path.name)
+def test_a_filter_over_tables_accepts_what_it_accepts_row_by_row(path: Path) -> None:
+    capture = read(path)
+    for text in FILTERS:
+        wanted = compile_filter(text, dissector_for(capture.session))
+        by_rows = list(settled(capture.items(), capture.session, None, wanted))
+        assert list(settled_in_bulk(capture, capture.session, None, wanted)) == by_rows, text
+
+
+@pytest.mark.parametrize("bus", [_mstp, _rtu])
+def test_a_filter_over_long_buses_accepts_the_same(bus: Bus) -> None:
+    session, reads = bus(0.01)
+    block = Block(reads)
+    source = SimpleNamespace(items=block.chunks, blocks=lambda: iter([block]))
+    for text in FILTERS:
+        wanted = compile_filter(text, dissector_for(session))
+        by_rows = list(settled(block.chunks(), session, None, wanted))
+        assert list(settled_in_bulk(source, session, None, wanted)) == by_rows, text
