@@ -19,6 +19,7 @@ from sniff.analysis.points import PointReader, Sample
 from sniff.bus.autodetect import Progress, Search
 from sniff.bus.derived_topics import BusChannels, DerivedMessage
 from sniff.bus.model import BusModel
+from sniff.bus.router import Router
 from sniff.bus.thinning import Budget, Room
 from sniff.bus.value_topics import ValueChannels
 from sniff.capture.link import CaptureLink
@@ -56,9 +57,17 @@ class LiveBus:
     """
 
     def __init__(
-        self, link: CaptureLink, bus: int = 0, devices: Devices | None = None, detecting: Detecting | None = None
+        self,
+        link: CaptureLink,
+        bus: int = 0,
+        devices: Devices | None = None,
+        detecting: Detecting | None = None,
+        router: Router | None = None,
     ) -> None:
+        """`router`: shared by all buses of the link; a bus that is shown alone has its own."""
         self.link = link
+        self._router = router or Router(link)
+        self._router.open(bus)
         self.bus = bus
         self.engine = engine_for(link.session(bus))
         self.search = None
@@ -100,7 +109,7 @@ class LiveBus:
     @property
     def unseen(self) -> int:
         """Octets of the line that were not looked at, because this side did not keep up."""
-        return self.status.dropped + self.link.dropped.get(self.bus, 0) + self._skipped
+        return self.status.dropped + self.link.dropped.get(self.bus, 0) + self._router.dropped[self.bus] + self._skipped
 
     @property
     def file_is_gone(self) -> bool:
@@ -116,9 +125,8 @@ class LiveBus:
         if self._pending:
             self.link.look()
         else:
-            self._pending.extend(self.link.receive(timeout))
-        if (killed := self.link.insist()) is not None:
-            self._pending.append(killed)
+            self._pending.extend(self._router.receive(self.bus, timeout))
+        self._router.insist()
         until = time.monotonic() + AT_ONCE
         while self._pending:
             if self.link.closing and self._leave_at is None:
@@ -127,7 +135,7 @@ class LiveBus:
                 break
             items += self._next()
             if not self._pending and self._leave_at is not None:  # the end is near: go there
-                self._pending.extend(self.link.receive())
+                self._pending.extend(self._router.receive(self.bus))
         return items
 
     def _next(self) -> list[LiveItem]:

@@ -1,0 +1,89 @@
+"""Several models on one capture: each gets its rows, whoever asks first."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+from dissectors.frame import Chunk
+from dissectors.line import LineSettings
+from sniff.bus import router as router_module
+from sniff.bus.live import LiveBus
+from sniff.bus.router import Router
+from sniff.capture.wire import Ended, Message, Received, Status, Tick
+from sniff.engine.engine import Output
+from sniff.engine.session import Session
+from tests.property.modbus_adus import rtu
+
+MS = 1_000_000
+REQUEST, ANSWER = rtu(bytes.fromhex("010300000001")), rtu(bytes.fromhex("0103020007"))
+
+
+class Link:
+    """Hands out what it was given, once."""
+
+    def __init__(self, *messages: Message) -> None:
+        self.messages = list(messages)
+        self.paths: list[str] = []
+        self.priority = ""
+        self.dropped: dict[int, int] = {}
+        self.closing = False
+
+    def session(self, bus: int) -> Session:
+        return Session(f"port{bus}", LineSettings.parse("19200,8E1"), "modbus-rtu", bus=f"bus{bus}")
+
+    def receive(self, timeout: float = 0.0) -> list[Message]:
+        given, self.messages = self.messages, []
+        return given
+
+    def look(self, timeout: float = 0.0) -> bool:
+        return True
+
+    def insist(self) -> Ended | None:
+        return None
+
+    def let_go(self) -> None:
+        pass
+
+
+def said(bus: int, at: int) -> list[Message]:
+    return [
+        Received(bus, Chunk(at * MS, REQUEST)),
+        Received(bus, Chunk((at + 20) * MS, ANSWER)),
+        Tick(bus, (at + 100) * MS),
+    ]
+
+
+def rows(live: LiveBus) -> int:
+    return sum(len(item.rows) for item in live.poll() if isinstance(item, Output))
+
+
+def test_two_models_on_one_link_each_get_their_rows() -> None:
+    link: Any = Link(*said(0, 100), *said(1, 100), *said(0, 300), Ended("stopped"))
+    router = Router(link)
+    lives = [LiveBus(link, bus, router=router) for bus in (0, 1)]
+    assert [rows(live) for live in lives] == [4, 2]
+    assert [live.model.summary.frames for live in lives] == [4, 2]
+    assert all(live.ended is not None for live in lives)
+
+
+def test_a_bus_that_nobody_asks_for_costs_no_more_than_its_share(monkeypatch: Any) -> None:
+    monkeypatch.setattr(router_module, "HELD", 100)
+    link: Any = Link(*(message for at in range(0, 3000, 300) for message in said(1, at)), *said(0, 5000))
+    router = Router(link)
+    alone, late = LiveBus(link, 0, router=router), LiveBus(link, 1, router=router)
+    assert rows(alone) == 2
+    assert late.unseen == 10 * (len(REQUEST) + len(ANSWER)) - 98
+    assert late.poll()
+
+
+def test_buses_that_are_shown_by_nobody_are_left_alone() -> None:
+    link: Any = Link(*said(0, 100), *said(7, 100), Status(7))
+    assert rows(LiveBus(link, 0)) == 2
+
+
+def test_the_newest_tick_says_it_all() -> None:
+    link: Any = SimpleNamespace(receive=lambda timeout: [Tick(0, 1), Tick(0, 2), Tick(0, 3)])
+    router = Router(link)
+    router.open(0)
+    assert router.receive(0) == [Tick(0, 3)]
