@@ -33,7 +33,7 @@ _STRAY_BUS: Final = 1500
 class Past:
     """Requests and lengths of answers by station and function; whether zeros tend to follow frames on this bus."""
 
-    __slots__ = ("_calls", "_constant", "_flaws", "_lengths", "_requests", "_strays")
+    __slots__ = ("_calls", "_constant", "_flaws", "_lengths", "_requests", "_strays", "learnt")
 
     def __init__(self) -> None:
         self._requests: dict[bytes, None] = {}  # in the order they came first
@@ -42,6 +42,7 @@ class Past:
         self._calls: set[int] = set()  # unit and function of all requests
         self._flaws: dict[int, Flaw] = {}  # of the newest answer, by station
         self._strays = 0
+        self.learnt: object = None  # of what was noted many at a time (past_columns.py)
 
     def bits(self, octets: bytes, request: bool, response: bool) -> int:
         """Evidence for a complete frame that may be a request, a response or either."""
@@ -73,6 +74,11 @@ class Past:
         before = self._flaws.get(unit)
         self._flaws[unit] = flaw
         return before is flaw
+
+    @property
+    def only_gathers(self) -> bool:
+        """Whether noting what was noted before changes nothing: nothing is forgotten or counted down."""
+        return not self._strays and not self._flaws and len(self._requests) < _MOST_REQUESTS
 
     def note(self, octets: bytes, request: bool) -> None:
         """A good frame, and what it was taken for."""

@@ -3,12 +3,23 @@
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 
 from dissectors.columns import ROLES, FrameColumns, Octets, Times
 from dissectors.frame import Role
 from dissectors.modbus.past import Past
 
 _RESPONSE = ROLES.index(Role.RESPONSE)
+_WORD = 8
+"""Octets of the commonest requests, which are compared as numbers."""
+
+
+class Learnt:
+    """What was noted already, ascending: answers by station, function and length; requests of eight octets."""
+
+    def __init__(self) -> None:
+        self.answers: npt.NDArray[np.int64] = np.zeros(0, np.int64)
+        self.requests: npt.NDArray[np.uint64] = np.zeros(0, np.uint64)
 
 
 def learn(past: Past, units: set[int], frames: FrameColumns, octets: Octets) -> None:
@@ -18,37 +29,52 @@ def learn(past: Past, units: set[int], frames: FrameColumns, octets: Octets) -> 
     that its request has not.
     """
     frames = frames.take(frames.ok & (frames.length >= 4))
-    units.update(np.unique(octets[frames.offset]).tolist())
-    answers = frames.role == _RESPONSE
-    for row in _distinct_answers(frames, octets, np.flatnonzero(answers)):
+    units.update(np.flatnonzero(np.bincount(octets[frames.offset])).tolist())
+    known = past.learnt if past.only_gathers and isinstance(past.learnt, Learnt) else Learnt()
+    past.learnt = known
+    is_answer = frames.role == _RESPONSE
+    for row in _new_answers(frames, octets, np.flatnonzero(is_answer), known):
         past.note(_octets_of(frames, octets, row), request=False)
-    asked = np.flatnonzero(~answers)
+    asked = np.flatnonzero(~is_answer)
     first = [
-        _first_of_each(frames, octets, asked[frames.length[asked] == length]) for length in _lengths(frames, asked)
+        _first_of_each(frames, octets, asked[frames.length[asked] == length], known)
+        for length in np.flatnonzero(np.bincount(frames.length[asked])).tolist()
     ]
     for row in sorted(np.concatenate(first).tolist()) if first else ():
         past.note(_octets_of(frames, octets, row), request=True)
 
 
-def _lengths(frames: FrameColumns, rows: Times) -> list[int]:
-    lengths: list[int] = np.unique(frames.length[rows]).tolist()
-    return lengths
-
-
-def _distinct_answers(frames: FrameColumns, octets: Octets, rows: Times) -> list[int]:
-    """One row for each station, function and length."""
+def _new_answers(frames: FrameColumns, octets: Octets, rows: Times, known: Learnt) -> list[int]:
+    """One row for each station, function and length that was not there before."""
     begins = frames.offset[rows]
     keys = octets[begins].astype(np.int64) << 24 | octets[begins + 1].astype(np.int64) << 16 | frames.length[rows]
-    distinct: list[int] = rows[np.unique(keys, return_index=True)[1]].tolist()
-    return distinct
+    distinct, first = np.unique(keys, return_index=True)
+    new = ~_is_among(distinct, known.answers)
+    if new.any():
+        known.answers = np.union1d(known.answers, distinct)
+    found: list[int] = rows[first[new]].tolist()
+    return found
 
 
-def _first_of_each(frames: FrameColumns, octets: Octets, rows: Times) -> Times:
-    """Of rows of one length the first with each content."""
+def _first_of_each(frames: FrameColumns, octets: Octets, rows: Times, known: Learnt) -> Times:
+    """Of rows of one length the first with each content; of short ones only those that were not there before."""
     length = int(frames.length[rows[0]])
-    content = octets[frames.offset[rows][:, None] + np.arange(length)]
-    keys = np.ascontiguousarray(content).view(np.uint64 if length == 8 else np.dtype((np.void, length)))[:, 0]
-    return rows[np.unique(keys, return_index=True)[1]]
+    content = np.ascontiguousarray(octets[frames.offset[rows][:, None] + np.arange(length)])
+    if length != _WORD:
+        return rows[np.unique(content.view(np.dtype((np.void, length)))[:, 0], return_index=True)[1]]
+    distinct, first = np.unique(content.view(np.uint64)[:, 0], return_index=True)
+    new = ~_is_among(distinct, known.requests)
+    if new.any():
+        known.requests = np.union1d(known.requests, distinct)
+    return rows[first[new]]
+
+
+def _is_among(values: npt.NDArray[np.integer], ascending: npt.NDArray[np.integer]) -> npt.NDArray[np.bool_]:
+    if not len(ascending):
+        return np.zeros(len(values), bool)
+    at = np.minimum(np.searchsorted(ascending, values), len(ascending) - 1)
+    found: npt.NDArray[np.bool_] = ascending[at] == values
+    return found
 
 
 def _octets_of(frames: FrameColumns, octets: Octets, row: int) -> bytes:

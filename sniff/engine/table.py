@@ -208,14 +208,18 @@ def joined_columns(kind: type[Named], parts: Sequence[Named]) -> Named:
     """Columns one after the other, their texts under common numbers."""
     names, columns = Names(), [one.name for one in fields(kind)[:-1]]
     held: dict[str, list[npt.NDArray[Any]]] = {name: [] for name in columns}
-    texts: tuple[str, ...] = ()
+    known: dict[int, npt.NDArray[np.uint16]] = {}  # by the identity of their texts, which many parts share
     for part in parts:
-        if part.names is not texts:
-            texts, numbers = part.names, np.array([names.number(text) for text in part.names], np.uint16)
+        numbers = known.get(id(part.names))
+        if numbers is None:
+            numbers = np.array([names.number(text) for text in part.names], np.uint16)
+            known[id(part.names)] = numbers
         for name in columns:
             values = getattr(part, name)
             held[name].append(numbers[values] if name in TEXTS else values)
-    return kind(**{name: np.concatenate(values) for name, values in held.items()}, names=names.texts)
+    texts = names.texts
+    same = next((part.names for part in parts if part.names == texts), texts)  # shared again by the next joining
+    return kind(**{name: np.concatenate(values) for name, values in held.items()}, names=same)
 
 
 def _is_plain(row: Row) -> bool:
