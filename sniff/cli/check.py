@@ -95,7 +95,9 @@ def _is_file(source: str) -> bool:
 def _read(source: str, capture: Capture, args: argparse.Namespace) -> Checked:
     """What was found in a capture."""
     session = arguments.settings_of(args, capture.session, source)
-    run_of = Checking(BusModel(session, dissector_for(session), arguments.noted_devices(args, session)))
+    run_of = Checking(
+        BusModel(session, dissector_for(session), arguments.noted_devices(args, session), with_points=False)
+    )
     survey(capture, session, run_of.model, run_of, reference=args.reference)
     complete = capture.completeness()
     notes = [] if complete.whole else [complete.text]

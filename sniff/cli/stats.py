@@ -69,7 +69,8 @@ def run(args: argparse.Namespace) -> int:
 
         return ring.show(source.items(), session, shown, args.style)
     if table == "health":
-        model = BusModel(session, dissector_for(session), noted_devices(session))
+        devices = noted_devices(session)
+        model = BusModel(session, dissector_for(session), devices, with_points=False)
         survey(source, session, model, reference=args.reference)
         tables.write(HEALTH_HEADINGS, _health(model.health(), station_word(session.protocol)), args.style)
         return 0

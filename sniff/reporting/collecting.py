@@ -48,7 +48,11 @@ GOOD = frozenset((Verdict.ANSWERED, Verdict.BROADCAST, Verdict.DATA, Verdict.OPE
 def collect(source: str, capture: Capture, session: Session, devices: Devices) -> Numbers:
     """Read a capture to its end. `session`: with the settings to use. Raises CaptureError."""
     dissector = dissector_for(session)
-    model, timeline, told = BusModel(session, dissector, devices), Timeline(session.line.char), _Told(session)
+    model, timeline, told = (
+        BusModel(session, dissector, devices, with_points=False),
+        Timeline(session.line.char),
+        _Told(session),
+    )
     observe(outputs(capture.items(), session), model, timeline, told)
     summary, findings, healths = model.summary, model.findings(), model.health()
     health = healths.bus if summary.octets else None
