@@ -17,6 +17,7 @@ from sniff.bus.model import BusModel
 from sniff.bus.offline import survey
 from sniff.cli import INTERRUPTED, PORT_TROUBLE, UNREADABLE, USAGE, Failure, arguments, check_output
 from sniff.cli.check_output import Checked
+from sniff.cli.interruption import until_interrupted
 from sniff.engine.capture import Capture
 from sniff.engine.engine import Output
 from sniff.engine.follow_settings import dissector_for
@@ -117,7 +118,7 @@ def _listen(port: str, args: argparse.Namespace) -> Checked:
     duration = args.duration or DEFAULT_DURATION
     print(f"sniff485: listening to {port} for {duration:g} s", file=sys.stderr)
     live = listening.start(target.source, None, None, target.devices, target.search)
-    with listening.until_interrupted() as caught:
+    with until_interrupted() as caught:
         early = _found_first(live, caught)
         run_of = Checking(live.model)
         observe(_heard(early), run_of)

@@ -108,7 +108,7 @@ def _capture(bus: _Bus, fifo: str) -> int:
     from sniff.capture.config import SourceSpec
     from sniff.capture.link import CaptureLink
     from sniff.capture.wire import Ended, Received, Tick
-    from sniff.cli.listening import until_interrupted
+    from sniff.cli.interruption import until_interrupted
     from sniff.engine.capture import CaptureError
     from sniff.formats.pcapng import PcapngWriter
     from sniff.sources import PortError

@@ -6,7 +6,6 @@ import argparse
 import contextlib
 import os
 import re
-import signal
 import sys
 import time
 from collections.abc import Iterator
@@ -24,6 +23,7 @@ from sniff.capture.config import RecordSpec, SourceSpec
 from sniff.capture.link import CaptureLink
 from sniff.capture.wire import NOTHING_MORE, Ended, Status
 from sniff.cli import INTERRUPTED, PORT_TROUBLE, UNREADABLE, USAGE, Failure, arguments, rows, searching
+from sniff.cli.interruption import until_interrupted
 from sniff.cli.searching import Unknowns
 from sniff.config import AUTO, FILE, Config, ConfigError, load
 from sniff.engine.capture import CaptureError
@@ -168,19 +168,6 @@ def new_recording(bus: str) -> str:
     while path.exists():
         path, number = Path(f"{stem}-{number}.mcap"), number + 1
     return str(path)
-
-
-@contextlib.contextmanager
-def until_interrupted() -> Iterator[list[int]]:
-    """Collect SIGINT and SIGTERM instead of dying of them; the list holds their numbers."""
-    caught: list[int] = []
-    numbers = [signal.SIGINT, signal.SIGTERM]
-    before = [signal.signal(number, lambda received, _frame: caught.append(received)) for number in numbers]
-    try:
-        yield caught
-    finally:
-        for number, handler in zip(numbers, before, strict=True):
-            signal.signal(number, handler)
 
 
 class Printer:

@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 from sniff.cli import PORT_TROUBLE, USAGE, Failure, arguments
-from sniff.cli.listening import until_interrupted
+from sniff.cli.interruption import until_interrupted
 
 
 def configure(parser: argparse.ArgumentParser) -> None:

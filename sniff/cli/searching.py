@@ -39,7 +39,7 @@ class Unknowns:
 
 def search(link: CaptureLink, unknowns: Unknowns, timeout: float = TIMEOUT) -> Outcome:
     """Search on a running capture, with progress on standard error. Ends with exit code 4 when the capture ends."""
-    from sniff.cli.listening import until_interrupted
+    from sniff.cli.interruption import until_interrupted
 
     session = link.session(0)
     detecting = unknowns.detecting(session.adapter.latency, session.adapter.reports)

@@ -14,7 +14,7 @@ import numpy as np
 
 from dissectors.columns import Reads
 from dissectors.frame import Chunk, Mark
-from sniff.engine.capture import CaptureError
+from sniff.engine.capture_error import CaptureError
 from sniff.engine.session import Item, LineEvent
 
 if TYPE_CHECKING:

@@ -5,14 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Protocol
 
+from sniff.engine.capture_error import CaptureError as CaptureError
 from sniff.engine.session import Completeness, Item, LineEvent, Session
 
 if TYPE_CHECKING:
     from sniff.engine.blocks import Block
-
-
-class CaptureError(Exception):
-    """A file that cannot be read or written; the message names it, what is wrong and the way out."""
 
 
 class Capture(Protocol):

@@ -10,7 +10,6 @@ from __future__ import annotations
 import json
 import struct
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
@@ -18,6 +17,7 @@ from sniff.engine.capture import CaptureError
 from sniff.engine.session import Completeness, Item, LineEvent, Session
 from sniff.formats.files import NewFile, open_capture
 from sniff.formats.linktypes import LINK_TYPES, USER1
+from sniff.formats.pcapng_interface import Interface
 from sniff.formats.records import SEARCHED, Record, RecordMaker, SearchMarks, foreign_session, items_of, protocol_of
 
 if TYPE_CHECKING:
@@ -34,15 +34,6 @@ LONGEST = 4 * 1024 * 1024
 LATEST = (1 << 33) * 1_000_000_000
 """ns since the epoch, in the year 2242; a record that says more, or as much before it, is given this time."""
 SESSION_MARK = "sniff485 session: "
-
-
-@dataclass(frozen=True, slots=True)
-class Interface:
-    """What a section says of an interface."""
-
-    link_type: int
-    resolution: tuple[int, int] = (1000, 1)  # ns per tick as a fraction
-    offset: int = 0  # s
 
 
 def read(path: Path) -> PcapngCapture:

@@ -15,7 +15,7 @@ from sniff.formats.pcapng_walk import HEADER, PlainPackets
 
 if TYPE_CHECKING:
     from dissectors.columns import Times
-    from sniff.formats.pcapng import Interface
+    from sniff.formats.pcapng_interface import Interface
 
 _MOST = 1 << 62
 
