@@ -42,7 +42,7 @@ _ALL = (
         "tokens for a moment.",
         "an overloaded or old station; each round takes longer, and above 20 ms its neighbour repeats the token",
         "firmware and load of the station; Max_Info_Frames of the others",
-        explains=("MS102", "MS104", "MS105", "MS106", "MS401"),
+        explains=("MS102", "MS104", "MS105", "MS106", "MS401", "MS403", "LN101", "LN103", "LN2"),
     ),
     Rule(
         "MS104",
@@ -52,7 +52,7 @@ _ALL = (
         "and only where tokens are in the capture.",
         "a second token after a disturbance, two stations with one address, or a ring joined while running",
         "the stations named: address switches, and whether two segments were joined",
-        explains=("MS401", "MS402", "MS403", "LN2"),
+        explains=("MS401", "MS402", "MS403", "LN101", "LN103", "LN2"),
     ),
     Rule(
         "MS105",
@@ -118,7 +118,7 @@ _ALL = (
         "asked it for. The station that has the token is not at fault. A single one is only noted.",
         "a slave that answers broadcasts or reports by itself; it runs into the frames of whoever has the token",
         "the slave's settings (unsolicited I-Am, COV), or make it a master",
-        explains=("MS101", "MS401", "MS402"),
+        explains=("MS101", "MS102", "MS401", "MS402", "MS403", "LN101", "LN103", "LN2"),
     ),
     Rule(
         "MS201",
