@@ -37,9 +37,8 @@ _ALL = (
         "slow to use the token",
         "A station began to send later than 15 ms (Tusage_delay) after the token reached it, by the smallest "
         "reading of the "
-        "time and more often than the others; or only when its neighbour had already taken the token back, which "
-        "makes two "
-        "tokens for a moment.",
+        "time and more often than the others; or only when its neighbour had already repeated the token or taken it "
+        "back, which makes two tokens for a moment.",
         "an overloaded or old station; each round takes longer, and above 20 ms its neighbour repeats the token",
         "firmware and load of the station; Max_Info_Frames of the others",
         explains=("MS102", "MS104", "MS105", "MS106", "MS401", "MS403", "LN101", "LN103", "LN2"),

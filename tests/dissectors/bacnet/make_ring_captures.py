@@ -27,6 +27,30 @@ def used_late() -> list[Step]:
     return steps
 
 
+def used_twice() -> list[Step]:
+    """14 begins when 6 has repeated its token, and uses the repeat too, over the frame of 33."""
+    steps = rounds(9, 6, 14, 33)
+    for _ in range(4):
+        steps += [(2, token(6, 14)), (33, token(6, 14)), (4, token(14, 33)), (2, spoil(token(33, 6), 4, 0x20))]
+        steps += [(26, token(14, 33)), (2, token(33, 6)), *rounds(9, 6, 14, 33)]
+    return steps
+
+
+def lost_behind_damage() -> list[Step]:
+    """What 14 made of its token was damaged for everybody: it has not left, and does not come back."""
+    steps = rounds(9, 6, 14, 33)
+    for _ in range(3):
+        steps += [
+            (2, token(6, 14)),
+            (2, spoil(token(14, 33), 6)),
+            (30, poll(6, 7)),
+            (25, poll(6, 14)),
+            (3, found(14, 6)),
+        ]
+        steps += [(2, token(6, 14)), (2, token(14, 33)), (2, token(33, 6)), *rounds(9, 6, 14, 33)]
+    return steps
+
+
 def shut_out() -> list[Step]:
     """40 joins, polls 41 alone, and passes to 6 past 90."""
     joins: list[Step] = [(2, poll(6, 40)), (3, found(40, 6)), (2, token(6, 40)), (2, poll(40, 41)), (25, token(40, 6))]
@@ -117,6 +141,8 @@ def after_an_empty_poll() -> list[Step]:
 
 MADE = {
     "ms-tp-token-used-after-it-was-given-up": used_late,
+    "ms-tp-token-and-its-repeat-both-used": used_twice,
+    "ms-tp-use-of-the-token-damaged": lost_behind_damage,
     "ms-tp-shut-out-of-the-ring": shut_out,
     "ms-tp-slave-speaks-unasked": slave_speaks,
     "ms-tp-last-octet-missing": last_octet_missing,
