@@ -231,7 +231,7 @@ class MstpTracker:
             return self._at(no, waiting.id, header, Role.RESPONSE)
         if back and frame_type not in (FrameType.TOKEN, FrameType.POLL_FOR_MASTER):
             message, key = read(frame)
-            if waiting.damaged:
+            if waiting.damaged and key not in self._postponed:  # else it is the answer to what is open already
                 waiting.key = key
             apdu = message.apdu if message is not None else None
             if apdu is not None and key is not None and apdu.type == PduType.SEGMENT_ACK:

@@ -51,6 +51,26 @@ def lost_behind_damage() -> list[Step]:
     return steps
 
 
+def cut_in_header() -> list[Step]:
+    """27 lets go within the header of its tokens now and then; whose turn it was says that it was 27."""
+    steps: list[Step] = []
+    for keep in (4, 5, 4, 6):
+        steps += [*rounds(6, 8, 27, 61), (2, token(8, 27)), (2, token(27, 61)[:keep]), (24, token(27, 61))]
+        steps += [(2, token(61, 8))]
+    return steps + rounds(6, 8, 27, 61)
+
+
+def header_spoilt() -> list[Step]:
+    """Of tokens of 27 more than one octet is wrong; they stand alone in their place, half a preamble before them."""
+    steps: list[Step] = []
+    for places in ((1, 2), (1, 2, 3), (0, 2), (0, 1)):
+        octets = token(27, 61)
+        for at in places:
+            octets = spoil(octets, at, 0x6B)
+        steps += [*rounds(6, 8, 27, 61), (2, token(8, 27)), (2, octets), (2, token(61, 8))]
+    return steps + rounds(6, 8, 27, 61)
+
+
 def shut_out() -> list[Step]:
     """40 joins, polls 41 alone, and passes to 6 past 90."""
     joins: list[Step] = [(2, poll(6, 40)), (3, found(40, 6)), (2, token(6, 40)), (2, poll(40, 41)), (25, token(40, 6))]
@@ -143,6 +163,8 @@ MADE = {
     "ms-tp-token-used-after-it-was-given-up": used_late,
     "ms-tp-token-and-its-repeat-both-used": used_twice,
     "ms-tp-use-of-the-token-damaged": lost_behind_damage,
+    "ms-tp-cut-within-the-header": cut_in_header,
+    "ms-tp-header-with-more-than-one-octet-spoilt": header_spoilt,
     "ms-tp-shut-out-of-the-ring": shut_out,
     "ms-tp-slave-speaks-unasked": slave_speaks,
     "ms-tp-last-octet-missing": last_octet_missing,
