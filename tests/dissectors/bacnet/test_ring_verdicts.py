@@ -294,3 +294,37 @@ def test_a_station_that_has_the_line_most_of_the_time_is_a_fact():
     assert read.graves() == set()
     assert read.of("MS601").severity is Severity.INFO
     assert "up to 10 frames" in read.of("MS601").seen
+
+
+def lost(silence: float, maker: int, holder: int = 8) -> list[Step]:
+    """The token of `holder` is gone; `maker` begins anew after so many ms as the reads show them."""
+    steps: list[Step] = []
+    for _ in range(3):
+        steps += [*rounds(6, 1, 8, 20), (2, token(1, 8))]
+        steps += [(silence, poll(maker, holder)), (4, found(holder, maker)), (2, token(maker, holder))]
+        steps += [(2, token(8, 20)), (2, token(20, 1))]
+    return steps
+
+
+@pytest.mark.parametrize("silence", [490, 500, 510, 700])
+def test_a_lost_token_through_an_adapter_that_holds_reads_back(silence: float):
+    """490 ms as read may be 507: nobody but the one with a new token sends after so long a silence."""
+    read = script(lost(silence, 20), latency=17.5)
+    assert read.of("MS101").subject == "MAC 8"
+    assert read.of("MS101").count == 3
+    assert "MS104" not in {code for code, _ in read.graves()}
+
+
+def test_a_silence_that_cannot_be_500_ms_loses_no_token():
+    """At 470 ms it is a second token, whatever the adapter does."""
+    read = script(lost(470, 20), latency=17.5)
+    assert not [what for what, _ in read.ring.happened if what is What.LOST_TOKEN]
+    assert read.ring.of(What.TWO_TOKENS, 20).count == 3
+
+
+@pytest.mark.parametrize("silence", [490, 510])
+def test_one_that_had_the_token_has_not_surely_made_a_new_one(silence: float):
+    """8 has the token, or 1 has just passed it: either may go on, unless even the shortest reading is 500 ms."""
+    for maker in (1, 8):
+        read = script(lost(silence, maker, 20), latency=17.5)
+        assert not [what for what, _ in read.ring.happened if what is What.LOST_TOKEN]
