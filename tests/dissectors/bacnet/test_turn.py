@@ -14,10 +14,10 @@ from dissectors.bacnet import MSTP
 from dissectors.bacnet.frame_making import frame
 from dissectors.bacnet.simulated import Node, Poller, f510
 from dissectors.bacnet.turn import Turn
-from dissectors.frame import Check, Chunk, Damage, Flaw, Found, Frame, Noise
+from dissectors.frame import Check, Chunk, Damage, Flaw, Found, Frame, Noise, Role
 from dissectors.line import LineSettings, Timing
 from sniff.simulation.wire import Party, Wire
-from tests.dissectors.bacnet.ring_script import poll, rounds, script, spoil, token
+from tests.dissectors.bacnet.ring_script import data, poll, rounds, script, spoil, token
 
 LINE = LineSettings(38400)
 TIMING = Timing(LINE)
@@ -135,6 +135,21 @@ def test_a_frame_that_can_be_put_right(octets: bytes, flaw: Flaw):
     assert damaged.repair is not None
     assert (damaged.repair.flaw, damaged.repair.octets) == (flaw, token(2, 5))
     assert (read.placements[2].source, read.placements[2].destination) == (2, 5)
+
+
+VALUE = "010030010c0c020004d2194d3e75030041313f"
+
+
+@pytest.mark.parametrize("cut", [1, 2])
+def test_a_repaired_frame_has_the_fields_of_what_it_was(cut: int):
+    """As the whole one has them, but for the check that failed."""
+    whole = data(5, 2, VALUE)
+    steps = [*rounds(2, 2, 5), (2, data(2, 5, "010400030 10c0c020004d2194d".replace(" ", ""), expects=True))]
+    frames = [script([*steps, (9, octets), (2, token(2, 5))]).events[5] for octets in (whole, whole[cut:])]
+    good, repaired = (MSTP.fields(one, Role.RESPONSE) for one in frames if isinstance(one, Frame))
+    differing = {name for name in good.keys() | repaired.keys() if good.get(name) != repaired.get(name)}
+    assert "bacapp.invoke_id" in repaired
+    assert differing == {"mstp.checksum.status"}
 
 
 def spoilt(*places: int) -> bytes:
