@@ -80,6 +80,7 @@ class Flaw(Enum):
     FIRST_MISSING = "first octet missing"
     FIRST_SPOILT = "first octet spoilt"
     FIRST_TWO_MISSING = "first two octets missing"
+    FIRST_TWO_SPOILT = "first two octets spoilt"
     LAST_MISSING = "last octet missing"
     LAST_TWO_MISSING = "last two octets missing"
     LAST_SPOILT = "last octet spoilt"

@@ -26,6 +26,12 @@ ALL_LATE = 4
 """A station is named for slow uses of the token where its share is so many times that of the others: what hits all of
 them in the same way is a busy computer."""
 
+USED_BOTH_LEAST = 3
+USED_BOTH_SHARE = 0.5
+LIKE_USUAL = 4
+"""A station used tokens and their repeats where something is damaged after half of the repeats, and so many times more
+often than after other tokens."""
+
 POSTPONED_SHARE = 0.1
 LEAST_USES = 20
 ALONE_POLLS = 2 * MAX_MASTER
@@ -241,8 +247,29 @@ def _late_uses(ring: Ring) -> Iterable[Remark]:
                 f"{milliseconds(most)} "
                 "after it came: two tokens for a moment"
             )
+        both = ring.of(What.USED_BOTH, mac)
+        if _uses_both(ring, mac, node):
+            most = max((event.value or 0 for event in both.events), default=0)
+            words.append(
+                f"{times(both.count)} only after its neighbour had repeated the token, up to {milliseconds(most)} "
+                "after it came, and then it used the repeated one too, while the next station sent"
+            )
+            evidence = evidence.merge(both)
         if words:
             yield of("MS103", mac, "; ".join(words), evidence)
+
+
+def _uses_both(ring: Ring, mac: int, node: Node) -> bool:
+    """Whether the damage after tokens that were repeated to a station is its own: it uses them and their repeats.
+
+    A noisy neighbour, or noise that falls anywhere, strikes as often after tokens that were not repeated.
+    """
+    both, repeated = ring.of(What.USED_BOTH, mac).count, ring.of(What.RETRY, mac).count
+    usual = node.tokens_received - repeated
+    if both < max(USED_BOTH_LEAST, USED_BOTH_SHARE * repeated) or usual < repeated:
+        return False
+    elsewhere = max(0, ring.header_errors + ring.data_errors + ring.cut - both)
+    return both * usual >= LIKE_USUAL * elsewhere * repeated
 
 
 def _answers(ring: Ring) -> Iterable[Remark]:

@@ -12,7 +12,8 @@ The rules:
    silence or where a frame without data would end, or the length it claims, when that many octets make sense: a node
    would have to drop it, we can often still say who sent it. Of a doubled preamble the second one counts.
 5. A good header whose preamble lacks an octet or has a wrong one, directly after a frame or after silence, begins a
-   damaged frame where no data are announced or the data CRC is good.
+   damaged frame where no data are announced or the data CRC is good. Eight octets alone between frames or silences,
+   with half a preamble and the length 0, are a token or a poll of which more is spoilt.
 6. One FF directly after a good frame belongs to it (the tail octet that some drivers send): flag "trailing-pad".
 7. All else is noise, cut at silence of 60 bit times and at NOISE_MAX octets.
 """
@@ -31,7 +32,7 @@ from dissectors.bacnet.limits import (
     T_FRAME_ABORT_MAX,
     T_NO_TOKEN,
 )
-from dissectors.bacnet.mending import after_spoilt_preamble, body_is_good, header_is_good, mended
+from dissectors.bacnet.mending import after_spoilt_preamble, body_is_good, header_is_good, is_like_header, mended
 from dissectors.checksums import crc8_mstp
 from dissectors.frame import Check, Chunk, Damage, Event, Found, Frame, LineError, Noise, Place, Reason, Repair
 from dissectors.framer import UNKNOWN_SILENCE, OctetWindow, Taken
@@ -43,15 +44,15 @@ NOISE_MAX = 1024
 """Most octets in one Noise event."""
 
 _PIECE = 4096  # octets of a chunk taken at once: bounds memory and keeps the window cheap to cut
-_NAMED = 5  # preamble, type, destination, source: from here on a fragment says who sent it
+_NAMED = 4  # preamble, type, destination: a frame has begun, and whose turn it was says who sent it
 _WAIT = -1
 
 
 class _Mended(NamedTuple):
-    """A frame whose preamble is not as it should be: how many octets, and what it was."""
+    """A frame whose preamble is not as it should be: how many octets, and what it was where that is proved."""
 
     size: int
-    repair: Repair
+    repair: Repair | None
 
 
 class MstpFramer:
@@ -185,7 +186,8 @@ class MstpFramer:
         stop = len(octets) if stop is None else stop
         spoilt = after_spoilt_preamble(octets[: min(HEADER, stop)])
         if spoilt is None:
-            return None if ended or stop >= HEADER or PREAMBLE in octets else _WAIT
+            undecided = not ended and stop < HEADER and PREAMBLE not in octets
+            return _WAIT if undecided else self._like_header(stop, ended)
         at, length, flaw = spoilt
         begin = at + HEADER - 2
         size = begin + (length + 2 if length else 0)
@@ -198,6 +200,17 @@ class MstpFramer:
             return None
         return _Mended(size, Repair(flaw, whole))
 
+    def _like_header(self, stop: int, ended: bool) -> _Mended | int | None:
+        """What is left of a frame without data at the front of the window, up to silence or the next good header."""
+        octets, whole = self._window.octets, _Mended(HEADER, None)
+        if stop < HEADER or PREAMBLE in octets[:HEADER] or not is_like_header(octets[:HEADER]):
+            return None
+        if stop >= 2 * HEADER:
+            return whole if header_is_good(octets[HEADER : 2 * HEADER]) else None
+        if stop == HEADER and ended:
+            return whole
+        return None if ended or not PREAMBLE.startswith(bytes(octets[HEADER : HEADER + 2])) else _WAIT
+
     def _frame_at(self, at: int, quiet: int, final: bool) -> int | tuple[int, Check, Damage | None, Found]:
         """The frame at a 55: (octets, check, damage, found), or how many octets here are noise, or _WAIT."""
         octets = self._window.octets
@@ -208,7 +221,8 @@ class MstpFramer:
         if have < HEADER:
             if not ended:
                 return self._await(at, at + (HEADER if have >= 2 else 2))
-            return (have, Check.ABSENT, Damage.SHORT, self._found(at)) if have >= _NAMED else 1
+            named = have >= _NAMED and octets[at + 2 : at + 4] != PREAMBLE
+            return (have, Check.ABSENT, Damage.SHORT, self._found(at)) if named else 1
         frame_type, length = octets[at + 2], octets[at + 5] << 8 | octets[at + 6]
         if crc8_mstp(bytes(octets[at + 2 : at + 7])) != octets[at + 7]:
             return self._bad_header(at, frame_type, length, stop, ended)

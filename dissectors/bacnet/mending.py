@@ -71,7 +71,13 @@ def _preambles(begin: bytes) -> tuple[tuple[int, Flaw], ...]:
         return (1, Flaw.FIRST_MISSING), (0, Flaw.FIRST_TWO_MISSING)
     if begin[:1] == PREAMBLE[:1]:
         return (2, Flaw.ONE_SPOILT), (1, Flaw.ONE_MISSING), (0, Flaw.FIRST_TWO_MISSING)
-    return ((0, Flaw.FIRST_TWO_MISSING),)
+    return (2, Flaw.FIRST_TWO_SPOILT), (0, Flaw.FIRST_TWO_MISSING)
+
+
+def is_like_header(octets: bytes | bytearray) -> bool:
+    """Whether eight octets that are no header any more begin with half a preamble and have the length 0 of a token."""
+    half = octets[:1] == PREAMBLE[:1] or octets[1:2] == PREAMBLE[1:]
+    return half and octets[5:7] == b"\x00\x00" and any(octets[2:5]) and octets[7] != 0
 
 
 def _most(frame_type: int) -> int:

@@ -38,6 +38,7 @@ class What(Enum):
     UNASKED = "sent without being asked, and never has the token"
     LATE_USE = "late to use the token"
     GIVEN_UP = "used the token after it was given up"
+    USED_BOTH = "used the token and its repeat"
     SLOW_SEARCH = "late to go on after a poll that nobody answered"
     STOPPED = "searched for a successor for over a second"
     STORM = "one of many broadcasts in a short time"

@@ -27,6 +27,7 @@ from dissectors.bacnet.limits import (
     T_USAGE_TIMEOUT,
     TURNAROUND_BITS,
 )
+from dissectors.bacnet.repeated_token import RepeatedToken
 from dissectors.bacnet.ring import EVENTS_MAX, Event, Ring, What
 from dissectors.bacnet.ring_damage import count_damage, speaker_of
 from dissectors.bacnet.ring_questions import Asked, Questions
@@ -79,6 +80,7 @@ class RingObserver:
         self._token: Frame | None = None  # that token, while unused
         self._second: int | None = None  # who has another token, or was sent it, as far as seen
         self._given_up: _GivenUp | None = None
+        self._repeated = RepeatedToken()
         self._two_until = 0  # ns; two tokens until then are known of
         self._got: int | None = None  # when the holder got the token
         self._hold = 0  # data frames sent on this token
@@ -111,6 +113,7 @@ class RingObserver:
                     self._turn.see_noise(event)
                 if len(event.octets) >= N_MIN_OCTETS:  # fewer prove nothing: who was asked may still answer
                     self._questions.asked = None
+                    self._disturb(no, event.start)
                 self._doubt = True
             else:
                 self._see_hole(event.start)
@@ -152,6 +155,7 @@ class RingObserver:
         self._forget()
         self._missed, self._quiet_since = None, end
         self._given_up = None
+        self._repeated.forget()
         self._questions.forget()
         self._reads.forget()
         self._doubt = True
@@ -162,7 +166,7 @@ class RingObserver:
     def _see_damage(self, no: int, frame: Frame, header: Header) -> None:
         tally, asked = self._tally, self._questions.asked
         speaker = speaker_of(frame, header, self._turn)
-        count_damage(tally, frame, speaker)
+        count_damage(tally, frame, None if self._disturb(no, frame.start) else speaker)
         self._questions.asked = None
         if asked is None or speaker is None or asked.frame_type == _POLL:
             pass
@@ -173,6 +177,14 @@ class RingObserver:
             assert header.destination is not None
             self._questions.asked = Asked(header.function, header.source, header.destination, frame, no)
         self._doubt = True
+
+    def _disturb(self, no: int, start: int) -> bool:
+        """Whether octets that are no good frame may be of two: of the next one, and of one that has a second token."""
+        mac = self._repeated.of
+        took = None if mac is None else self._repeated.disturbed(start)
+        if took is not None:
+            self._tally.note(What.USED_BOTH, start, no, mac, None, took)
+        return took is not None
 
     # Good frames
 
@@ -188,6 +200,10 @@ class RingObserver:
                 tally.impossible += 1
             if self._is_new_token(frame, source):
                 self._lose_token(no, frame, source)
+        if (slow := self._repeated.of) is not None:
+            took = self._repeated.see(frame, frame_type, source, destination)
+            if took is not None:
+                tally.note(What.USED_BOTH, frame.start, no, slow, None, took)
         self._questions.holder = self._holder
         answers = self._questions.is_answer(no, frame, frame_type, source, destination, node)
         self._check_addresses(no, frame, frame_type, source, destination)
@@ -343,9 +359,10 @@ class RingObserver:
         if self._holder is not None and frame.octets[2] != _TOKEN:
             token_end = frame.start if self._token is None else self._token.end
             self._given_up = _GivenUp(self._holder, source, token_end)
-            if frame.octets[2] == _POLL:
+            if frame.octets[2] == _POLL and not self._doubt:  # damage in between may have been its use
                 self._tally.note(What.LEFT, frame.start, no, self._holder, source)
                 self._tally.node(self._holder).gone = True
+            if frame.octets[2] == _POLL:
                 node.searches = True
                 node.searching_since = frame.start
         self._holder = source
@@ -392,7 +409,8 @@ class RingObserver:
             and before.octets[:HEADER] == frame.octets[:HEADER]
             and self._gap(frame) + before.slack >= T_USAGE_TIMEOUT // 2
         )
-        if again:
+        if again and before is not None:
+            self._repeated.repeat(destination, before.end)
             edge.retries += 1
             tally.note(What.RETRY, frame.start, no, destination, source, self._gap(frame))
         else:

@@ -37,12 +37,11 @@ _ALL = (
         "slow to use the token",
         "A station began to send later than 15 ms (Tusage_delay) after the token reached it, by the smallest "
         "reading of the "
-        "time and more often than the others; or only when its neighbour had already taken the token back, which "
-        "makes two "
-        "tokens for a moment.",
+        "time and more often than the others; or only when its neighbour had already repeated the token or taken it "
+        "back, which makes two tokens for a moment.",
         "an overloaded or old station; each round takes longer, and above 20 ms its neighbour repeats the token",
         "firmware and load of the station; Max_Info_Frames of the others",
-        explains=("MS102", "MS104", "MS105", "MS106", "MS401"),
+        explains=("MS102", "MS104", "MS105", "MS106", "MS401", "MS403", "LN101", "LN103", "LN2"),
     ),
     Rule(
         "MS104",
@@ -52,7 +51,7 @@ _ALL = (
         "and only where tokens are in the capture.",
         "a second token after a disturbance, two stations with one address, or a ring joined while running",
         "the stations named: address switches, and whether two segments were joined",
-        explains=("MS401", "MS402", "MS403", "LN2"),
+        explains=("MS401", "MS402", "MS403", "LN101", "LN103", "LN2"),
     ),
     Rule(
         "MS105",
@@ -118,7 +117,7 @@ _ALL = (
         "asked it for. The station that has the token is not at fault. A single one is only noted.",
         "a slave that answers broadcasts or reports by itself; it runs into the frames of whoever has the token",
         "the slave's settings (unsolicited I-Am, COV), or make it a master",
-        explains=("MS101", "MS401", "MS402"),
+        explains=("MS101", "MS102", "MS401", "MS402", "MS403", "LN101", "LN103", "LN2"),
     ),
     Rule(
         "MS201",

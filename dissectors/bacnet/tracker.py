@@ -24,7 +24,7 @@ from __future__ import annotations
 from collections import OrderedDict
 from dataclasses import dataclass, replace
 
-from dissectors.bacnet.apdu import Apdu, PduType
+from dissectors.bacnet.apdu import NEGATIVE_ACK, Apdu, PduType
 from dissectors.bacnet.exchange import Exchange, Key, mirrored, read, trails
 from dissectors.bacnet.frame_types import EXPECTING, FrameType, total
 from dissectors.bacnet.header import is_whole_header
@@ -51,6 +51,9 @@ _REPLY: dict[int, int] = {
     FrameType.POLL_FOR_MASTER: FrameType.REPLY_TO_POLL_FOR_MASTER,
     FrameType.TEST_REQUEST: FrameType.TEST_RESPONSE,
 }
+
+_ACKNOWLEDGED = frozenset((PduType.SIMPLE_ACK, PduType.COMPLEX_ACK))
+"""Answers to a request that came whole."""
 
 _ENDED = frozenset(Verdict) - {Verdict.NO_RESPONSE, Verdict.DAMAGED_ANSWER}
 """How an exchange ended whose segments had come: what trails after it changes nothing."""
@@ -231,9 +234,11 @@ class MstpTracker:
             return self._at(no, waiting.id, header, Role.RESPONSE)
         if back and frame_type not in (FrameType.TOKEN, FrameType.POLL_FOR_MASTER):
             message, key = read(frame)
-            if waiting.damaged:
-                waiting.key = key
             apdu = message.apdu if message is not None else None
+            if waiting.damaged:
+                if key is not None and apdu is not None and self._is_of_open(waiting, key, apdu, closed):
+                    return None
+                waiting.key = key
             if apdu is not None and key is not None and apdu.type == PduType.SEGMENT_ACK:
                 waiting.damaged = False  # acknowledged: the segment got there whole, the listener alone had it damaged
                 if key != waiting.key:
@@ -252,6 +257,22 @@ class MstpTracker:
                 return None
         self._let_go(waiting, closed)
         return None
+
+    def _is_of_open(self, damaged: Exchange, key: Key, apdu: Apdu, closed: list[Transaction]) -> bool:
+        """Whether what follows a damaged request belongs to an exchange that was open before; the request is over then.
+
+        It was the next segment of that exchange, which got there whole, where it is acknowledged or answered.
+        """
+        begun = self._postponed.get(key)
+        if begun is None and apdu.type == PduType.SEGMENT_ACK:
+            begun = self._postponed.get(mirrored(key))
+        if begun is None:
+            return False
+        acknowledged = apdu.type == PduType.SEGMENT_ACK and not apdu.flags & NEGATIVE_ACK
+        arrived = acknowledged or (begun.more_follows and apdu.type in _ACKNOWLEDGED)
+        self._waiting, damaged.of = None, begun.id
+        closed.append(damaged.close(Verdict.DATA if arrived else Verdict.DAMAGED_REQUEST))
+        return True
 
     def _keep(self, exchange: Exchange, closed: list[Transaction]) -> None:
         assert exchange.key is not None

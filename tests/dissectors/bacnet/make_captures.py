@@ -84,6 +84,20 @@ def segments_lost() -> list[Step]:
     return [*steps, *rest.steps]
 
 
+def segments_heard_damaged() -> list[Step]:
+    """Of setpoints written in segments the sniffer hears the second one damaged, and once the last; the station
+    acknowledges and answers as if nothing were."""
+    steps: list[Step] = []
+    for invoke, name in ((50, "request 1"), (51, "request 2")):
+        bus = SegmentedBus(Party(4), Party(17))
+        bus.rounds(2)
+        bus.ask_in_segments(invoke, WRITE_MULTIPLE, writes(9), 60, 1)
+        bus.reply(invoke, WRITE_MULTIPLE)
+        bus.rounds(2)
+        steps += spoilt(bus.steps, name)
+    return steps
+
+
 def behind_routers() -> list[Step]:
     """Reads from MS/TP, BACnet/IP, Ethernet and VMAC addresses behind a router."""
     steps: list[Step] = []
@@ -186,6 +200,7 @@ CAPTURES: dict[str, Callable[[], list[Step]]] = {
     "mstp-segments": segments,
     "mstp-segments-lost": segments_lost,
     "mstp-behind-routers": behind_routers,
+    "findings/ms-tp-segments-heard-damaged": segments_heard_damaged,
     "findings/ms-tp-confirmed-without-reply-bit": no_reply_bit,
     "findings/ms-tp-dates-that-are-none": wrong_dates,
     "findings/ms-tp-values-of-another-type": other_types,

@@ -27,6 +27,67 @@ def used_late() -> list[Step]:
     return steps
 
 
+def used_twice() -> list[Step]:
+    """14 begins when 6 has repeated its token, and uses the repeat too, over the frame of 33."""
+    steps = rounds(9, 6, 14, 33)
+    for _ in range(4):
+        steps += [(2, token(6, 14)), (33, token(6, 14)), (4, token(14, 33)), (2, spoil(token(33, 6), 4, 0x20))]
+        steps += [(26, token(14, 33)), (2, token(33, 6)), *rounds(9, 6, 14, 33)]
+    return steps
+
+
+def lost_behind_damage() -> list[Step]:
+    """What 14 made of its token was damaged for everybody: it has not left, and does not come back."""
+    steps = rounds(9, 6, 14, 33)
+    for _ in range(3):
+        steps += [
+            (2, token(6, 14)),
+            (2, spoil(token(14, 33), 6)),
+            (30, poll(6, 7)),
+            (25, poll(6, 14)),
+            (3, found(14, 6)),
+        ]
+        steps += [(2, token(6, 14)), (2, token(14, 33)), (2, token(33, 6)), *rounds(9, 6, 14, 33)]
+    return steps
+
+
+def cut_in_header() -> list[Step]:
+    """27 lets go within the header of its tokens now and then; whose turn it was says that it was 27."""
+    steps: list[Step] = []
+    for keep in (4, 5, 4, 6):
+        steps += [*rounds(6, 8, 27, 61), (2, token(8, 27)), (2, token(27, 61)[:keep]), (24, token(27, 61))]
+        steps += [(2, token(61, 8))]
+    return steps + rounds(6, 8, 27, 61)
+
+
+def header_spoilt() -> list[Step]:
+    """Of tokens of 27 more than one octet is wrong; they stand alone in their place, half a preamble before them."""
+    steps: list[Step] = []
+    for places in ((1, 2), (1, 2, 3), (0, 2), (0, 1)):
+        octets = token(27, 61)
+        for at in places:
+            octets = spoil(octets, at, 0x6B)
+        steps += [*rounds(6, 8, 27, 61), (2, token(8, 27)), (2, octets), (2, token(61, 8))]
+    return steps + rounds(6, 8, 27, 61)
+
+
+def lost_behind_an_adapter() -> list[Step]:
+    """19 loses its token; 44 makes a new one, by the reads less than 500 ms later: the adapter held one back."""
+    steps = rounds(5, 3, 19, 44)
+    for silence in (489, 494, 506):
+        steps += [(2, token(3, 19)), (silence, poll(44, 3)), (4, found(3, 44)), (2, token(44, 3))]
+        steps += [(2, token(3, 19)), (2, token(19, 44)), (2, token(44, 3)), *rounds(5, 3, 19, 44)]
+    return steps
+
+
+def data_without_first_octet() -> list[Step]:
+    """Answers of 31 whose first octet is missing or wrong: what they say is proved by both checks, and is shown."""
+    steps: list[Step] = []
+    for octets in (data(31, 12, VALUE)[1:], spoil(data(31, 12, VALUE), 0), data(31, 12, VALUE)[2:]):
+        steps += [*rounds(4, 12, 31), (2, data(12, 31, READ, expects=True)), (18, octets)]
+    return steps + rounds(4, 12, 31)
+
+
 def shut_out() -> list[Step]:
     """40 joins, polls 41 alone, and passes to 6 past 90."""
     joins: list[Step] = [(2, poll(6, 40)), (3, found(40, 6)), (2, token(6, 40)), (2, poll(40, 41)), (25, token(40, 6))]
@@ -117,6 +178,12 @@ def after_an_empty_poll() -> list[Step]:
 
 MADE = {
     "ms-tp-token-used-after-it-was-given-up": used_late,
+    "ms-tp-token-and-its-repeat-both-used": used_twice,
+    "ms-tp-use-of-the-token-damaged": lost_behind_damage,
+    "ms-tp-cut-within-the-header": cut_in_header,
+    "ms-tp-header-with-more-than-one-octet-spoilt": header_spoilt,
+    "ms-tp-lost-token-behind-an-adapter": lost_behind_an_adapter,
+    "ms-tp-answers-without-their-first-octet": data_without_first_octet,
     "ms-tp-shut-out-of-the-ring": shut_out,
     "ms-tp-slave-speaks-unasked": slave_speaks,
     "ms-tp-last-octet-missing": last_octet_missing,
@@ -132,7 +199,11 @@ MADE = {
 }
 
 
-def text(steps: Sequence[Step]) -> str:
+LATENCY = {"ms-tp-lost-token-behind-an-adapter": 17.5}
+"""ms, of captures that come through an adapter that holds reads back."""
+
+
+def text(steps: Sequence[Step], latency: float = 0) -> str:
     """The capture file; steps without silence come in the read before."""
     lines: list[tuple[float, bytes]] = []
     for silence, octets in steps:
@@ -140,9 +211,10 @@ def text(steps: Sequence[Step]) -> str:
             lines[-1] = lines[-1][0], lines[-1][1] + octets
         else:
             lines.append((silence, octets))
-    return _HEAD + "".join(f"~{f'{silence:g}':<8} {octets.hex(' ').upper()}\n" for silence, octets in lines)
+    told = f"# latency: {latency}\n# latency-from: simulated\n" if latency else ""
+    return _HEAD + told + "".join(f"~{f'{silence:g}':<8} {octets.hex(' ').upper()}\n" for silence, octets in lines)
 
 
 if __name__ == "__main__":
     for name, make in MADE.items():
-        (Path(sys.argv[1]) / f"{name}.cap.txt").write_text(text(make()), encoding="utf-8")
+        (Path(sys.argv[1]) / f"{name}.cap.txt").write_text(text(make(), LATENCY.get(name, 0)), encoding="utf-8")

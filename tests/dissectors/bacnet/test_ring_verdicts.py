@@ -30,6 +30,52 @@ def test_a_token_used_late_accuses_the_slow_station_alone():
     assert not any(what is What.TWO_TOKENS for what, _ in read.ring.happened)
 
 
+def both_used(times: int, damage: int = 6) -> list[Step]:
+    """8 begins after 1 has repeated its token, and then uses the repeat too, while 20 speaks."""
+    steps: list[Step] = []
+    for _ in range(times):
+        steps += [*rounds(8, 1, 8, 20), (2, token(1, 8)), (31, token(1, 8)), (6, token(8, 20))]
+        steps += [(2, spoil(token(20, 1), damage)), (27, token(8, 20)), (2, token(20, 1))]
+    return [*steps, *rounds(8, 1, 8, 20)]
+
+
+@pytest.mark.parametrize("damage", [3, 4, 6, 7])
+def test_a_station_that_uses_a_token_and_its_repeat_is_slow(damage: int):
+    read = script(both_used(4, damage))
+    assert read.graves() == {("MS103", "MAC 8")}
+    assert "4 times only after its neighbour had repeated the token, up to 39.1 ms" in read.of("MS103").seen
+    assert read.of("MS102").cause == read.of("MS401").cause == ("MS103", "MAC 8")
+
+
+def test_a_station_that_speaks_twice_after_a_repeated_token_is_slow():
+    """What it sends for the second token comes whole."""
+    steps: list[Step] = []
+    for _ in range(4):
+        steps += [*rounds(8, 1, 8, 20), (2, token(1, 8)), (31, token(1, 8)), (6, token(8, 20)), (1.2, token(8, 20))]
+        steps += [(2, token(20, 1))]
+    assert ("MS103", "MAC 8") in script(steps).graves()
+
+
+def test_a_station_deaf_to_the_first_token_is_not_slow():
+    """Its neighbour's frames are damaged now and then, repeated token or not."""
+    steps: list[Step] = []
+    for no in range(12):
+        hit = token(20, 1) if no % 3 else spoil(token(20, 1), 6)
+        steps += [*rounds(2, 1, 8, 20), (2, token(1, 8)), (31, token(1, 8)), (2, token(8, 20)), (2, hit)]
+        steps += [(2, token(1, 8)), (2, token(8, 20)), (2, spoil(token(20, 1), 6))]
+    assert "MS103" not in {code for code, _ in script(steps).graves()}
+
+
+def test_damage_between_a_token_and_the_poll_after_it_may_have_been_its_use():
+    """8 used the token, though nobody understood it, and is not said to have left or come back."""
+    steps = rounds(10, 1, 8, 20)
+    for _ in range(4):
+        steps += [(2, token(1, 8)), (2, spoil(token(8, 20), 6)), (30, poll(1, 9)), (25, poll(1, 8)), (2, found(8, 1))]
+        steps += [(2, token(1, 8)), (2, token(8, 20)), (2, token(20, 1)), *rounds(10, 1, 8, 20)]
+    happened = script(steps).ring.happened
+    assert not {what for what, _ in happened} & {What.LEFT, What.REJOINED}
+
+
 def test_a_poll_after_a_token_that_failed_is_no_use_of_it():
     steps = rounds(10, 1, 5, 8)
     for _ in range(5):
@@ -248,3 +294,37 @@ def test_a_station_that_has_the_line_most_of_the_time_is_a_fact():
     assert read.graves() == set()
     assert read.of("MS601").severity is Severity.INFO
     assert "up to 10 frames" in read.of("MS601").seen
+
+
+def lost(silence: float, maker: int, holder: int = 8) -> list[Step]:
+    """The token of `holder` is gone; `maker` begins anew after so many ms as the reads show them."""
+    steps: list[Step] = []
+    for _ in range(3):
+        steps += [*rounds(6, 1, 8, 20), (2, token(1, 8))]
+        steps += [(silence, poll(maker, holder)), (4, found(holder, maker)), (2, token(maker, holder))]
+        steps += [(2, token(8, 20)), (2, token(20, 1))]
+    return steps
+
+
+@pytest.mark.parametrize("silence", [490, 500, 510, 700])
+def test_a_lost_token_through_an_adapter_that_holds_reads_back(silence: float):
+    """490 ms as read may be 507: nobody but the one with a new token sends after so long a silence."""
+    read = script(lost(silence, 20), latency=17.5)
+    assert read.of("MS101").subject == "MAC 8"
+    assert read.of("MS101").count == 3
+    assert "MS104" not in {code for code, _ in read.graves()}
+
+
+def test_a_silence_that_cannot_be_500_ms_loses_no_token():
+    """At 470 ms it is a second token, whatever the adapter does."""
+    read = script(lost(470, 20), latency=17.5)
+    assert not [what for what, _ in read.ring.happened if what is What.LOST_TOKEN]
+    assert read.ring.of(What.TWO_TOKENS, 20).count == 3
+
+
+@pytest.mark.parametrize("silence", [490, 510])
+def test_one_that_had_the_token_has_not_surely_made_a_new_one(silence: float):
+    """8 has the token, or 1 has just passed it: either may go on, unless even the shortest reading is 500 ms."""
+    for maker in (1, 8):
+        read = script(lost(silence, maker, 20), latency=17.5)
+        assert not [what for what, _ in read.ring.happened if what is What.LOST_TOKEN]

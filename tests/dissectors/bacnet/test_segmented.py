@@ -246,6 +246,40 @@ def test_a_damaged_segment_that_comes_again_completes_the_message():
     assert all(one.verdict is not Verdict.ANSWERED_TWICE for one in output.transactions)
 
 
+@pytest.mark.parametrize(
+    ("name", "window"),
+    [("request 0", 1), ("request 1", 1), ("request 3", 1), ("request 0", 3), ("request 3", 3)],  # each expects a reply
+)
+def test_a_segment_that_was_acknowledged_was_damaged_for_the_sniffer_alone(name: str, window: int):
+    steps = written(12, window).steps
+    output = run(spoilt(steps, name))
+    verdicts = {one.verdict for one in exchanges(output)}
+    assert not verdicts & {Verdict.DAMAGED_REQUEST, Verdict.NO_RESPONSE, Verdict.OPEN}
+    assert Verdict.ANSWERED in verdicts
+
+
+def test_a_last_segment_that_was_answered_was_damaged_for_the_sniffer_alone():
+    """The server answers at once, without acknowledging it."""
+    bus = SegmentedBus()
+    bus.rounds(1)
+    bus.ask_in_segments(INVOKE, WRITE_MULTIPLE, writes(12), SIZE, 1)
+    steps = bus.steps[:-1]
+    bus.steps = []
+    bus.reply(INVOKE, WRITE_MULTIPLE, at_once=True)
+    output = run(spoilt([*steps, *bus.steps], "request 3"))
+    assert [one.verdict for one in exchanges(output)] == [Verdict.ANSWERED, Verdict.DATA]
+
+
+def test_a_damaged_segment_that_is_refused_was_damaged_for_the_server_too():
+    """It is sent again; the exchange is answered."""
+    steps = written(12, 1).steps
+    at = next(number for number, step in enumerate(steps) if step.name == "request 1")
+    bus = SegmentedBus()
+    bus.acknowledge(bus.server, INVOKE, 0, 1, negative=True)
+    output = run([*spoilt(steps[: at + 1], "request 1"), *bus.steps, *steps[at:]])
+    assert [one.verdict for one in exchanges(output)] == [Verdict.ANSWERED, Verdict.DAMAGED_REQUEST]
+
+
 def test_what_only_the_sniffer_missed_is_said_and_the_exchange_ends_with_the_acknowledgement():
     output = run(without(answered(12, 3).steps, "segment 2"))
     one = is_clean(output)

@@ -319,6 +319,18 @@ BUS = st.sampled_from(
 )
 
 
+def test_segments_that_follow_a_damaged_request_belong_to_what_they_began():
+    """Both exchanges end: the one that was answered, and the request that nobody understood."""
+    first, last = (
+        npdu_frame(2, 5, bytes.fromhex(octets), expects_reply=False)
+        for octets in ("01003c1100040e0c020004d21e", "0100381101040e29554475040041")
+    )
+    run = track((0, first), (5, request()[:-2]), (5, last))
+    assert sorted(tx.id for tx in run.closed) == [1, 2]
+    assert [placement.tx for placement in run.placements] == [1, 2, 1]
+    assert {tx.id: tx.verdict for tx in run.closed}[2] is Verdict.DAMAGED_REQUEST
+
+
 @settings(max_examples=150, deadline=None)
 @given(st.lists(st.tuples(st.sampled_from([0, 1, 20, 260, 600, 11_000]), BUS), max_size=25))
 def test_whatever_passes_each_transaction_closes_once(steps: list[tuple[float, bytes]]):

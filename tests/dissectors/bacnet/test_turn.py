@@ -14,10 +14,10 @@ from dissectors.bacnet import MSTP
 from dissectors.bacnet.frame_making import frame
 from dissectors.bacnet.simulated import Node, Poller, f510
 from dissectors.bacnet.turn import Turn
-from dissectors.frame import Check, Chunk, Damage, Flaw, Found, Frame
+from dissectors.frame import Check, Chunk, Damage, Flaw, Found, Frame, Noise, Role
 from dissectors.line import LineSettings, Timing
 from sniff.simulation.wire import Party, Wire
-from tests.dissectors.bacnet.ring_script import poll, rounds, script, spoil, token
+from tests.dissectors.bacnet.ring_script import data, poll, rounds, script, spoil, token
 
 LINE = LineSettings(38400)
 TIMING = Timing(LINE)
@@ -121,6 +121,7 @@ def test_any_octets_have_a_sender_or_none(octets: bytes, before: list[bytes]):
         (token(2, 5)[2:], Flaw.FIRST_TWO_MISSING),
         (spoil(token(2, 5), 0), Flaw.FIRST_SPOILT),
         (spoil(token(2, 5), 1), Flaw.ONE_SPOILT),
+        (spoil(spoil(token(2, 5), 0), 1), Flaw.FIRST_TWO_SPOILT),
         (token(2, 5)[:1] + token(2, 5)[2:], Flaw.ONE_MISSING),
         (token(2, 5)[:-1], Flaw.LAST_MISSING),
     ],
@@ -134,6 +135,62 @@ def test_a_frame_that_can_be_put_right(octets: bytes, flaw: Flaw):
     assert damaged.repair is not None
     assert (damaged.repair.flaw, damaged.repair.octets) == (flaw, token(2, 5))
     assert (read.placements[2].source, read.placements[2].destination) == (2, 5)
+
+
+VALUE = "010030010c0c020004d2194d3e75030041313f"
+
+
+@pytest.mark.parametrize("cut", [1, 2])
+def test_a_repaired_frame_has_the_fields_of_what_it_was(cut: int):
+    """As the whole one has them, but for the check that failed."""
+    whole = data(5, 2, VALUE)
+    steps = [*rounds(2, 2, 5), (2, data(2, 5, "010400030 10c0c020004d2194d".replace(" ", ""), expects=True))]
+    frames = [script([*steps, (9, octets), (2, token(2, 5))]).events[5] for octets in (whole, whole[cut:])]
+    good, repaired = (MSTP.fields(one, Role.RESPONSE) for one in frames if isinstance(one, Frame))
+    differing = {name for name in good.keys() | repaired.keys() if good.get(name) != repaired.get(name)}
+    assert "bacapp.invoke_id" in repaired
+    assert differing == {"mstp.checksum.status"}
+
+
+def spoilt(*places: int) -> bytes:
+    """A token from 2 to 5 with those octets wrong."""
+    octets = token(2, 5)
+    for at in places:
+        octets = spoil(octets, at, 0x6B)
+    return octets
+
+
+@pytest.mark.parametrize("latency", [0, 17.5])
+@pytest.mark.parametrize(
+    "octets", [token(2, 5)[:4], token(2, 5)[:5], spoilt(1, 2), spoilt(1, 2, 3), spoilt(0, 2), spoilt(1, 7)]
+)
+def test_what_is_left_of_a_token_is_of_who_had_it(octets: bytes, latency: float):
+    """Cut within its header, or with so much spoilt that only its length, half a preamble and its place tell."""
+    read = script([*rounds(2, 2, 5), (2, octets), (2, token(5, 2)), (2, token(2, 5))], latency)
+    damaged = read.events[4]
+    assert isinstance(damaged, Frame)
+    assert (damaged.octets, damaged.ok, damaged.repair) == (octets, False, None)
+    assert read.placements[4] is not None
+    assert read.placements[4].source == 2
+    assert all(isinstance(event, Frame) and event.ok for event in read.events[5:])
+
+
+@pytest.mark.parametrize(
+    "octets",
+    [
+        token(2, 5)[:3],
+        bytes(8),
+        b"\x55" + bytes(7),
+        b"\x12\xff" + bytes(6),
+        spoilt(1, 2) + b"\x31",
+        b"\x31" + spoilt(1, 2),
+        spoilt(0, 1, 2),
+        b"\x55\xff\x55\xff",
+    ],
+)
+def test_what_may_be_anything_is_no_frame(octets: bytes):
+    read = script([*rounds(2, 5, 2), (2, octets), (2, token(5, 2))])
+    assert [type(event) for event in read.events] == [Frame] * 4 + [Noise] + [Frame]
 
 
 def test_a_length_that_the_data_contradict():
