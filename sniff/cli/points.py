@@ -8,7 +8,6 @@ from __future__ import annotations
 import argparse
 import fnmatch
 from collections.abc import Iterator
-from pathlib import Path
 
 from dissectors.line import NS_PER_S
 from dissectors.profiles.decoding import number
@@ -22,7 +21,6 @@ from sniff.engine.capture import Capture
 from sniff.engine.engine import Output
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import Session
-from sniff.formats import parquet
 
 LATEST = ("device", "point", "value", "unit", "means", "quality", "age s", "changed s", "samples")
 SAMPLES = ("time", "device", "point", "value", "raw", "unit", "quality", "how", "frame", "means")
@@ -52,12 +50,8 @@ def run(args: argparse.Namespace) -> int:
         return _print(args)
     if args.latest:
         raise Failure("--parquet holds every sample: leave --latest out", USAGE)
-    if not parquet.available():
-        raise Failure("--parquet needs polars: pip install 'sniff485[parquet]'", USAGE)
-    path = Path(args.parquet)
-    if path.exists() and not args.force:
-        raise Failure(f"{path}: exists; add --force to overwrite it", USAGE)
-    with parquet.ParquetWriter(path, COLUMNS) as table:
+    with writing.parquet_file(args, COLUMNS) as table:
+        assert table is not None
         for name, capture in arguments.open_captures(args.files):
             session = arguments.settings_of(args, capture.session, name)
             for samples in _samples(args, capture, session):
