@@ -7,13 +7,14 @@ does not go into one process with scapy.
 from __future__ import annotations
 
 import importlib.util
+import io
 from collections.abc import Mapping, Sequence
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sniff.engine.capture import CaptureError
-from sniff.formats.files import NewFile, explain
+from sniff.formats.files import NewFile
 
 if TYPE_CHECKING:
     import polars as pl
@@ -62,11 +63,9 @@ class ParquetWriter:
         import polars as pl
 
         self._gather()
-        try:
-            pl.concat(self._parts).write_parquet(self._file.stream)
-        except OSError as error:
-            self._file.discard()
-            raise explain(self._file.path, error) from None
+        made = io.BytesIO()  # polars does not say what the system says of a file
+        pl.concat(self._parts).write_parquet(made)
+        self._file.write(made.getbuffer())
         self._file.close()
 
     def __enter__(self) -> ParquetWriter:
