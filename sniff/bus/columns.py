@@ -246,7 +246,7 @@ def _add(into: _Growing, values: Values, missing: Masks) -> None:
 
 def _add_texts(into: _Growing, values: Values, texts: Sequence[str], missing: Masks) -> None:
     """Only texts that stand in a row get a number."""
-    used = np.unique(values[~missing])
+    used = np.flatnonzero(np.bincount(values[~missing], minlength=len(texts)))
     numbers = np.zeros(len(texts), np.int32)
     numbers[used] = into.text_numbers(texts[place] for place in used.tolist())
     _add(into, numbers[values], missing)

@@ -10,6 +10,7 @@ import subprocess
 import sys
 import warnings
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ import pytest
 
 import sniff
 from dissectors import registry
+from dissectors.line import LineSettings
 from sniff.bus.columns import FRAMES, TRANSACTIONS
 from sniff.bus.offline import outputs
 from sniff.cli import main
@@ -24,7 +26,7 @@ from sniff.data_frames import IncompleteCapture, NoDataFrames
 from sniff.devices import UnknownProfile
 from sniff.engine.capture import CaptureError
 from sniff.engine.engine import Output
-from sniff.formats import read
+from sniff.formats import create, read
 
 CAPTURES = Path(__file__).parents[2] / "captures"
 NAMES = sorted(
@@ -159,6 +161,19 @@ def test_settings_as_on_the_command_line(shown: Shown) -> None:
     _rows_are_those_shown(
         capture.frames(octets=True).to_dicts(), shown(path, "-p", "n2", "-s", "9600,8N1"), capture.started
     )
+
+
+@needs_polars
+def test_what_a_search_heard(tmp_path: Path, shown: Shown) -> None:
+    path, source = tmp_path / "unknown.mcap", read(CAPTURES / "mstp-clean.cap.txt")
+    unknown = replace(source.session, line=LineSettings.parse("9600,8N1"), unknown=("line", "protocol"))
+    with create(path, unknown) as writer:
+        for item in source.items():
+            writer.write(item)
+    capture = sniff.read(path)
+    frame = capture.frames(octets=True)
+    assert "searching" in frame["kind"]
+    _rows_are_those_shown(frame.to_dicts(), shown(path), capture.started)
 
 
 def test_words_that_mean_nothing() -> None:
