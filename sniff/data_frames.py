@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from dissectors.line import LineSettings
+from dissectors.profiles import Devices
 from sniff import devices as profiles
 from sniff.analysis.points import PointReader
 from sniff.bus.columns import Column, Columns, Form, TableColumns
@@ -58,7 +59,7 @@ class DataCapture:
     `session`: what it says of itself, with the settings that were given. `started`: ns since the epoch.
     """
 
-    def __init__(self, path: str, capture: Capture, session: Session, devices: Any) -> None:
+    def __init__(self, path: str, capture: Capture, session: Session, devices: Devices) -> None:
         self.path = path
         self.session = session
         self.devices = devices
