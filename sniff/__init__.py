@@ -1,3 +1,25 @@
-"""sniff485, the application: sources, recording, formats, the engine, and its two faces (command line and terminal)."""
+"""sniff485, the application: sources, recording, formats, the engine, and its two faces (command line and terminal).
+
+For notebooks: `sniff.read("night.mcap")` gives a capture as data frames; see data_frames.py.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from sniff.data_frames import DataCapture
 
 __version__ = "0.1.0"
+
+
+def read(
+    path: str | Path, protocol: str | None = None, line: str | None = None, devices: str | Iterable[str] = ()
+) -> DataCapture:
+    """Open a capture for data frames. `protocol`, `line`, `devices`: as -p, -s and -d say it, the last two such as
+    "9600,8N1", "3=teco-e510". Raises CaptureError, ValueError, registry.UnknownProtocol."""
+    from sniff import data_frames  # numpy and all formats: not for whoever wants the version
+
+    return data_frames.read(path, protocol, line, devices)

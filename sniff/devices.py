@@ -109,6 +109,16 @@ def folders() -> tuple[Path, ...]:
     return (*(folder / FOLDER for folder in (here, *here.parents)), user / "sniff485" / FOLDER)
 
 
+def assignment(word: str) -> tuple[str, str]:
+    """Address (or "*") and profile of "3=teco-e510". Raises ValueError."""
+    station, equals, name = word.partition("=")
+    if not equals or not name:
+        raise ValueError(f"device {word!r}: expected ADDRESS=PROFILE, for instance 3=teco-e510")
+    if station != EVERY:
+        address(station)
+    return station, name
+
+
 def devices(assigned: Mapping[str, str], documents: Mapping[str, str] | None = None) -> Devices:
     """Profiles by station, from address (or "*") → name. Raises ValueError, UnknownProfile, ProfileError.
 

@@ -64,17 +64,12 @@ def add_devices(parser: argparse.ArgumentParser) -> None:
 
 def device(token: str) -> tuple[str, str]:
     """argparse type for -d."""
-    from sniff.devices import EVERY, address
+    from sniff.devices import assignment
 
-    word, equals, name = token.partition("=")
     try:
-        if not equals or not name:
-            raise ValueError(f"device {token!r}: expected ADDRESS=PROFILE, for instance 3=teco-e510")
-        if word != EVERY:
-            address(word)
+        return assignment(token)
     except ValueError as error:
         raise argparse.ArgumentTypeError(str(error)) from None
-    return word, name
 
 
 def devices_of(args: argparse.Namespace, configured: Mapping[str, str] | None = None) -> Devices:

@@ -8,12 +8,12 @@ from __future__ import annotations
 import argparse
 import fnmatch
 from collections.abc import Iterator
-from pathlib import Path
 
 from dissectors.line import NS_PER_S
 from dissectors.profiles.decoding import number
 from sniff.analysis.points import Point, PointReader, PointTable, Sample
 from sniff.bus.offline import outputs
+from sniff.bus.sample_row import COLUMNS, sample_row, shown_value
 from sniff.cli import USAGE, Failure, arguments, tables, writing
 from sniff.cli.rows import iso
 from sniff.cli.tables import Cell
@@ -21,24 +21,9 @@ from sniff.engine.capture import Capture
 from sniff.engine.engine import Output
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import Session
-from sniff.formats import parquet
-from sniff.formats.parquet import Kind
 
 LATEST = ("device", "point", "value", "unit", "means", "quality", "age s", "changed s", "samples")
 SAMPLES = ("time", "device", "point", "value", "raw", "unit", "quality", "how", "frame", "means")
-PARQUET = {
-    "time": Kind.TIME,
-    "device": Kind.TEXT,
-    "point": Kind.TEXT,
-    "value": Kind.NUMBER,
-    "text": Kind.TEXT,
-    "raw": Kind.INTEGER,
-    "unit": Kind.TEXT,
-    "quality": Kind.INTEGER,
-    "how": Kind.TEXT,
-    "frame": Kind.INTEGER,
-    "means": Kind.TEXT,
-}
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -65,17 +50,13 @@ def run(args: argparse.Namespace) -> int:
         return _print(args)
     if args.latest:
         raise Failure("--parquet holds every sample: leave --latest out", USAGE)
-    if not parquet.available():
-        raise Failure("--parquet needs polars: pip install 'sniff485[parquet]'", USAGE)
-    path = Path(args.parquet)
-    if path.exists() and not args.force:
-        raise Failure(f"{path}: exists; add --force to overwrite it", USAGE)
-    with parquet.ParquetWriter(path, PARQUET) as table:
+    with writing.parquet_file(args, COLUMNS) as table:
+        assert table is not None
         for name, capture in arguments.open_captures(args.files):
             session = arguments.settings_of(args, capture.session, name)
             for samples in _samples(args, capture, session):
                 for sample in samples:
-                    table.add(_parquet_row(sample))
+                    table.add(sample_row(sample))
             writing.say_incomplete(name, capture)
     return 0
 
@@ -120,7 +101,7 @@ def _latest(point: Point, end: int, style: str) -> tuple[Cell, ...]:
     means = f"command: {value.words}".rstrip(": ") if point.is_command else value.words
     age = round((end - sample.time) / NS_PER_S, 3)
     changed = round((end - point.changed) / NS_PER_S, 3) if point.changed else None
-    shown = _rounded(sample) if style == "text" else _cell(sample)
+    shown = _rounded(sample) if style == "text" else shown_value(sample)
     return (sample.station, sample.name, shown, value.unit, means, int(value.quality), age, changed, point.count)
 
 
@@ -130,28 +111,7 @@ def _sample(sample: Sample) -> tuple[Cell, ...]:
         iso(sample.time),
         sample.station,
         sample.name,
-        _cell(sample),
-        value.raw,
-        value.unit,
-        int(value.quality),
-        value.how.value,
-        sample.frame,
-        value.words,
-    )
-
-
-def _parquet_row(sample: Sample) -> tuple[Cell, ...]:
-    """A column has one type: a number and a text do not share one."""
-    value = sample.value
-    shown = _cell(sample)
-    text = isinstance(value.value, str)
-    number = None if text else float(value.value)
-    return (
-        sample.time,
-        sample.station,
-        sample.name,
-        number,
-        shown if text else None,
+        shown_value(sample),
         value.raw,
         value.unit,
         int(value.quality),
@@ -164,12 +124,4 @@ def _parquet_row(sample: Sample) -> tuple[Cell, ...]:
 def _rounded(sample: Sample) -> Cell:
     """The value as a text with the digits that its scale makes."""
     value = sample.value
-    return _cell(sample) if isinstance(value.value, str) else number(value.value, value.entry)
-
-
-def _cell(sample: Sample) -> Cell:
-    """The value; text from the wire without its control characters, no number as text."""
-    value = sample.value.value
-    if isinstance(value, str):
-        return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in value)
-    return value if sample.finite else str(value)
+    return shown_value(sample) if isinstance(value.value, str) else number(value.value, value.entry)

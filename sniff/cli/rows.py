@@ -13,12 +13,22 @@ from sniff.analysis.wording import describe, duration, is_error
 from sniff.cli import json_output
 from sniff.engine.session import Session
 from sniff.engine.verdict_join import Settled
+from sniff.formats.parquet import Kind
 
 JSON_KEYS = (
     "no", "t", "start_ns", "end_ns", "proto", "src", "dst", "role", "kind", "ok", "error", "found", "noise_before",
     "tx", "verdict", "latency_ms", "text", "hex",
 )  # fmt: skip
 """Keys of `to_json`, in order: a promise."""
+
+COLUMNS = {
+    **dict.fromkeys(JSON_KEYS, Kind.TEXT),
+    **dict.fromkeys(("no", "start_ns", "end_ns", "src", "dst", "noise_before", "tx"), Kind.INTEGER),
+    "t": Kind.TIME,
+    "ok": Kind.TRUTH,
+    "latency_ms": Kind.NUMBER,
+}
+"""The same as columns with types."""
 
 GOOD_VERDICTS = {"answered", "broadcast", "data", "open"}
 
@@ -78,6 +88,11 @@ def since_start(time: int, session: Session) -> int:
 def json_line(item: Settled, dissector: Dissector, session: Session, with_fields: bool = False) -> str:
     """The object on one line."""
     return json_output.dumps(to_json(item, dissector, session, with_fields))
+
+
+def typed(item: Settled, dissector: Dissector, session: Session) -> list[Any]:
+    """The values of `to_json` in the types of `COLUMNS`: the time is ns since the epoch."""
+    return list({**to_json(item, dissector, session), "t": item.row.event.start}.values())
 
 
 def role_of(item: Settled) -> Role:

@@ -24,6 +24,7 @@ from sniff.engine.capture import Capture
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import Session
 from sniff.engine.verdict_join import Settled
+from sniff.formats.parquet import ParquetWriter
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -32,12 +33,16 @@ def configure(parser: argparse.ArgumentParser) -> None:
     arguments.add_line(parser)
     arguments.add_devices(parser)
     arguments.add_reference(parser)
-    parser.add_argument("--json", action="store_true", help="one JSON object a frame")
+    style = parser.add_mutually_exclusive_group()
+    style.add_argument("--json", action="store_true", help="one JSON object a frame")
+    style.add_argument("--csv", action="store_true", help="comma-separated values, the columns of --json")
+    style.add_argument("--parquet", metavar="OUT", help="the same into a Parquet file: instants, numbers and texts")
+    parser.add_argument("-f", "--force", action="store_true", help="overwrite OUT")
     parser.add_argument("--fields", action="store_true", help="with --json: add every field under Wireshark's names")
     parser.add_argument("-V", dest="tree", action="store_true", help="full tree of each frame")
     parser.add_argument("-x", dest="hex", action="store_true", help="octets of each frame")
     parser.add_argument("-Y", dest="filter", metavar="FILTER", default="", help="only frames that match")
-    parser.add_argument("-T", dest="table", choices=["fields"], help="tab-separated fields, chosen by -e")
+    style.add_argument("-T", dest="table", choices=["fields"], help="tab-separated fields, chosen by -e")
     parser.add_argument("-e", dest="names", metavar="NAME", action="append", default=[], help="a field; repeatable")
     parser.add_argument("-c", "--count", type=int, metavar="N", help="stop after N frames shown")
 
@@ -52,6 +57,13 @@ def run(args: argparse.Namespace) -> int:
     for name in args.names:
         if name not in rows.JSON_KEYS and not name.startswith((*of_protocols, "frame.", "tx.", "line.")):
             raise Failure(f"-e {name}: unknown field{nearest(name, rows.JSON_KEYS)}; --fields lists a capture's", USAGE)
+    with writing.parquet_file(args, rows.COLUMNS) as table:
+        return _show_all(args, table)
+
+
+def _show_all(args: argparse.Namespace, table: ParquetWriter | None) -> int:
+    if args.csv:
+        csv.writer(sys.stdout, lineterminator="\n").writerow(rows.JSON_KEYS)
     left = args.count
     for path, capture in arguments.open_captures(args.files):
         session = arguments.settings_of(args, capture.session, path)
@@ -59,7 +71,7 @@ def run(args: argparse.Namespace) -> int:
         devices = arguments.noted_devices(args, session)
         wanted = _filter(args, dissector)
         spoken = devices if not args.table or "text" in args.names else None
-        left = _show(args, _settled(args, capture, session, spoken, wanted), session, dissector, left)
+        left = _show(args, _settled(args, capture, session, spoken, wanted), session, dissector, left, table)
         writing.say_incomplete(path, capture)
         if left == 0:
             break
@@ -87,12 +99,17 @@ def _show(
     session: Session,
     dissector: Dissector,
     left: int | None,
+    table: ParquetWriter | None,
 ) -> int | None:
     colour = arguments.colour()
-    writer = csv.writer(sys.stdout, delimiter="\t", lineterminator="\n", quoting=csv.QUOTE_MINIMAL)
+    writer = csv.writer(sys.stdout, delimiter="," if args.csv else "\t", lineterminator="\n", quoting=csv.QUOTE_MINIMAL)
     for item in items if left != 0 else ():
         left = None if left is None else left - 1
-        if args.table:
+        if table is not None:
+            table.add(rows.typed(item, dissector, session))
+        elif args.csv:
+            writer.writerow([_cell(value) for value in rows.to_json(item, dissector, session).values()])
+        elif args.table:
             writer.writerow(_cells(item, args.names, dissector, session))
         elif args.json:
             print(rows.json_line(item, dissector, session, args.fields))

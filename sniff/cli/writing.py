@@ -6,6 +6,7 @@ import argparse
 import sys
 import time
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 
 from dissectors.frame import Chunk
@@ -15,7 +16,8 @@ from sniff.cli import UNREADABLE, USAGE, Failure
 from sniff.engine.capture import Capture, CaptureError
 from sniff.engine.engine import Output
 from sniff.engine.session import Item, Session
-from sniff.formats import create
+from sniff.formats import create, parquet
+from sniff.formats.parquet import Kind, ParquetWriter
 from sniff.formats.records import RecordMaker
 
 
@@ -41,7 +43,7 @@ def write(
     `notes`: by row number, for the comments of packets where OUT has such. Ends with exit code 2 when OUT is there.
     """
     target = Path(args.output)
-    _refuse_to_overwrite(target, sources, args.force)
+    refuse_to_overwrite(target, sources, args.force)
     chunks = octets = 0
     progress = _Progress(target.name)
     try:
@@ -74,11 +76,23 @@ def write(
     return octets
 
 
-def _refuse_to_overwrite(target: Path, sources: Sequence[str], force: bool) -> None:
+def refuse_to_overwrite(target: Path, sources: Sequence[str], force: bool) -> None:
+    """Ends with exit code 2 for a file that is there, and always for one of the sources."""
     if target.exists() and any(name != "-" and Path(name).samefile(target) for name in sources):
         raise Failure(f"{target}: is a capture to read; name another file", USAGE)
     if target.exists() and not force and not target.is_char_device():
         raise Failure(f"{target}: exists; add --force to overwrite it", USAGE)
+
+
+def parquet_file(args: argparse.Namespace, columns: Mapping[str, Kind]) -> AbstractContextManager[ParquetWriter | None]:
+    """The table that --parquet names; None without it. Ends with exit code 2 when it cannot be, or is there."""
+    if args.parquet is None:
+        return nullcontext()
+    if not parquet.available():
+        raise Failure("--parquet needs polars: pip install 'sniff485[parquet]'", USAGE)
+    target = Path(args.parquet)
+    refuse_to_overwrite(target, args.files, args.force)
+    return parquet.ParquetWriter(target, columns)
 
 
 def say_incomplete(path: str, capture: Capture) -> None:

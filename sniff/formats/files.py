@@ -100,7 +100,7 @@ class NewFile:
         except OSError as error:
             raise explain(path, error) from None
 
-    def write(self, octets: bytes) -> None:
+    def write(self, octets: bytes | memoryview) -> None:
         """Append; what cannot be written gives the file up."""
         try:
             self.stream.write(octets)

@@ -7,12 +7,14 @@ does not go into one process with scapy.
 from __future__ import annotations
 
 import importlib.util
+import io
 from collections.abc import Mapping, Sequence
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sniff.engine.capture import CaptureError
+from sniff.formats.files import NewFile
 
 if TYPE_CHECKING:
     import polars as pl
@@ -29,6 +31,7 @@ class Kind(Enum):
     TEXT = "text"
     NUMBER = "number"
     INTEGER = "integer"
+    TRUTH = "truth"
 
 
 def available() -> bool:
@@ -37,14 +40,14 @@ def available() -> bool:
 
 
 class ParquetWriter:
-    """A table that grows; the file comes at `close`.
+    """A table that grows; the file has its name only when it is whole, at `close`. Raises CaptureError.
 
     A context manager: after a capture that turned out to be damaged, what came before is written; after any other
     exception nothing.
     """
 
     def __init__(self, path: Path, columns: Mapping[str, Kind]) -> None:
-        self._path = path
+        self._file = NewFile(path)
         self._columns = columns
         self._rows: list[Sequence[Any]] = []
         self._parts: list[pl.DataFrame] = []
@@ -60,10 +63,10 @@ class ParquetWriter:
         import polars as pl
 
         self._gather()
-        try:
-            pl.concat(self._parts).write_parquet(self._path)
-        except OSError as error:
-            raise CaptureError(f"{self._path}: {error.strerror or error}") from None
+        made = io.BytesIO()  # polars does not say what the system says of a file
+        pl.concat(self._parts).write_parquet(made)
+        self._file.write(made.getbuffer())
+        self._file.close()
 
     def __enter__(self) -> ParquetWriter:
         return self
@@ -71,6 +74,8 @@ class ParquetWriter:
     def __exit__(self, kind: type[BaseException] | None, *exc: object) -> None:
         if kind is None or issubclass(kind, CaptureError):
             self.close()
+        else:
+            self._file.discard()
 
     def _gather(self) -> None:
         import polars as pl
@@ -80,6 +85,7 @@ class ParquetWriter:
             Kind.TEXT: pl.String(),
             Kind.NUMBER: pl.Float64(),
             Kind.INTEGER: pl.Int64(),
+            Kind.TRUTH: pl.Boolean(),
         }
         schema = {name: types[kind] for name, kind in self._columns.items()}
         self._parts.append(pl.DataFrame(self._rows, schema=schema, orient="row"))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import json
 import os
 from collections.abc import Callable
@@ -171,3 +173,51 @@ def test_a_name_that_is_no_text(sniff485: Callable, tmp_path: Path) -> None:
     for out in ("out.mcap", "out.cap.txt", "out.pcapng"):
         assert sniff485("convert", log, tmp_path / out).code == 0
         assert "\\udcff.log" in sniff485("info", tmp_path / out).out
+
+
+def test_csv_has_the_values_of_json(poll: Path, sniff485: Callable) -> None:
+    expected = [json.loads(line) for line in sniff485("show", "--json", poll).out.splitlines()]
+    ran = sniff485("show", "--csv", poll)
+    assert ran.code == 0
+    assert ran.out.splitlines()[0] == ",".join(KEYS)
+    rows = list(csv.DictReader(io.StringIO(ran.out)))
+    assert len(rows) == len(expected) > 1
+    for row, wanted in zip(rows, expected, strict=True):
+        told = {key: int(value) if isinstance(value, bool) else value for key, value in wanted.items()}
+        assert row == {key: "" if value is None else str(value) for key, value in told.items()}
+
+
+def test_csv_has_one_heading_and_takes_filters(poll: Path, sniff485: Callable) -> None:
+    out = sniff485("show", "--csv", poll, poll, "-Y", "verdict == no-response").out
+    assert [line.split(",")[0] for line in out.splitlines()] == ["no", "4", "4"]
+
+
+def test_no_cell_of_csv_is_a_formula(poll: Path, sniff485: Callable, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sniff.cli.rows.describe", lambda dissector, row: "=1+1,\n2")
+    rows = list(csv.DictReader(io.StringIO(sniff485("show", "--csv", poll, "-c", "1").out)))
+    assert [row["text"] for row in rows] == ["'=1+1,\n2"]
+
+
+def test_parquet_has_the_values_of_json(poll: Path, sniff485: Callable, tmp_path: Path) -> None:
+    pl = pytest.importorskip("polars", reason="needs polars, the extra parquet")
+    expected = [json.loads(line) for line in sniff485("show", "--json", poll).out.splitlines()]
+    target = tmp_path / "out.parquet"
+    assert sniff485("show", poll, "--parquet", target).code == 0
+    table = pl.read_parquet(target)
+    assert table.columns == KEYS
+    assert (table["t"].dtype, table["ok"].dtype) == (pl.Datetime("ns", "UTC"), pl.Boolean)
+    assert table.drop("t").to_dicts() == [{key: row[key] for key in row if key != "t"} for row in expected]
+    assert table["t"].dt.to_string("%Y-%m-%dT%H:%M:%S%.9fZ").to_list() == [row["t"] for row in expected]
+
+
+def test_parquet_overwrites_nothing_unasked(poll: Path, sniff485: Callable, tmp_path: Path) -> None:
+    pytest.importorskip("polars", reason="needs polars, the extra parquet")
+    target = tmp_path / "out.parquet"
+    target.write_text("precious")
+    assert sniff485("show", poll, "--parquet", target).code == 2
+    assert target.read_text() == "precious"
+    assert sniff485("show", poll, "--parquet", poll, "-f").code == 2
+    assert sniff485("show", poll, "--parquet", tmp_path / "no" / "where").code == 3
+    assert sniff485("show", poll, "--parquet", target, "-f", "-c", "2").code == 0
+    assert target.read_bytes()[:4] == b"PAR1"
+    assert [path.name for path in tmp_path.iterdir() if path.name.startswith(".")] == []

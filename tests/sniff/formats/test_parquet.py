@@ -84,3 +84,21 @@ def test_nothing_is_overwritten_and_no_folder_is_a_line(tmp_path: Path, capsys: 
     assert there.read_text() == "precious"
     assert main(["points", capture, "--parquet", str(tmp_path / "no" / "where.parquet")]) == 3
     assert len(capsys.readouterr().err.splitlines()) == 1
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full here")
+@pytest.mark.parametrize("command", ["points", "show"])
+def test_a_full_disk_is_a_line(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([command, str(CAPTURES / "rtu-clean.cap.txt"), "--parquet", "/dev/full", "-f"]) == 3
+    assert "no space left" in capsys.readouterr().err
+
+
+def test_after_a_defect_there_is_no_file(tmp_path: Path) -> None:
+    def write() -> None:
+        with ParquetWriter(tmp_path / "never.parquet", COLUMNS) as table:
+            table.add((1, "whole", 1.0, 1))
+            raise KeyError
+
+    with pytest.raises(KeyError):
+        write()
+    assert list(tmp_path.iterdir()) == []
