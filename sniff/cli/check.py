@@ -18,6 +18,7 @@ from sniff.bus.offline import survey
 from sniff.cli import INTERRUPTED, PORT_TROUBLE, UNREADABLE, USAGE, Failure, arguments, check_output
 from sniff.cli.check_output import Checked
 from sniff.cli.interruption import until_interrupted
+from sniff.cli.progress import Watched
 from sniff.engine.capture import Capture
 from sniff.engine.engine import Output
 from sniff.engine.follow_settings import dissector_for
@@ -99,7 +100,7 @@ def _read(source: str, capture: Capture, args: argparse.Namespace) -> Checked:
     run_of = Checking(
         BusModel(session, dissector_for(session), arguments.noted_devices(args, session), with_points=False)
     )
-    survey(capture, session, run_of.model, run_of, reference=args.reference)
+    survey(Watched(capture), session, run_of.model, run_of, reference=args.reference)
     complete = capture.completeness()
     notes = [] if complete.whole else [complete.text]
     if session.unknown:

@@ -14,6 +14,7 @@ from sniff.analysis.plain import plain
 from sniff.analysis.summary import Summary, ranked
 from sniff.bus.offline import survey
 from sniff.cli import arguments, json_output
+from sniff.cli.progress import Watched
 from sniff.cli.rows import iso
 from sniff.engine.capture import Capture
 from sniff.engine.engine import Output
@@ -52,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _summarise(capture: Capture, session: Session, reference: bool) -> tuple[Summary, list[LineEvent]]:
     summary, happened = Summary(session.line), _Happened()
-    survey(capture, session, summary, happened, reference=reference)
+    survey(Watched(capture), session, summary, happened, reference=reference)
     return summary, happened.events
 
 

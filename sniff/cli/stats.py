@@ -22,6 +22,7 @@ from sniff.analysis.wording import station_word
 from sniff.bus.model import BusModel
 from sniff.bus.offline import survey
 from sniff.cli import USAGE, Failure, arguments, tables
+from sniff.cli.progress import Watched
 from sniff.cli.rows import iso
 from sniff.cli.tables import Cell
 from sniff.devices import noted_devices
@@ -71,11 +72,11 @@ def run(args: argparse.Namespace) -> int:
     if table == "health":
         devices = noted_devices(session)
         model = BusModel(session, dissector_for(session), devices, with_points=False)
-        survey(source, session, model, reference=args.reference)
+        survey(Watched(source), session, model, reference=args.reference)
         tables.write(HEALTH_HEADINGS, _health(model.health(), station_word(session.protocol)), args.style)
         return 0
     summary, kinds = Summary(session.line), _Kinds()
-    survey(source, session, summary, kinds, reference=args.reference)
+    survey(Watched(source), session, summary, kinds, reference=args.reference)
     if table == "nodes":
         nodes = [_node(node) for node in summary.nodes.present()]
         if nodes or args.style != "text":

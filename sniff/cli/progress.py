@@ -1,0 +1,63 @@
+"""Progress on standard error, on a terminal only, of what takes longer than half a second."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, TextIO, TypeVar
+
+from sniff.bus.offline import Source
+from sniff.engine.session import Item, LineEvent
+
+if TYPE_CHECKING:
+    from sniff.engine.blocks import Block
+
+AFTER, EVERY = 0.5, 0.2
+"""Seconds until it is first said, and again."""
+
+Read = TypeVar("Read")
+
+
+class Watched:
+    """A capture whose reading is told. `clock`: seconds."""
+
+    def __init__(
+        self, capture: Source, stream: TextIO | None = None, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._capture = capture
+        self._stream = sys.stderr if stream is None else stream
+        self._clock = clock
+
+    def items(self) -> Iterator[Item]:
+        """What the capture gives."""
+        return self._told(self._capture.items(), lambda item: len(getattr(item, "octets", b"")))
+
+    def blocks(self) -> Iterator[Block | LineEvent]:
+        """What the capture gives."""
+        return self._told(
+            self._capture.blocks(), lambda block: 0 if isinstance(block, LineEvent) else len(block.reads.octets)
+        )
+
+    def _told(self, parts: Iterator[Read], octets_of: Callable[[Read], int]) -> Iterator[Read]:
+        if not self._stream.isatty():
+            yield from parts
+            return
+        began = self._clock()
+        due, octets, said = began + AFTER, 0, False
+        try:
+            for part in parts:
+                yield part
+                octets += octets_of(part)
+                now = self._clock()
+                if now >= due:
+                    due, said = now + EVERY, True
+                    print(
+                        f"\rreading: {octets:,} octets, {now - began:.0f} s\x1b[K",
+                        end="",
+                        file=self._stream,
+                        flush=True,
+                    )
+        finally:
+            if said:
+                print("\r\x1b[K", end="", file=self._stream, flush=True)
