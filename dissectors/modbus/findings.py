@@ -23,6 +23,7 @@ from dissectors.modbus.judgement import judge
 from dissectors.modbus.learnt import READ, Learnt
 from dissectors.modbus.response_groups import Answered
 from dissectors.modbus.station_record import Lost, Station
+from dissectors.modbus.torn import TornFrames
 from dissectors.tracker import Placement, Transaction, Verdict
 
 MS = 1_000_000
@@ -44,6 +45,7 @@ _STRAY_KEPT = 600  # octets, more than the longest frame; of more nothing is sai
 _EXCESS_KEPT = 256
 _WORDS_KEPT = 16
 _TALKED_OVER = 3  # octets by which an answer must be too long before somebody else has spoken
+_MAY_BE_TORN = (Verdict.DAMAGED_ANSWER, Verdict.DAMAGED_REQUEST, Verdict.NO_RESPONSE)
 _SETTLED_ELSEWHERE = (Verdict.ECHO, Verdict.DATA, Verdict.OPEN, Verdict.BROADCAST)
 
 
@@ -72,6 +74,8 @@ class ModbusFindings:
         self._lost: dict[int, Lost] = {}  # requests without answer, by transaction
         self._begins: set[bytes] = set()  # the first octets of good requests
         self._late_read = 0  # the newest frame that was read later than the adapter explains
+        self._torn = TornFrames()
+        self._bad_ends: dict[int, tuple[int, int, Frame]] = {}  # damaged answers (station, row), by transaction
         self._marked: deque[int] = deque(maxlen=64)  # transactions with line errors in what came in answer
         self._waits: dict[int, int] = {}  # by request that nothing followed: until the next one, ns
         self._final: dict[int, bytes] = {}  # the last answers, by transaction
@@ -86,6 +90,8 @@ class ModbusFindings:
         if self._is_cut_echo(event):
             seen.cut_echoes.add(event.start, no)
             return
+        tx = self._newest if placement is None or header is None else placement.tx
+        self._torn.see(no, event, tx, is_good_frame=header is not None and header.ok)
         if isinstance(event, Noise) or header is None or placement is None:
             self._gather(event)
             self._see_broken(no, event, event.octets)
@@ -117,6 +123,7 @@ class ModbusFindings:
         code = self._codes.pop(transaction.id, 0)
         answer = self._answers.pop(transaction.id, b"")
         stray, flaw = self._stray.pop(transaction.id, b""), self._flaws.pop(transaction.id, None)
+        ended = self._bad_ends.pop(transaction.id, None)
         verdict = transaction.verdict
         if verdict in _SETTLED_ELSEWHERE:
             if verdict is Verdict.ECHO:
@@ -130,6 +137,10 @@ class ModbusFindings:
         damaged = verdict in (Verdict.DAMAGED_ANSWER, Verdict.DAMAGED_REQUEST)
         if damaged and self._late_read >= (transaction.request or transaction.response or 0):
             return  # a frame was torn by a late read, not spoilt
+        if self._is_torn(transaction, asked):
+            return
+        if ended is not None:
+            self._see_end(*ended)
         if verdict is Verdict.DAMAGED_REQUEST:
             self._seen.damaged_requests.add(transaction.start, transaction.request)
             if flaw is not None:
@@ -247,10 +258,9 @@ class ModbusFindings:
             self._damaged.append(placement.tx)
             self._gather(frame)
             self._note_flaw(placement.tx, frame)
-            station = self._station(placement.source)
-            station.cut += frame.damage is Damage.SHORT
-            if _ends_badly(frame):
-                station.last_octet.add(frame.end, no)
+            self._bad_ends[placement.tx] = placement.source, no, frame
+            if len(self._bad_ends) > _OPEN_KEPT:
+                self._bad_ends.clear()
 
     def _see_noise(self, no: int, event: Event) -> None:
         if self._broadcast is not None and event.start - self._broadcast.frame.end < TURNAROUND:
@@ -272,6 +282,26 @@ class ModbusFindings:
         return asked.octets[1:] == before.octets[1:] and (before.unit, asked.unit) in self._seen.pairs
 
     # ---- transactions
+
+    def _is_torn(self, transaction: Transaction, asked: Asked | None) -> bool:
+        """Whether a late read made of it what it seems; where a station's frames are so often, it is the station."""
+        verdict, torn = transaction.verdict, self._torn
+        if verdict in (Verdict.UNSOLICITED, Verdict.LATE, Verdict.ANSWERED_TWICE):
+            return torn.may_answer(transaction.response)
+        is_either = asked is not None and asked.header.role is Role.EITHER
+        if verdict is Verdict.NO_RESPONSE and is_either and torn.may_answer(transaction.request):
+            return True  # no request, but the confirmation of the one that was torn
+        if verdict not in _MAY_BE_TORN or not torn.is_torn(transaction.id):
+            return False
+        unit = transaction.station
+        return unit is None or torn.is_seldom(unit, self._station(unit).asked)
+
+    def _see_end(self, unit: int, no: int, frame: Frame) -> None:
+        """How a damaged answer of a station, in that row, ended."""
+        station = self._station(unit)
+        station.cut += frame.damage is Damage.SHORT
+        if _ends_badly(frame):
+            station.last_octet.add(frame.end, no)
 
     def _settle_unasked(self, transaction: Transaction) -> None:
         """An answer that fits no request: of another unit than the one asked, or of nobody's asking."""
@@ -331,7 +361,7 @@ class ModbusFindings:
             return
         station.answered += 1
         station.copies += answer == asked.octets
-        if transaction.latency is not None:
+        if transaction.latency is not None and not self._torn.is_torn(transaction.id):
             station.times.add(transaction.latency)
             if asked.header.ok and transaction.attempt == 1:
                 self._learnt.answered(transaction.station or 0, READ, transaction.latency.nominal)

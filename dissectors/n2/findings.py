@@ -92,8 +92,8 @@ class N2Findings:
             self._add_bad(sent, no, event)
 
     def _add_bad(self, sender: Damages, no: int, event: Frame) -> None:
-        if self._torn.is_late(event):
-            return  # its begin may have been read before
+        if self._torn.is_late(event) or self._torn.completes(no):
+            return  # its begin was read before, or may have been
         sender.add_bad(event.end, no, event.repair.flaw if event.repair is not None else None)
         self._torn.struck(sender)
 
@@ -103,18 +103,21 @@ class N2Findings:
         code = self._codes.pop(transaction.id, "")
         verdict = transaction.verdict
         if verdict is Verdict.UNSOLICITED:
-            if transaction.response != self._bad:
+            if transaction.response != self._bad and not self._torn.may_answer(transaction.response):
                 self._stray.add(transaction.start, transaction.response)
             return
         if transaction.station is None or verdict in _NOT_JUDGED:
             return
         station = self._station(transaction.station)
         if verdict is Verdict.ANSWERED_TWICE:
-            if self._torn.is_torn(transaction.of, transaction.response):
+            response = transaction.response
+            if self._torn.is_torn(transaction.of, response) or self._torn.may_answer(response):
                 return  # to what was torn, perhaps
             same = self._answers.get(transaction.id) == self._answers.get(transaction.of or 0)
             (station.repeated if same else station.twice).add(transaction.start, transaction.response)
         elif verdict is Verdict.LATE:
+            if self._torn.may_answer(transaction.response):
+                return  # the command that it answers was torn
             station.late.add(transaction.start, transaction.response)
             station.missing.take_back(transaction.of)
             self._masters.see_late(transaction, station)
@@ -127,6 +130,8 @@ class N2Findings:
         verdict = transaction.verdict
         if transaction.response is None:
             if verdict is Verdict.NO_RESPONSE:
+                if self._torn.is_answered(transaction.request):
+                    return
                 station.missing.add(transaction.id, transaction.end, transaction.request)
             elif verdict is Verdict.DAMAGED_ANSWER and not self._torn.is_torn(transaction.id, transaction.request):
                 station.sent.add_bad(transaction.end, transaction.request)

@@ -18,6 +18,7 @@ from sniff.analysis.other_settings import SAMPLE_OCTETS, Fit, other_protocol, wh
 from sniff.analysis.sender_findings import BUS, WRONG, Senders
 from sniff.analysis.slower_bus import slower_by
 from sniff.analysis.time_patterns import TimePatterns
+from sniff.analysis.unsure_strays import UnsureStrays
 from sniff.analysis.wording import station_word
 from sniff.engine.engine import Row
 from sniff.engine.session import LineEvent, LineEventKind, Session
@@ -63,6 +64,7 @@ class LineFindings:
         self._before_ok = True  # the newest frame
         self._awaiting = False  # a request was the newest frame of a known kind
         self._pending: list[tuple[int, Noise]] = []  # noise directly before the frame to come
+        self._begins = UnsureStrays()  # noise that may be the begin of the frame to come
         self._sample: list[Chunk] = []  # what came first, to ask what else it may be
         self._sampled = 0
         self._rests: list[bytes] = []  # the first stretches that are no frame
@@ -157,6 +159,9 @@ class LineFindings:
         if frame.slack <= self._session.timing.latency + READ_LATE:
             for no, noise in self._pending:
                 self._senders.stray(sender, "LN201", no, noise)
+            self._begins.forget()
+        else:
+            self._begins.take_back(self._senders)
         self._pending.clear()  # before a frame that was read late they are the rest of one that was torn
         return sender
 
@@ -165,7 +170,7 @@ class LineFindings:
             return
         if self._rows == 1:  # the capture began in the middle of something
             return
-        of_damaged = noise.place is Place.AFTER and not self._before_ok  # where a damaged frame ends nobody knows
+        of_damaged = noise.place is not Place.BETWEEN and not self._before_ok  # where a damaged frame ends nobody knows
         if len(noise.octets) > STRAY_MOST or of_damaged:
             self._rest.add(noise.start, no)
             self._rest_octets += len(noise.octets)
@@ -178,9 +183,9 @@ class LineFindings:
             self._pending.append((no, noise))
             del self._pending[:-8]
         elif noise.place is Place.AFTER and self._senders.before is not None:
-            self._senders.stray(self._senders.before, "LN202", no, noise)
+            self._begins.add(self._senders, self._senders.before, "LN202", no, noise)
         else:
-            self._senders.stray(BUS, "LN203", no, noise)
+            self._begins.add(self._senders, BUS, "LN203", no, noise)
 
     # ---- judging
 

@@ -116,6 +116,15 @@ class Senders:
         sender.stray.setdefault(code, Tally()).add(noise.start, no)
         sender.values.update((code, octet) for octet in noise.octets)
 
+    def put_back(self, name: str, code: str, noise: Noise, before: Tally | None) -> None:
+        """Forget the newest stray octets of a sender by a rule; `before`: what was counted of them until then."""
+        sender = self.of(name)
+        if before is None:
+            sender.stray.pop(code, None)
+        else:
+            sender.stray[code] = before
+        sender.values -= Counter((code, octet) for octet in noise.octets)
+
     def _see_packet(self, name: str, no: int, frame: Frame, wrong: list[Mark]) -> None:
         """Gather who sent in one packet with a flag: its marks run from octet to octet, over frames."""
         if not wrong:

@@ -1,6 +1,8 @@
 """Damage of frames that a late read tore is nobody's; any other damage stays."""
 
-from dissectors.frame import Check, Damage, Found, Frame
+from dataclasses import replace
+
+from dissectors.frame import Check, Damage, Flaw, Found, Frame, Noise, Place, Reason, Repair
 from dissectors.line import LineSettings, Timing
 from dissectors.n2.record import Damages
 from dissectors.n2.torn import TornFrames
@@ -40,3 +42,41 @@ def test_pieces_that_make_a_good_frame_are_no_damage() -> None:
 
 def test_other_damage_stays() -> None:
     assert _struck_by(_frame(b"A00400", damage=Damage.TIMEOUT), _frame(b">0104C5\r")) == 1
+
+
+def test_pieces_are_put_together_as_they_were_heard() -> None:
+    """The last one alone looks like a refusal with its first octet spoilt, which is no part of the whole."""
+    torn = TornFrames(TIMING)
+    seems = Repair(Flaw.FIRST_SPOILT, b"NE4\r")
+    torn.see(0, _frame(b"A0040000", damage=Damage.TIMEOUT), 1, is_good_frame=False)
+    torn.see(1, Noise(b"00", 0, 1, Place.BEFORE, Reason.NO_DELIMITER), None, is_good_frame=False)
+    torn.see(2, replace(_frame(b"0E4\r", damage=Damage.FORM), repair=seems), 1, is_good_frame=False)
+    assert torn.completes(2)
+    assert torn.is_torn(1, None)
+
+
+def test_an_acknowledgement_has_no_check_and_is_whole_all_the_same() -> None:
+    torn = TornFrames(TIMING)
+    torn.see(0, _frame(b"A", damage=Damage.TIMEOUT), 1, is_good_frame=False)
+    torn.see(1, Noise(b"\r", 0, 1, Place.BEFORE, Reason.PAD), None, is_good_frame=False)
+    assert torn.is_torn(1, None)
+
+
+def test_what_is_behind_a_torn_command_may_answer_it() -> None:
+    torn = TornFrames(TIMING)
+    torn.see(0, _frame(b">0104", damage=Damage.TIMEOUT), 1, is_good_frame=False)
+    torn.see(1, _frame(b"C5\r", damage=Damage.FORM), 1, is_good_frame=False)
+    torn.see(2, _frame(b"A\r"), 1, is_good_frame=True)
+    torn.see(3, _frame(b"A\r"), 1, is_good_frame=True)
+    assert torn.may_answer(2)
+    assert not torn.may_answer(3)
+    assert not torn.may_answer(None)
+
+
+def test_an_answer_torn_to_noise_is_one() -> None:
+    torn = TornFrames(TIMING)
+    torn.see(0, _frame(b">0104C5\r"), 1, is_good_frame=True)
+    torn.see(1, Noise(b"N1", 0, 1, Place.AFTER, Reason.NO_DELIMITER), None, is_good_frame=False)
+    torn.see(2, Noise(b"1\r", 0, 1, Place.BEFORE, Reason.NO_DELIMITER), None, is_good_frame=False)
+    assert torn.is_answered(0)
+    assert not torn.is_answered(1)

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 import pytest
 
-from dissectors.frame import Noise, Place, Reason
+from dissectors.findings import Severity
+from dissectors.frame import Check, Damage, Found, Frame, Noise, Place, Reason
 from dissectors.line import LineSettings
 from sniff.analysis.line_findings import LineFindings
 from sniff.engine.engine import Row
@@ -29,3 +30,40 @@ def test_mostly_needs_a_majority(octets: Sequence[int], said: str) -> None:
         line.see(Row(no, noise, None, None))
     (finding,) = (finding for finding in line.findings() if finding.code == "LN203")
     assert finding.seen == f"stray octets {len(octets)} times in the silence between 0 frames{said}"
+
+
+def _hear(line: LineFindings, *, slack: int = 0, damage: Damage | None = None, rounds: int = 30) -> Severity | None:
+    """Octets between frames, again and again; how grave what is said of them is."""
+    second = 1_000_000_000
+    octets = bytes.fromhex("01 03 00 00 00 01 84 0A")
+    for no in range(2, 4 * rounds, 4):
+        time = no * second
+        before = Frame("modbus-rtu", octets, time, time, Check.GOOD, Found.GAP, damage)
+        line.see(Row(no, before, None, None))
+        place = Place.BEFORE if damage else Place.AFTER
+        line.see(Row(no + 1, Noise(b"\x01", time + second, time + second, place, Reason.NO_FRAME), None, None))
+        late = Frame("modbus-rtu", octets, time + 2 * second, time + 2 * second, Check.GOOD, Found.GAP, slack=slack)
+        line.see(Row(no + 2, late, None, None))
+    return next((one.severity for one in line.findings() if one.code in ("LN201", "LN202", "LN203")), None)
+
+
+def _line() -> LineFindings:
+    return LineFindings(Session(port="test", line=LineSettings(), protocol="modbus-rtu"))
+
+
+def test_octets_before_a_frame_that_was_read_late_may_be_its_begin() -> None:
+    assert _hear(_line(), slack=90_000_000) is None
+    assert _hear(_line()) is Severity.WARNING
+
+
+def test_octets_behind_a_damaged_frame_may_be_its_end() -> None:
+    assert _hear(_line(), damage=Damage.CHECK) is None
+
+
+def test_only_what_is_directly_before_a_late_frame_is_taken_back() -> None:
+    kept, late = _line(), _line()
+    assert _hear(kept) is not None
+    assert _hear(late) is not None
+    _hear(late, slack=90_000_000, rounds=3)
+    said = [{one.code: one.count for one in line.findings() if one.code.startswith("LN20")} for line in (kept, late)]
+    assert said[0] == said[1]
