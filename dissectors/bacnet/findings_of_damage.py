@@ -44,6 +44,12 @@ def damage(ring: Ring) -> Iterable[Remark]:
         yield plain("MS403", ring, None, seen, ring.noise)
 
 
+def _is_there(node: Node) -> bool:
+    """Whether more than damaged headers speak for a station: it sent a good frame, or was asked or given the token. Two
+    that talk at once make headers of stations that there are not."""
+    return _sent(node) > node.damaged or node.tokens_received > 0 or node.requests_received > 0
+
+
 def _is_its_own(ring: Ring, node: Node) -> bool:
     """Whether a station has more damaged frames than noise that hits everybody brings, by its share of the octets."""
     own = node.octets + node.damaged_octets
@@ -59,7 +65,7 @@ def _of_one(ring: Ring, mac: int, node: Node) -> Iterable[Remark]:
     if node.cut_last >= DAMAGED_LEAST and node.cut_last >= AT_END_SHARE * node.damaged:
         seen = f"{node.cut_last} of its {sent} frames lack their last octet, or it is wrong; all before it is right"
         yield plain("MS405", ring, mac, seen, node.cut_last)
-    if node.damaged > DAMAGED_OF_ONE_SHARE * sent:
+    if node.damaged > DAMAGED_OF_ONE_SHARE * sent and _is_there(node):
         seen = f"{node.damaged} of its {sent} frames damaged"
         if replies:
             seen += f", {replies} of them answers"
