@@ -6,7 +6,8 @@ functions raise is shown at the frame it was about (`plugin_guard.py`).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import sys
+from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
@@ -37,7 +38,7 @@ class BrokenPlugin(UnknownProtocol):
 
 def names() -> tuple[str, ...]:
     """Names of all protocols, built-in first."""
-    plugged = sorted(point.name for point in entry_points(group=GROUP) if point.name not in BUILT_IN)
+    plugged = sorted(point.name for point in _plugged_points() if point.name not in BUILT_IN)
     return (*BUILT_IN, *plugged)
 
 
@@ -47,7 +48,7 @@ def get(name: str) -> Dissector:
     if target is not None:
         found = _built_in(target)
     else:
-        for point in entry_points(group=GROUP):
+        for point in _plugged_points():
             if point.name == name:
                 return _plugged(point)
         else:
@@ -61,6 +62,17 @@ def _built_in(target: str) -> Dissector:
     found = getattr(import_module(module), name)
     assert isinstance(found, Dissector)
     return found
+
+
+def _plugged_points() -> tuple[EntryPoint, ...]:
+    """What other packages bring, as long as the same places are looked at."""
+    return _points(entry_points, tuple(sys.path))
+
+
+@cache
+def _points(read: Callable[..., Iterable[EntryPoint]], path: tuple[str, ...]) -> tuple[EntryPoint, ...]:
+    """Reads the metadata of every installed package, which takes milliseconds: whoever has a row may ask."""
+    return tuple(read(group=GROUP))
 
 
 def usable() -> tuple[Dissector, ...]:

@@ -45,7 +45,7 @@ class LineFindings:
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        self._nouns = cache(station_word)  # to ask for the installed protocols takes longer than a frame may
+        self._nouns = cache(station_word)  # asked for every frame
         self._patterns = TimePatterns(session)
         self._use = LineUse(session.line)
         adapter = session.adapter
