@@ -23,7 +23,7 @@ import numpy.typing as npt
 
 from dissectors.frame import Check, Damage, Found, Frame, Header, Role
 from dissectors.line import Timing
-from dissectors.tracker import Verdict
+from dissectors.tracker import Interval, Transaction, Verdict
 
 if TYPE_CHECKING:
     from dissectors.framer import Framer
@@ -248,6 +248,26 @@ class TransactionColumns:
     def take(self, which: slice | Masks | Times) -> TransactionColumns:
         """Some of them."""
         return replace(self, **{one.name: getattr(self, one.name)[which] for one in fields(self)[:-1]})
+
+    def transaction(self, place: int) -> Transaction:
+        """The transaction that an entry stands for."""
+        latency = None
+        if self.latency[place] != NONE:
+            latency = Interval(int(self.latency[place]), int(self.least[place]), int(self.most[place]))
+        return Transaction(
+            int(self.id[place]),
+            some(self.station[place]),
+            self.names[self.kind[place]],
+            some(self.request[place]),
+            some(self.response[place]),
+            VERDICTS[self.verdict[place]],
+            int(self.start[place]),
+            int(self.end[place]),
+            latency,
+            int(self.attempt[place]),
+            some(self.of[place]),
+            self.names[self.error[place]] if self.error[place] else None,
+        )
 
 
 def counted(*keys: npt.NDArray[np.integer[Any]]) -> Iterator[tuple[tuple[int, ...], int]]:

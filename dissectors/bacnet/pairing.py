@@ -24,7 +24,7 @@ from dissectors.bacnet.frame_types import HEADER
 from dissectors.bacnet.past_exchanges import Entry, Nets, PastExchanges
 from dissectors.bacnet.placed_rows import CODE, POLL_REPLY, REQUEST, TOKEN, WAITS, PlacedRows
 from dissectors.bacnet.tracker import LATE_WITHIN, POSTPONED_FOR, REMEMBERED, SEGMENTS_FOR, MstpTracker
-from dissectors.columns import CHECKS, FOUNDS, NONE, ROLES, FrameColumns, PlacementColumns, TransactionColumns
+from dissectors.columns import NONE, ROLES, FrameColumns, PlacementColumns, TransactionColumns
 from dissectors.frame import Frame, Role
 from dissectors.tracker import Interval, Verdict
 
@@ -268,19 +268,7 @@ class Pairing:
         return self.octets[begin : begin + int(self.frames.length[row])].tobytes()
 
     def _frame(self, row: int) -> Frame:
-        frames = self.frames
-        return Frame(
-            "mstp",
-            self._octets_of(row),
-            int(frames.start[row]),
-            int(frames.end[row]),
-            CHECKS[frames.check[row]],
-            FOUNDS[frames.found[row]],
-            None,
-            int(frames.expected[row]),
-            0,
-            int(self._slack[row]),
-        )
+        return self.frames.frame(row, self.octets, "mstp", int(self._slack[row]))
 
     def exchange(self, row: int, stretch: _Stretch) -> Exchange:
         """What a row of a stretch opened, as the tracker holds it."""

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from dissectors.columns import CHECKS, DAMAGES, FOUNDS, NONE, ROLES, VERDICTS, Masks, Times
-from dissectors.frame import Check, Frame
+from dissectors.columns import DAMAGES, FOUNDS, NONE, ROLES, VERDICTS, Masks, Times
+from dissectors.frame import Frame
 from sniff.engine.engine import Row
 from sniff.engine.table import Table
 
@@ -179,7 +179,7 @@ class TableColumns:
             "t": frames.start,
             "start_ns": frames.start,
             "end_ns": frames.end,
-            "ok": table.is_frame & (frames.damage == 0) & (frames.check != CHECKS.index(Check.BAD)),
+            "ok": table.good,
             "noise_before": np.zeros(count),
             "len": frames.length,
         }

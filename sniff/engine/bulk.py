@@ -138,7 +138,7 @@ class _Leg:
 
     def _clean(self, stretch: Clean) -> Table:
         """Rows of a kernel: paired by columns as far as that is certain, by the tracker where it is not."""
-        table = stretch.table(self.dissector.name, self.next, self._late.slack(stretch.ends))
+        table = stretch.table(self.dissector.name, self.next, self._late.slack(stretch.columns.end))
         make = self.dissector.pairing
         if make is None:
             return self._placed(list(table.rows()))

@@ -37,11 +37,6 @@ class Clean:
     columns: FrameColumns
     octets: Octets
 
-    @property
-    def ends(self) -> Times:
-        """ns, when each ended."""
-        return self.columns.end
-
     def table(self, protocol: str, first: int, slack: Times) -> Table:
         """The rows as a table that nobody has placed yet."""
         count = len(self.columns)
@@ -69,7 +64,6 @@ class BulkFraming:
         self._given = 0  # octets of the stream that are in rows
         self._base = 0  # octets of the stream before the block at work
         self._before: int | None = None  # nominal end of the newest octet
-        self._events: list[Event] = []
 
     def take(self, block: Block) -> list[Stretch]:
         """Take the reads that follow; give the rows that are certain by now."""

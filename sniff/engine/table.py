@@ -29,7 +29,7 @@ from dissectors.columns import (
     some,
 )
 from dissectors.frame import Check, Frame
-from dissectors.tracker import Interval, Placement, Transaction
+from dissectors.tracker import Placement, Transaction
 from sniff.engine.engine import Output, Row
 
 _CHECKS = {one: at for at, one in enumerate(CHECKS)}
@@ -152,24 +152,7 @@ class Table:
 
     def transaction(self, place: int) -> Transaction:
         """The transaction that closed as number `place` of the table, from 0."""
-        held = self.transactions
-        latency = None
-        if held.latency[place] != NONE:
-            latency = Interval(int(held.latency[place]), int(held.least[place]), int(held.most[place]))
-        return Transaction(
-            int(held.id[place]),
-            some(held.station[place]),
-            held.names[held.kind[place]],
-            some(held.request[place]),
-            some(held.response[place]),
-            VERDICTS[held.verdict[place]],
-            int(held.start[place]),
-            int(held.end[place]),
-            latency,
-            int(held.attempt[place]),
-            some(held.of[place]),
-            held.names[held.error[place]] if held.error[place] else None,
-        )
+        return self.transactions.transaction(place)
 
 
 def joined(protocol: str, first: int, parts: Sequence[Table]) -> Table:

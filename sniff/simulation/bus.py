@@ -20,8 +20,8 @@ from typing import Any
 
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
+from dissectors.simulated_faults import Fault
 from sniff.simulation import hub
-from sniff.simulation.faults import Fault
 from sniff.simulation.hub import NO_STATIONS, Plan, Report
 from sniff.simulation.ports import HAS_PTY, Port
 from sniff.simulation.scenarios import Scenario

@@ -24,8 +24,8 @@ from multiprocessing.connection import Connection
 
 from dissectors.frame import Chunk, Mark
 from dissectors.line import LineSettings, Timing
+from dissectors.simulated_faults import Fault
 from sniff.capture.priority import raise_priority
-from sniff.simulation.faults import Fault
 from sniff.simulation.line_mix import Received
 from sniff.simulation.ports import HAS_PTY, GatewayPort, MemoryPort, Port, PtyPort
 from sniff.simulation.wire import Burst, Factory, Sent, Wire

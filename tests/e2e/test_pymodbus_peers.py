@@ -21,13 +21,13 @@ from pymodbus.exceptions import ModbusException
 from dissectors import registry
 from dissectors.frame import Chunk, Frame, Noise
 from dissectors.line import LineSettings, Timing
+from dissectors.simulated_faults import LateResponse, LostResponse
 from dissectors.tracker import Transaction, Verdict
 from sniff.capture.config import SourceSpec
 from sniff.capture.link import CaptureLink
 from sniff.capture.wire import Received
 from sniff.engine.engine import Engine, Row
 from sniff.simulation.bus import WHOLE, VirtualBus
-from sniff.simulation.faults import LateResponse, LostResponse
 from sniff.simulation.ports import HAS_PTY
 from sniff.simulation.wire import Sent
 

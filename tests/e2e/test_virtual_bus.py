@@ -17,8 +17,8 @@ import pytest
 from dissectors.frame import Chunk, LineError
 from dissectors.line import LineSettings
 from dissectors.simulated import Send
+from dissectors.simulated_faults import Break, LostResponse, MarkParity
 from sniff.simulation.bus import BusFailed, VirtualBus
-from sniff.simulation.faults import Break, LostResponse, MarkParity
 from sniff.simulation.ports import HAS_PTY
 from sniff.simulation.wire import Party, Sent
 

@@ -9,7 +9,7 @@ from dissectors.line import LineSettings, Timing
 from dissectors.modbus.simulated import Cells, ModbusServer
 from dissectors.modbus.simulated_master import PollingMaster, read_holding, write_register
 from dissectors.simulated import Station
-from sniff.simulation.faults import Fault
+from dissectors.simulated_faults import Fault
 from sniff.simulation.scenarios import Scenario
 from sniff.simulation.wire import Party
 

@@ -7,7 +7,7 @@ from functools import partial
 
 from dissectors.frame import Place
 from dissectors.modbus.simulated_master import read_holding, write_register
-from sniff.simulation.faults import (
+from dissectors.simulated_faults import (
     BitFlips,
     Break,
     CutShort,

@@ -9,7 +9,7 @@ from dissectors.frame import Place
 from dissectors.line import LineSettings, Timing
 from dissectors.modbus.simulated_master import read_holding, write_register
 from dissectors.simulated import Station
-from sniff.simulation.faults import LostResponse, NoiseInGaps
+from dissectors.simulated_faults import LostResponse, NoiseInGaps
 from sniff.simulation.tap import FTDI
 from tests.faults.buses import modbus, mstp, n2
 from tests.faults.case import Case, Said

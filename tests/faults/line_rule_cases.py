@@ -7,7 +7,7 @@ from functools import partial
 from dissectors.frame import Place
 from dissectors.line import LineSettings
 from dissectors.modbus.simulated_master import write_register
-from sniff.simulation.faults import Break, MarkParity, NoiseInGaps
+from dissectors.simulated_faults import Break, MarkParity, NoiseInGaps
 from sniff.simulation.tap import FTDI
 from tests.faults.buses import modbus, n2
 from tests.faults.case import Case

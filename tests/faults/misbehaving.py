@@ -11,7 +11,7 @@ from dissectors.line import LineSettings
 from dissectors.modbus.adu import seal_ascii, seal_rtu, unseal
 from dissectors.modbus.simulated_master import PollingMaster, Request
 from dissectors.simulated import Send, Station
-from sniff.simulation.faults import Fault, Transmission
+from dissectors.simulated_faults import Fault, Transmission
 from tests.faults.stations import Wrapped
 
 MS = 1_000_000

@@ -8,7 +8,7 @@ from dissectors.frame import Place
 from dissectors.line import LineSettings
 from dissectors.modbus.simulated_master import read_holding, write_register, write_registers
 from dissectors.simulated import Station
-from sniff.simulation.faults import BitFlips, Break, CutShort, LateResponse, LostResponse, MarkParity, NoiseInGaps
+from dissectors.simulated_faults import BitFlips, Break, CutShort, LateResponse, LostResponse, MarkParity, NoiseInGaps
 from sniff.simulation.tap import CH340, FTDI, UART
 from tests.faults.buses import RTU_LINE, modbus
 from tests.faults.case import Case, Said

@@ -11,7 +11,7 @@ from dissectors.bacnet.simulated import Faults, Node
 from dissectors.frame import Place
 from dissectors.line import Timing
 from dissectors.simulated import Station
-from sniff.simulation.faults import EarlyRelease, NoiseInGaps
+from dissectors.simulated_faults import EarlyRelease, NoiseInGaps
 from sniff.simulation.tap import FTDI
 from tests.faults.buses import MSTP_LINE
 from tests.faults.case import Case, Said

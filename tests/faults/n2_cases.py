@@ -10,7 +10,7 @@ from dissectors.frame import Place
 from dissectors.modbus.simulated_master import read_holding
 from dissectors.n2.simulated import reading
 from dissectors.simulated import Station
-from sniff.simulation.faults import BitFlips, LateResponse, NoiseInGaps
+from dissectors.simulated_faults import BitFlips, LateResponse, NoiseInGaps
 from sniff.simulation.tap import FTDI
 from tests.faults.case import Case, Said
 from tests.faults.misbehaving import Trimmed, When

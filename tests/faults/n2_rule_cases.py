@@ -10,8 +10,8 @@ from dissectors.frame import Chunk
 from dissectors.n2.f510 import POINTS
 from dissectors.n2.simulated import Follower, Master, readings
 from dissectors.simulated import Send, Station
+from dissectors.simulated_faults import BitFlips, DuplicateAddress, Fault, LateResponse
 from sniff.engine.session import Item
-from sniff.simulation.faults import BitFlips, DuplicateAddress, Fault, LateResponse
 from sniff.simulation.scenarios import Scenario, simulate
 from sniff.simulation.tap import TapModel
 from sniff.simulation.wire import Party

@@ -9,7 +9,7 @@ from dissectors.bacnet.frame_making import frame
 from dissectors.bacnet.frame_types import FrameType
 from dissectors.bacnet.simulated import Faults
 from dissectors.frame import Place
-from sniff.simulation.faults import BitFlips, EarlyRelease, NoiseInGaps
+from dissectors.simulated_faults import BitFlips, EarlyRelease, NoiseInGaps
 from tests.faults.buses import MSTP_LINE, mstp
 from tests.faults.case import Case
 from tests.faults.ring_nodes import AlsoSends, FailsFor, SlowToBeFound

@@ -11,7 +11,7 @@ from dissectors.modbus.adu import seal_ascii, seal_rtu, unseal
 from dissectors.modbus.simulated import Bank, ModbusServer
 from dissectors.n2.simulated import Follower
 from dissectors.simulated import Send, Station
-from sniff.simulation.faults import Fault, Transmission
+from dissectors.simulated_faults import Fault, Transmission
 
 MS = 1_000_000
 

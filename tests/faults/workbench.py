@@ -12,7 +12,7 @@ from dissectors.line import LineSettings, Timing
 from dissectors.modbus.simulated import Cells, ModbusServer
 from dissectors.modbus.simulated_master import PollingMaster, read_holding
 from dissectors.simulated import Station
-from sniff.simulation.faults import Fault
+from dissectors.simulated_faults import Fault
 from sniff.simulation.scenarios import Scenario
 from sniff.simulation.wire import Party
 from tests.faults.buses import ASCII_LINE, MSTP_LINE, N2_LINE, RTU_LINE, Change

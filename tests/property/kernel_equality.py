@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from dissectors.columns import CHECKS, DAMAGES, FOUNDS, NONE, ROLES, FrameColumns, Octets, Reads
+from dissectors.columns import FrameColumns, Octets, Reads
 from dissectors.frame import Chunk, Event, Frame, Header
 from dissectors.line import Timing
 from dissectors.manifest import Dissector
@@ -39,36 +39,8 @@ def frame_at(
 ) -> tuple[Frame, Header]:
     """A row of columns as the values it stands for."""
 
-    def some(value: int) -> int | None:
-        return None if value == NONE else value
-
-    offset, length = int(columns.offset[row]), int(columns.length[row])
-    error = columns.names[columns.error[row]] if columns.error[row] else None
-    frame = Frame(
-        protocol,
-        bytes(octets[offset : offset + length]),
-        int(columns.start[row]),
-        int(columns.end[row]),
-        CHECKS[columns.check[row]],
-        FOUNDS[columns.found[row]],
-        DAMAGES[columns.damage[row]],
-        some(int(columns.expected[row])),
-        0,
-        latency,
-    )
-    header = Header(
-        protocol,
-        some(int(columns.source[row])),
-        some(int(columns.destination[row])),
-        ROLES[columns.role[row]],
-        columns.names[columns.kind[row]],
-        some(int(columns.function[row])),
-        some(int(columns.address[row])),
-        some(int(columns.count[row])),
-        bool(columns.ok[row]),
-        error,
-    )
-    return frame, header
+    held = np.frombuffer(octets, np.uint8)
+    return columns.frame(row, held, protocol, latency), columns.header(row, protocol)
 
 
 def assert_equal(dissector: Dissector, chunks: Sequence[Chunk], timing: Timing) -> tuple[int, int]:

@@ -14,10 +14,10 @@ from dissectors.bacnet.kernel import kernel
 from dissectors.bacnet.pairing import Pairing, Run, prepare
 from dissectors.bacnet.tracker import MstpTracker
 from dissectors.bacnet.turn import Turn
-from dissectors.columns import NONE, ROLES, VERDICTS
+from dissectors.columns import NONE, ROLES
 from dissectors.frame import Chunk, Event, Frame
 from dissectors.line import Timing
-from dissectors.tracker import Interval, Placement, Tracked, Transaction, Verdict
+from dissectors.tracker import Placement, Tracked, Transaction, Verdict
 from tests.property.kernel_equality import events_of, frame_at, reads_of
 
 FIRST = 1
@@ -29,27 +29,7 @@ def _some(value: int) -> int | None:
 
 def transactions_of(run: Run) -> list[Transaction]:
     """The transactions of a run as values."""
-    columns, given = run.transactions, []
-    for row in range(len(columns)):
-        latency = int(columns.latency[row])
-        interval = Interval(latency, int(columns.least[row]), int(columns.most[row]))
-        given.append(
-            Transaction(
-                int(columns.id[row]),
-                int(columns.station[row]),
-                columns.names[columns.kind[row]],
-                _some(int(columns.request[row])),
-                _some(int(columns.response[row])),
-                VERDICTS[columns.verdict[row]],
-                int(columns.start[row]),
-                int(columns.end[row]),
-                None if latency == NONE else interval,
-                int(columns.attempt[row]),
-                _some(int(columns.of[row])),
-                columns.names[columns.error[row]] if columns.error[row] else None,
-            )
-        )
-    return given
+    return [run.transactions.transaction(place) for place in range(len(run.transactions))]
 
 
 def placements_of(run: Run, no: int) -> list[Placement]:

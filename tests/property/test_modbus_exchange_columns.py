@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dissectors.columns import NONE, ROLES, VERDICTS, FrameColumns, PlacementColumns, TransactionColumns
+from dissectors.columns import NONE, ROLES, FrameColumns, PlacementColumns, TransactionColumns
 from dissectors.frame import Chunk, Event, Frame
 from dissectors.line import LineSettings, Timing
 from dissectors.modbus import RTU
@@ -21,7 +21,7 @@ from dissectors.modbus.exchange import Exchange, Seen
 from dissectors.modbus.exchange_columns import Exchanges, exchanges, placed
 from dissectors.modbus.exchange_memory import holding, passed
 from dissectors.modbus.tracker import ModbusTracker, PassedBy
-from dissectors.tracker import Interval, Placement, Transaction
+from dissectors.tracker import Placement, Transaction
 from sniff import formats
 from tests.bench import bulk_rtu
 from tests.bus_delivery import FTDI_LATENCY, MS, ftdi, laid_out
@@ -80,25 +80,7 @@ def placements_of(columns: PlacementColumns, numbers: list[int]) -> list[Placeme
 
 
 def transactions_of(columns: TransactionColumns) -> list[Transaction]:
-    return [
-        Transaction(
-            int(columns.id[row]),
-            _some(columns.station[row]),
-            columns.names[columns.kind[row]],
-            _some(columns.request[row]),
-            _some(columns.response[row]),
-            VERDICTS[columns.verdict[row]],
-            int(columns.start[row]),
-            int(columns.end[row]),
-            None
-            if columns.latency[row] == NONE
-            else Interval(int(columns.latency[row]), int(columns.least[row]), int(columns.most[row])),
-            int(columns.attempt[row]),
-            _some(columns.of[row]),
-            columns.names[columns.error[row]] or None,
-        )
-        for row in range(len(columns))
-    ]
+    return [columns.transaction(place) for place in range(len(columns))]
 
 
 def assert_paired_equally(chunks: list[Chunk], timing: Timing) -> tuple[int, int]:

@@ -26,8 +26,8 @@ from dissectors.n2.simulated import (
     releasing,
 )
 from dissectors.simulated import Send
+from dissectors.simulated_faults import BitFlips, DuplicateAddress, Fault, LateResponse, LostResponse, NoiseInGaps
 from dissectors.tracker import Transaction, Verdict
-from sniff.simulation.faults import BitFlips, DuplicateAddress, Fault, LateResponse, LostResponse, NoiseInGaps
 from sniff.simulation.tap import EXACT, MODELS, Tap, TapModel
 from sniff.simulation.wire import Party, Wire
 

@@ -9,8 +9,8 @@ import pytest
 
 from dissectors.findings import Finding, Severity
 from dissectors.frame import Place
+from dissectors.simulated_faults import BitFlips, Break, MarkParity, NoiseInGaps
 from sniff.analysis.shares import at_least, standing_out
-from sniff.simulation.faults import BitFlips, Break, MarkParity, NoiseInGaps
 from sniff.simulation.tap import EXACT, FTDI, UART, TapModel
 from tests.faults.buses import modbus, mstp, n2
 from tests.faults.case import Case

@@ -8,9 +8,9 @@ import pytest
 
 from dissectors.frame import Check, Damage, Found, Frame
 from dissectors.line import LineSettings
+from dissectors.simulated_faults import BitFlips, MarkParity, NoiseInGaps
 from sniff.analysis.time_patterns import TimePatterns
 from sniff.engine.session import Session
-from sniff.simulation.faults import BitFlips, MarkParity, NoiseInGaps
 from sniff.simulation.tap import EXACT, FTDI
 from tests.faults.buses import modbus, mstp, n2
 from tests.faults.case import Case

@@ -11,6 +11,7 @@ import pytest
 from dissectors import registry
 from dissectors.bacnet import RingObserver
 from dissectors.bacnet.ring import What
+from dissectors.simulated_faults import LostResponse
 from sniff.analysis.judging import Judging
 from sniff.bus.derived_topics import BUS, NODE, BusChannels
 from sniff.bus.model import BusModel
@@ -22,7 +23,6 @@ from sniff.engine.observer import observe
 from sniff.engine.session import LineEvent, LineEventKind
 from sniff.formats import read
 from sniff.recording.topics import SCHEMAS
-from sniff.simulation.faults import LostResponse
 from sniff.simulation.scenarios import scenario, simulate
 from sniff.simulation.tap import EXACT
 from tests.faults.buses import modbus

@@ -12,8 +12,16 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from dissectors.line import NS_PER_S
+from dissectors.simulated_faults import (
+    BitFlips,
+    Break,
+    DuplicateAddress,
+    EarlyRelease,
+    Fault,
+    LostResponse,
+    NoiseInGaps,
+)
 from sniff.formats import create
-from sniff.simulation.faults import BitFlips, Break, DuplicateAddress, EarlyRelease, Fault, LostResponse, NoiseInGaps
 from sniff.simulation.scenarios import scenario, simulate
 from sniff.simulation.tap import EXACT, FTDI, UART, TapModel
 

@@ -11,11 +11,7 @@ import pytest
 from dissectors import registry
 from dissectors.frame import Chunk, Frame
 from dissectors.line import LineSettings
-from dissectors.tracker import Transaction, Verdict
-from sniff.engine.engine import Engine, Row
-from sniff.engine.session import Session
-from sniff.simulation import scenarios
-from sniff.simulation.faults import (
+from dissectors.simulated_faults import (
     BitFlips,
     Break,
     CutShort,
@@ -27,6 +23,10 @@ from sniff.simulation.faults import (
     MarkParity,
     NoiseInGaps,
 )
+from dissectors.tracker import Transaction, Verdict
+from sniff.engine.engine import Engine, Row
+from sniff.engine.session import Session
+from sniff.simulation import scenarios
 from sniff.simulation.scenarios import Scenario, UnknownScenario, bursts, scenario, simulate
 from sniff.simulation.tap import EXACT, FTDI, FTDI_LOW_LATENCY, OCTETS, UART, TapModel
 from sniff.simulation.wire import Sent

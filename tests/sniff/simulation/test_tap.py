@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from dissectors.frame import Chunk, LineError
 from dissectors.line import LineSettings
+from dissectors.simulated_faults import BitFlips, Break, MarkParity, NoiseInGaps
 from sniff.engine.session import LineEvent, LineEventKind
-from sniff.simulation.faults import BitFlips, Break, MarkParity, NoiseInGaps
 from sniff.simulation.tap import CH340, EXACT, FTDI, FTDI_LOW_LATENCY, MODELS, MS, OCTETS, UART, Tap, TapModel
 from sniff.simulation.wire import Burst, Wire
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from dissectors.frame import LineError, Place
 from dissectors.line import LineSettings
 from dissectors.simulated import Send
-from sniff.simulation.faults import (
+from dissectors.simulated_faults import (
     NOISE,
     BitFlips,
     Break,

@@ -8,11 +8,11 @@ import pytest
 
 from dissectors.findings import Severity
 from dissectors.registry import get
+from dissectors.simulated_faults import LostResponse
 from sniff.bus.offline import outputs
 from sniff.bus.rows import Store
 from sniff.engine.observer import observe
 from sniff.engine.session import LineEvent, LineEventKind
-from sniff.simulation.faults import LostResponse
 from sniff.simulation.scenarios import simulate
 from sniff.tui.viewing import Viewing
 from tests.faults.buses import modbus
