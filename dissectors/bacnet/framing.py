@@ -113,6 +113,7 @@ class MstpFramer:
     def _drain(self, quiet: int, final: bool) -> list[Event]:
         events: list[Event] = []
         octets = self._window.octets
+        self._awaited = 0  # what was awaited may wait for something else by now, e.g. for a header after silence
         while octets:
             event = self._next(quiet, final)
             if event is None:

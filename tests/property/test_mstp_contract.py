@@ -166,3 +166,16 @@ def test_a_bad_header_with_good_data_is_one_damaged_frame():
     events = drive(bytes(frame) + TOKEN)
     assert [(e.octets, e.ok) for e in events] == [(bytes(frame), False), (TOKEN, True)]
     assert events[0].damage is Damage.HEADER
+
+
+def test_what_a_cut_frame_awaited_holds_back_no_good_frame_after_it() -> None:
+    """A header announces 489 octets of data; nothing, then a whole shorter frame: that is decided by its own end."""
+    cut, whole = mstp(6, 1, 2, bytes(489))[:8], mstp(6, 1, 2, bytes(480))
+    framer, now, events = MstpFramer(LINE), START, []
+    for pause, octets in ((0, cut), (2 * MS, whole)):
+        now += pause
+        for octet in octets:
+            now += LINE.char
+            events += framer.feed(Chunk(now, bytes((octet,))))
+    events += framer.advance(now + 2 * MS)
+    assert [e.octets for e in events] == [cut, whole]
