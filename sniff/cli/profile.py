@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from dissectors.profiles import Entry, Profile, ProfileError
+from dissectors.profiles.decoding import number, plain_name
 from sniff.analysis.profile_guess import Guess, Guessing
 from sniff.bus.offline import outputs
 from sniff.cli import UNREADABLE, USAGE, Failure, arguments, json_output, tables
@@ -76,16 +77,25 @@ def _show(args: argparse.Namespace) -> int:
             print(f"{family} longest frame: {limits.frame} octets")
         if limits.response is not None:
             print(f"{family} answers within: {limits.response / 1e6:g} ms")
+        if limits.stations is not None:
+            print(f"{family} station numbers: {limits.stations[0]} … {limits.stations[1]}")
+        if limits.functions is not None:
+            print(f"{family} functions: {' '.join(f'{code:02X}' for code in sorted(limits.functions))} (hex)")
     for family, codes in profile.exceptions.items():
         for code, words in codes.items():
             print(f"{family} error {code:02d} ({code:02X}h): {words}")
     for key, value in profile.constants.items():
         print(f"{key}: {value}")
     for first, last in profile.reserved:
-        print(f"reserved: {first:04X}h … {last:04X}h on the wire")
+        offset = profile.address_offset
+        wire = f" = wire 0x{first:04X} … 0x{last:04X}" if offset else ""
+        print(f"reserved: {first - offset:04X}h … {last - offset:04X}h{wire}")
+    if profile.address_offset:
+        print(f"on the wire a register is the manual's number {profile.address_offset:+d}; both are in the table")
     print()
     tables.write(ENTRY_HEADINGS, [_row(entry) for entry in profile.entries])
     _print_codes(profile)
+    _print_properties(profile)
     return 0
 
 
@@ -93,9 +103,34 @@ def _row(entry: Entry) -> tuple[str, ...]:
     low = "" if entry.low is None else f"{entry.low:g}"
     high = "" if entry.high is None else f"{entry.high:g}"
     span = f"{low} … {high}" if low or high else ""
-    title = f"{entry.title} (doubtful: {entry.doubt})" if entry.doubt else entry.title
+    remarks = [f"in the device: {entry.label}"] if entry.label else []
+    remarks += [f"usually {number(entry.default, entry, entry.unit)}"] if entry.default is not None else []
+    remarks += [f"doubtful: {entry.doubt}"] if entry.doubt else []
+    title = f"{entry.title} ({'; '.join(remarks)})" if remarks else entry.title
+    return _place(entry), entry.name, entry.unit, span, entry.access.value, title
+
+
+def _place(entry: Entry) -> str:
+    """The manual's number, and that of the wire where it is another."""
+    if entry.space not in ("holding", "input"):
+        return entry.number
     place = f"input {entry.number}" if entry.space == "input" else entry.number
-    return place, entry.name, entry.unit, span, entry.access.value, title
+    if entry.number == f"{entry.address:04X}h":
+        return place
+    return f"{place} = wire 0x{entry.address:04X}, {plain_name(entry.space, entry.address).partition('/')[2]}"
+
+
+def _print_properties(profile: Profile) -> None:
+    """Which properties which objects have, where the maker says so."""
+    if not profile.properties:
+        return
+    kinds = sorted({kind for kinds in profile.properties.values() for kind in kinds})
+    print()
+    headings = ("property", *kinds)
+    tables.write(
+        headings,
+        [(name, *("yes" if kind in had else "" for kind in kinds)) for name, had in profile.properties.items()],
+    )
 
 
 def _print_codes(profile: Profile) -> None:
@@ -108,8 +143,12 @@ def _print_codes(profile: Profile) -> None:
         print(f"\n{entry.name} ({entry.number})")
         for code, words in entry.states.items():
             print(f"  {code:>5}  {words}")
+        if entry.reserved_codes:
+            print(f"  reserved: {' '.join(map(str, sorted(entry.reserved_codes)))}")
         for bit in entry.bits:
             print(f"  bit {bit.number:X}  {bit.on}" + (f", else {bit.off}" if bit.off else ""))
+        if entry.reserved_bits:
+            print(f"  bits {' '.join(f'{bit:X}' for bit in entry.reserved_bits)}  reserved, to be written as 0")
         for part in entry.parts:
             print(f"  bits {part.low:X}…{part.high:X}  {part.name}")
             for code, words in part.states.items():
@@ -133,6 +172,10 @@ def _as_json(entry: Entry) -> dict[str, Any]:
         "reserved": entry.reserved,
         "states": {str(code): words for code, words in entry.states.items()},
         "bits": {str(bit.number): bit.on for bit in entry.bits},
+        "label": entry.label,
+        "default": entry.default,
+        "reserved_codes": sorted(entry.reserved_codes),
+        "reserved_bits": list(entry.reserved_bits),
         "doubt": entry.doubt,
     }
 
