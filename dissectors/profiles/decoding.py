@@ -21,6 +21,7 @@ MOST_WORDS = 6
 NO_BITS = "none"
 """What a register says whose bits are all 0 without a word for that."""
 
+_FLOATS = {Kind.F32: ">f", Kind.F64: ">d"}
 _EXACT = 1e15
 """Below it a float holds every whole number."""
 
@@ -81,11 +82,13 @@ def decode(profile: Profile | None, readings: Sequence[Reading]) -> tuple[Value,
         if entry.kind.registers == 1 or reading.space not in _REGISTERS:
             values += _values(entry, reading, (reading.raw,))
             continue
-        halves = [there.get((reading.how, reading.space, entry.address + step)) for step in (0, 1)]
-        if halves[0] is None or halves[1] is None:
-            values += _values(entry.word_of(reading.address), reading, (reading.raw,))  # half a value is none
-        elif halves[0] is reading:
-            values += _values(entry, reading, (reading.raw, halves[1].raw))
+        steps = range(entry.kind.registers)
+        words = [there.get((reading.how, reading.space, entry.address + step)) for step in steps]
+        whole = [word for word in words if word is not None]
+        if len(whole) < len(words):
+            values += _values(entry.word_of(reading.address), reading, (reading.raw,))  # part of a value is none
+        elif whole[0] is reading:
+            values += _values(entry, reading, [word.raw for word in whole])
     return tuple(values)
 
 
@@ -198,10 +201,11 @@ def _scaled(entry: Entry, reading: Reading, raws: Sequence[int | None]) -> tuple
     raw = 0
     for word in reversed(words) if entry.swapped else words:
         raw = raw << 16 | word
-    if entry.kind is Kind.F32:
-        return float(struct.unpack(">f", raw.to_bytes(4, "big"))[0]) * entry.scale + entry.offset, raw
+    form = _FLOATS.get(entry.kind)
+    if form is not None:
+        return float(struct.unpack(form, raw.to_bytes(2 * len(words), "big"))[0]) * entry.scale + entry.offset, raw
     width = 16 * len(words)
-    signed = raw - (1 << width) if entry.kind in (Kind.S16, Kind.S32) and raw >> width - 1 else raw
+    signed = raw - (1 << width) if entry.kind.signed and raw >> width - 1 else raw
     return (signed if entry.scale == 1 and not entry.offset else _rounded(signed, entry)), raw
 
 

@@ -19,6 +19,9 @@ class Kind(Enum):
     U32 = "u32"
     S32 = "s32"
     F32 = "f32"
+    U64 = "u64"
+    S64 = "s64"
+    F64 = "f64"
     BIT = "bit"
     REAL = "real"  # a number that the protocol itself encodes (N2, BACnet)
     TEXT = "text"
@@ -26,7 +29,12 @@ class Kind(Enum):
     @property
     def registers(self) -> int:
         """How many consecutive registers it takes."""
-        return 2 if self in (Kind.U32, Kind.S32, Kind.F32) else 1
+        return {"32": 2, "64": 4}.get(self.value[1:], 1)
+
+    @property
+    def signed(self) -> bool:
+        """Whether it is a whole number that may be below 0."""
+        return self in (Kind.S16, Kind.S32, Kind.S64)
 
 
 class Access(Enum):
@@ -133,14 +141,16 @@ class Entry:
         return tuple(bit for bit in self.reserved_bits if raw >> bit & 1)
 
     def word_of(self, address: int) -> Entry:
-        """The register at `address`, one of the several that make this value, by itself: its high or low word."""
-        high = (address == self.address) != self.swapped
-        word = "high" if high else "low"
+        """The register at `address`, one of the several that make this value, by itself: its high or low word, or
+        with four of them words 1 (the highest) … 4."""
+        count, at = self.kind.registers, address - self.address
+        place = count - 1 - at if self.swapped else at
+        word = ("high", "low")[place] if count == 2 else f"{place + 1}"
         return replace(
             self,
             address=address,
             name=f"{self.name}.{word}",
-            title=f"{self.title}, {word} word",
+            title=f"{self.title}, {word} word" if count == 2 else f"{self.title}, word {word}",
             kind=Kind.U16,
             scale=1.0,
             offset=0.0,
