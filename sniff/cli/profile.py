@@ -1,5 +1,7 @@
 """list: what there is. show NAME: registers, objects, limits. check FILE…: whether profiles are right. guess CAPTURE…:
-which profiles fit the stations that were heard. Own profiles: ./profiles/NAME.toml, or the user's folder.
+which profiles fit the stations that were heard. draft CAPTURE…: a profile of a station that has none, from what its
+registers did; types, orders and uses are guesses, with how sure. Own profiles: ./profiles/NAME.toml, or the user's
+folder.
 """
 
 from __future__ import annotations
@@ -12,7 +14,11 @@ from typing import Any
 
 from dissectors.profiles import Entry, Profile, ProfileError
 from dissectors.profiles.decoding import number, plain_name
+from sniff.analysis.points import PointReader
+from sniff.analysis.profile_draft import drafted
 from sniff.analysis.profile_guess import Guess, Guessing
+from sniff.analysis.register_guess import Sure, guessed
+from sniff.analysis.register_series import RegisterSeries
 from sniff.bus.offline import outputs
 from sniff.cli import UNREADABLE, USAGE, Failure, arguments, json_output, tables
 from sniff.devices import UnknownProfile, available, find, read
@@ -25,7 +31,7 @@ ENTRY_HEADINGS = ("place", "point", "unit", "range", "access", "what")
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
-    """`list`, `show`, `check` and `guess`."""
+    """`list`, `show`, `check`, `guess` and `draft`."""
     actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
     listing = actions.add_parser("list", help="profiles by name, with where they are from")
     listing.add_argument("--json", action="store_true", help="one JSON object a profile")
@@ -38,11 +44,17 @@ def configure(parser: argparse.ArgumentParser) -> None:
     arguments.add_files(guess)
     arguments.add_line(guess)
     guess.add_argument("--json", action="store_true", help="one JSON object a guess")
+    draft = actions.add_parser("draft", help="a profile of a station that has none, to be corrected by hand")
+    arguments.add_files(draft)
+    arguments.add_line(draft)
+    draft.add_argument("--station", type=int, metavar="N", help="which one, where several were heard")
+    draft.add_argument("--name", default="device", help="of the profile (default: device)")
+    draft.add_argument("-w", "--write", metavar="FILE", type=Path, help="write it there instead of standard output")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Do one of the four."""
-    return {"list": _list, "show": _show, "check": _check, "guess": _guess}[args.action](args)
+    """Do one of the five."""
+    return {"list": _list, "show": _show, "check": _check, "guess": _guess, "draft": _draft}[args.action](args)
 
 
 def _list(args: argparse.Namespace) -> int:
@@ -207,6 +219,39 @@ def _guess(args: argparse.Namespace) -> int:
         rows += [(guess.station, guess.profile.name, f"{guess.score:.0%}", guess.why) for guess in guesses]
         _say_ties(guesses)
     tables.write(("station", "profile", "fits", "why"), rows, "json" if args.json else "text")
+    return 0
+
+
+def _draft(args: argparse.Namespace) -> int:
+    series, protocols, family = RegisterSeries(), dict[str, None](), ""
+    for path in args.files:
+        capture = arguments.open_capture(path)
+        session = arguments.settings_of(args, capture.session, path)
+        dissector = dissector_for(session)
+        reader, family = PointReader(dissector), dissector.profile_family
+        protocols[dissector.name] = None
+        for output in outputs(capture.items(), session):
+            if isinstance(output, Output):
+                series.add(reader.add(output))
+    found = list(guessed(series.blocks(), series.written))
+    stations = sorted({one.device for one in found})
+    if args.station is None and len(stations) > 1:
+        raise Failure(f"stations {', '.join(map(str, stations))} answered registers: name one with --station", USAGE)
+    chosen = [one for one in found if args.station in (None, one.device)]
+    if not chosen:
+        who = "no station" if args.station is None else f"station {args.station}"
+        raise Failure(f"{', '.join(args.files)}: {who} answered no registers", UNREADABLE)
+    document = drafted(args.name, family, list(protocols), chosen)
+    if args.write is None:
+        print(document, end="")
+        return 0
+    try:
+        with args.write.open("x", encoding="utf-8") as file:
+            file.write(document)
+    except OSError as error:
+        raise Failure(f"{args.write}: {error.strerror or error}", UNREADABLE) from None
+    sure = sum(one.sure is Sure.SURE for one in chosen)
+    print(f"sniff485: {len(chosen)} values drafted to {args.write}, {sure} of them sure", file=sys.stderr)
     return 0
 
 
