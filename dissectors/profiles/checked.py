@@ -90,6 +90,19 @@ class Table:
             found[number] = value
         return found
 
+    def tables_by_number(self, key: str) -> dict[int, Table]:
+        """A table of tables by number; empty when absent."""
+        found = {}
+        for number, value in self.numbered(key).items():
+            if not isinstance(value, dict):
+                raise self.error(f"{key}.{number}", f"expected a table, not {value!r}")
+            found[number] = Table(self.origin, f"{self.path}.{key}.{number}", value)
+        return found
+
+    def with_usual(self, **values: Any) -> Table:
+        """The same table with values for keys that it does not have."""
+        return Table(self.origin, self.path, {**values, **self.data})
+
     def words(self, key: str) -> dict[int, str]:
         """A table of texts by number; empty when absent."""
         table = self.table(key)

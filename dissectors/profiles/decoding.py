@@ -21,6 +21,10 @@ MOST_WORDS = 6
 NO_BITS = "none"
 """What a register says whose bits are all 0 without a word for that."""
 
+_FLOATS = {Kind.F32: ">f", Kind.F64: ">d"}
+_EXACT = 1e15
+"""Below it a float holds every whole number."""
+
 _FIRST = {"coil": 0, "discrete": 1, "input": 3, "holding": 4}
 _REGISTERS = ("holding", "input")
 _PARAMETER = re.compile(r"[A-Za-z]+2?\.\d+|\d\d-\d\d")
@@ -78,11 +82,13 @@ def decode(profile: Profile | None, readings: Sequence[Reading]) -> tuple[Value,
         if entry.kind.registers == 1 or reading.space not in _REGISTERS:
             values += _values(entry, reading, (reading.raw,))
             continue
-        halves = [there.get((reading.how, reading.space, entry.address + step)) for step in (0, 1)]
-        if halves[0] is None or halves[1] is None:
-            values.append(_plain(reading))  # half a value is none
-        elif halves[0] is reading:
-            values += _values(entry, reading, (reading.raw, halves[1].raw))
+        steps = range(entry.kind.registers)
+        words = [there.get((reading.how, reading.space, entry.address + step)) for step in steps]
+        whole = [word for word in words if word is not None]
+        if len(whole) < len(words):
+            values += _values(entry.word_of(reading.address), reading, (reading.raw,))  # part of a value is none
+        elif whole[0] is reading:
+            values += _values(entry, reading, [word.raw for word in whole])
     return tuple(values)
 
 
@@ -112,8 +118,15 @@ def number(value: int | float | str, entry: Entry | None = None, unit: str = "")
     if isinstance(value, str):
         return '"' + "".join(c if c.isprintable() else f"\\x{ord(c):02x}" for c in value) + '"'
     scaled = entry is not None and entry.scale != 1 and isinstance(value, float) and math.isfinite(value)
-    digits = f"{value:.{min(entry.decimals, 4)}f}" if scaled and entry is not None else f"{value:.7g}"
+    digits = f"{value:.{min(entry.decimals, 4)}f}" if scaled and entry is not None else _digits(value)
     return f"{digits} {unit}".rstrip()
+
+
+def _digits(value: int | float) -> str:
+    """A whole number with all its digits, another with as many as a float of 32 bits has."""
+    if isinstance(value, int) or (value.is_integer() and abs(value) < _EXACT):
+        return str(int(value))
+    return f"{value:.7g}"
 
 
 def plain_name(space: str, address: int) -> str:
@@ -133,6 +146,7 @@ def bit_words(entry: Entry, raw: int) -> str:
     """What the bits of a register say; empty when it has no named bits."""
     words = [bit.on if raw >> bit.number & 1 else bit.off for bit in entry.bits]
     words += [part.states.get(part.of(raw), f"{part.name} {part.of(raw)}") for part in entry.parts]
+    words += [f"reserved bit {bit:X}" for bit in entry.reserved_in(raw)]
     said = ", ".join(word for word in words if word)
     return said or (NO_BITS if entry.bits or entry.parts else "")
 
@@ -155,10 +169,12 @@ def _values(entry: Entry, reading: Reading, raws: Sequence[int | None]) -> Itera
     words = ""
     if isinstance(value, int) or (isinstance(value, float) and value.is_integer()):
         words = state_words(entry, int(value))
-        if not words and entry.states:
-            words = f"code {int(value)}"
+        if not words and entry.states and reading.how is How.READ:  # a password may be written where a state is read
+            words = f"code {int(value)}" + (", reserved" if int(value) in entry.reserved_codes else "")
     if raw is not None and (entry.bits or entry.parts):
         words = bit_words(entry, raw)
+    if raw is not None and entry.version:
+        words = f"{raw >> 8:x}.{raw & 0xFF:02x}"
     yield Value(entry.name, value, raw, entry.unit, quality, reading, entry, words=words)
     if raw is None:
         return
@@ -185,10 +201,11 @@ def _scaled(entry: Entry, reading: Reading, raws: Sequence[int | None]) -> tuple
     raw = 0
     for word in reversed(words) if entry.swapped else words:
         raw = raw << 16 | word
-    if entry.kind is Kind.F32:
-        return float(struct.unpack(">f", raw.to_bytes(4, "big"))[0]) * entry.scale + entry.offset, raw
+    form = _FLOATS.get(entry.kind)
+    if form is not None:
+        return float(struct.unpack(form, raw.to_bytes(2 * len(words), "big"))[0]) * entry.scale + entry.offset, raw
     width = 16 * len(words)
-    signed = raw - (1 << width) if entry.kind in (Kind.S16, Kind.S32) and raw >> width - 1 else raw
+    signed = raw - (1 << width) if entry.kind.signed and raw >> width - 1 else raw
     return (signed if entry.scale == 1 and not entry.offset else _rounded(signed, entry)), raw
 
 

@@ -7,7 +7,7 @@ offset between the manual's numbers and the wire is already applied. README.md h
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 
 
@@ -19,6 +19,9 @@ class Kind(Enum):
     U32 = "u32"
     S32 = "s32"
     F32 = "f32"
+    U64 = "u64"
+    S64 = "s64"
+    F64 = "f64"
     BIT = "bit"
     REAL = "real"  # a number that the protocol itself encodes (N2, BACnet)
     TEXT = "text"
@@ -26,7 +29,12 @@ class Kind(Enum):
     @property
     def registers(self) -> int:
         """How many consecutive registers it takes."""
-        return 2 if self in (Kind.U32, Kind.S32, Kind.F32) else 1
+        return {"32": 2, "64": 4}.get(self.value[1:], 1)
+
+    @property
+    def signed(self) -> bool:
+        """Whether it is a whole number that may be below 0."""
+        return self in (Kind.S16, Kind.S32, Kind.S64)
 
 
 class Access(Enum):
@@ -35,6 +43,7 @@ class Access(Enum):
     READ = "r"
     WRITE = "w"
     BOTH = "rw"
+    STOPPED = "rw-stopped"  # written only while the device is stopped
 
     @property
     def writable(self) -> bool:
@@ -86,8 +95,11 @@ class Entry:
     `space`, `address`: its place on the wire ("holding" 0x2524, "AI" 10, "analog-input" 4). `number`: the place as the
     manual writes it. `name`: of the point, the same for the same thing in every protocol of the device; `title`: for
     people; `label`: what the device itself calls it (BACnet's Object_Name). value = raw · `scale` + `offset`, in
-    `unit`, within `low` … `high` (None: not said). `states_from`: the entry whose states these are. `codes`: how many
-    codes the manual lists, with those that it leaves empty. `doubt`: why its meaning is not certain, in words.
+    `unit`, within `low` … `high` (None: not said). `states_from`: the entry whose states these are; `like`: the entry
+    that says the same thing at another place. `reserved_codes`: codes that the manual lists without a meaning;
+    `reserved_bits`: bits that are to be written as 0. `version`: the
+    digits are a version, 0100h is 1.00. `default`: as the device leaves the maker, scaled. `doubt`: why its meaning is
+    not certain, in words.
     """
 
     space: str
@@ -109,7 +121,11 @@ class Entry:
     reserved: bool = False
     states: Mapping[int, str] = field(default_factory=dict)
     states_from: str = ""
-    codes: int = 0
+    like: str = ""
+    reserved_codes: frozenset[int] = frozenset()
+    reserved_bits: tuple[int, ...] = ()
+    version: bool = False
+    default: float | None = None
     bits: tuple[Bit, ...] = ()
     parts: tuple[Part, ...] = ()
     doubt: str = ""
@@ -117,8 +133,31 @@ class Entry:
     @property
     def decimals(self) -> int:
         """Digits after the point that the scale makes."""
-        text = f"{self.scale:.9f}".rstrip("0")
+        text = f"{self.scale:.11f}".rstrip("0")
         return len(text.partition(".")[2])
+
+    def reserved_in(self, raw: int) -> tuple[int, ...]:
+        """The reserved bits that are 1."""
+        return tuple(bit for bit in self.reserved_bits if raw >> bit & 1)
+
+    def word_of(self, address: int) -> Entry:
+        """The register at `address`, one of the several that make this value, by itself: its high or low word, or
+        with four of them words 1 (the highest) … 4."""
+        count, at = self.kind.registers, address - self.address
+        place = count - 1 - at if self.swapped else at
+        word = ("high", "low")[place] if count == 2 else f"{place + 1}"
+        return replace(
+            self,
+            address=address,
+            name=f"{self.name}.{word}",
+            title=f"{self.title}, {word} word" if count == 2 else f"{self.title}, word {word}",
+            kind=Kind.U16,
+            scale=1.0,
+            offset=0.0,
+            unit="",
+            low=None,
+            high=None,
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,10 +172,16 @@ class Sign:
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """What the device promises or cannot take; None: not said. `frame`: octets; `response`: ns."""
+    """What the device promises or cannot take; None: not said.
+
+    `frame`: octets; `response`: ns; `stations`: the lowest and the highest number that it can be given; `functions`:
+    the codes that it knows.
+    """
 
     frame: int | None = None
     response: int | None = None
+    stations: tuple[int, int] | None = None
+    functions: frozenset[int] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,6 +192,7 @@ class Profile:
     "n2", "bacnet"); the exceptions are exception and error codes in the maker's words. `properties`: BACnet property →
     object types that have it. `constants`: BACnet device property → its value. `absent`: parameters that the manual
     lists without a register. `reserved`: spans of registers (first, last, on the wire) that the maker keeps for itself.
+    `address_offset`: number on the wire less the manual's.
     `document`: the text of the TOML document that all this was read from.
     """
 
@@ -164,6 +210,7 @@ class Profile:
     constants: Mapping[str, str | int] = field(default_factory=dict)
     absent: tuple[str, ...] = ()
     reserved: tuple[tuple[int, int], ...] = ()
+    address_offset: int = 0
     source: str = ""
     origin: str = ""
     document: str = field(default="", repr=False, compare=False)
@@ -209,10 +256,10 @@ class Devices:
     default: Profile | None = None
 
     def at(self, address: int | None) -> Profile | None:
-        """The profile of a station."""
-        if address is None:
-            return self.default
-        return self.by_address.get(address, self.default)
+        """The profile of a station; None stands for all of them, which have one where it is the same for each."""
+        if address is not None:
+            return self.by_address.get(address, self.default)
+        return self.profiles[0] if len(self.profiles) == 1 else None
 
     def exception(self, address: int, family: str, code: int) -> str:
         """The maker's words for an exception code of a station; empty when there are none."""

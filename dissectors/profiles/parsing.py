@@ -33,7 +33,7 @@ def parse(data: Mapping[str, Any], origin: str) -> Profile:
         models=top.texts("models", ()),
         noun=top.text("noun", "device"),
         protocols=top.texts("protocols"),
-        entries=_with_shared_states(origin, (*registers, *objects)),
+        entries=_with_shared_meaning(origin, (*registers, *objects)),
         limits={family.path: _limits(family.table("limits")) for family in (modbus, n2, bacnet)},
         exceptions=exceptions,
         signs=tuple(_sign(table, modbus) for table in top.tables("sign")),
@@ -41,6 +41,7 @@ def parse(data: Mapping[str, Any], origin: str) -> Profile:
         constants=_constants(bacnet.table("device")),
         absent=absent,
         reserved=_reserved(modbus),
+        address_offset=modbus.whole("address-offset", 0),
         source=top.text("source", ""),
         origin=origin,
     )
@@ -63,7 +64,7 @@ def _modbus(modbus: Table) -> tuple[list[Entry], tuple[str, ...]]:
     described = {entry.address for entry in entries}
     absent: list[str] = []
     for table in modbus.tables("parameters"):
-        more, missing = _parameters(table, offset, tables)
+        more, missing = _parameters(table, offset, tables, modbus)
         entries += [entry for entry in more if entry.address not in described]
         absent += missing
     unknown = set(tables) - {*REGISTER_TABLES, *BIT_TABLES}
@@ -92,15 +93,15 @@ def _reserved(modbus: Table) -> tuple[tuple[int, int], ...]:
     return tuple(spans)
 
 
-def _parameters(table: Table, offset: int, tables: tuple[str, ...]) -> tuple[list[Entry], list[str]]:
+def _parameters(table: Table, offset: int, tables: tuple[str, ...], modbus: Table) -> tuple[list[Entry], list[str]]:
     """A group of parameters whose register is `base` plus the parameter's number."""
     prefix, base, digits = table.text("prefix"), table.whole("base"), table.whole("digits", 2)
     title = table.text("title", "parameter")
     access = Access(table.choice("access", [access.value for access in Access], "rw"))
     present, absent = table.numbers("present"), table.numbers("absent")
     elsewhere = {number: _whole(table, f"elsewhere.{number}", at) for number, at in table.numbered("elsewhere").items()}
-    titles = table.words("titles")
-    for number in {*titles, *elsewhere} - {*present, *absent}:
+    titles, described = table.words("titles"), table.tables_by_number("described")
+    for number in {*titles, *elsewhere, *described} - {*present, *absent}:
         raise table.error(f"titles.{number}", "is no parameter of this group")
     if set(present) & set(absent):
         raise table.error("absent", "has a number that is also present")
@@ -111,8 +112,14 @@ def _parameters(table: Table, offset: int, tables: tuple[str, ...]) -> tuple[lis
         if not 0 <= address + offset <= 0xFFFF:
             raise table.error("base", f"register {address} does not exist")
         name = f"{prefix}{number:0{digits}d}"
-        words = titles.get(number, f"{title} {name}")
-        entries += [Entry(space, address + offset, f"{address:04X}h", name, words, access=access) for space in tables]
+        words, where = titles.get(number, f"{title} {name}"), f"{address:04X}h"
+        if number in described:
+            named = described[number].text("name", name)
+            whole = words if named == name else f"{words} ({name})"
+            told = described[number].with_usual(name=name, title=whole, access=access.value)
+            entries += [_entry(told, space, address + offset, where, modbus) for space in tables]
+        else:
+            entries += [Entry(space, address + offset, where, name, words, access=access) for space in tables]
     return entries, [f"{prefix}{number:0{digits}d}" for number in absent]
 
 
@@ -172,10 +179,14 @@ def _entry(table: Table, space: str, address: int, number: str, modbus: Table | 
         role=Role(table.choice("role", [role.value for role in Role], "value")),
         reserved=reserved,
         states=states,
-        codes=len(states) + len(empty),
+        reserved_codes=frozenset(empty),
+        reserved_bits=table.numbers("reserved-bits"),
+        version=table.flag("version"),
+        default=table.number("default") if "default" in table else None,
         bits=_bits(table),
         parts=tuple(_part(part) for part in table.tables("part")),
         states_from=table.text("states-from", ""),
+        like=table.text("like", ""),
         doubt=table.text("doubt", ""),
     )
     table.finish()
@@ -217,13 +228,35 @@ def _part(table: Table) -> Part:
     return part
 
 
-def _with_shared_states(origin: str, entries: tuple[Entry, ...]) -> tuple[Entry, ...]:
-    """Entries with `states-from` get the states of the entry of that name."""
+def _with_shared_meaning(origin: str, entries: tuple[Entry, ...]) -> tuple[Entry, ...]:
+    """Entries with `like` get what they do not say themselves from the entry of that name, those with `states-from`
+    its states."""
+    first: dict[str, Entry] = {}
+    for entry in entries:
+        if not entry.like:
+            first.setdefault(entry.name, entry)
+    for entry in entries:
+        if entry.like and entry.like not in first:
+            raise ProfileError(f"{origin}: {entry.number}: like: no entry {entry.like!r}")
     by_name = {entry.name: entry.states for entry in entries if entry.states}
     for entry in entries:
         if entry.states_from and entry.states_from not in by_name:
             raise ProfileError(f"{origin}: {entry.number}: states-from: no entry {entry.states_from!r} with states")
-    return tuple(replace(e, states=by_name[e.states_from]) if e.states_from else e for e in entries)
+    first = {name: _with_states(entry, by_name) for name, entry in first.items()}
+    return tuple(_like(e, first[e.like]) if e.like else _with_states(e, by_name) for e in entries)
+
+
+def _with_states(entry: Entry, by_name: Mapping[str, Mapping[int, str]]) -> Entry:
+    return replace(entry, states=by_name[entry.states_from]) if entry.states_from else entry
+
+
+def _like(entry: Entry, other: Entry) -> Entry:
+    """An entry with the unit, range and words of another where it has none of its own."""
+    ranged = entry.low is not None or entry.high is not None
+    low, high = (entry.low, entry.high) if ranged else (other.low, other.high)
+    return replace(
+        entry, unit=entry.unit or other.unit, low=low, high=high, states=entry.states or other.states, label=other.label
+    )
 
 
 # --- the rest of a profile -------------------------------------------------------------------------------------------
@@ -234,8 +267,11 @@ def _limits(table: Table) -> Limits:
     response = table.number("response-ms") if "response-ms" in table else None
     if (frame is not None and frame < 1) or (response is not None and response <= 0):
         raise table.error("", "expected numbers above 0")
+    lowest, highest = table.pair("stations")
+    stations = None if lowest is None or highest is None else (int(lowest), int(highest))
+    functions = frozenset(table.numbers("functions")) or None
     table.finish()
-    return Limits(frame, None if response is None else int(response * MS))
+    return Limits(frame, None if response is None else int(response * MS), stations, functions)
 
 
 def _sign(table: Table, modbus: Table) -> Sign:

@@ -259,7 +259,8 @@ def _troubles(entry: Entry, value: Value) -> Iterator[str]:
     elif value.value and isinstance(value.value, int | float):
         code = int(value.value)
         words = state_words(entry, code) or bit_words(entry, raw)
-        yield words if entry.high == 1 else f"code {code}, {words}" if words else f"code {code}, not in the manual"
+        unknown = "reserved in the manual" if code in entry.reserved_codes else "not in the manual"
+        yield words if entry.high == 1 else f"code {code}, {words or unknown}"
 
 
 def _told_by_bits(entry: Entry, raw: int) -> Iterator[tuple[str, str]]:

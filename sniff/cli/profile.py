@@ -1,5 +1,7 @@
 """list: what there is. show NAME: registers, objects, limits. check FILE…: whether profiles are right. guess CAPTURE…:
-which profiles fit the stations that were heard. Own profiles: ./profiles/NAME.toml, or the user's folder.
+which profiles fit the stations that were heard. draft CAPTURE…: a profile of a station that has none, from what its
+registers did; types, orders and uses are guesses, with how sure. Own profiles: ./profiles/NAME.toml, or the user's
+folder.
 """
 
 from __future__ import annotations
@@ -11,7 +13,12 @@ from pathlib import Path
 from typing import Any
 
 from dissectors.profiles import Entry, Profile, ProfileError
+from dissectors.profiles.decoding import number, plain_name
+from sniff.analysis.points import PointReader
+from sniff.analysis.profile_draft import drafted
 from sniff.analysis.profile_guess import Guess, Guessing
+from sniff.analysis.register_guess import Sure, guessed
+from sniff.analysis.register_series import RegisterSeries
 from sniff.bus.offline import outputs
 from sniff.cli import UNREADABLE, USAGE, Failure, arguments, json_output, tables
 from sniff.devices import UnknownProfile, available, find, read
@@ -24,7 +31,7 @@ ENTRY_HEADINGS = ("place", "point", "unit", "range", "access", "what")
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
-    """`list`, `show`, `check` and `guess`."""
+    """`list`, `show`, `check`, `guess` and `draft`."""
     actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
     listing = actions.add_parser("list", help="profiles by name, with where they are from")
     listing.add_argument("--json", action="store_true", help="one JSON object a profile")
@@ -37,11 +44,17 @@ def configure(parser: argparse.ArgumentParser) -> None:
     arguments.add_files(guess)
     arguments.add_line(guess)
     guess.add_argument("--json", action="store_true", help="one JSON object a guess")
+    draft = actions.add_parser("draft", help="a profile of a station that has none, to be corrected by hand")
+    arguments.add_files(draft)
+    arguments.add_line(draft)
+    draft.add_argument("--station", type=int, metavar="N", help="which one, where several were heard")
+    draft.add_argument("--name", default="device", help="of the profile (default: device)")
+    draft.add_argument("-w", "--write", metavar="FILE", type=Path, help="write it there instead of standard output")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Do one of the four."""
-    return {"list": _list, "show": _show, "check": _check, "guess": _guess}[args.action](args)
+    """Do one of the five."""
+    return {"list": _list, "show": _show, "check": _check, "guess": _guess, "draft": _draft}[args.action](args)
 
 
 def _list(args: argparse.Namespace) -> int:
@@ -76,16 +89,25 @@ def _show(args: argparse.Namespace) -> int:
             print(f"{family} longest frame: {limits.frame} octets")
         if limits.response is not None:
             print(f"{family} answers within: {limits.response / 1e6:g} ms")
+        if limits.stations is not None:
+            print(f"{family} station numbers: {limits.stations[0]} … {limits.stations[1]}")
+        if limits.functions is not None:
+            print(f"{family} functions: {' '.join(f'{code:02X}' for code in sorted(limits.functions))} (hex)")
     for family, codes in profile.exceptions.items():
         for code, words in codes.items():
             print(f"{family} error {code:02d} ({code:02X}h): {words}")
     for key, value in profile.constants.items():
         print(f"{key}: {value}")
     for first, last in profile.reserved:
-        print(f"reserved: {first:04X}h … {last:04X}h on the wire")
+        offset = profile.address_offset
+        wire = f" = wire 0x{first:04X} … 0x{last:04X}" if offset else ""
+        print(f"reserved: {first - offset:04X}h … {last - offset:04X}h{wire}")
+    if profile.address_offset:
+        print(f"on the wire a register is the manual's number {profile.address_offset:+d}; both are in the table")
     print()
     tables.write(ENTRY_HEADINGS, [_row(entry) for entry in profile.entries])
     _print_codes(profile)
+    _print_properties(profile)
     return 0
 
 
@@ -93,9 +115,34 @@ def _row(entry: Entry) -> tuple[str, ...]:
     low = "" if entry.low is None else f"{entry.low:g}"
     high = "" if entry.high is None else f"{entry.high:g}"
     span = f"{low} … {high}" if low or high else ""
-    title = f"{entry.title} (doubtful: {entry.doubt})" if entry.doubt else entry.title
+    remarks = [f"in the device: {entry.label}"] if entry.label else []
+    remarks += [f"usually {number(entry.default, entry, entry.unit)}"] if entry.default is not None else []
+    remarks += [f"doubtful: {entry.doubt}"] if entry.doubt else []
+    title = f"{entry.title} ({'; '.join(remarks)})" if remarks else entry.title
+    return _place(entry), entry.name, entry.unit, span, entry.access.value, title
+
+
+def _place(entry: Entry) -> str:
+    """The manual's number, and that of the wire where it is another."""
+    if entry.space not in ("holding", "input"):
+        return entry.number
     place = f"input {entry.number}" if entry.space == "input" else entry.number
-    return place, entry.name, entry.unit, span, entry.access.value, title
+    if entry.number == f"{entry.address:04X}h":
+        return place
+    return f"{place} = wire 0x{entry.address:04X}, {plain_name(entry.space, entry.address).partition('/')[2]}"
+
+
+def _print_properties(profile: Profile) -> None:
+    """Which properties which objects have, where the maker says so."""
+    if not profile.properties:
+        return
+    kinds = sorted({kind for kinds in profile.properties.values() for kind in kinds})
+    print()
+    headings = ("property", *kinds)
+    tables.write(
+        headings,
+        [(name, *("yes" if kind in had else "" for kind in kinds)) for name, had in profile.properties.items()],
+    )
 
 
 def _print_codes(profile: Profile) -> None:
@@ -108,8 +155,12 @@ def _print_codes(profile: Profile) -> None:
         print(f"\n{entry.name} ({entry.number})")
         for code, words in entry.states.items():
             print(f"  {code:>5}  {words}")
+        if entry.reserved_codes:
+            print(f"  reserved: {' '.join(map(str, sorted(entry.reserved_codes)))}")
         for bit in entry.bits:
             print(f"  bit {bit.number:X}  {bit.on}" + (f", else {bit.off}" if bit.off else ""))
+        if entry.reserved_bits:
+            print(f"  bits {' '.join(f'{bit:X}' for bit in entry.reserved_bits)}  reserved, to be written as 0")
         for part in entry.parts:
             print(f"  bits {part.low:X}…{part.high:X}  {part.name}")
             for code, words in part.states.items():
@@ -133,6 +184,10 @@ def _as_json(entry: Entry) -> dict[str, Any]:
         "reserved": entry.reserved,
         "states": {str(code): words for code, words in entry.states.items()},
         "bits": {str(bit.number): bit.on for bit in entry.bits},
+        "label": entry.label,
+        "default": entry.default,
+        "reserved_codes": sorted(entry.reserved_codes),
+        "reserved_bits": list(entry.reserved_bits),
         "doubt": entry.doubt,
     }
 
@@ -164,6 +219,39 @@ def _guess(args: argparse.Namespace) -> int:
         rows += [(guess.station, guess.profile.name, f"{guess.score:.0%}", guess.why) for guess in guesses]
         _say_ties(guesses)
     tables.write(("station", "profile", "fits", "why"), rows, "json" if args.json else "text")
+    return 0
+
+
+def _draft(args: argparse.Namespace) -> int:
+    series, protocols, family = RegisterSeries(), dict[str, None](), ""
+    for path in args.files:
+        capture = arguments.open_capture(path)
+        session = arguments.settings_of(args, capture.session, path)
+        dissector = dissector_for(session)
+        reader, family = PointReader(dissector), dissector.profile_family
+        protocols[dissector.name] = None
+        for output in outputs(capture.items(), session):
+            if isinstance(output, Output):
+                series.add(reader.add(output))
+    found = list(guessed(series.blocks(), series.written))
+    stations = sorted({one.device for one in found})
+    if args.station is None and len(stations) > 1:
+        raise Failure(f"stations {', '.join(map(str, stations))} answered registers: name one with --station", USAGE)
+    chosen = [one for one in found if args.station in (None, one.device)]
+    if not chosen:
+        who = "no station" if args.station is None else f"station {args.station}"
+        raise Failure(f"{', '.join(args.files)}: {who} answered no registers", UNREADABLE)
+    document = drafted(args.name, family, list(protocols), chosen)
+    if args.write is None:
+        print(document, end="")
+        return 0
+    try:
+        with args.write.open("x", encoding="utf-8") as file:
+            file.write(document)
+    except OSError as error:
+        raise Failure(f"{args.write}: {error.strerror or error}", UNREADABLE) from None
+    sure = sum(one.sure is Sure.SURE for one in chosen)
+    print(f"sniff485: {len(chosen)} values drafted to {args.write}, {sure} of them sure", file=sys.stderr)
     return 0
 
 

@@ -50,7 +50,7 @@ def test_write_property() -> None:
     assert exchange(request) == [("analog-output", 0, 42.5, "write", "", DRIVE)]
     alone = readings(frame(MASTER, DRIVE, request, True), None)
     assert [(r.address, r.value, r.station) for r in alone] == [(0, 42.5, DRIVE)]
-    assert exchange(confirmed(3, 15, {**write, "property-value": 99.0})) == []
+    assert exchange(confirmed(3, 15, {**write, "property-value": 999.0})) == []
 
 
 def test_read_property_multiple() -> None:

@@ -9,11 +9,12 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from dissectors.profiles import packaged, parse_text
+from dissectors.profiles import Devices, packaged, parse_text
 from dissectors.profiles.decoding import Quality, decode, plain_name, say
 from dissectors.readings import How, Reading
 
 E510 = packaged("teco-e510")
+F510 = packaged("teco-f510")
 ACN = packaged("automationdirect-acn")
 
 
@@ -43,6 +44,11 @@ def one(text: str, *words: int) -> float | int | str:
         ('type = "s32"', (0xFFFF, 0xFFFE), -2),
         ('type = "f32"', struct.unpack(">HH", struct.pack(">f", 12.5)), 12.5),
         ('type = "f32"\nword-order = "low-first"', struct.unpack(">HH", struct.pack(">f", 12.5))[::-1], 12.5),
+        ('type = "u64"', (1, 2, 3, 4), 0x1000200030004),
+        ('type = "u64"\nword-order = "low-first"', (1, 2, 3, 4), 0x4000300020001),
+        ('type = "s64"', (0xFFFF, 0xFFFF, 0xFFFF, 0xFFFE), -2),
+        ('type = "f64"', struct.unpack(">HHHH", struct.pack(">d", -12.5)), -12.5),
+        ('type = "f64"\noctet-order = "low-first"', struct.unpack("<HHHH", struct.pack(">d", 7.25)), 7.25),
         ("scale = 0.01", (5003,), 50.03),
         ("scale = 0.1\noffset = -40", (651,), 25.1),
     ],
@@ -57,10 +63,10 @@ def test_hundredths_are_exact_decimals(raw: int) -> None:
     assert str(value) == str(float(f"{raw // 100}.{raw % 100:02d}"))
 
 
-def test_half_of_a_long_value_is_no_value() -> None:
+def test_half_of_a_long_value_is_said_to_be_half() -> None:
     profile = device('[[modbus.register]]\naddress = 8\nname = "a"\ntype = "u32"')
-    assert [value.name for value in decode(profile, holding(8, 1))] == ["holding/40009"]  # type: ignore[arg-type]
-    assert [value.name for value in decode(profile, holding(9, 1))] == ["holding/40010"]  # type: ignore[arg-type]
+    assert [value.name for value in decode(profile, holding(8, 1))] == ["a.high"]  # type: ignore[arg-type]
+    assert [value.name for value in decode(profile, holding(9, 1))] == ["a.low"]  # type: ignore[arg-type]
     assert [value.name for value in decode(profile, holding(7, 1, 2, 3, 4))] == [  # type: ignore[arg-type]
         "holding/40008",
         "a",
@@ -96,7 +102,37 @@ def test_parts_of_a_register() -> None:
 def test_codes_in_the_manuals_words() -> None:
     (fault,) = decode(E510, holding(0x2521, 49))
     assert (fault.value, fault.text) == (49, "MtrSw (DI motor switch fault)")
-    assert decode(E510, holding(0x2521, 11))[0].text == "code 11"
+    assert decode(E510, holding(0x2521, 11))[0].text == "code 11, reserved"
+    assert decode(E510, holding(0x2521, 99))[0].text == "code 99"
+
+
+def test_bits_that_must_be_zero_are_said() -> None:
+    (command, *_) = decode(E510, holding(0x2501, 0x3001, how=How.WRITE))
+    assert command.text == "run, forward, reserved bit C, reserved bit D"
+
+
+def test_a_parameter_says_what_the_same_point_says_elsewhere() -> None:
+    frequency, voltage, lock = (
+        decode(F510, holding(at, raw))[0] for at, raw in ((0x0C11, 1234), (0x0204, 4000), (0x0B00, 2))
+    )
+    assert (frequency.name, frequency.text) == ("12-17", "12.34 Hz")
+    assert (voltage.name, voltage.text) == ("motor-rated-voltage", "400.0 V")
+    assert lock.text == "reverse only"
+    assert decode(F510, holding(0x0C2D, 17))[0].text == "external fault 01"
+
+
+def test_long_whole_numbers_keep_their_digits() -> None:
+    (display,) = decode(E510, holding(0x2510, 0x1234, 0x5678))
+    assert display.text == "305419896"
+
+
+def test_the_scale_of_the_torque_is_exact() -> None:
+    assert [decode(E510, holding(0x2503, raw))[0].value for raw in (0x2000, 0xE000, 0x1000)] == [100.0, -100.0, 50.0]
+
+
+def test_a_version_is_told_as_people_write_it() -> None:
+    (version,) = decode(ACN, holding(0x0302, 0x0101))
+    assert version.text == "1.01"
 
 
 def test_a_register_read_along_with_its_neighbours_is_no_point() -> None:
@@ -165,3 +201,10 @@ def test_any_readings_decode(name: str, given_readings: list[Reading]) -> None:
         assert value.text
         assert value.text.isprintable()
     assert say(packaged(name), given_readings).isprintable()
+
+
+def test_all_devices_have_a_profile_where_each_has_the_same() -> None:
+    assert Devices({1: E510, 2: E510}).at(None) is E510
+    assert Devices({1: E510, 2: F510}).at(None) is None
+    assert Devices({1: E510}, F510).at(None) is None
+    assert Devices({}, F510).at(None) is F510

@@ -110,7 +110,7 @@ states-from = "fault"
         (5, "low-flow", "Low Flow", ""),
     ]
     assert (command.role, fault.role) == (Role.COMMAND, Role.FAULT)
-    assert (fault.states, fault.codes) == ({0: "no fault", 16: "dry"}, 6)
+    assert (fault.states, fault.reserved_codes) == ({0: "no fault", 16: "dry"}, {2, 4, 5, 6})
     assert last.states == fault.states
     assert fault.parts[0].of(0xFF1F) == 1
 

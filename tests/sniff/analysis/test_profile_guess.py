@@ -6,8 +6,13 @@ import importlib.util
 from pathlib import Path
 from typing import Any
 
+from dissectors.bacnet.application import confirmed
+from dissectors.bacnet.f510 import f510
+from dissectors.bacnet.frame_making import npdu_frame
+from dissectors.bacnet.readings import readings
+from dissectors.frame import Check, Found, Frame
 from dissectors.profiles import packaged
-from sniff.analysis.profile_guess import Guess, Guessing
+from sniff.analysis.profile_guess import Guess, Guessing, Heard, guess
 from sniff.bus.offline import outputs
 from sniff.engine.engine import Output
 from sniff.engine.follow_settings import dissector_for
@@ -73,3 +78,21 @@ def test_n2_and_mstp_stations() -> None:
                 guessing.add(output)
         best = {guess.station: guess.profile.name for guess in reversed(list(guessing.guesses(PROFILES)))}
         assert {station: best.get(station) for station in stations} == dict.fromkeys(stations, "teco-f510")
+
+
+def test_a_device_as_its_manual_has_it_fits_wholly() -> None:
+    profile = next(profile for profile in PROFILES if profile.name == "teco-f510")
+    drive, heard = f510(510), Heard(5)
+    for name in profile.constants:
+        request = confirmed(1, 12, {"object-identifier": "device,510", "property-identifier": name})
+        answer = drive.answer(1, request)
+        assert answer is not None
+        frames = [
+            Frame("mstp", npdu_frame(to, source, npdu, source == 1), 0, 1, Check.GOOD, Found.DELIMITER)
+            for source, to, npdu in ((1, 5, request), (5, 1, answer))
+        ]
+        for reading in readings(*frames):
+            heard.answered[reading.space, reading.address, reading.part] = reading
+    assert len(heard.answered) == len(profile.constants)
+    best = guess(heard, profile)
+    assert (best.score, "is another" in best.why) == (1.0, False), best.why

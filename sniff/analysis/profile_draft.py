@@ -1,0 +1,80 @@
+"""A device profile drafted from what was heard of a station, as a TOML document to be corrected by hand. Pure."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Sequence
+
+from dissectors.profiles.decoding import plain_name
+from dissectors.profiles.model import Kind
+from sniff.analysis.register_guess import RegisterGuess, Sure, Use
+
+_HOW = {Sure.SURE: "sure", Sure.LIKELY: "likely", Sure.OPEN: "open: other readings fit as well"}
+_USES = {
+    Use.CONSTANT: "never changed",
+    Use.SENSOR: "moves up and down",
+    Use.COUNTER: "only grows",
+    Use.SETTING: "written by a master",
+    Use.BITS: "single bits come and go",
+    Use.TEXT: "text",
+}
+
+
+def drafted(name: str, family: str, protocols: Sequence[str], guesses: Iterable[RegisterGuess]) -> str:
+    """The document for one device. `protocols`: registry names it was heard with; `family`: theirs (`Dissector`)."""
+    held = sorted(guesses, key=lambda one: (one.address, one.space != "holding"))
+    both = {one.space for one in held}
+    tables = [space for space in ("holding", "input") if space in both] or ["holding"]
+    lines = [
+        "# Drafted from a capture: types and orders are guesses, each with how sure it is. Names, units and scales",
+        "# are to be filled in by hand; `sniff485 profile check` says what is wrong with the document.",
+        "",
+        f"name = {_quoted(name)}",
+        f"title = {_quoted(f'{name} (draft)')}",
+        f"protocols = [{', '.join(map(_quoted, protocols))}]",
+        "",
+        f"[{family}]",
+        f"tables = [{', '.join(map(_quoted, tables))}]",
+    ]
+    done: set[int] = set()
+    for guess in held:
+        places = set(range(guess.address, guess.address + guess.kind.registers))
+        if not places & done:  # in both tables: described once
+            done |= places
+            lines += ["", *_register(family, guess)]
+    return "\n".join(lines) + "\n"
+
+
+def told(guess: RegisterGuess) -> str:
+    """What was seen of a register, in a line."""
+    if guess.low == guess.high:
+        span = f"always {guess.low:.7g}"
+    else:
+        span = f"{guess.low:.7g} … {guess.high:.7g}, {guess.changes} changes, {guess.rate:.3g} a second"
+    return f"{_HOW[guess.sure]}; {_USES[guess.use]}; {span} in {guess.answers} answers"
+
+
+def _register(family: str, guess: RegisterGuess) -> list[str]:
+    place = plain_name(guess.space, guess.address).replace("/", "-")
+    lines = [
+        f"# {told(guess)}",
+        f"[[{family}.register]]",
+        f"address = 0x{guess.address:04X}",
+        f"name = {_quoted(place)}",
+    ]
+    if guess.kind is not Kind.U16:
+        lines.append(f"type = {_quoted(guess.kind.value)}")
+    if guess.swapped:
+        lines.append('word-order = "low-first"')
+    if guess.little:
+        lines.append('octet-order = "low-first"')
+    if guess.use is not Use.SETTING:
+        lines.append('access = "r"')
+    if guess.sure is not Sure.SURE:
+        lines.append(f"doubt = {_quoted('guessed from a capture')}")
+    return lines
+
+
+def _quoted(text: str) -> str:
+    """A TOML basic string: what JSON escapes, TOML reads."""
+    return json.dumps(text, ensure_ascii=True)

@@ -1,0 +1,132 @@
+"""Guessing what registers hold, from meters whose registers are known."""
+
+from __future__ import annotations
+
+import random
+import struct
+from collections.abc import Callable
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dissectors.profiles.model import Kind
+from sniff.analysis.register_guess import RegisterGuess, Sure, Use, guessed
+from sniff.analysis.register_series import Block
+
+SECOND = 1_000_000_000
+Series = Callable[[random.Random, int], list[float]]
+
+
+def sensor(dice: random.Random, answers: int, middle: float, step: float) -> list[float]:
+    value, found = middle, []
+    for _ in range(answers):
+        value += dice.gauss(0, step) + (middle - value) * 0.05
+        found.append(value)
+    return found
+
+
+def counter(dice: random.Random, answers: int, begin: int, most: int) -> list[float]:
+    found = [begin]
+    for _ in range(answers - 1):
+        found.append(found[-1] + dice.randrange(0, most))
+    return [float(value) for value in found]
+
+
+def words_of(kind: Kind, value: float, swapped: bool, little: bool) -> tuple[int, ...]:
+    form = {Kind.F32: ">f", Kind.F64: ">d", Kind.U32: ">I", Kind.U16: ">H", Kind.S16: ">h", Kind.S32: ">i"}[kind]
+    packed = struct.pack(form, value if form[1] in "fd" else int(value))
+    words = list(struct.unpack(f">{len(packed) // 2}H", packed))
+    if little:
+        words = [word >> 8 | (word & 0xFF) << 8 for word in words]
+    return tuple(words[::-1] if swapped else words)
+
+
+METER: list[tuple[Kind, Series]] = [
+    (Kind.F32, lambda dice, n: sensor(dice, n, 230, 0.8)),
+    (Kind.F32, lambda dice, n: sensor(dice, n, 229, 0.8)),
+    (Kind.F32, lambda dice, n: sensor(dice, n, 12.3, 0.4)),
+    (Kind.F32, lambda dice, n: sensor(dice, n, 2800, 60)),
+    (Kind.F32, lambda dice, n: sensor(dice, n, -15, 4)),
+    (Kind.F32, lambda dice, n: sensor(dice, n, 0.93, 0.01)),
+    (Kind.F32, lambda dice, n: sensor(dice, n, 50.0, 0.01)),
+    (Kind.U32, lambda dice, n: counter(dice, n, 1_234_567, 900)),
+    (Kind.U32, lambda dice, n: counter(dice, n, 65_000, 40)),
+    (Kind.U32, lambda dice, n: counter(dice, n, 70_000_000, 3000)),
+    (Kind.U16, lambda dice, n: sensor(dice, n, 2300, 8)),
+    (Kind.U16, lambda dice, n: sensor(dice, n, 500, 1.4)),
+    (Kind.S16, lambda dice, n: sensor(dice, n, 5, 12)),
+    (Kind.U16, lambda dice, n: counter(dice, n, 100, 4)),
+]
+
+
+def block_of(
+    dice: random.Random, layout: list[tuple[Kind, Series]], swapped: bool, little: bool, answers: int
+) -> Block:
+    columns = [(kind, make(dice, answers)) for kind, make in layout]
+    width = sum(kind.registers for kind, _ in columns)
+    block = Block(1, "holding", 100, width)
+    for at in range(answers):
+        row = [word for kind, values in columns for word in words_of(kind, values[at], swapped, little)]
+        block.add(at * SECOND, tuple(row))
+    return block
+
+
+def judged(found: list[RegisterGuess], layout: list[tuple[Kind, Series]], order: tuple[bool, bool]) -> tuple[int, int]:
+    """How many registers are read rightly, and how many are wrong although they are said to be sure."""
+    by_address = {guess.address: guess for guess in found}
+    right = wrong = 0
+    at = 100
+    for kind, _ in layout:
+        guess = by_address.get(at)
+        same = guess is not None and guess.kind is kind
+        if kind.registers > 1 and guess is not None:
+            same = same and (guess.swapped, guess.little) == order
+        right += same * kind.registers
+        overlapping = [by_address[place] for place in range(at, at + kind.registers) if place in by_address]
+        wrong += sum(one.sure is Sure.SURE and not (one is guess and same) for one in overlapping)
+        at += kind.registers
+    return right, wrong
+
+
+@pytest.mark.parametrize("order", [(False, False), (True, False), (True, True)])
+def test_most_registers_of_a_meter_are_read_rightly_and_none_surely_wrong(order: tuple[bool, bool]) -> None:
+    right = total = 0
+    for seed in range(20):
+        dice = random.Random(seed)
+        layout = METER[:]
+        dice.shuffle(layout)
+        if order[1]:  # octets swapped are usual for wide values only
+            layout = [one for one in layout if one[0].registers > 1]
+        block = block_of(dice, layout, *order, 300)
+        found = list(guessed([block], set()))
+        good, wrong = judged(found, layout, order)
+        assert not wrong, [one for one in found if one.sure is Sure.SURE]
+        right += good
+        total += block.width
+    assert right >= 0.9 * total, f"{right} of {total}"
+
+
+def test_what_is_constant_is_left_open() -> None:
+    block = Block(1, "input", 0, 4)
+    for at in range(100):
+        block.add(at * SECOND, (0x4366, 0, 7, 0))
+    assert {(guess.sure, guess.use) for guess in guessed([block], set())} == {(Sure.OPEN, Use.CONSTANT)}
+
+
+def test_what_a_master_writes_is_a_setting() -> None:
+    block = Block(3, "holding", 9, 1)
+    for at in range(50):
+        block.add(at * SECOND, (3000 + at % 4,))
+    (guess,) = guessed([block], {(3, "holding", 9)})
+    assert guess.use is Use.SETTING
+
+
+@given(st.lists(st.lists(st.integers(0, 0xFFFF), min_size=5, max_size=5).map(tuple), min_size=1, max_size=40))
+def test_any_words_give_a_guess_for_every_register(rows: list[tuple[int, ...]]) -> None:
+    block = Block(1, "holding", 0, 5)
+    for at, row in enumerate(rows):
+        block.add(at, row)
+    found = list(guessed([block], set()))
+    assert sum(guess.kind.registers for guess in found) == 5
+    assert [guess.address for guess in found] == sorted(guess.address for guess in found)
