@@ -32,6 +32,7 @@ __all__ = [
 
 
 packet = on_first_use("dissectors.n2.packets:packet")
+kernel = on_first_use("dissectors.n2.kernel:kernel")
 
 
 def bits(frame: Frame) -> float:
@@ -43,6 +44,7 @@ N2 = Dissector(
     name="n2",
     title="Metasys N2",
     framer=N2Framer,
+    kernel=kernel,
     peek=peek,
     tracker=N2Tracker,
     text=text,
