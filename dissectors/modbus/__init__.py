@@ -34,6 +34,7 @@ __all__ = [
 packet = on_first_use("dissectors.modbus.packets:dissect")
 kernel = on_first_use("dissectors.modbus.kernel:kernel")
 pairing = on_first_use("dissectors.modbus.block_pairing:pairing")
+ascii_kernel = on_first_use("dissectors.modbus.ascii_kernel:kernel")
 
 
 def rtu_bits(frame: Frame) -> float:
@@ -97,4 +98,5 @@ ASCII = Dissector(
     rules=RULES,
     readings=readings,
     refusal=refusal,
+    kernel=ascii_kernel,
 )
