@@ -8,6 +8,7 @@ the framer keeps in mind.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -84,6 +85,19 @@ def _decoded(octets: Octets, begins: Times, ends: Times) -> tuple[Octets, Times,
     binary[:total] = high << 4 | low
     binary[places + pairs] = 0
     return binary, places, sizes
+
+
+def rtu_twins(frames: FrameColumns, octets: Octets) -> tuple[FrameColumns, Octets]:
+    """Frames of this kernel as the RTU frames that would carry the same, but for their check, and their octets.
+
+    What directly follows another still does, and nothing else.
+    """
+    binary, places, sizes = _decoded(octets, frames.offset, frames.offset + frames.length)
+    apart = np.cumsum(~frames.chained)
+    total = int(sizes.sum())
+    spread = np.zeros(len(binary) + int(apart[-1] if len(apart) else 0), np.uint8)
+    spread[np.arange(total) + np.repeat(apart, sizes)] = binary[:total]
+    return replace(frames, offset=places + apart, length=sizes.astype(np.int32)), spread
 
 
 def _sums(binary: Octets, places: Times, sizes: Times) -> Codes:
