@@ -33,6 +33,7 @@ __all__ = [
 
 packet = on_first_use("dissectors.n2.packets:packet")
 kernel = on_first_use("dissectors.n2.kernel:kernel")
+pairing = on_first_use("dissectors.n2.block_pairing:pairing")
 
 
 def bits(frame: Frame) -> float:
@@ -45,6 +46,7 @@ N2 = Dissector(
     title="Metasys N2",
     framer=N2Framer,
     kernel=kernel,
+    pairing=pairing,
     peek=peek,
     tracker=N2Tracker,
     text=text,
