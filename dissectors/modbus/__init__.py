@@ -33,7 +33,9 @@ __all__ = [
 
 packet = on_first_use("dissectors.modbus.packets:dissect")
 kernel = on_first_use("dissectors.modbus.kernel:kernel")
-pairing = on_first_use("dissectors.modbus.block_pairing:pairing")
+pairing = on_first_use("dissectors.modbus.block_pairing:rtu_pairing")
+ascii_kernel = on_first_use("dissectors.modbus.ascii_kernel:kernel")
+ascii_pairing = on_first_use("dissectors.modbus.block_pairing:ascii_pairing")
 
 
 def rtu_bits(frame: Frame) -> float:
@@ -97,4 +99,6 @@ ASCII = Dissector(
     rules=RULES,
     readings=readings,
     refusal=refusal,
+    kernel=ascii_kernel,
+    pairing=ascii_pairing,
 )

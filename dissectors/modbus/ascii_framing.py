@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import re
 from binascii import unhexlify
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from dissectors.checksums import sum8
 from dissectors.frame import Check, Chunk, Damage, Event, Flaw, Found, Frame, LineError, Noise, Reason, Repair
@@ -27,6 +27,10 @@ from dissectors.framer import UNKNOWN_SILENCE, OctetWindow
 from dissectors.line import NS_PER_S, Timing
 from dissectors.modbus.functions import DIAGNOSTIC_DELIMITER, ascii_length, is_open_length
 from dissectors.modbus.remains import ODD_LENGTH, Side, noise_place, predicted
+
+if TYPE_CHECKING:
+    from dissectors.columns import FrameColumns, Octets
+    from dissectors.framer import Framer
 
 MAX_CHARACTERS: Final = 513
 LONGEST_SILENCE: Final = NS_PER_S
@@ -106,6 +110,12 @@ class AsciiFramer:
         if not len(self._window):
             return None
         return self._window.proves_silence(LONGEST_SILENCE + 1 if self._inside else self._t35)
+
+    def remember(self, earlier: Framer, frames: FrameColumns, octets: Octets) -> None:
+        """See `dissectors.columns.Remembering`: what stations made of their end characters stays."""
+        assert isinstance(earlier, AsciiFramer)
+        self._delimiters = dict(earlier._delimiters)
+        self._change = None if len(frames) else earlier._change
 
     def _give(self) -> list[Event]:
         out, self._out = self._out, []

@@ -1,4 +1,8 @@
-"""The bulk form of the Modbus RTU tracker, as the engine asks for it (`dissectors.columns.Pairing`)."""
+"""The bulk form of the Modbus tracker, as the engine asks for it (`dissectors.columns.Pairing`).
+
+Frames in ASCII are paired as the RTU frames that would carry the same. What counts in characters of silence is that of
+RTU, which is more than ASCII asks: then the tracker looks at more by itself.
+"""
 
 from __future__ import annotations
 
@@ -6,25 +10,32 @@ import numpy as np
 
 from dissectors.columns import FrameColumns, Octets, Run, Times
 from dissectors.line import Timing
-from dissectors.modbus.adu import readable_adu
+from dissectors.modbus.adu import ASCII_NAME, RTU_NAME, readable_adu
+from dissectors.modbus.ascii_kernel import rtu_twins
 from dissectors.modbus.exchange import Exchange, Seen
 from dissectors.modbus.exchange_columns import exchanges, placed
 from dissectors.modbus.exchange_memory import holding, passed
 from dissectors.modbus.tracker import ModbusTracker, PassedBy
 from dissectors.tracker import Tracker
 
-PROTOCOL = "modbus-rtu"
 
-
-class RtuBlockPairing:
-    """Runs of regular exchanges among some frames."""
+class ModbusBlockPairing:
+    """Runs of regular exchanges among some frames. `twins`: the frames as RTU carries them, where they are others."""
 
     def __init__(
-        self, tracker: ModbusTracker, frames: FrameColumns, octets: Octets, timing: Timing, slack: Times
+        self,
+        protocol: str,
+        tracker: ModbusTracker,
+        frames: FrameColumns,
+        octets: Octets,
+        timing: Timing,
+        slack: Times,
+        twins: tuple[FrameColumns, Octets] | None = None,
     ) -> None:
+        self._protocol = protocol
         self._tracker = tracker
         self._frames, self._octets, self._timing, self._slack = frames, octets, timing, slack
-        self._found = exchanges(frames, octets, timing, slack)
+        self._found = exchanges(*(twins or (frames, octets)), timing, slack)
         self._numbers: Times | None = None
 
     def run(self, begin: int, no: int) -> Run | None:
@@ -71,11 +82,21 @@ class RtuBlockPairing:
         self._tracker.pass_by(went, by)
 
     def _seen(self, row: int, to_number: int) -> Seen:
-        frame = self._frames.frame(row, self._octets, PROTOCOL, int(self._slack[row]))
-        return Seen(row + to_number, frame, self._frames.header(row, PROTOCOL), readable_adu(frame))
+        frame = self._frames.frame(row, self._octets, self._protocol, int(self._slack[row]))
+        return Seen(row + to_number, frame, self._frames.header(row, self._protocol), readable_adu(frame))
 
 
-def pairing(tracker: Tracker, frames: FrameColumns, octets: Octets, timing: Timing, slack: Times) -> RtuBlockPairing:
+def rtu_pairing(
+    tracker: Tracker, frames: FrameColumns, octets: Octets, timing: Timing, slack: Times
+) -> ModbusBlockPairing:
     """For the manifest."""
     assert isinstance(tracker, ModbusTracker)
-    return RtuBlockPairing(tracker, frames, octets, timing, slack)
+    return ModbusBlockPairing(RTU_NAME, tracker, frames, octets, timing, slack)
+
+
+def ascii_pairing(
+    tracker: Tracker, frames: FrameColumns, octets: Octets, timing: Timing, slack: Times
+) -> ModbusBlockPairing:
+    """For the manifest."""
+    assert isinstance(tracker, ModbusTracker)
+    return ModbusBlockPairing(ASCII_NAME, tracker, frames, octets, timing, slack, rtu_twins(frames, octets))

@@ -32,6 +32,8 @@ __all__ = [
 
 
 packet = on_first_use("dissectors.n2.packets:packet")
+kernel = on_first_use("dissectors.n2.kernel:kernel")
+pairing = on_first_use("dissectors.n2.block_pairing:pairing")
 
 
 def bits(frame: Frame) -> float:
@@ -43,6 +45,8 @@ N2 = Dissector(
     name="n2",
     title="Metasys N2",
     framer=N2Framer,
+    kernel=kernel,
+    pairing=pairing,
     peek=peek,
     tracker=N2Tracker,
     text=text,

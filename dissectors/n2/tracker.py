@@ -19,6 +19,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from dissectors.frame import Event, Frame, Header, Noise, Reason, Role
@@ -30,12 +31,16 @@ from dissectors.n2.known import KnownStations
 from dissectors.n2.stretch import STRAY
 from dissectors.tracker import Interval, Placement, Tracked, Transaction, Verdict
 
+Row = tuple[int, Frame, Header]
+"""Number, frame and header."""
+
 GIVE_UP = 3 * NS_PER_S
 """Longest time that a master waits for an answer, ns (upper end of the NAE's setting; digimat.n2's default)."""
 
 _LONGEST = 256  # characters of an answer that may have begun in time and not be read yet
 _OWING = 16  # commands remembered that a late answer may still answer
-_FEW = 16  # answers of a station after which its shortest time says something
+FEW = 16
+"""Answers of a station after which its shortest time says something."""
 
 
 @dataclass(slots=True)
@@ -121,6 +126,50 @@ class N2Tracker:
             return ()
         left, self._open = self._open, None
         return (left.bad or _transaction(left, Verdict.OPEN),)
+
+    # --- exchanges that go by without it (`block_pairing.py`) ---
+
+    @property
+    def is_at_rest(self) -> bool:
+        """Whether nothing is open, and the last command was answered: then only what is known of times matters."""
+        return self._open is None and self._missed is None
+
+    @property
+    def next_id(self) -> int:
+        """The number of the next transaction."""
+        return self._next
+
+    def known_times(self, station: int) -> tuple[int, int]:
+        """How many answers of a station came, and the shortest time that one may have taken, ns."""
+        times = self._times.get(station)
+        return (0, 0) if times is None else (times.count, times.least)
+
+    def pass_by(self, count: int, times: Mapping[int, tuple[int, int]], asked: Row, answered: Frame) -> None:
+        """Take `count` answered exchanges that followed one another.
+
+        `times`: by station, in the order of first being asked: as `known_times` gives them behind. `asked`: the last
+        command, `answered` its answer.
+        """
+        for station, (number, least) in times.items():
+            self._known.add(station)
+            self._times[station] = _Times(number, least)
+        self._next += count
+        no, frame, header = asked
+        self._done = _Exchange(
+            id=self._next - 1,
+            no=no,
+            octets=frame.octets,
+            station=header.destination,
+            kind=header.kind,
+            start=frame.start,
+            end=frame.end,
+            slack=frame.slack,
+            attempt=1,
+            of=None,
+            damaged=False,
+            answer=answered.octets,
+            answer_end=answered.end,
+        )
 
     # --- commands ---
 
@@ -217,7 +266,7 @@ class N2Tracker:
         formless = not open_.damaged and not may_answer(asked, frame.octets)
         times = self._times.get(open_.station) if open_.station is not None else None
         latest = self._since(open_, frame).high
-        soon = times is not None and times.count >= _FEW and 2 * latest < times.least
+        soon = times is not None and times.count >= FEW and 2 * latest < times.least
         if not (formless or soon):
             return None
         candidates = [e for e in self._within(frame.start) if e.is_owed and (e.octets != open_.octets or not formless)]

@@ -83,7 +83,7 @@ def damaged(table: np.ndarray, length: np.ndarray, share: float, seed: int = 1) 
 
 def bus(table: np.ndarray, length: np.ndarray, timing: Timing) -> Reads:
     """The frames as an adapter reads them: one read each; held back for 16 ms, or until 62 octets are there."""
-    octets = table[np.arange(_MOST) < length[:, None]]
+    octets = table[np.arange(table.shape[1]) < length[:, None]]
     pause = np.where(np.arange(len(table)) & 1, 5 * _MS, 9 * _MS)
     end = np.cumsum(pause + length * timing.char)
     if not timing.latency:

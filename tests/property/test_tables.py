@@ -7,7 +7,7 @@ from dataclasses import replace
 from functools import partial
 from itertools import chain
 from pathlib import Path
-from types import SimpleNamespace
+from types import ModuleType, SimpleNamespace
 
 import pytest
 
@@ -26,7 +26,7 @@ from sniff.engine.observer import observe
 from sniff.engine.session import Adapter, LineEvent, Session
 from sniff.engine.table import Table
 from sniff.formats import read
-from tests.bench import bulk_mstp, bulk_rtu
+from tests.bench import bulk_ascii, bulk_mstp, bulk_n2, bulk_rtu
 
 Bus = Callable[[float], tuple[Session, Reads]]
 
@@ -101,11 +101,26 @@ def _mstp(damaged: float) -> tuple[Session, Reads]:
     return Session("x", bulk_mstp.LINE, "mstp"), bulk_mstp.reads(12_000, damaged=damaged)
 
 
-def _rtu(damaged: float, timing: Timing = bulk_rtu.TIMING) -> tuple[Session, Reads]:
-    table, length = bulk_rtu.frames(12_000)
+def _polled(
+    damaged: float, protocol: str, made: ModuleType, timing: Timing, count: int = 12_000
+) -> tuple[Session, Reads]:
+    """A bus on which stations are asked in turn."""
+    table, length = made.frames(count)
     spoilt = bulk_rtu.damaged(table, length, damaged) if damaged else table
-    session = Session("x", timing.line, "modbus-rtu", adapter=Adapter(latency=timing.latency))
+    session = Session("x", timing.line, protocol, adapter=Adapter(latency=timing.latency))
     return session, bulk_rtu.bus(spoilt, length, timing)
+
+
+def _rtu(damaged: float, timing: Timing = bulk_rtu.TIMING) -> tuple[Session, Reads]:
+    return _polled(damaged, "modbus-rtu", bulk_rtu, timing)
+
+
+def _ascii(damaged: float, timing: Timing = bulk_ascii.TIMING) -> tuple[Session, Reads]:
+    return _polled(damaged, "modbus-ascii", bulk_ascii, timing, 6000)
+
+
+def _n2(damaged: float, timing: Timing = bulk_n2.TIMING) -> tuple[Session, Reads]:
+    return _polled(damaged, "n2", bulk_n2, timing, 6000)
 
 
 def _hidden(damaged: float) -> tuple[Session, Reads]:
@@ -115,7 +130,19 @@ def _hidden(damaged: float) -> tuple[Session, Reads]:
 
 
 @pytest.mark.parametrize("damaged", [0.0, 0.01])
-@pytest.mark.parametrize("bus", [_mstp, _rtu, partial(_rtu, timing=bulk_rtu.HELD_BACK), _hidden])
+@pytest.mark.parametrize(
+    "bus",
+    [
+        _mstp,
+        _rtu,
+        partial(_rtu, timing=bulk_rtu.HELD_BACK),
+        _hidden,
+        _ascii,
+        partial(_ascii, timing=bulk_ascii.HELD_BACK),
+        _n2,
+        partial(_n2, timing=bulk_n2.HELD_BACK),
+    ],
+)
 def test_long_buses_give_the_same_rows_as_tables(bus: Bus, damaged: float) -> None:
     """With seams between blocks, and between columns and the reference."""
     session, reads = bus(damaged)
