@@ -17,14 +17,11 @@ from dissectors.modbus.functions import (
     EXCEPTION_LENGTH,
     EXCEPTIONS,
     FUNCTIONS,
-    MAX_FRAME,
     MAX_UNIT,
-    MIN_FRAME,
-    MORE,
     VENDOR_EXCEPTIONS,
-    Octets,
     is_open_length,
 )
+from dissectors.modbus.lengths import MAX_FRAME, MIN_FRAME, MORE, Octets
 from dissectors.modbus.past import Past
 
 CRC_BITS: Final = 16

@@ -38,15 +38,8 @@ from dissectors.modbus.candidates import (
     whole_stretch,
 )
 from dissectors.modbus.expectation import EXACT
-from dissectors.modbus.functions import (
-    BROADCAST,
-    EXCEPTION_BIT,
-    FUNCTIONS,
-    MAX_FRAME,
-    MAX_UNIT,
-    MORE,
-    is_open_length,
-)
+from dissectors.modbus.functions import BROADCAST, EXCEPTION_BIT, FUNCTIONS, MAX_UNIT, is_open_length
+from dissectors.modbus.lengths import MAX_FRAME, MORE
 from dissectors.modbus.open_length import OpenLengthFinder
 from dissectors.modbus.past import KNOWN_LENGTH
 from dissectors.modbus.remains import Side

@@ -21,6 +21,7 @@ from dissectors.modbus.functions import (
     MEI_TYPES,
     Function,
 )
+from dissectors.modbus.ranges import ANSWERED, ASKED, SHARED, Number
 
 _DAMAGE = {
     Damage.FORM: "characters that a frame may not hold",
@@ -170,31 +171,25 @@ def _by_shape(function: Function, octets: bytes, size: int) -> Role:
 
 def _address_count(code: int, role: Role, octets: bytes, end: int) -> tuple[int | None, int | None]:
     """First address and how many, as far as this direction of the function has them; unit and PDU end at `end`."""
-    if code in (0x0F, 0x10) and role is not Role.UNKNOWN:
-        return _u16(octets, 2, end), _u16(octets, 4, end)
-    if role in (Role.REQUEST, Role.BROADCAST):
-        if code in (0x01, 0x02, 0x03, 0x04, 0x17):
-            return _u16(octets, 2, end), _u16(octets, 4, end)
-        if code == 0x18:
-            return _u16(octets, 2, end), None
-        if code == 0x14:
-            return None, octets[2] // 7 if end > 2 else None
-        if code == 0x2B:
-            return (octets[4] if end > 4 else None), None
-    elif role is Role.RESPONSE:
-        if code in (0x03, 0x04, 0x17):
-            return None, octets[2] // 2 if end > 2 else None
-        if code == 0x18:
-            return None, _u16(octets, 4, end)
-        if code == 0x2B:
-            return None, octets[7] if end > 7 else None
-    if code in (0x05, 0x06, 0x16) and role is not Role.UNKNOWN:
-        return _u16(octets, 2, end), 1
-    return None, None
+    if role is Role.RESPONSE:
+        told = ANSWERED.get(code)
+    elif role is Role.EITHER:
+        told = SHARED.get(code)
+    else:
+        told = ASKED.get(code) if role is not Role.UNKNOWN else None
+    if told is None:
+        return None, None
+    address, quantity, single = told
+    return _number(octets, address, end), 1 if single else _number(octets, quantity, end)
 
 
-def _u16(octets: bytes, at: int, end: int) -> int | None:
-    return octets[at] << 8 | octets[at + 1] if at + 2 <= end else None
+def _number(octets: bytes, number: Number | None, end: int) -> int | None:
+    if number is None:
+        return None
+    at, size, divisor = number
+    if at + size > end:
+        return None
+    return octets[at] << 8 | octets[at + 1] if size == 2 else octets[at] // divisor
 
 
 def _damage(frame: Frame, check_words: str, check: tuple[int, int] | None) -> str:

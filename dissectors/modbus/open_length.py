@@ -23,15 +23,8 @@ from dissectors.modbus.candidates import (
     without_zeros,
 )
 from dissectors.modbus.expectation import Expected
-from dissectors.modbus.functions import (
-    BROADCAST,
-    EXCEPTION_BIT,
-    EXCEPTION_LENGTH,
-    FUNCTIONS,
-    MAX_FRAME,
-    MIN_FRAME,
-    is_open_length,
-)
+from dissectors.modbus.functions import BROADCAST, EXCEPTION_BIT, EXCEPTION_LENGTH, FUNCTIONS, is_open_length
+from dissectors.modbus.lengths import MAX_FRAME, MIN_FRAME
 from dissectors.modbus.past import Past
 
 _UNPREDICTED: Final = frozenset(range(256)) - {

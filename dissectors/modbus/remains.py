@@ -8,15 +8,8 @@ from typing import NamedTuple
 from dissectors.frame import Damage, LineError, Mark, Place, Reason
 from dissectors.modbus.candidates import SHORT_FRAME, Reading, octet_bits, readings
 from dissectors.modbus.expectation import Expected
-from dissectors.modbus.functions import (
-    BROADCAST,
-    EXCEPTION_BIT,
-    FUNCTIONS,
-    MAX_FRAME,
-    MAX_UNIT,
-    MIN_FRAME,
-    MORE,
-)
+from dissectors.modbus.functions import BROADCAST, EXCEPTION_BIT, FUNCTIONS, MAX_UNIT
+from dissectors.modbus.lengths import MAX_FRAME, MIN_FRAME, MORE
 
 _COMMON = frozenset({0x01, 0x02, 0x03, 0x04, 0x05, 0x06, 0x0F, 0x10})
 

@@ -24,16 +24,10 @@ from dissectors.checksums import crc16_modbus
 from dissectors.frame import Flaw, Repair
 from dissectors.modbus.candidates import octet_bits, readings
 from dissectors.modbus.expectation import Expected
-from dissectors.modbus.functions import (
-    EXCEPTION_BIT,
-    FUNCTIONS,
-    IMPLAUSIBLE,
-    MAX_FRAME,
-    MAX_UNIT,
-    MIN_FRAME,
-    is_open_length,
-)
+from dissectors.modbus.functions import EXCEPTION_BIT, FUNCTIONS, MAX_UNIT, is_open_length
+from dissectors.modbus.lengths import MAX_FRAME, MIN_FRAME
 from dissectors.modbus.past import Past
+from dissectors.modbus.shapes import IMPLAUSIBLE
 
 _SHORTEST: Final = MIN_FRAME + 1
 """Octets of the shortest frame that is put right: of fewer, too little agrees beside the check."""

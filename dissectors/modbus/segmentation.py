@@ -34,7 +34,8 @@ from typing import Final, NamedTuple, Protocol
 
 from dissectors.modbus.candidates import ANY_END, CRC_BITS, ZERO_TAIL, Candidate, Pending, Reading, octet_hope
 from dissectors.modbus.expectation import LOOSE, REPEATED, SAME_UNKNOWN, Expected, expectation
-from dissectors.modbus.functions import EXCEPTION_BIT, MIN_FRAME, MORE
+from dissectors.modbus.functions import EXCEPTION_BIT
+from dissectors.modbus.lengths import MIN_FRAME, MORE
 from dissectors.modbus.past import KNOWN_LENGTH, Past
 
 THRESHOLD: Final = 20
