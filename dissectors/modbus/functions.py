@@ -14,14 +14,12 @@ from dissectors.modbus.lengths import MIN_FRAME, MORE, NEVER, Length, Octets, le
 from dissectors.modbus.notation import (
     CHECK,
     HEAD,
-    Field,
     Means,
     Message,
     Messages,
     counted,
     first,
     fixed_length,
-    octets_of,
 )
 from dissectors.modbus.shapes import Shape, shape_of
 
@@ -140,23 +138,23 @@ def answer_length(request: Octets) -> int | None:
     code = request[1]
     asked = ITEMS_ASKED.get(code)
     if asked is not None:
-        at, items = asked
+        at, bits = asked
         if len(request) < at + 2 + CHECK:
             return None
-        return HEAD + 1 + octets_of(items, request[at] << 8 | request[at + 1]) + CHECK
+        return HEAD + 1 + ((request[at] << 8 | request[at + 1]) * bits + 7 >> 3) + CHECK
     return len(request) if code in _COPIED else _ANSWER_LENGTHS.get(code)
 
 
-def _asked(messages: Messages) -> tuple[int, Field] | None:
-    """Where a request says how many items its answer holds, and what they are; None of others."""
+def _asked(messages: Messages) -> tuple[int, int] | None:
+    """Where a request says how many items its answer holds, and the bits of one; None of others."""
     quantity, answer = first(messages.request, Means.QUANTITY), counted(messages.response)
-    return None if quantity is None or answer is None else (quantity.at, answer.items)
+    return None if quantity is None or answer is None else (quantity.at, answer.items.bits)
 
 
-ITEMS_ASKED: Final[Mapping[int, tuple[int, Field]]] = {
+ITEMS_ASKED: Final[Mapping[int, tuple[int, int]]] = {
     code: asked for code, messages in MESSAGES.items() if (asked := _asked(messages)) is not None
 }
-"""By function: where the request says how many items its answer holds, and what they are."""
+"""By function: where the request says how many items its answer holds, and the bits of one."""
 
 _COPIED: Final = frozenset(code for code, messages in MESSAGES.items() if messages.request == messages.response)
 _ANSWER_LENGTHS: Final[Mapping[int, int]] = {

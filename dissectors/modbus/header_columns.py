@@ -19,7 +19,6 @@ from dissectors.modbus.functions import BROADCAST, EXCEPTION_BIT, FUNCTIONS, Fun
 from dissectors.modbus.header import exception_name, peek_rtu
 from dissectors.modbus.layout import MAX_READ_BITS
 from dissectors.modbus.length_columns import common
-from dissectors.modbus.notation import Means
 from dissectors.modbus.ranges import AGREEMENTS, ANSWERED, ASKED, SHARED, Number
 
 if TYPE_CHECKING:
@@ -167,11 +166,11 @@ def _numbers(octets: Octets, places: Times, number: Number) -> Numbers:
 def _contradicts_itself(octets: Octets, places: Times, codes: Codes, role: Codes) -> Masks:
     """Requests whose byte count does not fit their quantity."""
     wrong = np.zeros(len(places), bool)
-    for code, (quantity_at, count_at, items) in AGREEMENTS.items():
+    for code, (quantity_at, count_at, bits) in AGREEMENTS.items():
         which = np.flatnonzero((codes == code) & (role != RESPONSE))
         place = places[which]
         quantity = _numbers(octets, place, Number(quantity_at, 2))
-        needed = (quantity + 7) // 8 if items.means is Means.BITS else items.size * quantity
+        needed = quantity * bits + 7 >> 3
         wrong[which] = octets[place + count_at] != needed
     return wrong
 

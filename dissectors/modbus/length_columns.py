@@ -25,7 +25,7 @@ from dissectors.modbus.functions import (
 )
 from dissectors.modbus.layout import MESSAGES
 from dissectors.modbus.lengths import MAX_FRAME, MORE, NEVER, most_of
-from dissectors.modbus.notation import CHECK, HEAD, Field, Means, Message, Place, counted, fixed_length
+from dissectors.modbus.notation import CHECK, HEAD, Means, Message, Place, counted, fixed_length
 from dissectors.modbus.notation import places as places_of
 from dissectors.modbus.shapes import held, told
 
@@ -228,7 +228,7 @@ def _shapes(message: Message, octets: Octets, places: Times) -> Bits:
         fits &= _among(_number(octets, places, place), values)
     count = counted(message)
     if count is not None and count.quantity is not None:
-        needed = _octets_of(count.items, _number(octets, places, count.quantity)) + count.beside
+        needed = (_number(octets, places, count.quantity) * count.items.bits + 7 >> 3) + count.beside
         fits &= _number(octets, places, count.count) == needed
     elif count is not None and count.items.size > 1:
         fits &= _number(octets, places, count.count) % count.items.size == 0
@@ -247,10 +247,6 @@ def _number(octets: Octets, places: Times, place: Place) -> Numbers:
     return _word(octets, places, place.at) if place.field.size == 2 else octets[places + place.at].astype(np.int32)
 
 
-def _octets_of(items: Field, quantity: Numbers) -> Numbers:
-    return (quantity + 7) // 8 if items.means is Means.BITS else quantity * items.size
-
-
 def answer_lengths(octets: Octets, places: Times, codes: Codes) -> Lengths:
     """Octets of the normal answer to requests of COMMON functions; NEVER of others."""
     answers = np.full(len(places), NEVER, np.int16)
@@ -260,7 +256,7 @@ def answer_lengths(octets: Octets, places: Times, codes: Codes) -> Lengths:
         at = np.flatnonzero(codes == code)
         asked, length = ITEMS_ASKED.get(code), fixed_length(_RESPONSES[code])
         if asked is not None:
-            counted_octets = _octets_of(asked[1], _word(octets, places[at], asked[0]))
+            counted_octets = _word(octets, places[at], asked[0]) * asked[1] + 7 >> 3
             answers[at] = np.minimum(HEAD + 1 + counted_octets + CHECK, np.iinfo(np.int16).max)
         elif length is not None:
             answers[at] = length

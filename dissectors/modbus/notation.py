@@ -62,6 +62,11 @@ class Field:
         """Whether it fills what is left."""
         return self.means in _LISTS
 
+    @property
+    def bits(self) -> int:
+        """Bits of one item of a list."""
+        return 1 if self.means is Means.BITS else 8 * self.size
+
 
 _LISTS: Final = frozenset((Means.BITS, Means.REGISTERS, Means.OCTETS, Means.TEXT, Means.WORD, Means.GROUPS))
 
@@ -203,7 +208,7 @@ def counted(message: Message) -> Counted | None:
 
 def octets_of(items: Field, quantity: int) -> int:
     """Octets that so many items take."""
-    return (quantity + 7) // 8 if items.means is Means.BITS else quantity * items.size
+    return quantity * items.bits + 7 >> 3
 
 
 _COUNTED: Final = frozenset((Means.BYTES, Means.GROUPS))

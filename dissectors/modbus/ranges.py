@@ -29,11 +29,11 @@ class Range(NamedTuple):
 
 
 class Agreement(NamedTuple):
-    """A quantity, and the octet behind it that counts what so many items take."""
+    """A quantity, and the octet behind it that counts what so many items of so many bits take."""
 
     quantity_at: int
     count_at: int
-    items: Field
+    bits: int
 
 
 def _range(message: Message, writes: bool) -> Range | None:
@@ -85,7 +85,7 @@ def _agreement(message: Message) -> Agreement | None:
     count = counted(message)
     if count is None or count.quantity is None or count.quantity.at > count.count.at:
         return None
-    return Agreement(count.quantity.at, count.count.at, count.items)
+    return Agreement(count.quantity.at, count.count.at, count.items.bits)
 
 
 AGREEMENTS: Final[Mapping[int, Agreement]] = {

@@ -39,7 +39,15 @@ def shape_of(message: Message) -> Shape:
     if not holds:
         return _anything
     bits, penalty = told(message)
-    return _one_held(holds[0], bits, penalty) if len(holds) == 1 else _all_held(holds, bits, penalty)
+    ranges = held(message)
+    if len(holds) > 1:
+        return _all_held(holds, bits, penalty)
+    if ranges and isinstance(ranges[0][1], range) and ranges[0][0].field.size == 2:
+        return _word_held(ranges[0][0].at, ranges[0][1], bits, penalty)
+    count = counted(message)
+    if count is not None and count.quantity is None and not ranges and count.items.means is Means.REGISTERS:
+        return _even_held(count.count.at, bits, penalty)
+    return _one_held(holds[0], bits, penalty)
 
 
 def told(message: Message) -> tuple[int, int]:
@@ -76,6 +84,25 @@ def _anything(octets: Octets, start: int, length: int) -> int:
     return 0
 
 
+def _word_held(at: int, values: range, bits: int, penalty: int) -> Shape:
+    """By far the most frequent: the quantity of a read."""
+    least, most = values.start, values.stop - 1
+
+    def shape(octets: Octets, start: int, length: int) -> int:
+        return bits if least <= octets[start + at] << 8 | octets[start + at + 1] <= most else penalty
+
+    return shape
+
+
+def _even_held(at: int, bits: int, penalty: int) -> Shape:
+    """The answer to it: an even byte count."""
+
+    def shape(octets: Octets, start: int, length: int) -> int:
+        return penalty if octets[start + at] & 1 else bits
+
+    return shape
+
+
 def _one_held(holds: Test, bits: int, penalty: int) -> Shape:
     def shape(octets: Octets, start: int, length: int) -> int:
         return bits if holds(octets, start, length) else penalty
@@ -84,6 +111,14 @@ def _one_held(holds: Test, bits: int, penalty: int) -> Shape:
 
 
 def _all_held(holds: list[Test], bits: int, penalty: int) -> Shape:
+    if len(holds) == 2:
+        first, second = holds
+
+        def both(octets: Octets, start: int, length: int) -> int:
+            return bits if first(octets, start, length) and second(octets, start, length) else penalty
+
+        return both
+
     def shape(octets: Octets, start: int, length: int) -> int:
         for each in holds:
             if not each(octets, start, length):
@@ -116,12 +151,12 @@ def _among(place: Place, values: Collection[int]) -> Rule:
 def _agreeing(count: Counted, quantity: Place) -> Rule:
     """The byte count is what so many items take, and the single fields before them."""
     at, size, beside, of = count.count.at, count.count.field.size, count.beside, quantity.at
-    is_bits, item = count.items.means is Means.BITS, count.items.size
+    bits = count.items.bits
 
     def agrees(octets: Octets, start: int, length: int) -> bool:
         there = octets[start + at] if size == 1 else octets[start + at] << 8 | octets[start + at + 1]
         many = octets[start + of] << 8 | octets[start + of + 1]
-        return there == beside + ((many + 7) // 8 if is_bits else item * many)
+        return there == beside + (many * bits + 7 >> 3)
 
     return Rule(agrees, 8 * size)
 
