@@ -206,6 +206,11 @@ def counted(message: Message) -> Counted | None:
     return Counted(count, beside, message[-1], last(message, Means.QUANTITY))
 
 
+def has_text(message: Message) -> bool:
+    """Whether a vendor's text stands in it, by itself or in its groups."""
+    return any(each.means is Means.TEXT or has_text(each.group) for each in message)
+
+
 def octets_of(items: Field, quantity: int) -> int:
     """Octets that so many items take."""
     return quantity * items.bits + 7 >> 3
