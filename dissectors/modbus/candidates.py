@@ -17,12 +17,14 @@ from dissectors.modbus.functions import (
     EXCEPTION_LENGTH,
     EXCEPTIONS,
     FUNCTIONS,
+    ITEMS_ASKED,
     MAX_UNIT,
     VENDOR_EXCEPTIONS,
     is_open_length,
 )
 from dissectors.modbus.lengths import MAX_FRAME, MIN_FRAME, MORE, Octets
 from dissectors.modbus.past import Past
+from dissectors.modbus.ranges import AGREEMENTS
 
 CRC_BITS: Final = 16
 SHORT_FRAME: Final = -4
@@ -157,7 +159,7 @@ def octet_hope(octets: Octets, start: int, reading: Reading) -> int:
 
 
 _HOPED_SHAPE: Final = 4
-_TOLD_EARLY: Final = frozenset({0x01, 0x02, 0x03, 0x04, 0x0F, 0x10, 0x17})
+_TOLD_EARLY: Final = frozenset((*ITEMS_ASKED, *AGREEMENTS))
 """Functions whose shape is told by the octets that tell their length."""
 
 

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dissectors.modbus.functions import EXCEPTION_BIT, ITEMS_ASKED
 from dissectors.modbus.layout import MESSAGES, SUB_FUNCTIONS
 from dissectors.modbus.notation import HEAD, Group, Means, Messages, counted, first, places
+from dissectors.modbus.ranges import SINGLE_WRITES
 
 _Rule = Callable[[bytes, bytes], str | None]
 
@@ -64,7 +65,7 @@ def _byte_count(response: bytes, expected: int, asked: str) -> str | None:
 def _copy(request: bytes, response: bytes) -> str | None:
     if request[1:] == response[1:]:
         return None
-    if request[1] in _SINGLE_WRITES and request[2:4] == response[2:4]:
+    if request[1] in SINGLE_WRITES and request[2:4] == response[2:4]:
         return "confirms another value than was written"
     return "does not repeat the request"
 
@@ -117,6 +118,3 @@ def _rule(messages: Messages) -> _Rule | None:
 
 
 _RULES: dict[int, _Rule] = {code: rule for code, messages in MESSAGES.items() if (rule := _rule(messages)) is not None}
-_SINGLE_WRITES = frozenset(
-    code for code, messages in MESSAGES.items() if messages.writes and first(messages.request, Means.VALUE)
-)

@@ -92,3 +92,13 @@ AGREEMENTS: Final[Mapping[int, Agreement]] = {
     code: agreement for code, messages in MESSAGES.items() if (agreement := _agreement(messages.request)) is not None
 }
 """Of requests that write many."""
+
+SINGLE_WRITES: Final = frozenset(
+    code for code, messages in MESSAGES.items() if messages.writes and first(messages.request, Means.VALUE) is not None
+)
+"""Writes of one coil or register."""
+
+RANGES_REPEATED: Final = frozenset(
+    code for code, messages in MESSAGES.items() if messages.repeats and AGREEMENTS.get(code) is not None
+)
+"""Functions whose answer repeats address and quantity of the request."""

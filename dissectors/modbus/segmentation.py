@@ -37,6 +37,7 @@ from dissectors.modbus.expectation import LOOSE, REPEATED, SAME_UNKNOWN, Expecte
 from dissectors.modbus.functions import EXCEPTION_BIT
 from dissectors.modbus.lengths import MIN_FRAME, MORE
 from dissectors.modbus.past import KNOWN_LENGTH, Past
+from dissectors.modbus.ranges import AGREEMENTS
 
 THRESHOLD: Final = 20
 SCALE: Final = 16
@@ -54,8 +55,8 @@ WHOLE: Final = 12
 WHOLE_ANSWER: Final = 4
 """An answer whose last octets are zeros, and that is as long as was asked for."""
 
-_WELL_TOLD: Final = frozenset({0x0F, 0x10, 0x17})
-"""Functions whose first octets are ill formed by chance nearly always."""
+_WELL_TOLD: Final = frozenset(AGREEMENTS)
+"""Functions whose first octets are ill formed by chance nearly always: a count must agree with another."""
 
 _MOST_FROM_CONTEXT: Final = ADJACENT + SAME_UNKNOWN
 _CRC_OCTETS: Final = 2
