@@ -150,7 +150,7 @@ def _groups(group: Message, group_name: str) -> Field:
     return Field(Means.GROUPS, 0, group=group, group_name=group_name)
 
 
-_FILE_WRITE: Final[Message] = (_byte_count(9), _groups(_RECORD_WRITTEN, "Record written"))
+_FILE_WRITE: Final[Message] = (_byte_count(9), _groups(_RECORD_WRITTEN, "File Record Write"))
 _INTERFACE: Final = Field(
     Means.SELECTOR, 1, "mei", "MEIType", only=MEI_DEVICE_IDENTIFICATION, default=MEI_DEVICE_IDENTIFICATION
 )
@@ -297,8 +297,8 @@ MESSAGES: Final[Mapping[int, Messages]] = {
             "read-file-record",
             "read file",
             "Read File Record",
-            request=(_byte_count(7), _groups(_RECORD_ASKED, "Record asked for")),
-            response=(_byte_count(2), _groups(_RECORD_READ, "Record read")),
+            request=(_byte_count(7), _groups(_RECORD_ASKED, "File Record Request")),
+            response=(_byte_count(2), _groups(_RECORD_READ, "File Record")),
         ),
         Messages(
             0x15,
@@ -361,7 +361,7 @@ MESSAGES: Final[Mapping[int, Messages]] = {
                 _number(1, "more_follows", "more", names={0: "no", 1: "yes"}),
                 _number(1, "next_object_id", "nextObjId", names=DEVICE_ID_OBJECTS),
                 Field(Means.QUANTITY, 1, "num_objects", "objCount"),
-                _groups(_OBJECT, "Object"),
+                _groups(_OBJECT, "Identification Object"),
             ),
             repeats=1,
         ),
