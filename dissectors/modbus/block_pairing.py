@@ -6,7 +6,7 @@ import numpy as np
 
 from dissectors.columns import FrameColumns, Octets, Run, Times
 from dissectors.line import Timing
-from dissectors.modbus.adu import readable_adu
+from dissectors.modbus.envelope import readable_adu
 from dissectors.modbus.exchange import Exchange, Seen
 from dissectors.modbus.exchange_columns import exchanges, placed
 from dissectors.modbus.exchange_memory import holding, passed

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from dissectors.frame import Check, Frame, Role
-from dissectors.modbus.adu import ASCII_NAME, ascii_check, readable, readable_adu, rtu_check
+from dissectors.modbus.envelope import ASCII_NAME, ascii_check, readable, readable_adu, rtu_check
 from dissectors.modbus.functions import EXCEPTION_BIT
 from dissectors.modbus.header import peek_ascii, peek_rtu
 from dissectors.modbus.layout import MESSAGES, SUB_FUNCTIONS

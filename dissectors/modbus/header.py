@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from dissectors.frame import Check, Damage, Flaw, Frame, Header, Repair, Role
-from dissectors.modbus.adu import ASCII_NAME, RTU_NAME, ascii_check, ascii_octets, readable, rtu_check
+from dissectors.modbus.envelope import ASCII_NAME, RTU_NAME, ascii_check, ascii_octets, readable, rtu_check
 from dissectors.modbus.functions import (
     BROADCAST,
     DIAGNOSTIC_LISTEN_ONLY,

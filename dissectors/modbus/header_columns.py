@@ -14,7 +14,7 @@ import numpy as np
 
 from dissectors.columns import NONE, ROLES
 from dissectors.frame import Check, Damage, Found, Frame, Role
-from dissectors.modbus.adu import RTU_NAME
+from dissectors.modbus.envelope import RTU_NAME
 from dissectors.modbus.functions import BROADCAST, EXCEPTION_BIT, FUNCTIONS, Function, is_open_length
 from dissectors.modbus.header import exception_name, peek_rtu
 from dissectors.modbus.layout import MAX_READ_BITS

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 
 from dissectors.frame import Frame
-from dissectors.modbus.adu import adu
+from dissectors.modbus.envelope import adu
 from dissectors.modbus.functions import EXCEPTION_BIT, ITEMS_ASKED
 from dissectors.modbus.layout import MESSAGES
 from dissectors.modbus.notation import Means, first, last

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from dissectors.checksums import crc16_modbus, lrc
 from dissectors.frame import Damage, Frame
-from dissectors.modbus.adu import seal_rtu
+from dissectors.modbus.envelope import seal_rtu
 from dissectors.modbus.layout import MESSAGES
 from dissectors.modbus.notation import has_text
 from dissectors.pseudonyms import Pseudonyms, hex_octet, inflicted, without_text

@@ -23,9 +23,9 @@ from typing import Final
 from dissectors.checksums import crc16_modbus
 from dissectors.frame import Flaw, Repair
 from dissectors.modbus.candidates import octet_bits, readings
-from dissectors.modbus.expectation import Expected
 from dissectors.modbus.functions import EXCEPTION_BIT, FUNCTIONS, ITEMS_ASKED, MAX_UNIT, is_open_length
 from dissectors.modbus.lengths import MAX_FRAME, MIN_FRAME
+from dissectors.modbus.open_request import Expected
 from dissectors.modbus.past import Past
 from dissectors.modbus.ranges import RANGES_REPEATED
 from dissectors.modbus.shapes import IMPLAUSIBLE

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dissectors.modbus.best_split import HEARD, PROVED, SCALE
 from dissectors.modbus.candidates import CRC_BITS, WHOLE_STRETCH
-from dissectors.modbus.expectation import EXACT, ODD
 from dissectors.modbus.functions import EXCEPTION_BIT
 from dissectors.modbus.length_columns import (
     NOT_WEIGHED,
@@ -26,8 +26,8 @@ from dissectors.modbus.length_columns import (
     unit_bits,
 )
 from dissectors.modbus.lengths import MIN_FRAME, MORE, NEVER
+from dissectors.modbus.open_request import EXACT, ODD
 from dissectors.modbus.past import KNOWN_LENGTH
-from dissectors.modbus.segmentation import HEARD, PROVED, SCALE
 from dissectors.modbus.stretch_rows import Rows, Stretches
 from dissectors.modbus.whole_columns import FIRST_LOOK, Told
 
