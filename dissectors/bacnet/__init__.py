@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dissectors.bacnet import ring_words
+from dissectors.bacnet.envelope import frame
 from dissectors.bacnet.fields import fields
 from dissectors.bacnet.findings import MstpFindings, judge
-from dissectors.bacnet.frame_making import frame
 from dissectors.bacnet.framing import MstpFramer
 from dissectors.bacnet.header import peek
 from dissectors.bacnet.readings import readings

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from enum import Enum, auto
 
 from dissectors.bacnet.application import Application, Device, Outgoing, Poller, Quiet
+from dissectors.bacnet.envelope import frame, npdu_frame
 from dissectors.bacnet.f510 import f510
-from dissectors.bacnet.frame_making import frame, npdu_frame
 from dissectors.bacnet.frame_types import CARRIES_NPDU, EXPECTING, HEADER, FrameType, data_length, total
 from dissectors.bacnet.framing import MstpFramer, body_is_good, header_is_good
 from dissectors.bacnet.limits import (

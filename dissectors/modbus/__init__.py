@@ -5,8 +5,8 @@ from __future__ import annotations
 from dissectors.frame import Frame
 from dissectors.line import Timing
 from dissectors.manifest import Dissector, PacketFile, on_first_use
-from dissectors.modbus.adu import ASCII_NAME, RTU_NAME, make_ascii, make_rtu
 from dissectors.modbus.ascii_framing import AsciiFramer
+from dissectors.modbus.envelope import ASCII_NAME, RTU_NAME, make_ascii, make_rtu
 from dissectors.modbus.fields import fields
 from dissectors.modbus.findings import ModbusFindings
 from dissectors.modbus.framing import RtuFramer

@@ -25,8 +25,8 @@ from dissectors.checksums import sum8
 from dissectors.frame import Check, Chunk, Damage, Event, Flaw, Found, Frame, LineError, Noise, Reason, Repair
 from dissectors.framer import UNKNOWN_SILENCE, OctetWindow
 from dissectors.line import NS_PER_S, Timing
+from dissectors.modbus.damaged import ODD_LENGTH, Side, noise_place, predicted
 from dissectors.modbus.functions import DIAGNOSTIC_DELIMITER, ascii_length, is_open_length
-from dissectors.modbus.remains import ODD_LENGTH, Side, noise_place, predicted
 
 if TYPE_CHECKING:
     from dissectors.columns import FrameColumns, Octets

@@ -17,9 +17,9 @@ from dissectors.columns import CHECKS, FOUNDS, NONE, FrameColumns, OctetTimes
 from dissectors.frame import Check, Found
 from dissectors.modbus.ascii_framing import LONGEST_SILENCE, MAX_CHARACTERS
 from dissectors.modbus.candidates import SHORT_FRAME
-from dissectors.modbus.functions import NEVER
 from dissectors.modbus.header_columns import Words, headers
 from dissectors.modbus.length_columns import PADDING, lengths, predicting, shapes, unit_bits
+from dissectors.modbus.lengths import NEVER
 
 if TYPE_CHECKING:
     from dissectors.columns import Codes, Masks, Octets, Reads, Times

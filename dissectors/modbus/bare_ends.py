@@ -6,7 +6,7 @@ from typing import Final
 
 from dissectors.frame import Event, Frame, Header, Noise
 from dissectors.line import Timing
-from dissectors.modbus.adu import ASCII_NAME
+from dissectors.modbus.envelope import ASCII_NAME
 from dissectors.modbus.evidence import Evidence
 from dissectors.modbus.gaps import sender_of
 from dissectors.tracker import Placement

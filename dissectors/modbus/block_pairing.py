@@ -10,8 +10,8 @@ import numpy as np
 
 from dissectors.columns import FrameColumns, Octets, Run, Times
 from dissectors.line import Timing
-from dissectors.modbus.adu import ASCII_NAME, RTU_NAME, readable_adu
 from dissectors.modbus.ascii_kernel import rtu_twins
+from dissectors.modbus.envelope import ASCII_NAME, RTU_NAME, readable_adu
 from dissectors.modbus.exchange import Exchange, Seen
 from dissectors.modbus.exchange_columns import exchanges, placed
 from dissectors.modbus.exchange_memory import holding, passed

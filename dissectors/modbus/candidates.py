@@ -2,7 +2,7 @@
 
 A function code predicts the length of its frame, as request and as response. Where the CRC is right at a predicted
 length there is a candidate. Its `bits` say how unlikely chance is to make it; what stands round it (silence, other
-frames, the open request) is weighed in segmentation.py.
+frames, the open request) is weighed in best_split.py.
 """
 
 from __future__ import annotations
@@ -17,15 +17,14 @@ from dissectors.modbus.functions import (
     EXCEPTION_LENGTH,
     EXCEPTIONS,
     FUNCTIONS,
-    MAX_FRAME,
+    ITEMS_ASKED,
     MAX_UNIT,
-    MIN_FRAME,
-    MORE,
     VENDOR_EXCEPTIONS,
-    Octets,
     is_open_length,
 )
+from dissectors.modbus.lengths import MAX_FRAME, MIN_FRAME, MORE, Octets
 from dissectors.modbus.past import Past
+from dissectors.modbus.ranges import AGREEMENTS
 
 CRC_BITS: Final = 16
 SHORT_FRAME: Final = -4
@@ -47,10 +46,10 @@ ANY_END: Final = CRC_BITS - 7
 
 ZERO_TAIL: Final = -8
 """A good frame and zeros after it is good again as a whole (the CRC is 0): where zeros stray, or are more than a CRC
-has, the shorter reading wins (segmentation.py)."""
+has, the shorter reading wins (best_split.py)."""
 
 
-class Reading(NamedTuple):
+class LengthGuess(NamedTuple):
     """A length that the first octets predict, and the directions that have it. MORE: not told yet."""
 
     length: int
@@ -82,20 +81,20 @@ class Pending(NamedTuple):
     """A stretch that would be a frame if the octets to come make its CRC good. `start` as in Candidate."""
 
     start: int
-    reading: Reading
+    reading: LengthGuess
 
 
-_NOTHING: Final = Reading(-1, False, False)
-_UNTOLD: Final = Reading(MORE, True, True)
-_EXCEPTION = (Reading(EXCEPTION_LENGTH, False, True),)
+_NOTHING: Final = LengthGuess(-1, False, False)
+_UNTOLD: Final = LengthGuess(MORE, True, True)
+_EXCEPTION = (LengthGuess(EXCEPTION_LENGTH, False, True),)
 
 
-_REQUESTS: Final = tuple(Reading(length, True, False) for length in range(MAX_FRAME + 1))
-_RESPONSES: Final = tuple(Reading(length, False, True) for length in range(MAX_FRAME + 1))
-_EITHER: Final = tuple((Reading(length, True, True),) for length in range(MAX_FRAME + 1))
+_REQUESTS: Final = tuple(LengthGuess(length, True, False) for length in range(MAX_FRAME + 1))
+_RESPONSES: Final = tuple(LengthGuess(length, False, True) for length in range(MAX_FRAME + 1))
+_EITHER: Final = tuple((LengthGuess(length, True, True),) for length in range(MAX_FRAME + 1))
 
 
-def readings(octets: Octets, start: int, end: int) -> tuple[Reading, ...]:
+def readings(octets: Octets, start: int, end: int) -> tuple[LengthGuess, ...]:
     """The predicted lengths of a frame that begins at `start`, shorter first; looks at [start, end) only."""
     if end - start < 2:
         return ()
@@ -118,7 +117,7 @@ def readings(octets: Octets, start: int, end: int) -> tuple[Reading, ...]:
     return _RESPONSES[answered], _REQUESTS[asked]
 
 
-def octet_bits(octets: Octets, start: int, reading: Reading) -> int:
+def octet_bits(octets: Octets, start: int, reading: LengthGuess) -> int:
     """Evidence in a complete frame's octets beside the CRC: its shape, its address, its length."""
     unit, code = octets[start], octets[start + 1]
     function = FUNCTIONS[code & ~EXCEPTION_BIT]
@@ -144,7 +143,7 @@ def octet_bits(octets: Octets, start: int, reading: Reading) -> int:
     return bits + HIGH_UNIT if unit > MAX_UNIT else bits
 
 
-def octet_hope(octets: Octets, start: int, reading: Reading) -> int:
+def octet_hope(octets: Octets, start: int, reading: LengthGuess) -> int:
     """The same for a frame that is not complete: what its octets may still come to."""
     unit, code = octets[start], octets[start + 1]
     function = FUNCTIONS[code & ~EXCEPTION_BIT]
@@ -160,7 +159,7 @@ def octet_hope(octets: Octets, start: int, reading: Reading) -> int:
 
 
 _HOPED_SHAPE: Final = 4
-_TOLD_EARLY: Final = frozenset({0x01, 0x02, 0x03, 0x04, 0x0F, 0x10, 0x17})
+_TOLD_EARLY: Final = frozenset((*ITEMS_ASKED, *AGREEMENTS))
 """Functions whose shape is told by the octets that tell their length."""
 
 
@@ -171,7 +170,7 @@ def exception_bits(code: int) -> int:
     return SHORT_FRAME + (VENDOR_CODE if code in VENDOR_EXCEPTIONS else UNKNOWN_CODE)
 
 
-def candidate(stretch: bytes, reading: Reading, start: int) -> Candidate:
+def candidate(stretch: bytes, reading: LengthGuess, start: int) -> Candidate:
     """The candidate that a stretch with a good CRC is, read in that way."""
     bits = CRC_BITS + octet_bits(stretch, 0, reading)
     zeros = 0 if stretch[-1] else zeros_follow_good(stretch)
@@ -316,7 +315,7 @@ class CandidateFinder:
         elif not crc16_modbus(stretch):
             self.good.append(candidate(stretch, reading, start))
 
-    def _read_on(self, known: bytes, start: int, told: Reading) -> None:
+    def _read_on(self, known: bytes, start: int, told: LengthGuess) -> None:
         """A head some of whose octets were not there when it was read: only what is new in it counts."""
         more = False
         for reading in readings(known, start - self._base, len(known)):
@@ -326,7 +325,7 @@ class CandidateFinder:
                 self._weigh(known, Pending(start, reading))
                 told = reading
             elif reading != told:
-                other = Reading(reading.length, not told.request, not told.response)
+                other = LengthGuess(reading.length, not told.request, not told.response)
                 self._weigh(known, Pending(start, other))
         if more:
             self._unread.append(Pending(start, told))

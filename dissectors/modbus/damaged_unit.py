@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Collection
 
 from dissectors.frame import Check, Damage, Frame, Role
-from dissectors.modbus.adu import ASCII_NAME, ascii_octets
+from dissectors.modbus.envelope import ASCII_NAME, ascii_octets
 from dissectors.modbus.exchange import Seen
 from dissectors.modbus.functions import EXCEPTION_BIT, FUNCTIONS
 

@@ -33,9 +33,10 @@ from dissectors.columns import (
 )
 from dissectors.frame import Role
 from dissectors.line import NS_PER_S, Timing
-from dissectors.modbus.functions import EXCEPTION_BIT
+from dissectors.modbus.functions import EXCEPTION_BIT, ITEMS_ASKED
 from dissectors.modbus.learnt import Learnt
 from dissectors.modbus.length_columns import PADDING, answer_lengths, of_codes
+from dissectors.modbus.ranges import RANGES_REPEATED, SINGLE_WRITES
 from dissectors.tracker import Verdict
 
 SAMPLES: Final = 16
@@ -51,9 +52,7 @@ _ANSWERED, _RETRY, _EXCEPTION, _BROADCAST, _NO_RESPONSE = (
     for verdict in (Verdict.ANSWERED, Verdict.RETRY, Verdict.EXCEPTION, Verdict.BROADCAST, Verdict.NO_RESPONSE)
 )
 _SHORT: Final = 8
-_PAIRED: Final = frozenset((0x01, 0x02, 0x03, 0x04, 0x0F, 0x10, 0x17))
-_COPIED: Final = frozenset((0x05, 0x06))
-_RANGES: Final = frozenset((0x0F, 0x10))
+_PAIRED: Final = frozenset((*ITEMS_ASKED, *RANGES_REPEATED))
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +109,7 @@ def exchanges(frames: FrameColumns, octets: Octets, timing: Timing, slack: Times
     repeat[1:] = unanswered[:-1] & (run[1:] == run[:-1]) & (said[1:] == said[:-1])
     sure = frames.role[request] == _REQUEST
     copy = answered & ~sure & (frames.role[last] == _EITHER)
-    writes = of_codes(_COPIED | _RANGES, False)[frames.function[request]]
+    writes = of_codes(SINGLE_WRITES | RANGES_REPEATED, False)[frames.function[request]]
     limit = max(7 * timing.char // 2, timing.char + timing.latency)
     at_once = copy & (np.maximum(gap - _slack(frames, timing, slack)[last], 0) <= limit)
     none = np.zeros(len(run), np.int64)
@@ -130,7 +129,7 @@ def _candidates(frames: FrameColumns, octets: Octets) -> tuple[Times, Masks, Mas
     fine = (frames.damage == 0) & frames.ok
     place, code = frames.offset, frames.function
     paired = of_codes(_PAIRED, False)[code] & fine
-    copied = of_codes(_COPIED, False)[code] & fine
+    copied = of_codes(SINGLE_WRITES, False)[code] & fine
     asks = paired & (frames.role == _REQUEST) & (frames.destination > 0) & (frames.error == 0)
     either = copied & (frames.role == _EITHER) & (frames.error == 0)
     to_all = (paired | copied) & (frames.role == TO_ALL) & (frames.error == 0)
@@ -142,7 +141,7 @@ def _candidates(frames: FrameColumns, octets: Octets) -> tuple[Times, Masks, Mas
     refused = octets[place[behind] + 1] & EXCEPTION_BIT != 0
     length = answer_lengths(octets, place[at], octets[place[at] + 1])
     right = (frames.length[behind] == length) & (frames.error[behind] == 0)
-    ranged = of_codes(_RANGES, False)[code[at]]
+    ranged = of_codes(RANGES_REPEATED, False)[code[at]]
     right &= ~ranged | ((frames.address[at] == frames.address[behind]) & (frames.count[at] == frames.count[behind]))
     soon = frames.start[behind] - frames.end[at] < GIVE_UP
     answers[at] = same & soon & (frames.role[behind] == _RESPONSE) & (refused | (asks[at] & right))

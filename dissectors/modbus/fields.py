@@ -1,8 +1,8 @@
 """Field names and values for filters, `-T fields` and JSON: Wireshark's names where Wireshark has the field.
 
-A layout is a row of steps, each a name and how many octets it takes; the walk ends where the frame does, so a cut
-frame gives the fields that are there. A field that repeats (registers, objects) has its values joined by commas.
-Wireshark has no Modbus ASCII: there the envelope's fields are `mbascii.*`.
+Made of the layout: a message is a row of steps, each a name and how many octets it takes, and what fills the rest. The
+walk ends where the frame does, so a cut frame gives the fields that are there. A field that repeats (registers,
+objects) has its values joined by commas. Wireshark has no Modbus ASCII: there the envelope's fields are `mbascii.*`.
 """
 
 from __future__ import annotations
@@ -10,33 +10,20 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from dissectors.frame import Check, Frame, Role
-from dissectors.modbus.adu import ASCII_NAME, ascii_check, readable, readable_adu, rtu_check
-from dissectors.modbus.functions import EXCEPTION_BIT, FUNCTIONS
+from dissectors.modbus.envelope import ASCII_NAME, ascii_check, readable, readable_adu, rtu_check
+from dissectors.modbus.functions import EXCEPTION_BIT
 from dissectors.modbus.header import peek_ascii, peek_rtu
+from dissectors.modbus.layout import MESSAGES, SUB_FUNCTIONS
+from dissectors.modbus.notation import Field, Group, Means, Message
 from dissectors.modbus.text import printable
 
 Value = int | float | str
 Fields = dict[str, Value]
 Step = tuple[str, int]  # field name after "modbus.", octets
-Layout = tuple[Step, ...]
+Steps = tuple[Step, ...]
+Rest = Callable[[Fields, bytes, int], int]
 
 _NUMBERED = "regnum16"
-_DIAGNOSTIC_FIELDS = {
-    0x01: ("restart_communication_option", 2),
-    0x03: ("ascii_input_delimiter", 1),
-    0x0A: ("clear_ctr_diag_reg", 2),
-}
-_DIAGNOSTIC_ANSWERS = {
-    0x02: "return_diag_register",
-    0x0B: "bus_message_count",
-    0x0C: "bus_comm_error_count",
-    0x0D: "bus_exception_error_count",
-    0x0E: "slave_message_count",
-    0x0F: "no_slave_response_count",
-    0x10: "slave_nak_count",
-    0x11: "slave_busy_count",
-    0x12: "bus_char_overrun_count",
-}
 
 
 def fields(frame: Frame, role: Role) -> Fields:
@@ -67,10 +54,9 @@ def _pdu(found: Fields, octets: bytes, role: Role) -> None:
     at = 2
     if code & EXCEPTION_BIT:
         at = _walk(found, octets, 2, (("exception_code", 1),))
-    elif code in FUNCTIONS and role is not Role.UNKNOWN:
-        layouts = _RESPONSES if role is Role.RESPONSE else _REQUESTS
-        layout, rest = layouts.get(code, ((), _nothing))
-        at = rest(found, octets, _walk(found, octets, 2, layout))
+    elif code in MESSAGES and role is not Role.UNKNOWN:
+        steps, rest = (_RESPONSES if role is Role.RESPONSE else _REQUESTS)[code]
+        at = rest(found, octets, _walk(found, octets, 2, steps))
     if at < len(octets):
         _put(found, "data", _hex(octets[at:]))
 
@@ -84,9 +70,9 @@ def _hex(octets: bytes) -> str:
     return octets.hex(":")
 
 
-def _walk(found: Fields, octets: bytes, at: int, layout: Layout) -> int:
+def _walk(found: Fields, octets: bytes, at: int, steps: Steps) -> int:
     """Put the steps that are wholly there; give where the next begins."""
-    for name, size in layout:
+    for name, size in steps:
         if at + size > len(octets):
             break
         _put(found, name, int.from_bytes(octets[at : at + size], "big"))
@@ -127,18 +113,25 @@ def _bits(found: Fields, octets: bytes, at: int) -> int:
     return len(octets)
 
 
+def _events(found: Fields, octets: bytes, at: int) -> int:
+    for octet in octets[at:]:
+        _put(found, "event", octet)
+    return len(octets)
+
+
 def _diagnostics(found: Fields, octets: bytes, at: int, answer: bool = False) -> int:
-    sub = int.from_bytes(octets[2:4], "big")
-    if sub == 0:
+    sub = SUB_FUNCTIONS.get(int.from_bytes(octets[2:4], "big"))
+    if sub is None:
+        return at
+    if sub.data is not None and sub.data.means is Means.OCTETS:
         if at < len(octets):
-            _put(found, f"diagnostic.return_query_data.{'echo' if answer else 'request'}", _hex(octets[at:]))
+            _put(found, f"{sub.data.wireshark}.{'echo' if answer else 'request'}", _hex(octets[at:]))
         return len(octets)
-    if sub in _DIAGNOSTIC_FIELDS:
-        name, size = _DIAGNOSTIC_FIELDS[sub]
-        after = _walk(found, octets, at, ((f"diagnostic.{name}", size),))
-        return after + 1 if size == 1 and octets[after : after + 1] == b"\0" else after
-    if answer and sub in _DIAGNOSTIC_ANSWERS:
-        return _walk(found, octets, at, ((f"diagnostic.{_DIAGNOSTIC_ANSWERS[sub]}", 2),))
+    if sub.data is not None:
+        after = _walk(found, octets, at, ((sub.data.wireshark, sub.data.size),))
+        return after + 1 if sub.data.size == 1 and octets[after : after + 1] == b"\0" else after
+    if answer and sub.counter is not None:
+        return _walk(found, octets, at, ((sub.counter.wireshark, sub.counter.size),))
     return at
 
 
@@ -146,116 +139,74 @@ def _diagnostics_answer(found: Fields, octets: bytes, at: int) -> int:
     return _diagnostics(found, octets, at, answer=True)
 
 
-def _events(found: Fields, octets: bytes, at: int) -> int:
-    for octet in octets[at:]:
-        _put(found, "event", octet)
-    return len(octets)
+def _selected(selector: int, steps: Steps, rest: Rest) -> Rest:
+    """What follows a selector, for the one value whose layout is known."""
+
+    def selected(found: Fields, octets: bytes, at: int) -> int:
+        return rest(found, octets, _walk(found, octets, at, steps)) if octets[2:3] == bytes((selector,)) else at
+
+    return selected
 
 
-_GROUP: Layout = (("reference_type", 1), ("reference_num_32", 4), ("word_cnt", 2))
+def _groups(fields: Message) -> Rest:
+    """Groups, as long as the single fields of one are there, and what follows in each."""
+    group, steps, last = Group.of(fields), _steps(fields), fields[-1]
 
-
-def _file_requests(found: Fields, octets: bytes, at: int) -> int:
-    while at + 7 <= len(octets):
-        at = _walk(found, octets, at, _GROUP)
-    return at
-
-
-def _file_writes(found: Fields, octets: bytes, at: int) -> int:
-    while at + 7 <= len(octets):
-        size = 2 * (octets[at + 5] << 8 | octets[at + 6])
-        at = _walk(found, octets, at, _GROUP)
-        if octets[at : at + size]:
-            _put(found, "data", _hex(octets[at : at + size]))
-        at = min(at + size, len(octets))
-    return at
-
-
-def _file_answers(found: Fields, octets: bytes, at: int) -> int:
-    while at + 2 <= len(octets) and octets[at]:
-        end = min(at + 1 + octets[at], len(octets))
-        at = _walk(found, octets, at, (("byte_cnt", 1), ("reference_type", 1)))
-        if octets[at:end]:
-            _put(found, "data", _hex(octets[at:end]))
-        at = max(at, end)
-    return at
-
-
-def _identification_request(found: Fields, octets: bytes, at: int) -> int:
-    return _walk(found, octets, at, (("read_device_id", 1), ("object_id", 1))) if octets[2:3] == b"\x0e" else at
-
-
-def _identification(found: Fields, octets: bytes, at: int) -> int:
-    if octets[2:3] != b"\x0e":
+    def groups(found: Fields, octets: bytes, at: int) -> int:
+        while at + group.size <= len(octets) and group.whole(octets, at) >= group.size:
+            end = min(at + group.whole(octets, at), len(octets))
+            at = _walk(found, octets, at, steps)
+            if last.means is Means.TEXT:
+                _put(found, last.wireshark, printable(octets[at:end]))
+            elif last.is_list and at < end:
+                _put(found, last.wireshark, _hex(octets[at:end]))
+            at = end
         return at
-    at = _walk(found, octets, at, _IDENTIFICATION)
-    while at + 2 <= len(octets):
-        size = octets[at + 1]
-        at = _walk(found, octets, at, (("object_id", 1), ("objects_len", 1)))
-        _put(found, "object_str_value", printable(octets[at : at + size]))
-        at = min(at + size, len(octets))
-    return at
+
+    return groups
 
 
-_IDENTIFICATION: Layout = (
-    ("read_device_id", 1),
-    ("conformity_level", 1),
-    ("more_follows", 1),
-    ("next_object_id", 1),
-    ("num_objects", 1),
-)
-_BIT_RANGE: Layout = (("reference_num", 2), ("bit_cnt", 2))
-_WORD_RANGE: Layout = (("reference_num", 2), ("word_cnt", 2))
-_BYTES: Layout = (("byte_cnt", 1),)
-_REFERENCE: Layout = (("reference_num", 2),)
-_MASK: Layout = (("reference_num", 2), ("and_mask", 2), ("or_mask", 2))
-_SUB: Layout = (("diagnostic_code", 2),)
-_MEI: Layout = (("mei", 1),)
-_STATUS: Layout = (("ev_status", 2), ("ev_count", 2))
-_READ_WRITE: Layout = (
-    ("read_reference_num", 2),
-    ("read_word_cnt", 2),
-    ("write_reference_num", 2),
-    ("write_word_cnt", 2),
-    ("byte_cnt", 1),
-)
+def _steps(fields: Message) -> Steps:
+    """The single fields at the beginning that Wireshark has; neighbours of one name are one number there."""
+    steps: list[Step] = []
+    for each in fields:
+        if each.is_list or not each.wireshark or each.wireshark == _VALUE:
+            break
+        if steps and steps[-1][0] == each.wireshark:
+            steps[-1] = each.wireshark, steps[-1][1] + each.size
+        else:
+            steps.append((each.wireshark, each.size))
+        if each.means is Means.SELECTOR:
+            break
+    return tuple(steps)
 
-Rest = Callable[[Fields, bytes, int], int]
 
-_REQUESTS: dict[int, tuple[Layout, Rest]] = {
-    0x01: (_BIT_RANGE, _nothing),
-    0x02: (_BIT_RANGE, _nothing),
-    0x03: (_WORD_RANGE, _nothing),
-    0x04: (_WORD_RANGE, _nothing),
-    0x05: (_REFERENCE, _nothing),
-    0x06: (_REFERENCE, _value),
-    0x08: (_SUB, _diagnostics),
-    0x0F: (_BIT_RANGE + _BYTES, _nothing),
-    0x10: (_WORD_RANGE + _BYTES, _registers),
-    0x14: (_BYTES, _file_requests),
-    0x15: (_BYTES, _file_writes),
-    0x16: (_MASK, _nothing),
-    0x17: (_READ_WRITE, _registers),
-    0x18: (_REFERENCE, _nothing),
-    0x2B: (_MEI, _identification_request),
+_VALUE = "regval_uint16"
+_RESTS: dict[Means, Rest] = {
+    Means.VALUE: _value,
+    Means.REGISTERS: _registers,
+    Means.BITS: _bits,
+    Means.OCTETS: _events,
 }
 
-_RESPONSES: dict[int, tuple[Layout, Rest]] = {
-    0x01: (_BYTES, _bits),
-    0x02: (_BYTES, _bits),
-    0x03: (_BYTES, _registers),
-    0x04: (_BYTES, _registers),
-    0x05: (_REFERENCE, _nothing),
-    0x06: (_REFERENCE, _value),
-    0x08: (_SUB, _diagnostics_answer),
-    0x0B: (_STATUS, _nothing),
-    0x0C: (_BYTES + _STATUS + (("ev_msg_count", 2),), _events),
-    0x0F: (_BIT_RANGE, _nothing),
-    0x10: (_WORD_RANGE, _nothing),
-    0x14: (_BYTES, _file_answers),
-    0x15: (_BYTES, _file_writes),
-    0x16: (_MASK, _nothing),
-    0x17: (_BYTES, _registers),
-    0x18: ((("byte_cnt_16", 2), ("word_cnt", 2)), _registers),
-    0x2B: (_MEI, _identification),
-}
+
+def _message(message: Message, answer: bool) -> tuple[Steps, Rest]:
+    """The steps of a message, and what fills the rest of it."""
+    if not message:
+        return (), _nothing
+    first, last = message[0], message[-1]
+    if first.means is Means.SELECTOR and first.only is not None:
+        return _steps(message[:1]), _selected(first.only, *_message(message[1:], answer))
+    return _steps(message), _rest(last, answer)
+
+
+def _rest(last: Field, answer: bool) -> Rest:
+    if last.means is Means.WORD:
+        return _diagnostics_answer if answer else _diagnostics
+    if last.means is Means.GROUPS:
+        return _groups(last.group)
+    return _RESTS.get(last.means, _nothing) if last.wireshark else _nothing
+
+
+_REQUESTS = {code: _message(messages.request, answer=False) for code, messages in MESSAGES.items()}
+_RESPONSES = {code: _message(messages.response, answer=True) for code, messages in MESSAGES.items()}

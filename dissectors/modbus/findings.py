@@ -12,9 +12,9 @@ from dissectors.checksums import crc16_modbus
 from dissectors.findings import ExceptionWords, Finding, Tally
 from dissectors.frame import Damage, Event, Flaw, Frame, Header, Noise, Role
 from dissectors.line import Timing
-from dissectors.modbus.adu import RTU_NAME, readable_adu, rtu_check
 from dissectors.modbus.asked import Asked
 from dissectors.modbus.bare_ends import BareEnds
+from dissectors.modbus.envelope import RTU_NAME, readable_adu, rtu_check
 from dissectors.modbus.evidence import Evidence
 from dissectors.modbus.exchange import is_begin_of
 from dissectors.modbus.functions import BROADCAST, FUNCTIONS, answer_length

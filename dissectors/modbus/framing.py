@@ -11,9 +11,9 @@ in the gaps. So the framer works on octets with times, and never on chunks:
    as request and as response. A good one is taken, unless a longer reading of the same octets is still open and would
    be the better one. Without silence this waits for the next look, at most _FIRST octets later.
 3. Where that finds nothing, all candidates of the window are weighed and the best segmentation wins
-   (candidates.py, segmentation.py, expectation.py).
+   (candidates.py, best_split.py, open_request.py).
 4. Without silence the window is looked at when it has certain lengths, and never grows beyond WINDOW octets.
-5. What is left over is a damaged frame of a station, or noise (remains.py).
+5. What is left over is a damaged frame of a station, or noise (damaged.py).
 
 Every decision depends on octets, their nominal times and proved silences only, so other chunks give the same events.
 """
@@ -26,32 +26,25 @@ from dissectors.checksums import crc16_modbus
 from dissectors.frame import Chunk, Event
 from dissectors.framer import Framer, OctetWindow
 from dissectors.line import Timing
+from dissectors.modbus.best_split import ADJACENT, HEARD, PROVED, SILENCE_INSIDE, Paths, worth
 from dissectors.modbus.candidates import (
     CRC_BITS,
     Candidate,
     CandidateFinder,
-    Reading,
+    LengthGuess,
     lacks_zeros,
     octet_bits,
     octet_hope,
     readings,
     whole_stretch,
 )
-from dissectors.modbus.expectation import EXACT
-from dissectors.modbus.functions import (
-    BROADCAST,
-    EXCEPTION_BIT,
-    FUNCTIONS,
-    MAX_FRAME,
-    MAX_UNIT,
-    MORE,
-    is_open_length,
-)
+from dissectors.modbus.damaged import Side
+from dissectors.modbus.functions import BROADCAST, EXCEPTION_BIT, FUNCTIONS, MAX_UNIT, is_open_length
+from dissectors.modbus.lengths import MAX_FRAME, MORE
 from dissectors.modbus.open_length import OpenLengthFinder
+from dissectors.modbus.open_request import EXACT
 from dissectors.modbus.past import KNOWN_LENGTH
-from dissectors.modbus.remains import Side
 from dissectors.modbus.rtu_window import RtuWindow
-from dissectors.modbus.segmentation import ADJACENT, HEARD, PROVED, SILENCE_INSIDE, Paths, worth
 
 if TYPE_CHECKING:
     from dissectors.columns import FrameColumns, Octets
@@ -237,14 +230,14 @@ class RtuFramer:
                 return True
         return False
 
-    def _take_head(self, found: tuple[Reading, ...], count: int, hope: bool) -> bool:
+    def _take_head(self, found: tuple[LengthGuess, ...], count: int, hope: bool) -> bool:
         """Take the frame that the window begins with, if a reading of it is good and none still open is better.
 
         `found`: the readings of the head; `hope`: whether those that are not complete count.
         """
         window = self._window
         octets, expected, end = window.octets, window.expected, window.end
-        best: Reading | None = None
+        best: LengthGuess | None = None
         best_worth = -1
         hopes = None
         for reading in found:
@@ -270,7 +263,7 @@ class RtuFramer:
         window.take_frame(best.length, best.request, best.response)
         return True
 
-    def _hope(self, reading: Reading, count: int) -> int:
+    def _hope(self, reading: LengthGuess, count: int) -> int:
         """What the head may be worth once it is complete."""
         window = self._window
         length = reading.length if reading.length != MORE else count + 1
@@ -281,7 +274,7 @@ class RtuFramer:
         return self._worth(bits, length)
 
     def _worth(self, bits: int, length: int) -> int:
-        """Worth of a frame at the head of the window, by the rules of segmentation.py."""
+        """Worth of a frame at the head of the window, by the rules of best_split.py."""
         window = self._window
         bits += ADJACENT if window.good_before else window.start_bits()
         if window.octets[0] in window.units:

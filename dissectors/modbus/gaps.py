@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from dissectors.findings import Tally
 from dissectors.frame import Frame, Header, Role
 from dissectors.line import Timing
-from dissectors.modbus.adu import RTU_NAME
+from dissectors.modbus.envelope import RTU_NAME
 from dissectors.modbus.evidence import Evidence
 from dissectors.modbus.learnt import Learnt
 from dissectors.modbus.station_record import middle

@@ -7,10 +7,11 @@ EITHER and the tracker decides. A good check with a length that fits neither is 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 from dissectors.frame import Check, Damage, Flaw, Frame, Header, Repair, Role
-from dissectors.modbus.adu import ASCII_NAME, RTU_NAME, ascii_check, ascii_octets, readable, rtu_check
+from dissectors.modbus.envelope import ASCII_NAME, RTU_NAME, ascii_check, ascii_octets, readable, rtu_check
 from dissectors.modbus.functions import (
     BROADCAST,
     DIAGNOSTIC_LISTEN_ONLY,
@@ -21,6 +22,8 @@ from dissectors.modbus.functions import (
     MEI_TYPES,
     Function,
 )
+from dissectors.modbus.layout import SUB_FUNCTIONS
+from dissectors.modbus.ranges import AGREEMENTS, ANSWERED, ASKED, SHARED, Number, Range
 
 _DAMAGE = {
     Damage.FORM: "characters that a frame may not hold",
@@ -32,7 +35,7 @@ NO_EXCEPTIONS = frozenset((EXCEPTION_BIT, 0xFF))
 """Function octets with bit 7 set that are no exception: there is no function 00, and FF is all ones rather than 7F."""
 
 _WITH_MEI = 4  # octets of a frame of function 43 that ends before its type of interface
-_COUNTERS = frozenset((0x02, *range(0x0B, 0x13)))  # diagnostics whose request carries 0000, whose answer a value
+_COUNTERS = frozenset(code for code, sub in SUB_FUNCTIONS.items() if sub.counter)  # asked with 0000
 
 
 def peek_rtu(frame: Frame) -> Header:
@@ -105,7 +108,7 @@ def _peek(protocol: str, octets: bytes, frame: Frame, error: str | None, expecte
         elif ok and expected not in (None, size):
             error = f"{size} octets where its own count makes it {expected}"
         elif ok and role is Role.REQUEST:
-            error = request_fault(octets)
+            error = request_fault(octets) if code in AGREEMENTS else None
     if unit == BROADCAST and (role is Role.EITHER or (role is Role.REQUEST and _is_for_all(function))):
         role = Role.BROADCAST
     address, count = _address_count(code, role, octets, size if frame.check is Check.ABSENT else size - 2)
@@ -119,15 +122,17 @@ def request_fault(octets: bytes) -> str | None:
 
     Of functions 15, 16 and 23 (Modbus Application Protocol V1.1b3, 6.11, 6.12, 6.17); unit first. Total.
     """
-    code = octets[1] if len(octets) > 1 else 0
-    at = {0x0F: 4, 0x10: 4, 0x17: 8}.get(code)
-    if at is None or len(octets) < at + 3:
+    agreement = AGREEMENTS.get(octets[1]) if len(octets) > 1 else None
+    if agreement is None:
         return None
-    quantity, there = octets[at] << 8 | octets[at + 1], octets[at + 2]
-    needed = (quantity + 7) // 8 if code == 0x0F else 2 * quantity
-    thing = "coil" if code == 0x0F else "register"
+    at, count_at, bits = agreement
+    if len(octets) <= count_at:
+        return None
+    quantity, there = octets[at] << 8 | octets[at + 1], octets[count_at]
+    needed = quantity * bits + 7 >> 3
     if there == needed:
         return None
+    thing = "coil" if bits == 1 else "register"
     return f"byte count {there} for {quantity} {thing}{'' if quantity == 1 else 's'}, which take {needed}"
 
 
@@ -170,31 +175,49 @@ def _by_shape(function: Function, octets: bytes, size: int) -> Role:
 
 def _address_count(code: int, role: Role, octets: bytes, end: int) -> tuple[int | None, int | None]:
     """First address and how many, as far as this direction of the function has them; unit and PDU end at `end`."""
-    if code in (0x0F, 0x10) and role is not Role.UNKNOWN:
-        return _u16(octets, 2, end), _u16(octets, 4, end)
-    if role in (Role.REQUEST, Role.BROADCAST):
-        if code in (0x01, 0x02, 0x03, 0x04, 0x17):
-            return _u16(octets, 2, end), _u16(octets, 4, end)
-        if code == 0x18:
-            return _u16(octets, 2, end), None
-        if code == 0x14:
-            return None, octets[2] // 7 if end > 2 else None
-        if code == 0x2B:
-            return (octets[4] if end > 4 else None), None
-    elif role is Role.RESPONSE:
-        if code in (0x03, 0x04, 0x17):
-            return None, octets[2] // 2 if end > 2 else None
-        if code == 0x18:
-            return None, _u16(octets, 4, end)
-        if code == 0x2B:
-            return None, octets[7] if end > 7 else None
-    if code in (0x05, 0x06, 0x16) and role is not Role.UNKNOWN:
-        return _u16(octets, 2, end), 1
-    return None, None
+    if role is Role.RESPONSE:
+        read = _ANSWERED.get(code)
+    elif role is Role.EITHER:
+        read = _SHARED.get(code)
+    else:
+        read = _ASKED.get(code) if role is not Role.UNKNOWN else None
+    return (None, None) if read is None else read(octets, end)
 
 
-def _u16(octets: bytes, at: int, end: int) -> int | None:
-    return octets[at] << 8 | octets[at + 1] if at + 2 <= end else None
+_Read = Callable[[bytes, int], tuple[int | None, int | None]]
+
+
+def _reader(told: Range) -> _Read:
+    """What reads address and quantity off octets."""
+    address, quantity, single = told
+
+    def read(octets: bytes, end: int) -> tuple[int | None, int | None]:
+        return _number(octets, address, end), 1 if single else _number(octets, quantity, end)
+
+    if address is None or address.size != 2 or quantity != (address.at + 2, 2, 1):
+        return read
+    at = address.at
+
+    def read_words(octets: bytes, end: int) -> tuple[int | None, int | None]:
+        if at + 4 > end:
+            return read(octets, end)
+        return octets[at] << 8 | octets[at + 1], octets[at + 2] << 8 | octets[at + 3]
+
+    return read_words
+
+
+def _number(octets: bytes, number: Number | None, end: int) -> int | None:
+    if number is None:
+        return None
+    at, size, divisor = number
+    if at + size > end:
+        return None
+    return octets[at] << 8 | octets[at + 1] if size == 2 else octets[at] // divisor
+
+
+_ASKED, _ANSWERED, _SHARED = (
+    {code: _reader(told) for code, told in ranges.items()} for ranges in (ASKED, ANSWERED, SHARED)
+)
 
 
 def _damage(frame: Frame, check_words: str, check: tuple[int, int] | None) -> str:

@@ -14,17 +14,12 @@ import numpy as np
 
 from dissectors.columns import NONE, ROLES
 from dissectors.frame import Check, Damage, Found, Frame, Role
-from dissectors.modbus.adu import RTU_NAME
-from dissectors.modbus.functions import (
-    BROADCAST,
-    EXCEPTION_BIT,
-    FUNCTIONS,
-    MAX_READ_BITS,
-    Function,
-    is_open_length,
-)
+from dissectors.modbus.envelope import RTU_NAME
+from dissectors.modbus.functions import BROADCAST, EXCEPTION_BIT, FUNCTIONS, Function, is_open_length
 from dissectors.modbus.header import exception_name, peek_rtu
+from dissectors.modbus.layout import MAX_READ_BITS
 from dissectors.modbus.length_columns import common
+from dissectors.modbus.ranges import AGREEMENTS, ANSWERED, ASKED, SHARED, Number
 
 if TYPE_CHECKING:
     from dissectors.columns import Codes, Masks, Names, Numbers, Octets, Small, Times
@@ -32,9 +27,6 @@ if TYPE_CHECKING:
 REQUEST, RESPONSE, EITHER, TO_ALL = (
     ROLES.index(role) for role in (Role.REQUEST, Role.RESPONSE, Role.EITHER, Role.BROADCAST)
 )
-_RANGE_BOTH_WAYS: Final = (0x0F, 0x10)
-_RANGE_ASKED: Final = (0x01, 0x02, 0x03, 0x04, 0x17)
-_COUNT_ANSWERED: Final = (0x03, 0x04, 0x17)
 _MOST_NAMES: Final = np.iinfo(np.uint16).max
 
 
@@ -147,33 +139,39 @@ def _roles(octets: Octets, places: Times, codes: Codes, request: Masks, response
 
 def _addresses(octets: Octets, places: Times, codes: Codes, role: Codes) -> tuple[Numbers, Numbers]:
     """First address and how many."""
-    table = np.zeros(256, np.uint8)
-    table[[*_RANGE_ASKED]] = 1
-    table[[*_RANGE_BOTH_WAYS]] = 2
-    table[[0x05, 0x06, 0x16]] = 3
-    of = table[codes]
-    asked = (role == REQUEST) | (role == TO_ALL)
-    ranged = (of == 2) | ((of == 1) & asked)
-    first = octets[places + 2].astype(np.int32) << 8 | octets[places + 3]
-    quantity = octets[places + 4].astype(np.int32) << 8 | octets[places + 5]
-    address = np.where(ranged | (of == 3), first, NONE).astype(np.int32)
-    count = np.where(ranged, quantity, np.where(of == 3, 1, NONE)).astype(np.int32)
-    counted = np.zeros(256, bool)
-    counted[[*_COUNT_ANSWERED]] = True
-    told = counted[codes] & (role == RESPONSE)
-    count[told] = octets[places[told] + 2] // 2
+    address, count = np.full(len(places), NONE, np.int32), np.full(len(places), NONE, np.int32)
+    present = np.flatnonzero(np.bincount(codes, minlength=256)).tolist()
+    for ranges, roles in ((ASKED, (REQUEST, TO_ALL)), (ANSWERED, (RESPONSE,)), (SHARED, (EITHER,))):
+        of_roles = np.isin(role, roles)
+        for code in present:
+            told = ranges.get(code)
+            if told is None:
+                continue
+            which = np.flatnonzero((codes == code) & of_roles)
+            if told.address is not None:
+                address[which] = _numbers(octets, places[which], told.address)
+            if told.quantity is not None:
+                count[which] = _numbers(octets, places[which], told.quantity)
+            elif told.single:
+                count[which] = 1
     return address, count
+
+
+def _numbers(octets: Octets, places: Times, number: Number) -> Numbers:
+    at = places + number.at
+    values = octets[at].astype(np.int32)
+    return values << 8 | octets[at + 1] if number.size == 2 else values // number.divisor
 
 
 def _contradicts_itself(octets: Octets, places: Times, codes: Codes, role: Codes) -> Masks:
     """Requests whose byte count does not fit their quantity."""
     wrong = np.zeros(len(places), bool)
-    for code, at in ((0x0F, 4), (0x10, 4), (0x17, 8)):
+    for code, (quantity_at, count_at, bits) in AGREEMENTS.items():
         which = np.flatnonzero((codes == code) & (role != RESPONSE))
         place = places[which]
-        quantity = octets[place + at].astype(np.int32) << 8 | octets[place + at + 1]
-        needed = (quantity + 7) // 8 if code == 0x0F else 2 * quantity
-        wrong[which] = octets[place + at + 2] != needed
+        quantity = _numbers(octets, place, Number(quantity_at, 2))
+        needed = quantity * bits + 7 >> 3
+        wrong[which] = octets[place + count_at] != needed
     return wrong
 
 

@@ -23,9 +23,9 @@ import numpy as np
 from dissectors.columns import CHECKS, DAMAGES, FOUNDS, FrameColumns, OctetTimes
 from dissectors.frame import Check, Damage, Found
 from dissectors.modbus import damaged_columns, run_columns
-from dissectors.modbus.functions import MAX_FRAME
 from dissectors.modbus.header_columns import Words, headers
 from dissectors.modbus.length_columns import PADDING
+from dissectors.modbus.lengths import MAX_FRAME
 from dissectors.modbus.stretch_crc import StretchCrc
 from dissectors.modbus.stretch_rows import Rows, Stretches
 from dissectors.modbus.whole_columns import Told, whole_frames

@@ -18,28 +18,23 @@ from dissectors.modbus.functions import (
     EXCEPTION_LENGTH,
     EXCEPTIONS,
     FUNCTIONS,
-    IMPLAUSIBLE,
-    MAX_FIFO,
-    MAX_FRAME,
-    MAX_READ_BITS,
-    MAX_READ_REGISTERS,
-    MAX_READ_WRITE_REGISTERS,
+    ITEMS_ASKED,
     MAX_UNIT,
-    MAX_WRITE_BITS,
-    MAX_WRITE_REGISTERS,
-    MEI_DEVICE_IDENTIFICATION,
-    MORE,
-    NEVER,
     VENDOR_EXCEPTIONS,
     response_length,
 )
+from dissectors.modbus.layout import MESSAGES
+from dissectors.modbus.lengths import MAX_FRAME, MORE, NEVER, most_of
+from dissectors.modbus.notation import CHECK, HEAD, Means, Message, Place, counted, fixed_length
+from dissectors.modbus.notation import places as places_of
+from dissectors.modbus.shapes import held, told
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Collection, Mapping
 
     import numpy.typing as npt
 
-    from dissectors.columns import Codes, Masks, Octets, Times
+    from dissectors.columns import Codes, Masks, Numbers, Octets, Times
 
     Bits = npt.NDArray[np.int16]
     Lengths = npt.NDArray[np.int16]
@@ -50,26 +45,6 @@ RARE: Final = -100
 """Bits of frames whose shape is not weighed here."""
 
 NOT_WEIGHED: Final = RARE // 2
-
-_FIXED_REQUESTS: Final = {
-    **dict.fromkeys((0x01, 0x02, 0x03, 0x04, 0x05, 0x06, 0x08), 8),
-    **dict.fromkeys((0x07, 0x0B, 0x0C, 0x11), 4),
-    0x16: 10,
-    0x18: 6,
-}
-_FIXED_RESPONSES: Final = {
-    **dict.fromkeys((0x05, 0x06, 0x08, 0x0B, 0x0F, 0x10), 8),
-    0x07: 5,
-    0x16: 10,
-}
-_COUNTED_REQUESTS: Final = {0x0F: (6, 1), 0x10: (6, 2), 0x14: (2, 7), 0x15: (2, 9), 0x17: (10, 2)}
-_COUNTED_RESPONSES: Final = {
-    **dict.fromkeys((0x01, 0x02, 0x03, 0x04, 0x17, 0x11), (2, 1)),
-    0x0C: (2, 6),
-    0x14: (2, 2),
-    0x15: (2, 9),
-}
-"""By function: where the byte count stands, and the least that it may say."""
 
 COMMON: Final = frozenset((0x01, 0x02, 0x03, 0x04, 0x05, 0x06, 0x0F, 0x10, 0x17))
 """Functions whose shapes are weighed here; to them come exceptions."""
@@ -94,19 +69,35 @@ class _Direction(NamedTuple):
         return told
 
 
-def _direction(fixed: Mapping[int, int], counted: Mapping[int, tuple[int, int]]) -> _Direction:
+def _direction(messages: Mapping[int, Message]) -> _Direction:
     told = _Direction(np.full(256, NEVER, np.int16), *(np.zeros(256, np.uint8) for _ in range(3)))
-    for code, length in fixed.items():
-        told.fixed[code] = length
-    for code, (at, least) in counted.items():
-        told.fixed[code], told.at[code], told.mask[code], told.least[code] = at + 3, at, 0xFF, least
+    for code, message in messages.items():
+        count, length = counted(message), fixed_length(message)
+        if length is not None and not _selected(message):
+            told.fixed[code] = length
+        elif count is not None and count.count.field.size == 1:
+            at = count.count.at
+            told.fixed[code], told.at[code], told.mask[code], told.least[code] = (
+                at + 3,
+                at,
+                0xFF,
+                count.count.field.least,
+            )
     return told
+
+
+def _selected(message: Message) -> bool:
+    """Whether it is laid out so for one value of a selector only."""
+    return any(each.means is Means.SELECTOR and each.only is not None for each in message)
+
+
+_REQUESTS: Final = {code: messages.request for code, messages in MESSAGES.items()}
+_RESPONSES: Final = {code: messages.response for code, messages in MESSAGES.items()}
 
 
 @lru_cache(maxsize=1)
 def _directions() -> tuple[_Direction, _Direction]:
-    requests = _direction(_FIXED_REQUESTS, _COUNTED_REQUESTS)
-    responses = _direction(_FIXED_RESPONSES, _COUNTED_RESPONSES)
+    requests, responses = _direction(_REQUESTS), _direction(_RESPONSES)
     for code in FUNCTIONS:
         responses.fixed[code | EXCEPTION_BIT] = EXCEPTION_LENGTH
     return requests, responses
@@ -145,25 +136,33 @@ def lengths(octets: Octets, places: Times, codes: Codes, room: Times) -> tuple[L
 
 
 def _of_queues(octets: Octets, places: Times, codes: Codes, room: Times, response: Lengths) -> None:
-    """Function 24 counts in two octets."""
-    at = np.flatnonzero(codes == 0x18)
-    count = _word(octets, places[at], 2)
-    length = np.where((count >= 2) & (count <= 2 + 2 * MAX_FIFO), 6 + count, NEVER)
-    response[at] = np.where(room[at] > 3, length, MORE)
+    """Answers that count in two octets."""
+    for code, message in _RESPONSES.items():
+        count = counted(message)
+        if count is None or count.count.field.size != 2:
+            continue
+        at = np.flatnonzero(codes == code)
+        there, end = _number(octets, places[at], count.count), count.count.at + 2
+        length = np.where((there >= count.count.field.least) & (there <= most_of(count)), end + there + CHECK, NEVER)
+        response[at] = np.where(room[at] >= end, length, MORE)
 
 
 def _of_interfaces(
     octets: Octets, places: Times, codes: Codes, room: Times, request: Lengths, response: Lengths
 ) -> None:
-    """Function 43 with device identification, whose answer must be walked."""
-    at = np.flatnonzero(codes == 0x2B)
-    identifies = octets[places[at] + 2] == MEI_DEVICE_IDENTIFICATION
-    told = room[at] > 2
-    request[at] = np.where(told, np.where(identifies, 7, NEVER), MORE)
-    response[at] = np.where(told, NEVER, MORE)
-    for which in at[identifies & told].tolist():
-        place = int(places[which])
-        response[which] = response_length(octets[place : place + min(int(room[which]), MAX_FRAME)].tobytes())
+    """Device identification, whose answer must be walked."""
+    for code, message in _REQUESTS.items():
+        if not _selected(message):
+            continue
+        at = np.flatnonzero(codes == code)
+        selector = places_of(message)[0]
+        identifies = octets[places[at] + selector.at] == selector.field.only
+        told = room[at] > selector.at
+        request[at] = np.where(told, np.where(identifies, fixed_length(message) or NEVER, NEVER), MORE)
+        response[at] = np.where(told, NEVER, MORE)
+        for which in at[identifies & told].tolist():
+            place = int(places[which])
+            response[which] = response_length(octets[place : place + min(int(room[which]), MAX_FRAME)].tobytes())
 
 
 # --- shapes ----------------------------------------------------------------------------------------------------------
@@ -177,16 +176,6 @@ def _exception_bits() -> Bits:
     return bits
 
 
-_MOST_BY_CODE: Final = {
-    0x01: (MAX_READ_BITS, 5),
-    0x02: (MAX_READ_BITS, 5),
-    0x03: (MAX_READ_REGISTERS, 9),
-    0x04: (MAX_READ_REGISTERS, 9),
-}
-_MOST_WRITTEN: Final = {0x0F: (MAX_WRITE_BITS, 5), 0x10: (MAX_WRITE_REGISTERS, 9)}
-_TOLD: Final = 12
-
-
 def shapes(octets: Octets, places: Times, codes: Codes) -> tuple[Bits, Bits]:
     """Evidence of the octets as a request, as a response, all of them there; RARE where it is not weighed here.
 
@@ -194,32 +183,15 @@ def shapes(octets: Octets, places: Times, codes: Codes) -> tuple[Bits, Bits]:
     """
     request, response = np.full(len(places), RARE, np.int16), np.full(len(places), RARE, np.int16)
     units = octets[places]
-    quantity = _word(octets, places, 4)
     third = octets[places + 2]
     for code in np.flatnonzero(np.bincount(codes, minlength=256)).tolist():
         at = np.flatnonzero(codes == code)
         if code & EXCEPTION_BIT:
             response[at] = _exception_bits()[third[at]]
-        elif code in _MOST_BY_CODE:
-            most, bits = _MOST_BY_CODE[code]
-            request[at] = _within(quantity[at], most, bits)
-            response[at] = 0 if code <= 0x02 else np.where(third[at] & 1, IMPLAUSIBLE, 1)
-        elif code == 0x05:
-            value = quantity[at]
-            request[at] = response[at] = np.where((value == 0) | (value == 0xFF00), _TOLD, IMPLAUSIBLE)
-        elif code == 0x06:
-            request[at] = response[at] = 0
-        elif code in _MOST_WRITTEN:
-            most, bits = _MOST_WRITTEN[code]
-            written = quantity[at]
-            response[at] = _within(written, most, bits)
-            needed = (written + 7) // 8 if code == 0x0F else 2 * written
-            request[at] = _told((response[at] > 0) & (octets[places[at] + 6] == needed))
-        elif code == 0x17:
-            written = _word(octets, places[at], 8)
-            fits = (_within(quantity[at], MAX_READ_REGISTERS, 1) > 0) & (octets[places[at] + 10] == 2 * written)
-            request[at] = _told(fits & (_within(written, MAX_READ_WRITE_REGISTERS, 1) > 0))
-            response[at] = np.where(third[at] & 1, IMPLAUSIBLE, 1)
+        elif code in COMMON:
+            request[at] = asked = _shapes(_REQUESTS[code], octets, places[at])
+            same = _REQUESTS[code] == _RESPONSES[code]
+            response[at] = asked if same else _shapes(_RESPONSES[code], octets, places[at])
     writes = _writes()[codes]
     to_all = units == BROADCAST
     request[to_all & ~writes] += ODD_BROADCAST
@@ -249,21 +221,43 @@ def _word(octets: Octets, places: Times, at: int) -> npt.NDArray[np.int32]:
     return octets[places + at].astype(np.int32) << 8 | octets[places + (at + 1)]
 
 
-def _within(quantity: npt.NDArray[np.int32], most: int, bits: int) -> Bits:
-    return np.where((quantity >= 1) & (quantity <= most), bits, IMPLAUSIBLE).astype(np.int16)
+def _shapes(message: Message, octets: Octets, places: Times) -> Bits:
+    """As `shapes.shape_of`, of a message without groups."""
+    fits = np.ones(len(places), bool)
+    for place, values in held(message):
+        fits &= _among(_number(octets, places, place), values)
+    count = counted(message)
+    if count is not None and count.quantity is not None:
+        needed = (_number(octets, places, count.quantity) * count.items.bits + 7 >> 3) + count.beside
+        fits &= _number(octets, places, count.count) == needed
+    elif count is not None and count.items.size > 1:
+        fits &= _number(octets, places, count.count) % count.items.size == 0
+    bits, penalty = told(message)
+    return np.where(fits, bits, penalty).astype(np.int16)
 
 
-def _told(fits: Masks) -> Bits:
-    return np.where(fits, _TOLD, 2 * IMPLAUSIBLE).astype(np.int16)
+def _among(numbers: Numbers, values: Collection[int]) -> Masks:
+    if isinstance(values, range):
+        within: Masks = (numbers >= values.start) & (numbers < values.stop)
+        return within
+    return np.isin(numbers, tuple(values))
+
+
+def _number(octets: Octets, places: Times, place: Place) -> Numbers:
+    return _word(octets, places, place.at) if place.field.size == 2 else octets[places + place.at].astype(np.int32)
 
 
 def answer_lengths(octets: Octets, places: Times, codes: Codes) -> Lengths:
     """Octets of the normal answer to requests of COMMON functions; NEVER of others."""
     answers = np.full(len(places), NEVER, np.int16)
-    quantity = _word(octets, places, 4)
-    bits = codes <= 0x02
-    reads = bits | (codes == 0x03) | (codes == 0x04) | (codes == 0x17)
-    counted = np.where(bits, (quantity + 7) // 8, 2 * quantity)
-    answers[reads] = np.minimum(5 + counted[reads], np.iinfo(np.int16).max)
-    answers[(codes == 0x05) | (codes == 0x06) | (codes == 0x0F) | (codes == 0x10)] = 8
+    for code in np.flatnonzero(np.bincount(codes, minlength=256)).tolist():
+        if code not in COMMON:
+            continue
+        at = np.flatnonzero(codes == code)
+        asked, length = ITEMS_ASKED.get(code), fixed_length(_RESPONSES[code])
+        if asked is not None:
+            counted_octets = _word(octets, places[at], asked[0]) * asked[1] + 7 >> 3
+            answers[at] = np.minimum(HEAD + 1 + counted_octets + CHECK, np.iinfo(np.int16).max)
+        elif length is not None:
+            answers[at] = length
     return answers

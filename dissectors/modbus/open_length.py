@@ -22,16 +22,9 @@ from dissectors.modbus.candidates import (
     is_text,
     without_zeros,
 )
-from dissectors.modbus.expectation import Expected
-from dissectors.modbus.functions import (
-    BROADCAST,
-    EXCEPTION_BIT,
-    EXCEPTION_LENGTH,
-    FUNCTIONS,
-    MAX_FRAME,
-    MIN_FRAME,
-    is_open_length,
-)
+from dissectors.modbus.functions import BROADCAST, EXCEPTION_BIT, EXCEPTION_LENGTH, FUNCTIONS, is_open_length
+from dissectors.modbus.lengths import MAX_FRAME, MIN_FRAME
+from dissectors.modbus.open_request import Expected
 from dissectors.modbus.past import Past
 
 _UNPREDICTED: Final = frozenset(range(256)) - {

@@ -17,7 +17,7 @@ from scapy.packet import Packet, Raw
 
 from dissectors.checksums import crc16_modbus, lrc
 from dissectors.frame import Check, Damage, Frame, Role
-from dissectors.modbus.adu import ASCII_NAME, hex_pairs
+from dissectors.modbus.envelope import ASCII_NAME, hex_pairs
 from dissectors.modbus.header import peek_ascii, peek_rtu
 from dissectors.modbus.pdus import Cut, OtherFunction, Pdu, pdu_class
 

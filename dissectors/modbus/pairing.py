@@ -1,16 +1,19 @@
-"""Does this response fit that request? Both as unit and PDU, without check (see `adu.py`).
+"""Does this response fit that request? Both as unit and PDU, without check (see `envelope.py`).
 
-Lengths and copies are those of Modbus Application Protocol V1.1b3, clause 6.
+What must agree follows from the layout: a copy, leading fields that come back, a byte count that was asked for
+(Modbus Application Protocol V1.1b3, clause 6).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
-from dissectors.modbus.functions import EXCEPTION_BIT, FUNCTIONS
+from dissectors.modbus.functions import EXCEPTION_BIT, ITEMS_ASKED
+from dissectors.modbus.layout import MESSAGES, SUB_FUNCTIONS
+from dissectors.modbus.notation import HEAD, Group, Means, Messages, counted, first, places
+from dissectors.modbus.ranges import SINGLE_WRITES
 
-_SINGLE_WRITES = frozenset((0x05, 0x06))
-_DIAGNOSTIC_COPIES = frozenset((0x00, 0x01, 0x03, 0x04, 0x0A, 0x14))  # sub-functions of 8 whose answer repeats them
+_Rule = Callable[[bytes, bytes], str | None]
 
 
 def mismatch(request: bytes, response: bytes) -> str | None:
@@ -39,14 +42,15 @@ def is_restart(request: bytes) -> bool:
     return request[1:4] == b"\x08\x00\x01"
 
 
-def _bits(request: bytes, response: bytes) -> str | None:
-    quantity = int.from_bytes(request[4:6], "big")
-    return _byte_count(response, (quantity + 7) // 8, _of(quantity, "bit"))
+def _items(at: int, bits: int) -> _Rule:
+    """The answer holds what so many items take; the request says how many at `at`."""
+    thing = "bit" if bits == 1 else "register"
 
+    def rule(request: bytes, response: bytes) -> str | None:
+        quantity = int.from_bytes(request[at : at + 2], "big")
+        return _byte_count(response, quantity * bits + 7 >> 3, _of(quantity, thing))
 
-def _registers(request: bytes, response: bytes) -> str | None:
-    quantity = int.from_bytes(request[4:6], "big")
-    return _byte_count(response, 2 * quantity, _of(quantity, "register"))
+    return rule
 
 
 def _of(count: int, thing: str) -> str:
@@ -54,50 +58,63 @@ def _of(count: int, thing: str) -> str:
 
 
 def _byte_count(response: bytes, expected: int, asked: str) -> str | None:
-    there = response[2] if len(response) > 2 else 0
+    there = response[HEAD] if len(response) > HEAD else 0
     return None if there == expected else f"{_of(there, 'data octet')} for {asked} asked for, expected {expected}"
 
 
 def _copy(request: bytes, response: bytes) -> str | None:
     if request[1:] == response[1:]:
         return None
-    if request[1] in _SINGLE_WRITES and request[2:4] == response[2:4]:
+    if request[1] in SINGLE_WRITES and request[2:4] == response[2:4]:
         return "confirms another value than was written"
     return "does not repeat the request"
 
 
-def _range(request: bytes, response: bytes) -> str | None:
-    return None if request[2:6] == response[2:6] else "names another address or quantity than the request"
+def _leading(end: int, what: str) -> _Rule:
+    """The fields up to `end` come back."""
+
+    def rule(request: bytes, response: bytes) -> str | None:
+        return None if request[HEAD:end] == response[HEAD:end] else f"{what} than the request"
+
+    return rule
 
 
 def _diagnostics(request: bytes, response: bytes) -> str | None:
     if request[2:4] != response[2:4]:
         return "another sub-function than the request"
-    if int.from_bytes(request[2:4], "big") in _DIAGNOSTIC_COPIES:
-        return _copy(request, response)
-    return None
+    sub = SUB_FUNCTIONS.get(int.from_bytes(request[2:4], "big"))
+    return _copy(request, response) if sub is not None and sub.counter is None else None
 
 
-def _file_groups(request: bytes, response: bytes) -> str | None:
-    """Each group asked for (7 octets, length at 5) comes back as its length, reference type and data."""
-    expected = sum(2 + 2 * int.from_bytes(request[at + 5 : at + 7], "big") for at in range(3, len(request) - 6, 7))
-    return _byte_count(response, expected, _of((len(request) - 3) // 7, "record"))
+def _records(messages: Messages) -> _Rule:
+    """Each group asked for comes back as the single fields of an answered one, and its registers."""
+    asked, answered = (Group.of(message[-1].group) for message in (messages.request, messages.response))
+    length_at = asked.size - messages.request[-1].group[-1].size
+
+    def rule(request: bytes, response: bytes) -> str | None:
+        begins = range(HEAD + 1, len(request) - asked.size + 1, asked.size)
+        lengths = (int.from_bytes(request[at + length_at : at + asked.size], "big") for at in begins)
+        expected = sum(answered.size + 2 * length for length in lengths)
+        return _byte_count(response, expected, _of((len(request) - HEAD - 1) // asked.size, "record"))
+
+    return rule
 
 
-def _encapsulated(request: bytes, response: bytes) -> str | None:
-    return None if request[2:3] == response[2:3] else "another MEI type than the request"
+def _rule(messages: Messages) -> _Rule | None:
+    """What an answer is held to; None where the layout asks for nothing."""
+    if messages.echoes:
+        return _copy
+    if messages.code in ITEMS_ASKED:
+        return _items(*ITEMS_ASKED[messages.code])
+    if any(field.means is Means.WORD for field in messages.request):
+        return _diagnostics
+    if messages.repeats:
+        end = places(messages.request[: messages.repeats])[-1]
+        selects = first(messages.request, Means.SELECTOR) is not None
+        what = "another MEI type" if selects else "names another address or quantity"
+        return _leading(end.at + end.field.size, what)
+    count = counted(messages.response)
+    return _records(messages) if count is not None and count.items.means is Means.GROUPS else None
 
 
-_RULES: dict[int, Callable[[bytes, bytes], str | None]] = {
-    1: _bits,
-    2: _bits,
-    3: _registers,
-    4: _registers,
-    8: _diagnostics,
-    15: _range,
-    16: _range,
-    20: _file_groups,
-    23: _registers,
-    43: _encapsulated,
-    **{code: _copy for code, function in FUNCTIONS.items() if function.echoes},
-}
+_RULES: dict[int, _Rule] = {code: rule for code, messages in MESSAGES.items() if (rule := _rule(messages)) is not None}

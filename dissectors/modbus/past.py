@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Final
 
 from dissectors.frame import Flaw
-from dissectors.modbus.functions import EXCEPTION_BIT, FUNCTIONS
+from dissectors.modbus.functions import ANSWER_LENGTHS, EXCEPTION_BIT, FUNCTIONS
 
 KNOWN_REQUEST: Final = 14
 """Bits for octets that were a request before, octet for octet."""
@@ -19,9 +19,6 @@ KNOWN_LENGTH: Final = 6
 
 _MOST_REQUESTS: Final = 512
 _MOST_LENGTHS: Final = 4096
-_FIXED: Final = frozenset({0x05, 0x06, 0x07, 0x08, 0x0B, 0x0F, 0x10, 0x16})
-"""Functions whose answers have one length, or (diagnostics) that of their request: it tells nothing."""
-
 _CONSTANT: Final = 4
 """So many frames of one length, and none of another, make it the length of their kind."""
 
@@ -94,7 +91,7 @@ class Past:
             self._requests[octets] = None
             if len(self._requests) > _MOST_REQUESTS:
                 del self._requests[next(iter(self._requests))]
-        if (known and request) or code & EXCEPTION_BIT or code in _FIXED:
+        if (known and request) or code & EXCEPTION_BIT or code in ANSWER_LENGTHS:
             return
         key = _key(octets[0], code, not request)
         lengths = self._lengths.get(key, 0)

@@ -2,27 +2,28 @@
 
     bytes(ReadHoldingRegistersRequest(startAddr=0x2520, quantity=2))  ==  bytes.fromhex("0325200002")
 
-Layouts and field names are those of `scapy.contrib.modbus` where they are right. Ours, with the same names, are those
-that it lacks or that lose octets there (scapy 2.8): lists of over 100 coils or registers (it raises), a write-file
-request (cannot be built again), the server id (cannot be read), the event log (fixed count), the exception status
-(named startAddr), diagnostics with an odd octet, exceptions (no vendor codes, two names for the code).
+The classes are made of `layout.py` and have the names that `scapy.contrib.modbus` gives fields. Its own classes are not
+used: they take 130 ms to import, and several lose octets (scapy 2.8): lists of over 100 coils or registers (it raises),
+a write-file request (cannot be built again), the server id (cannot be read), the event log (fixed count), the exception
+status (named startAddr), diagnostics with an odd octet, exceptions (no vendor codes, two names for the code).
 
-A message cut short has the fields that are there and the rest as `Cut`; octets too many are `Raw`. Nothing is lost:
-`bytes(packet)` gives back what was dissected.
+A class is named like its message: `PACKETS` has all of them, and each can be imported by its name. A message cut short
+has the fields that are there and the rest as `Cut`; octets too many are `Raw`. Nothing is lost: `bytes(packet)` gives
+back what was dissected.
 """
 
 from __future__ import annotations
 
 import struct
+from collections.abc import Callable
 from typing import Any, ClassVar
 
-from scapy.contrib import modbus as contrib
 from scapy.fields import (
     BitFieldLenField,
     ByteEnumField,
     ByteField,
-    Field,
     FieldListField,
+    ShortField,
     StrField,
     StrLenField,
     XByteField,
@@ -31,8 +32,11 @@ from scapy.fields import (
 )
 from scapy.packet import Packet, Raw
 
-from dissectors.modbus.functions import DIAGNOSTICS, EXCEPTION_BIT, EXCEPTIONS
+from dissectors.modbus.functions import EXCEPTION_BIT, EXCEPTIONS
 from dissectors.modbus.header import kind_of
+from dissectors.modbus.layout import MESSAGES
+from dissectors.modbus.notation import Field as Declared
+from dissectors.modbus.notation import Group, Means, Message
 
 
 class Cut(Raw):
@@ -64,10 +68,6 @@ class Pdu(Packet):
         return Cut if len(self.fields_desc) < len(type(self).fields_desc) else Raw
 
 
-def _list(name: str, item: Field, count: Any) -> FieldListField:
-    return _WholeItems(name, [], item, count_from=count)
-
-
 class _WholeItems(FieldListField):
     """A list of any length that leaves half an item, at the end of a cut message, to what follows."""
 
@@ -79,225 +79,160 @@ class _WholeItems(FieldListField):
         return s[wanted * size :], values
 
 
-def _octets(name: str, count: Any = None) -> FieldListField:
-    return _list(name, XByteField("", 0), count)
+# --- fields of the layout --------------------------------------------------------------------------------------------
+
+_SINGLE: dict[tuple[int, bool], Any] = {
+    (1, False): XByteField,
+    (1, True): ByteField,
+    (2, False): XShortField,
+    (2, True): ShortField,
+}
+"""By octets, and whether people count in it: in groups are numbers of files and objects, else addresses and values."""
 
 
-def _registers(name: str, count: Any = None) -> FieldListField:
-    return _list(name, XShortField("", 0), count)
+def _fields(message: Message, *, grouped: bool = False) -> list[Any]:
+    """The fields of a message, or of a group. A count whose list follows is computed where it is None."""
+    items = message[-1] if message and message[-1].is_list else None
+    counts = [each for each in message if items is not None and _counts(each, items)]
+    return [
+        _list(each, message, counts) if each.is_list else _single(each, message, each in counts, grouped)
+        for each in message
+        if each.means is not Means.GROUPS
+    ]
 
 
-def _byte_count(of: str, size: int, more: int = 0) -> BitFieldLenField:
-    """A byte count computed from a list of items of `size` octets, `more` octets on top."""
-    return BitFieldLenField("byteCount", None, 8, count_of=of, adjust=lambda pkt, n: n * size + more)
+def _counts(each: Declared, items: Declared) -> bool:
+    """Whether a field tells how long the list is, in whole items."""
+    if each.means is Means.BYTES:
+        return True
+    return each.means is Means.QUANTITY and items.means is Means.REGISTERS
 
 
-def _pdu(name: str, *layout: Any) -> Any:
-    """A message without groups: a class named like it, without the blanks. A class of scapy's gives its fields."""
+def _single(each: Declared, message: Message, computed: bool, grouped: bool) -> Any:
+    items = message[-1]
+    if computed and items.means is Means.GROUPS:
+        return ByteField(each.scapy, None)
+    if computed and items.means is Means.TEXT:
+        return BitFieldLenField(each.scapy, None, 8 * each.size, length_of=items.scapy)
+    if computed and (each.means is Means.BYTES or each is _last_quantity(message)):
+        octets, more = (items.size, _beside(each, message)) if each.means is Means.BYTES else (1, 0)
+        return BitFieldLenField(
+            each.scapy, None, 8 * each.size, count_of=items.scapy, adjust=lambda pkt, n: n * octets + more
+        )
+    if each.names is not None:
+        return (ByteEnumField if each.size == 1 else XShortEnumField)(each.scapy, each.default, dict(each.names))
+    return _SINGLE[each.size, grouped](each.scapy, each.default)
+
+
+def _last_quantity(message: Message) -> Declared | None:
+    return next((each for each in reversed(message) if each.means is Means.QUANTITY), None)
+
+
+def _beside(count: Declared, message: Message) -> int:
+    """Octets of single fields behind a byte count."""
+    behind = message[message.index(count) + 1 :]
+    return sum(each.size for each in behind if not each.is_list)
+
+
+def _list(each: Declared, message: Message, counts: list[Declared]) -> Any:
+    count = next((one for one in counts if one.means is Means.BYTES), counts[-1] if counts else None)
+    if each.means is Means.TEXT and count is not None:
+        name = count.scapy
+        return StrLenField(each.scapy, b"", length_from=lambda pkt: pkt.getfieldval(name))
+    item = XShortField("", 0) if each.size == 2 else XByteField("", 0)
+    return _WholeItems(each.scapy, [], item, count_from=_count_from(each, count, message))
+
+
+def _count_from(each: Declared, count: Declared | None, message: Message) -> Callable[[Packet], int] | None:
+    if count is None:
+        return None
+    name, size, more = count.scapy, 1, 0
+    if count.means is Means.BYTES:
+        size, more = each.size, _beside(count, message)
+
+    def items(pkt: Packet) -> int:
+        there: int = pkt.getfieldval(name)
+        return max(0, there - more) // size
+
+    return items
+
+
+# --- messages of the layout ------------------------------------------------------------------------------------------
+
+
+def _class(name: str, base: type[Pdu], **members: Any) -> Any:
+    """A class named like it, without the blanks."""
     class_name = name.replace(" ", "").replace("/", "").replace("ID", "Id").replace("FIFO", "Fifo")
-    return type(class_name, (Pdu,), {"name": name, "fields_desc": list(layout)})
+    PACKETS[class_name] = made = type(class_name, (base,), {"name": name, **members, "__module__": __name__})
+    return made
 
 
-def _code(code: int) -> XByteField:
-    return XByteField("funcCode", code)
+class _Group(Pdu):
+    """One group of many; they follow each other as payloads. `least`: octets of its single fields."""
 
-
-def _bits_read(code: int, name: str) -> tuple[Any, ...]:
-    return _code(code), _byte_count(name, 1), _octets(name, lambda pkt: pkt.byteCount)
-
-
-def _registers_read(code: int) -> tuple[Any, ...]:
-    return _code(code), _byte_count("registerVal", 2), _registers("registerVal", lambda pkt: pkt.byteCount // 2)
-
-
-_DIAGNOSTICS = (_code(8), XShortEnumField("subFunc", 0, dict(DIAGNOSTICS)), _registers("data"))
-
-# --- bits and registers
-
-ReadCoilsRequest = _pdu("Read Coils Request", contrib.ModbusPDU01ReadCoilsRequest)
-ReadCoilsResponse = _pdu("Read Coils Response", *_bits_read(1, "coilStatus"))
-ReadDiscreteInputsRequest = _pdu("Read Discrete Inputs Request", contrib.ModbusPDU02ReadDiscreteInputsRequest)
-ReadDiscreteInputsResponse = _pdu("Read Discrete Inputs Response", *_bits_read(2, "inputStatus"))
-ReadHoldingRegistersRequest = _pdu("Read Holding Registers Request", contrib.ModbusPDU03ReadHoldingRegistersRequest)
-ReadHoldingRegistersResponse = _pdu("Read Holding Registers Response", *_registers_read(3))
-ReadInputRegistersRequest = _pdu("Read Input Registers Request", contrib.ModbusPDU04ReadInputRegistersRequest)
-ReadInputRegistersResponse = _pdu("Read Input Registers Response", *_registers_read(4))
-WriteSingleCoilRequest = _pdu("Write Single Coil Request", contrib.ModbusPDU05WriteSingleCoilRequest)
-WriteSingleCoilResponse = _pdu("Write Single Coil Response", contrib.ModbusPDU05WriteSingleCoilResponse)
-WriteSingleRegisterRequest = _pdu("Write Single Register Request", contrib.ModbusPDU06WriteSingleRegisterRequest)
-WriteSingleRegisterResponse = _pdu("Write Single Register Response", contrib.ModbusPDU06WriteSingleRegisterResponse)
-WriteMultipleCoilsRequest = _pdu(
-    "Write Multiple Coils Request",
-    _code(15),
-    XShortField("startAddr", 0),
-    XShortField("quantityOutput", 1),
-    _byte_count("outputsValue", 1),
-    _octets("outputsValue", lambda pkt: pkt.byteCount),
-)
-WriteMultipleCoilsResponse = _pdu("Write Multiple Coils Response", contrib.ModbusPDU0FWriteMultipleCoilsResponse)
-WriteMultipleRegistersRequest = _pdu(
-    "Write Multiple Registers Request",
-    _code(16),
-    XShortField("startAddr", 0),
-    BitFieldLenField("quantityRegisters", None, 16, count_of="outputsValue"),
-    _byte_count("outputsValue", 2),
-    _registers("outputsValue", lambda pkt: pkt.byteCount // 2),
-)
-WriteMultipleRegistersResponse = _pdu(
-    "Write Multiple Registers Response", contrib.ModbusPDU10WriteMultipleRegistersResponse
-)
-MaskWriteRegisterRequest = _pdu("Mask Write Register Request", contrib.ModbusPDU16MaskWriteRegisterRequest)
-MaskWriteRegisterResponse = _pdu("Mask Write Register Response", contrib.ModbusPDU16MaskWriteRegisterResponse)
-ReadWriteMultipleRegistersRequest = _pdu(
-    "Read/Write Multiple Registers Request",
-    _code(23),
-    XShortField("readStartingAddr", 0),
-    XShortField("readQuantityRegisters", 1),
-    XShortField("writeStartingAddr", 0),
-    BitFieldLenField("writeQuantityRegisters", None, 16, count_of="writeRegistersValue"),
-    _byte_count("writeRegistersValue", 2),
-    _registers("writeRegistersValue", lambda pkt: pkt.byteCount // 2),
-)
-ReadWriteMultipleRegistersResponse = _pdu("Read/Write Multiple Registers Response", *_registers_read(23))
-ReadFifoQueueRequest = _pdu("Read FIFO Queue Request", contrib.ModbusPDU18ReadFIFOQueueRequest)
-ReadFifoQueueResponse = _pdu("Read FIFO Queue Response", contrib.ModbusPDU18ReadFIFOQueueResponse)
-
-# --- serial line functions
-
-ReadExceptionStatusRequest = _pdu("Read Exception Status Request", contrib.ModbusPDU07ReadExceptionStatusRequest)
-ReadExceptionStatusResponse = _pdu("Read Exception Status Response", _code(7), XByteField("status", 0))
-DiagnosticsRequest = _pdu("Diagnostics Request", *_DIAGNOSTICS)
-DiagnosticsResponse = _pdu("Diagnostics Response", *_DIAGNOSTICS)
-GetCommEventCounterRequest = _pdu("Get Comm Event Counter Request", contrib.ModbusPDU0BGetCommEventCounterRequest)
-GetCommEventCounterResponse = _pdu("Get Comm Event Counter Response", contrib.ModbusPDU0BGetCommEventCounterResponse)
-GetCommEventLogRequest = _pdu("Get Comm Event Log Request", contrib.ModbusPDU0CGetCommEventLogRequest)
-GetCommEventLogResponse = _pdu(
-    "Get Comm Event Log Response",
-    _code(12),
-    _byte_count("event", 1, more=6),
-    XShortField("status", 0),
-    XShortField("eventCount", 0),
-    XShortField("messageCount", 0),
-    _octets("event", lambda pkt: max(0, pkt.byteCount - 6)),
-)
-ReportServerIdRequest = _pdu("Report Server ID Request", contrib.ModbusPDU11ReportSlaveIdRequest)
-# identifier, run indicator and more are in one string: only the vendor knows where each ends
-ReportServerIdResponse = _pdu(
-    "Report Server ID Response",
-    _code(17),
-    BitFieldLenField("byteCount", None, 8, length_of="serverId"),
-    StrLenField("serverId", b"", length_from=lambda pkt: pkt.byteCount),
-)
-
-
-# --- files
-
-
-class FileRecordRequest(Pdu):
-    """One group of a read file record request; groups follow each other as payloads."""
-
-    name = "Record asked for"
-    fields_desc: ClassVar = [contrib.ModbusReadFileSubRequest]
+    least = 0
 
     def guess_payload_class(self, payload: bytes) -> type[Packet]:
-        return FileRecordRequest if len(payload) >= 7 else super().guess_payload_class(payload)
+        return type(self) if len(payload) >= self.least else super().guess_payload_class(payload)
 
 
-class FileRecord(Pdu):
-    """One group of a read file record response."""
-
-    name = "Record read"
-    fields_desc: ClassVar = [
-        BitFieldLenField("respLength", None, 8, count_of="recData", adjust=lambda pkt, n: 2 * n + 1),
-        ByteField("refType", 6),
-        _registers("recData", lambda pkt: max(0, pkt.respLength - 1) // 2),
-    ]
-
-    def guess_payload_class(self, payload: bytes) -> type[Packet]:
-        return FileRecord if len(payload) >= 2 else super().guess_payload_class(payload)
-
-
-class FileRecordWrite(Pdu):
-    """One group of a write file record request or response."""
-
-    name = "Record written"
-    fields_desc: ClassVar = [
-        ByteField("refType", 6),
-        XShortField("fileNumber", 1),
-        XShortField("recordNumber", 0),
-        BitFieldLenField("recordLength", None, 16, count_of="recordData"),
-        _registers("recordData", lambda pkt: pkt.recordLength),
-    ]
-
-    def guess_payload_class(self, payload: bytes) -> type[Packet]:
-        return FileRecordWrite if len(payload) >= 7 else super().guess_payload_class(payload)
-
-
-class _FileMessage(Pdu):
-    """Function code and the octets of all groups; the count is computed when None."""
+class _Grouped(Pdu):
+    """What stands before the groups; a byte count is computed where it is None. `count`: the field that counts."""
 
     group: type[Packet] = Raw
+    count = ""
 
     def guess_payload_class(self, payload: bytes) -> type[Packet]:
-        return self.group
+        whole = len(self.fields_desc) == len(type(self).fields_desc)
+        counted = self.count == "byteCount" or (whole and self.getfieldval(self.count))
+        return self.group if counted else super().guess_payload_class(payload)
 
     def post_build(self, pkt: bytes, pay: bytes) -> bytes:
-        if len(self.fields_desc) > 1 and self.byteCount is None:
+        if len(self.fields_desc) > 1 and self.count == "byteCount" and self.byteCount is None:
             pkt = pkt[:1] + bytes((len(pay) & 0xFF,))
         return pkt + pay
 
 
-class ReadFileRecordRequest(_FileMessage):
-    name = "Read File Record Request"
-    fields_desc: ClassVar = [_code(20), ByteField("byteCount", None)]
-    group = FileRecordRequest
+def _message(code: int, name: str, message: Message) -> Any:
+    fields = [XByteField("funcCode", code), *_fields(message)]
+    if not message or message[-1].means is not Means.GROUPS:
+        return _class(name, Pdu, fields_desc=fields)
+    groups = message[-1]
+    return _class(name, _Grouped, fields_desc=fields, count=message[-2].scapy, group=_group(groups))
 
 
-class ReadFileRecordResponse(_FileMessage):
-    name = "Read File Record Response"
-    fields_desc: ClassVar = [_code(20), ByteField("byteCount", None)]
-    group = FileRecord
+def _group(groups: Declared) -> Any:
+    made = _GROUPS.get(groups.group_name)
+    if made is None:
+        least, fields = Group.of(groups.group).size, _fields(groups.group, grouped=True)
+        made = _GROUPS[groups.group_name] = _class(groups.group_name, _Group, fields_desc=fields, least=least)
+    return made
 
 
-class WriteFileRecordRequest(_FileMessage):
-    name = "Write File Record Request"
-    fields_desc: ClassVar = [_code(21), ByteField("byteCount", None)]
-    group = FileRecordWrite
+PACKETS: dict[str, Any] = {}
+"""The classes by name."""
+
+_GROUPS: dict[str, Any] = {}
+
+REQUESTS = {code: _message(code, f"{each.title} Request", each.request) for code, each in MESSAGES.items()}
+RESPONSES = {code: _message(code, f"{each.title} Response", each.response) for code, each in MESSAGES.items()}
 
 
-class WriteFileRecordResponse(WriteFileRecordRequest):
-    name = "Write File Record Response"
+def __getattr__(name: str) -> Any:
+    try:
+        return PACKETS[name]
+    except KeyError:
+        raise AttributeError(f"module {__name__} has no packet {name}") from None
 
 
-# --- encapsulated interfaces, exceptions, the unknown
-
-ReadDeviceIdentificationRequest = _pdu(
-    "Read Device Identification Request", contrib.ModbusPDU2B0EReadDeviceIdentificationRequest
-)
-
-
-class IdentificationObject(Pdu):
-    name = "Object"
-    fields_desc: ClassVar = [contrib.ModbusObjectId]
-
-    def guess_payload_class(self, payload: bytes) -> type[Packet]:
-        return IdentificationObject if len(payload) >= 2 else super().guess_payload_class(payload)
-
-
-class ReadDeviceIdentificationResponse(Pdu):
-    name = "Read Device Identification Response"
-    fields_desc: ClassVar = [contrib.ModbusPDU2B0EReadDeviceIdentificationResponse]
-
-    def guess_payload_class(self, payload: bytes) -> type[Packet]:
-        whole = len(self.fields_desc) == len(type(self).fields_desc)
-        return IdentificationObject if whole and self.objCount else super().guess_payload_class(payload)
+# --- what no layout tells --------------------------------------------------------------------------------------------
 
 
 class EncapsulatedInterface(Pdu):
     """Function 43 with another MEI type than 14, either direction."""
 
     name = "Encapsulated Interface"
-    fields_desc: ClassVar = [_code(43), XByteField("MEIType", 13), StrField("data", b"")]
+    fields_desc: ClassVar = [XByteField("funcCode", 43), XByteField("MEIType", 13), StrField("data", b"")]
 
 
 class ExceptionResponse(Pdu):
@@ -315,54 +250,6 @@ class OtherFunction(Pdu):
 
     name = "Other Function"
     fields_desc: ClassVar = [XByteField("funcCode", 0x41), StrField("data", b"")]
-
-
-def _by_code(*classes: Any) -> dict[int, Any]:
-    return {cls.fields_desc[0].default: cls for cls in classes}
-
-
-REQUESTS = _by_code(
-    ReadCoilsRequest,
-    ReadDiscreteInputsRequest,
-    ReadHoldingRegistersRequest,
-    ReadInputRegistersRequest,
-    WriteSingleCoilRequest,
-    WriteSingleRegisterRequest,
-    ReadExceptionStatusRequest,
-    DiagnosticsRequest,
-    GetCommEventCounterRequest,
-    GetCommEventLogRequest,
-    WriteMultipleCoilsRequest,
-    WriteMultipleRegistersRequest,
-    ReportServerIdRequest,
-    ReadFileRecordRequest,
-    WriteFileRecordRequest,
-    MaskWriteRegisterRequest,
-    ReadWriteMultipleRegistersRequest,
-    ReadFifoQueueRequest,
-    ReadDeviceIdentificationRequest,
-)
-RESPONSES = _by_code(
-    ReadCoilsResponse,
-    ReadDiscreteInputsResponse,
-    ReadHoldingRegistersResponse,
-    ReadInputRegistersResponse,
-    WriteSingleCoilResponse,
-    WriteSingleRegisterResponse,
-    ReadExceptionStatusResponse,
-    DiagnosticsResponse,
-    GetCommEventCounterResponse,
-    GetCommEventLogResponse,
-    WriteMultipleCoilsResponse,
-    WriteMultipleRegistersResponse,
-    ReportServerIdResponse,
-    ReadFileRecordResponse,
-    WriteFileRecordResponse,
-    MaskWriteRegisterResponse,
-    ReadWriteMultipleRegistersResponse,
-    ReadFifoQueueResponse,
-    ReadDeviceIdentificationResponse,
-)
 
 
 def pdu_class(octets: bytes, response: bool) -> Any:

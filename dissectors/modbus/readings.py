@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 from dissectors.frame import Frame
-from dissectors.modbus.adu import adu
-from dissectors.modbus.functions import EXCEPTION_BIT
+from dissectors.modbus.envelope import adu
+from dissectors.modbus.functions import EXCEPTION_BIT, ITEMS_ASKED
+from dissectors.modbus.layout import MESSAGES
+from dissectors.modbus.notation import Means, first, last
+from dissectors.modbus.ranges import AGREEMENTS
 from dissectors.readings import How, Reading
 
-_READS = {0x01: "coil", 0x02: "discrete", 0x03: "holding", 0x04: "input"}
-_COIL_ON, _COIL_OFF = 0xFF00, 0x0000
+_COIL_ON = 0xFF00
 _HEAD = 6  # unit, function, two words
 
 
@@ -24,16 +28,16 @@ def readings(request: Frame | None, response: Frame | None) -> tuple[Reading, ..
     answer = adu(response) if response.ok else b""
     if len(answer) < 2 or answer[:2] != asked[:2] or answer[1] & EXCEPTION_BIT:
         return ()
-    code = asked[1]
-    if code in (0x01, 0x02):
-        return _bits(_READS[code], _word(asked, 2), _word(asked, 4), answer[3 : 3 + answer[2]] if answer[2:] else b"")
-    if code in (0x03, 0x04, 0x17):
-        count, octets = _word(asked, 4), answer[3:]
-        if len(octets) < 2 * count or not answer[2:] or answer[2] != 2 * count:
-            return ()
-        read = _registers(_READS.get(code, "holding"), _word(asked, 2), octets[: 2 * count], How.READ)
-        return (*_written(asked), *read)
-    return _written(asked)
+    if asked[1] not in ITEMS_ASKED:
+        return _written(asked)
+    at, bits = ITEMS_ASKED[asked[1]]
+    space, begin, count = MESSAGES[asked[1]].space, _word(asked, at - 2), _word(asked, at)
+    if bits == 1:
+        return _bits(space, begin, count, answer[3 : 3 + answer[2]] if answer[2:] else b"")
+    octets = answer[3:]
+    if len(octets) < 2 * count or not answer[2:] or answer[2] != 2 * count:
+        return ()
+    return (*_written(asked), *_registers(space, begin, octets[: 2 * count], How.READ))
 
 
 def refusal(frame: Frame) -> tuple[str, int] | None:
@@ -45,20 +49,34 @@ def refusal(frame: Frame) -> tuple[str, int] | None:
 def _written(octets: bytes) -> tuple[Reading, ...]:
     """What a request writes; nothing for one that does not, or whose counts contradict each other."""
     code = octets[1]
-    if code == 0x05:
-        value = _word(octets, 4)
-        known = value in (_COIL_ON, _COIL_OFF)
-        return (Reading("coil", _word(octets, 2), value, int(value == _COIL_ON), How.WRITE),) if known else ()
-    if code == 0x06:
-        return _registers("holding", _word(octets, 2), octets[4:6], How.WRITE)
-    if code == 0x0F and len(octets) > 7:
-        return _bits("coil", _word(octets, 2), _word(octets, 4), octets[7 : 7 + octets[6]], How.WRITE)
-    if code in (0x10, 0x17):
-        at = 2 if code == 0x10 else 6
-        data = octets[at + 5 :]
-        if len(octets) > at + 4 and len(data) == octets[at + 4] == 2 * _word(octets, at + 2):
-            return _registers("holding", _word(octets, at), data, How.WRITE)
-    return ()
+    if code in _SINGLE:
+        return _single(octets, *_SINGLE[code])
+    agreement = AGREEMENTS.get(code)
+    if agreement is None or len(octets) <= agreement.count_at:
+        return ()
+    space, begin = MESSAGES[code].space, _word(octets, agreement.quantity_at - 2)
+    quantity, count = _word(octets, agreement.quantity_at), octets[agreement.count_at]
+    data = octets[agreement.count_at + 1 :]
+    if agreement.bits == 1:
+        return _bits(space, begin, quantity, data[:count], How.WRITE)
+    return _registers(space, begin, data, How.WRITE) if len(data) == count == 2 * quantity else ()
+
+
+_SINGLE = {
+    code: (messages.space, address.at, value.at, value.field.among)
+    for code, messages in MESSAGES.items()
+    if messages.writes
+    and (address := first(messages.request, Means.ADDRESS)) is not None
+    and (value := last(messages.request, Means.VALUE)) is not None
+}
+"""Of writes of one value: space, where address and value stand, what the value may be (None: anything)."""
+
+
+def _single(octets: bytes, space: str, at: int, value_at: int, among: Collection[int] | None) -> tuple[Reading, ...]:
+    if among is None:
+        return _registers(space, _word(octets, at), octets[value_at : value_at + 2], How.WRITE)
+    value = _word(octets, value_at)
+    return (Reading(space, _word(octets, at), value, int(value == _COIL_ON), How.WRITE),) if value in among else ()
 
 
 def _registers(space: str, first: int, octets: bytes, how: How) -> tuple[Reading, ...]:

@@ -1,11 +1,16 @@
-"""Modbus frames under other names: units renumbered, server identification (functions 17 and 43/14) blanked."""
+"""Modbus frames under other names: units renumbered, text blanked where the layout has any (server
+identification, functions 17 and 43/14)."""
 
 from __future__ import annotations
 
 from dissectors.checksums import crc16_modbus, lrc
 from dissectors.frame import Damage, Frame
-from dissectors.modbus.adu import seal_rtu
+from dissectors.modbus.envelope import seal_rtu
+from dissectors.modbus.layout import MESSAGES
+from dissectors.modbus.notation import has_text
 from dissectors.pseudonyms import Pseudonyms, hex_octet, inflicted, without_text
+
+_WITH_TEXT = frozenset(code for code, messages in MESSAGES.items() if has_text(messages.response))
 
 
 class RtuRenamer:
@@ -31,7 +36,7 @@ class RtuRenamer:
     def pdu(self, body: bytes) -> bytes:
         """Unit and PDU, renamed."""
         unit, pdu = body[:1], body[1:]
-        if pdu[:1] in (b"\x11", b"\x2b"):
+        if pdu and pdu[0] in _WITH_TEXT:
             pdu = pdu[:1] + without_text(pdu[1:])
         return bytes([self.stations.of(unit[0])]) + pdu
 

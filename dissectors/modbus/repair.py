@@ -23,17 +23,12 @@ from typing import Final
 from dissectors.checksums import crc16_modbus
 from dissectors.frame import Flaw, Repair
 from dissectors.modbus.candidates import octet_bits, readings
-from dissectors.modbus.expectation import Expected
-from dissectors.modbus.functions import (
-    EXCEPTION_BIT,
-    FUNCTIONS,
-    IMPLAUSIBLE,
-    MAX_FRAME,
-    MAX_UNIT,
-    MIN_FRAME,
-    is_open_length,
-)
+from dissectors.modbus.functions import EXCEPTION_BIT, FUNCTIONS, ITEMS_ASKED, MAX_UNIT, is_open_length
+from dissectors.modbus.lengths import MAX_FRAME, MIN_FRAME
+from dissectors.modbus.open_request import Expected
 from dissectors.modbus.past import Past
+from dissectors.modbus.ranges import RANGES_REPEATED
+from dissectors.modbus.shapes import IMPLAUSIBLE
 
 _SHORTEST: Final = MIN_FRAME + 1
 """Octets of the shortest frame that is put right: of fewer, too little agrees beside the check."""
@@ -173,11 +168,7 @@ def _says_its_length(whole: bytes, expected: Expected | None, past: Past) -> boo
         return True
     if expected is None or whole[1] & EXCEPTION_BIT:
         return False
-    if whole[1] in _COUNTED:
+    if whole[1] in ITEMS_ASKED:
         return True
     asked = expected.octets
-    return whole[2:6] == asked[2:6] if whole[1] in _RANGES else whole == asked
-
-
-_COUNTED: Final = frozenset({0x01, 0x02, 0x03, 0x04, 0x17})
-_RANGES: Final = frozenset({0x0F, 0x10})
+    return whole[2:6] == asked[2:6] if whole[1] in RANGES_REPEATED else whole == asked

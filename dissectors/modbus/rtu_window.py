@@ -9,23 +9,23 @@ from dissectors.checksums import crc16_modbus
 from dissectors.frame import Check, Damage, Event, Flaw, Found, Frame, Noise, Place, Reason, Repair
 from dissectors.framer import UNKNOWN_SILENCE, OctetWindow
 from dissectors.line import Timing
-from dissectors.modbus.candidates import SHORT_FRAME, Candidate, Reading, octet_bits, readings
-from dissectors.modbus.expectation import Expected, expectation
-from dissectors.modbus.functions import EXCEPTION_BIT, is_open_length
-from dissectors.modbus.past import Past
-from dissectors.modbus.remains import (
+from dissectors.modbus.best_split import LIKELY, PROVED
+from dissectors.modbus.candidates import SHORT_FRAME, Candidate, LengthGuess, octet_bits, readings
+from dissectors.modbus.damaged import (
     ODD_LENGTH,
-    Injury,
+    DamagedFrame,
     Side,
+    classify_leftover,
     cut_echo_of,
-    injury,
     noise_place,
     noise_reason,
     predicted,
     zeros_at_start,
 )
+from dissectors.modbus.functions import EXCEPTION_BIT, is_open_length
+from dissectors.modbus.open_request import Expected, expectation
+from dissectors.modbus.past import Past
 from dissectors.modbus.repair import repaired
-from dissectors.modbus.segmentation import LIKELY, PROVED
 
 _ALL_AGREES = frozenset({Flaw.CHECK_SWAPPED, Flaw.FIRST_MISSING, Flaw.FIRST_SPOILT})
 
@@ -89,7 +89,7 @@ class RtuWindow:
 
     # --- what stands round a place ---------------------------------------------------------------------------------
 
-    def readings(self, count: int) -> tuple[Reading, ...]:
+    def readings(self, count: int) -> tuple[LengthGuess, ...]:
         """Predicted lengths of a frame that begins with the window, of which `count` octets are known."""
         return readings(self.octets, 0, count)
 
@@ -179,10 +179,10 @@ class RtuWindow:
                 before, stretch, count = Side.NOISE, stretch[zeros:], count - zeros
         heard = stretch[0] in self.units if self.units else None
         called = count > 1 and self.past.has_called(stretch[0], stretch[1] & ~EXCEPTION_BIT)
-        hurt = injury(stretch, before, after, heard, called, self.expected)
+        hurt = classify_leftover(stretch, before, after, heard, called, self.expected)
         bounded = before is not Side.NOISE and after is not Side.NOISE
         if bounded and (echoed := cut_echo_of(stretch, self.expected)):
-            self._take_damaged(count, Injury(echoed, Damage.SHORT), None)
+            self._take_damaged(count, DamagedFrame(echoed, Damage.SHORT), None)
         elif bounded and crc16_modbus(stretch) and (repair := repaired(stretch, self.expected, self.past, self.units)):
             self._take_repaired(count, repair)
         elif hurt is None:
@@ -196,7 +196,9 @@ class RtuWindow:
     def _take_repaired(self, count: int, repair: Repair) -> None:
         """Give a damaged frame that is known all the same. A request of which all of the check agrees is open now."""
         whole = repair.octets
-        self._take_damaged(count, Injury(len(whole), Damage.CHECK if len(whole) == count else Damage.SHORT), repair)
+        self._take_damaged(
+            count, DamagedFrame(len(whole), Damage.CHECK if len(whole) == count else Damage.SHORT), repair
+        )
         fits = [r for r in readings(whole, 0, len(whole)) if r.length == len(whole)]
         request = any(r.request for r in fits) or is_open_length(whole)
         if request and (repair.flaw in _ALL_AGREES or self.past.has_asked(whole)):
@@ -223,7 +225,7 @@ class RtuWindow:
         self._skipped += count
         self._out.append(Noise(taken.octets, taken.start, taken.end, place, reason, taken.marks))
 
-    def _take_damaged(self, count: int, hurt: Injury, repair: Repair | None) -> None:
+    def _take_damaged(self, count: int, hurt: DamagedFrame, repair: Repair | None) -> None:
         found = self._found(count)
         octets, start, end, slack, marks = self._octets.take(count)
         check = Check.ABSENT if hurt.damage is Damage.SHORT else Check.BAD

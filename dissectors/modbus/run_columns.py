@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dissectors.modbus.best_split import HEARD, PROVED, SCALE
 from dissectors.modbus.candidates import CRC_BITS, WHOLE_STRETCH
-from dissectors.modbus.expectation import EXACT, ODD
-from dissectors.modbus.functions import EXCEPTION_BIT, MIN_FRAME, MORE, NEVER
+from dissectors.modbus.functions import EXCEPTION_BIT
 from dissectors.modbus.length_columns import (
     NOT_WEIGHED,
     answer_lengths,
@@ -25,8 +25,9 @@ from dissectors.modbus.length_columns import (
     shapes,
     unit_bits,
 )
+from dissectors.modbus.lengths import MIN_FRAME, MORE, NEVER
+from dissectors.modbus.open_request import EXACT, ODD
 from dissectors.modbus.past import KNOWN_LENGTH
-from dissectors.modbus.segmentation import HEARD, PROVED, SCALE
 from dissectors.modbus.stretch_rows import Rows, Stretches
 from dissectors.modbus.whole_columns import FIRST_LOOK, Told
 

@@ -7,7 +7,7 @@ from functools import partial
 from itertools import cycle
 
 from dissectors.line import MS, NS_PER_S, LineSettings, Timing
-from dissectors.modbus.adu import ASCII_NAME, RTU_NAME
+from dissectors.modbus.envelope import ASCII_NAME, RTU_NAME
 from dissectors.modbus.simulated_e510 import SimulatedE510
 from dissectors.modbus.simulated_master import PollingMaster, read_holding, write_register, write_registers
 from dissectors.simulated import Party, SimulatedBus, no_gap

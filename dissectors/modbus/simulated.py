@@ -13,13 +13,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from dissectors.modbus.adu import seal_ascii, seal_rtu, unseal
-from dissectors.modbus.functions import (
-    BROADCAST,
-    DIAGNOSTIC_LISTEN_ONLY,
-    DIAGNOSTIC_LOOPBACK,
-    EXCEPTION_BIT,
-    FUNCTIONS,
+from dissectors.modbus.envelope import seal_ascii, seal_rtu, unseal
+from dissectors.modbus.functions import BROADCAST, DIAGNOSTIC_LISTEN_ONLY, DIAGNOSTIC_LOOPBACK, EXCEPTION_BIT, FUNCTIONS
+from dissectors.modbus.layout import (
     MAX_READ_BITS,
     MAX_READ_REGISTERS,
     MAX_READ_WRITE_REGISTERS,

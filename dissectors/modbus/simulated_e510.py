@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from dissectors.line import NS_PER_S
-from dissectors.modbus.functions import MAX_FRAME
+from dissectors.modbus.lengths import MAX_FRAME
 from dissectors.modbus.simulated import ILLEGAL_ADDRESS, ModbusServer, Refused
 from dissectors.profiles import packaged
 from dissectors.simulated import Send

@@ -12,7 +12,7 @@ import struct
 from collections.abc import Callable, Sequence
 
 from dissectors.line import LineSettings
-from dissectors.modbus.adu import seal_ascii, seal_rtu, unseal
+from dissectors.modbus.envelope import seal_ascii, seal_rtu, unseal
 from dissectors.modbus.functions import BROADCAST, EXCEPTION_BIT
 from dissectors.simulated import Send
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from dissectors.modbus.functions import MAX_FRAME
+from dissectors.modbus.lengths import MAX_FRAME
 
 if TYPE_CHECKING:
     import numpy.typing as npt

@@ -8,9 +8,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from dissectors.frame import Frame, Header, Role
-from dissectors.modbus.adu import readable_adu
-from dissectors.modbus.functions import DEVICE_ID_CODES, DEVICE_ID_OBJECTS, DIAGNOSTICS, EXCEPTION_BIT, FUNCTIONS
+from dissectors.modbus.envelope import readable_adu
+from dissectors.modbus.functions import DIAGNOSTICS, EXCEPTION_BIT, FUNCTIONS
 from dissectors.modbus.header import NO_EXCEPTIONS, exception_name, kind_of
+from dissectors.modbus.layout import DEVICE_ID_CODES, DEVICE_ID_OBJECTS
 
 _MOST_REGISTERS = 10
 _MOST_BITS = 32

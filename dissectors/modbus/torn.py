@@ -15,7 +15,7 @@ from typing import Final
 
 from dissectors.checksums import crc16_modbus, lrc
 from dissectors.frame import Event, Frame
-from dissectors.modbus.adu import ASCII_NAME, hex_pairs
+from dissectors.modbus.envelope import ASCII_NAME, hex_pairs
 
 PIECES: Final = 8
 """Most rows that one torn frame is."""

@@ -23,10 +23,10 @@ from typing import TYPE_CHECKING
 
 from dissectors.frame import Event, Header, Noise, Reason, Role
 from dissectors.line import Timing
-from dissectors.modbus.adu import readable_adu
 from dissectors.modbus.damaged_unit import names_another, unit_of
 from dissectors.modbus.doubts import is_full
 from dissectors.modbus.echoes import MOST_VOTES, Echoes
+from dissectors.modbus.envelope import readable_adu
 from dissectors.modbus.exchange import Exchange, Garble, Seen, answer_apart, echo_of
 from dissectors.modbus.exchanges import FIRST_SEEN, Exchanges
 from dissectors.modbus.functions import BROADCAST

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from dissectors.modbus import damaged_columns
-from dissectors.modbus.functions import MAX_FRAME, MIN_FRAME, NEVER
+from dissectors.modbus.best_split import PROVED
 from dissectors.modbus.length_columns import common, frame_bits, lengths, predicting
-from dissectors.modbus.segmentation import PROVED
+from dissectors.modbus.lengths import MAX_FRAME, MIN_FRAME, NEVER
 from dissectors.modbus.stretch_rows import Rows, Stretches
 
 if TYPE_CHECKING:

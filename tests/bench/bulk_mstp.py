@@ -15,7 +15,7 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
-from dissectors.bacnet.frame_making import frame
+from dissectors.bacnet.envelope import frame
 from dissectors.bacnet.kernel import kernel
 from dissectors.bacnet.pairing import Pairing, prepare
 from dissectors.bacnet.tracker import MstpTracker

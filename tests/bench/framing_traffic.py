@@ -72,7 +72,7 @@ def n2(dice: Random, frames: int) -> Traffic:
 
 
 def _modbus(dice: Random, frames: int, *, is_ascii: bool) -> Traffic:
-    from dissectors.modbus.adu import seal_ascii, seal_rtu
+    from dissectors.modbus.envelope import seal_ascii, seal_rtu
 
     seal = seal_ascii if is_ascii else seal_rtu
     said: list[Said] = []

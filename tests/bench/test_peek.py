@@ -9,7 +9,7 @@ import pytest
 
 from dissectors.frame import Check, Found, Frame, Role
 from dissectors.line import LineSettings, Timing
-from dissectors.modbus.adu import seal_ascii, seal_rtu
+from dissectors.modbus.envelope import seal_ascii, seal_rtu
 from dissectors.modbus.fields import fields
 from dissectors.modbus.header import peek_ascii, peek_rtu
 from dissectors.modbus.packets import dissect

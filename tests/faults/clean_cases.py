@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 
 from dissectors.bacnet.application import Poller, Quiet, read_property
-from dissectors.bacnet.frame_making import npdu_frame
+from dissectors.bacnet.envelope import npdu_frame
 from dissectors.bacnet.simulated import Node
 from dissectors.line import LineSettings, Timing
 from dissectors.modbus.simulated_master import read_holding, write_register, write_registers

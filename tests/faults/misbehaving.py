@@ -8,7 +8,7 @@ from random import Random
 from typing import Any, ClassVar
 
 from dissectors.line import LineSettings
-from dissectors.modbus.adu import seal_ascii, seal_rtu, unseal
+from dissectors.modbus.envelope import seal_ascii, seal_rtu, unseal
 from dissectors.modbus.simulated_master import PollingMaster, Request
 from dissectors.simulated import Send, Station
 from dissectors.simulated_faults import Fault, Transmission

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 
 from dissectors.bacnet.application import WRITE_PROPERTY, Application, Outgoing, confirmed
-from dissectors.bacnet.frame_making import npdu_frame
+from dissectors.bacnet.envelope import npdu_frame
 from dissectors.bacnet.frame_types import EXPECTING, FrameType
 from dissectors.bacnet.simulated import Faults, Node
 from dissectors.frame import Place

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 
 from dissectors.bacnet.application import read_property
-from dissectors.bacnet.frame_making import frame
+from dissectors.bacnet.envelope import frame
 from dissectors.bacnet.frame_types import FrameType
 from dissectors.bacnet.simulated import Faults
 from dissectors.frame import Place

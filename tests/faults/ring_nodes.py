@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 from dissectors.bacnet.application import Outgoing, Poller
-from dissectors.bacnet.frame_making import frame
+from dissectors.bacnet.envelope import frame
 from dissectors.bacnet.frame_types import FrameType
 from dissectors.bacnet.simulated import Faults, Node
 from dissectors.line import LineSettings

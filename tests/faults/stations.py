@@ -7,7 +7,7 @@ from random import Random
 from typing import ClassVar
 
 from dissectors.line import LineSettings
-from dissectors.modbus.adu import seal_ascii, seal_rtu, unseal
+from dissectors.modbus.envelope import seal_ascii, seal_rtu, unseal
 from dissectors.modbus.simulated import Bank, ModbusServer
 from dissectors.n2.simulated import Follower
 from dissectors.simulated import Send, Station

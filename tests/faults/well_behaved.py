@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from itertools import count
 
 from dissectors.checksums import crc16_modbus
-from dissectors.modbus.adu import seal_rtu, unseal
+from dissectors.modbus.envelope import seal_rtu, unseal
 from dissectors.modbus.simulated import Cells, ModbusServer
 from dissectors.modbus.simulated_master import read_holding
 from dissectors.n2.simulated import Master, command

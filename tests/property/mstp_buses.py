@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from hypothesis import strategies as st
 
-from dissectors.bacnet.frame_making import frame
+from dissectors.bacnet.envelope import frame
 from dissectors.bacnet.frame_types import HEADER, PREAMBLE
 from dissectors.checksums import crc8_mstp
 from dissectors.columns import Reads

@@ -14,9 +14,9 @@ from dissectors.columns import FrameColumns
 from dissectors.frame import Chunk, LineError, Mark
 from dissectors.line import LineSettings, Timing
 from dissectors.modbus import ASCII
-from dissectors.modbus.adu import seal_ascii
 from dissectors.modbus.ascii_framing import AsciiFramer
 from dissectors.modbus.ascii_kernel import kernel
+from dissectors.modbus.envelope import seal_ascii
 from sniff import formats
 from tests.bus_delivery import FTDI_LATENCY, MS, exact, ftdi, laid_out, with_noise
 from tests.property.kernel_equality import assert_equal, reads_of

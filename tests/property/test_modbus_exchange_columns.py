@@ -16,7 +16,7 @@ from dissectors.columns import NONE, ROLES, FrameColumns, PlacementColumns, Tran
 from dissectors.frame import Chunk, Event, Frame
 from dissectors.line import LineSettings, Timing
 from dissectors.modbus import RTU
-from dissectors.modbus.adu import readable_adu
+from dissectors.modbus.envelope import readable_adu
 from dissectors.modbus.exchange import Exchange, Seen
 from dissectors.modbus.exchange_columns import Exchanges, exchanges, placed
 from dissectors.modbus.exchange_memory import holding, passed

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dissectors.bacnet import MSTP
-from dissectors.bacnet.frame_making import frame
+from dissectors.bacnet.envelope import frame
 from dissectors.bacnet.kernel import kernel
 from dissectors.checksums import crc8_mstp
 from dissectors.columns import Reads

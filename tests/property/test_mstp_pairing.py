@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dissectors.bacnet import past_exchanges
-from dissectors.bacnet.frame_making import frame
+from dissectors.bacnet.envelope import frame
 from dissectors.frame import Chunk
 from dissectors.line import Timing
 from tests.bench import bulk_mstp

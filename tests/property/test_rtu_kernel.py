@@ -16,9 +16,9 @@ from dissectors.frame import Chunk, LineError, Mark
 from dissectors.line import LineSettings, Timing
 from dissectors.modbus import RTU
 from dissectors.modbus.candidates import octet_bits, readings
-from dissectors.modbus.functions import MAX_FRAME, MORE
 from dissectors.modbus.kernel import kernel
 from dissectors.modbus.length_columns import PADDING, RARE, lengths, predicting, shapes, unit_bits
+from dissectors.modbus.lengths import MAX_FRAME, MORE
 from sniff import formats
 from tests.bench import bulk_rtu
 from tests.bus_delivery import FTDI_LATENCY, MS, ftdi, laid_out, stalled, with_noise

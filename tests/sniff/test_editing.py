@@ -75,8 +75,8 @@ def test_anonymising_renumbers_stations_one_for_one(name: str) -> None:
 
 
 def test_no_name_survives(tmp_path: Path, sniff485: Callable[..., tuple[int, str, str]]) -> None:
-    from dissectors.bacnet.frame_making import frame as mstp
-    from dissectors.modbus.adu import make_rtu as modbus_rtu
+    from dissectors.bacnet.envelope import frame as mstp
+    from dissectors.modbus.envelope import make_rtu as modbus_rtu
 
     secret = b"BOILER ROOM 7"
     answer = modbus_rtu(9, b"\x11" + bytes([len(secret) + 1]) + secret + b"\xff")

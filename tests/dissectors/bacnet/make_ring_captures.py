@@ -9,7 +9,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from dissectors.bacnet.frame_making import frame
+from dissectors.bacnet.envelope import frame
 from tests.dissectors.bacnet.ring_script import Step, data, found, poll, rounds, spoil, token
 
 READ = "0104000301 0c0c020004d2194d".replace(" ", "")

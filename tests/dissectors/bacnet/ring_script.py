@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from dissectors.bacnet import MSTP, RingObserver, judge
-from dissectors.bacnet.frame_making import frame, npdu_frame
+from dissectors.bacnet.envelope import frame, npdu_frame
 from dissectors.bacnet.ring import Ring
 from dissectors.bacnet.rules import RULES
 from dissectors.findings import Finding, Severity, with_consequences

@@ -16,7 +16,7 @@ from dissectors.bacnet import codec, layout, names, npdu, services
 from dissectors.bacnet.apdu import MORE_FOLLOWS, SEGMENTED, SEGMENTED_ACCEPTED, PduType
 from dissectors.bacnet.choices import CHOICES
 from dissectors.bacnet.enumerations import BIT_STRINGS, ENUMERATIONS
-from dissectors.bacnet.frame_making import frame, npdu_frame
+from dissectors.bacnet.envelope import frame, npdu_frame
 from dissectors.bacnet.property_types import PROPERTY_TYPES
 from dissectors.bacnet.values import BitString, Date, Double, Enumerated, ObjectId, Record, Signed, Time, base
 from tests.dissectors.bacnet.generate_tables import types_by_object

@@ -9,7 +9,7 @@ from pathlib import Path
 from dissectors.bacnet import apdu as apdus
 from dissectors.bacnet import codec, npdu, services
 from dissectors.bacnet.apdu import MORE_FOLLOWS, NEGATIVE_ACK, SEGMENTED, SEGMENTED_ACCEPTED, SERVER
-from dissectors.bacnet.frame_making import frame
+from dissectors.bacnet.envelope import frame
 from dissectors.bacnet.frame_types import FrameType
 from dissectors.bacnet.limits import MAX_DATA
 from dissectors.frame import Chunk

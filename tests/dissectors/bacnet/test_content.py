@@ -13,7 +13,7 @@ from dissectors.bacnet import MSTP, codec, npdu, services
 from dissectors.bacnet import apdu as apdus
 from dissectors.bacnet.content import Odd, ReplyFlaw, oddities
 from dissectors.bacnet.content_findings import ContentFindings
-from dissectors.bacnet.frame_making import frame
+from dissectors.bacnet.envelope import frame
 from dissectors.bacnet.station_address import mac_text, remote
 from dissectors.bacnet.summary import text
 from dissectors.bacnet.values import Date, ObjectId, Record, Time, WhenFlaw

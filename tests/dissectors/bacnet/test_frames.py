@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from dissectors.bacnet import MSTP, RingObserver, fields, packet, peek, text
 from dissectors.bacnet import message as messages
 from dissectors.bacnet import packets as layers
-from dissectors.bacnet.frame_making import frame, npdu_frame
+from dissectors.bacnet.envelope import frame, npdu_frame
 from dissectors.bacnet.packets import (
     NPDU,
     Abort,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from dissectors.bacnet import frame_making, framing
+from dissectors.bacnet import envelope, framing
 from dissectors.checksums import crc8_mstp
 from dissectors.frame import Chunk, Event
 from dissectors.line import LineSettings, Timing
@@ -19,7 +19,7 @@ def test_octets_inside_a_frame_of_known_length_cost_nothing(monkeypatch: pytest.
         return crc8_mstp(octets)
 
     monkeypatch.setattr(framing, "crc8_mstp", counted)
-    frame = frame_making.frame(6, 1, 2, bytes(400))
+    frame = envelope.frame(6, 1, 2, bytes(400))
     timing = Timing(LineSettings.parse("115200,8N1"), 0)
     framer = framing.MstpFramer(timing)
     events: list[Event] = []

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from dissectors.bacnet import apdu as apdus
 from dissectors.bacnet import codec, services
 from dissectors.bacnet.application import confirmed
+from dissectors.bacnet.envelope import npdu_frame
 from dissectors.bacnet.f510 import f510
-from dissectors.bacnet.frame_making import npdu_frame
 from dissectors.bacnet.frame_types import FrameType
 from dissectors.bacnet.readings import readings
 from dissectors.bacnet.values import Enumerated

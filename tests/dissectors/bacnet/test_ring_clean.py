@@ -8,7 +8,7 @@ from random import Random
 import pytest
 
 from dissectors.bacnet import MSTP, RingObserver, judge
-from dissectors.bacnet.frame_making import frame
+from dissectors.bacnet.envelope import frame
 from dissectors.bacnet.simulated import Faults, Node, Poller, f510
 from dissectors.findings import Severity
 from dissectors.frame import Chunk, Frame

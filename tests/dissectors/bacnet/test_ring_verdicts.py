@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from dissectors.bacnet.frame_making import frame
+from dissectors.bacnet.envelope import frame
 from dissectors.bacnet.frame_types import FrameType
 from dissectors.bacnet.ring import What
 from dissectors.findings import Severity

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from dissectors.bacnet import MSTP, Reassembler
 from dissectors.bacnet import apdu as apdus
 from dissectors.bacnet.apdu import SEGMENTED_ACCEPTED, SERVER, Apdu
-from dissectors.bacnet.frame_making import frame
+from dissectors.bacnet.envelope import frame
 from dissectors.bacnet.frame_types import CARRIES_NPDU
 from dissectors.bacnet.npdu import EXPECTS_REPLY
 from dissectors.bacnet.readings import readings

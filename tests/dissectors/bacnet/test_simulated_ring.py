@@ -300,7 +300,7 @@ def test_the_drive_answers_as_documented():
     write = {"object-identifier": "analog-output,0", "property-identifier": "present-value"}
     apdu, _ = ask(confirmed(5, 15, {**write, "property-value": 42.5}))
     assert apdu.type == 2
-    apdu, values = ask(confirmed(6, 15, {**write, "property-value": 99.0}))
+    apdu, values = ask(confirmed(6, 15, {**write, "property-value": 999.0}))
     assert str(values["error-code"]) == "value-out-of-range"
     apdu, values = ask(confirmed(7, 15, {**write, "object-identifier": "analog-input,0", "property-value": 1.0}))
     assert str(values["error-code"]) == "write-access-denied"

@@ -11,7 +11,7 @@ from dissectors.bacnet import MSTP, Reassembler
 from dissectors.bacnet import apdu as apdus
 from dissectors.bacnet import npdu as npdus
 from dissectors.bacnet.apdu import MORE_FOLLOWS, SEGMENTED
-from dissectors.bacnet.frame_making import frame, npdu_frame
+from dissectors.bacnet.envelope import frame, npdu_frame
 from dissectors.frame import Chunk, Event, Frame, Role
 from dissectors.line import LineSettings, Timing
 from dissectors.tracker import Placement, Transaction, Verdict

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dissectors.bacnet import MSTP
-from dissectors.bacnet.frame_making import frame
+from dissectors.bacnet.envelope import frame
 from dissectors.bacnet.simulated import Node, Poller, f510
 from dissectors.bacnet.turn import Turn
 from dissectors.frame import Check, Chunk, Damage, Flaw, Found, Frame, Noise, Role

@@ -11,7 +11,7 @@ import pytest
 from dissectors.checksums import crc16_modbus
 from dissectors.frame import Check, Damage, Event, Found, Frame, Header, Noise, Place, Reason
 from dissectors.line import LineSettings, Timing
-from dissectors.modbus.adu import seal_ascii, seal_rtu, unseal
+from dissectors.modbus.envelope import seal_ascii, seal_rtu, unseal
 from dissectors.modbus.header import peek_ascii, peek_rtu
 from dissectors.modbus.tracker import ModbusTracker
 from dissectors.tracker import Placement, Transaction

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dissectors.frame import Chunk, Frame
 from dissectors.line import LineSettings, Timing
-from dissectors.modbus.adu import ascii_adu, seal_ascii
 from dissectors.modbus.ascii_framing import AsciiFramer
 from dissectors.modbus.damaged_unit import unit_of
+from dissectors.modbus.envelope import ascii_adu, seal_ascii
 from dissectors.modbus.header import peek_ascii
 from dissectors.modbus.tracker import ModbusTracker
 

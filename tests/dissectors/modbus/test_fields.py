@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dissectors.frame import Check, Damage, Role
-from dissectors.modbus.adu import seal_ascii
+from dissectors.modbus.envelope import seal_ascii
 from dissectors.modbus.fields import fields
 
 LINES = [

@@ -11,15 +11,13 @@ from hypothesis import strategies as st
 
 from dissectors.modbus.functions import (
     FUNCTIONS,
-    MAX_FRAME,
-    MORE,
-    NEVER,
     answer_length,
     ascii_length,
     is_open_length,
     request_length,
     response_length,
 )
+from dissectors.modbus.lengths import MAX_FRAME, MORE, NEVER
 from tests.property.modbus_adus import ascii_frame, bodies, exceptions, requests, responses, rtu
 
 PROTOCOLS = Path(__file__).parents[3] / "../shared/protocols"

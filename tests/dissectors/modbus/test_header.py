@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dissectors.frame import Check, Damage, Frame, Role
-from dissectors.modbus.adu import seal_ascii, seal_rtu
+from dissectors.modbus.envelope import seal_ascii, seal_rtu
 from dissectors.modbus.functions import FUNCTIONS
 from dissectors.modbus.header import peek_ascii, peek_rtu
 from dissectors.modbus.text import text

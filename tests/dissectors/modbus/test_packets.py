@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from dissectors.checksums import crc16_modbus, lrc
 from dissectors.frame import Check, Damage, Frame, Role
-from dissectors.modbus.adu import seal_ascii, seal_rtu
+from dissectors.modbus.envelope import seal_ascii, seal_rtu
 from dissectors.modbus.packets import ASCII, RTU, dissect
 from dissectors.modbus.pdus import (
     RESPONSES,

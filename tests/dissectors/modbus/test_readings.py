@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dissectors.frame import Check, Damage, Found, Frame
-from dissectors.modbus.adu import seal_ascii, seal_rtu
+from dissectors.modbus.envelope import seal_ascii, seal_rtu
 from dissectors.modbus.readings import readings, refusal
 from dissectors.readings import How
 

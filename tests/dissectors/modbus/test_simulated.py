@@ -19,7 +19,7 @@ from pymodbus.pdu.register_message import (
 )
 
 from dissectors.line import LineSettings
-from dissectors.modbus.adu import seal_ascii, seal_rtu, unseal
+from dissectors.modbus.envelope import seal_ascii, seal_rtu, unseal
 from dissectors.modbus.simulated import Cells, ModbusServer
 from dissectors.modbus.simulated_e510 import EXTERNAL_FAULT, FAULT_RESET, RUN, SimulatedE510
 from dissectors.modbus.simulated_master import PollingMaster, read_holding, write_register, write_registers

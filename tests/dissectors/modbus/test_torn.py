@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from dissectors.frame import Check, Damage, Found, Frame, Noise, Place, Reason
-from dissectors.modbus.adu import ASCII_NAME, RTU_NAME, seal_ascii, seal_rtu
+from dissectors.modbus.envelope import ASCII_NAME, RTU_NAME, seal_ascii, seal_rtu
 from dissectors.modbus.torn import FREE, SELDOM, TornFrames
 
 RTU = seal_rtu(bytes.fromhex("01 03 04 00 01 00 02"))

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
-from dissectors.modbus.adu import seal_rtu
+from dissectors.modbus.envelope import seal_rtu
 from sniff.bus.offline import outputs
 from sniff.engine.engine import Output
 from sniff.engine.session import Session

@@ -9,7 +9,7 @@ import pytest
 
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
-from dissectors.modbus.adu import seal_ascii, seal_rtu
+from dissectors.modbus.envelope import seal_ascii, seal_rtu
 from sniff.analysis.other_settings import Fit, what_fits
 from sniff.analysis.slower_bus import slower_by
 from sniff.simulation.line_mix import low_times, receive

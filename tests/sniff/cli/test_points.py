@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from dissectors.modbus.adu import seal_rtu
+from dissectors.modbus.envelope import seal_rtu
 
 EXCHANGES = (
     ("010625021770", "010625021770"),

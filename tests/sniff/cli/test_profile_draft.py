@@ -12,7 +12,7 @@ import pytest
 
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
-from dissectors.modbus.adu import seal_rtu
+from dissectors.modbus.envelope import seal_rtu
 from dissectors.profiles import parse_text
 from dissectors.profiles.model import Kind
 from sniff.engine.session import Session

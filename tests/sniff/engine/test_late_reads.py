@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dissectors import registry
 from dissectors.frame import Chunk, Frame
 from dissectors.line import LineSettings, Timing
-from dissectors.modbus.adu import seal_rtu
+from dissectors.modbus.envelope import seal_rtu
 from sniff.engine.engine import Engine, Output
 
 MS = 1_000_000

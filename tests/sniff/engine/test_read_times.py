@@ -11,7 +11,7 @@ import pytest
 
 from dissectors.frame import Chunk, Frame
 from dissectors.line import LineSettings, Timing
-from dissectors.modbus.adu import seal_rtu
+from dissectors.modbus.envelope import seal_rtu
 from sniff.bus.offline import outputs
 from sniff.engine.read_times import MS, ReadTimes, held_back
 from sniff.engine.session import INFERRED, Adapter, LineEvent, LineEventKind, Session, with_settings

@@ -5,7 +5,7 @@ Evidence is counted in bits. A candidate brings those of its octets (candidates.
     +4  silence proved at its start, at its end; or a good frame directly before it
     +2  silence of 1.5 characters proved there
     +4  a station that has been heard before
-    +2 … +14  it answers the open request, or repeats it (expectation.py)
+    +2 … +14  it answers the open request, or repeats it (open_request.py)
     +6 … +14  this station was asked the same before, or answered at this length (past.py)
     -6  each silence proved inside it
 
@@ -32,10 +32,12 @@ from bisect import bisect_right
 from collections.abc import Iterable, Sequence
 from typing import Final, NamedTuple, Protocol
 
-from dissectors.modbus.candidates import ANY_END, CRC_BITS, ZERO_TAIL, Candidate, Pending, Reading, octet_hope
-from dissectors.modbus.expectation import LOOSE, REPEATED, SAME_UNKNOWN, Expected, expectation
-from dissectors.modbus.functions import EXCEPTION_BIT, MIN_FRAME, MORE
+from dissectors.modbus.candidates import ANY_END, CRC_BITS, ZERO_TAIL, Candidate, LengthGuess, Pending, octet_hope
+from dissectors.modbus.functions import EXCEPTION_BIT
+from dissectors.modbus.lengths import MIN_FRAME, MORE
+from dissectors.modbus.open_request import LOOSE, REPEATED, SAME_UNKNOWN, Expected, expectation
 from dissectors.modbus.past import KNOWN_LENGTH, Past
+from dissectors.modbus.ranges import AGREEMENTS
 
 THRESHOLD: Final = 20
 SCALE: Final = 16
@@ -53,8 +55,8 @@ WHOLE: Final = 12
 WHOLE_ANSWER: Final = 4
 """An answer whose last octets are zeros, and that is as long as was asked for."""
 
-_WELL_TOLD: Final = frozenset({0x0F, 0x10, 0x17})
-"""Functions whose first octets are ill formed by chance nearly always."""
+_WELL_TOLD: Final = frozenset(AGREEMENTS)
+"""Functions whose first octets are ill formed by chance nearly always: a count must agree with another."""
 
 _MOST_FROM_CONTEXT: Final = ADJACENT + SAME_UNKNOWN
 _CRC_OCTETS: Final = 2
@@ -247,7 +249,7 @@ class Paths:
                 options = (*options, awaiting[1][at])
         return options
 
-    def _hope(self, start: int, reading: Reading, count: int) -> tuple[int, _Step]:
+    def _hope(self, start: int, reading: LengthGuess, count: int) -> tuple[int, _Step]:
         """The best path that ends in a frame whose CRC may yet be good, and its worth."""
         window = self._window
         octets, at = window.octets, start - window.base

@@ -6,17 +6,10 @@ from enum import Enum, auto
 from typing import NamedTuple
 
 from dissectors.frame import Damage, LineError, Mark, Place, Reason
-from dissectors.modbus.candidates import SHORT_FRAME, Reading, octet_bits, readings
-from dissectors.modbus.expectation import Expected
-from dissectors.modbus.functions import (
-    BROADCAST,
-    EXCEPTION_BIT,
-    FUNCTIONS,
-    MAX_FRAME,
-    MAX_UNIT,
-    MIN_FRAME,
-    MORE,
-)
+from dissectors.modbus.candidates import SHORT_FRAME, LengthGuess, octet_bits, readings
+from dissectors.modbus.functions import BROADCAST, EXCEPTION_BIT, FUNCTIONS, MAX_UNIT
+from dissectors.modbus.lengths import MAX_FRAME, MIN_FRAME, MORE
+from dissectors.modbus.open_request import Expected
 
 _COMMON = frozenset({0x01, 0x02, 0x03, 0x04, 0x05, 0x06, 0x0F, 0x10})
 
@@ -33,16 +26,16 @@ class Side(Enum):
     NOISE = auto()
 
 
-class Injury(NamedTuple):
+class DamagedFrame(NamedTuple):
     """A damaged frame: the length it should have had (None: not known), and what is wrong with it."""
 
     expected: int | None
     damage: Damage
 
 
-def injury(
+def classify_leftover(
     octets: bytes, before: Side, after: Side, heard: bool | None, called: bool, expected: Expected | None
-) -> Injury | None:
+) -> DamagedFrame | None:
     """The damaged frame that a stretch without a good one is; None when it is noise.
 
     It must begin where a frame may begin, with a station and a known function, and end where a frame may end. From a
@@ -61,8 +54,8 @@ def injury(
     if function is None:
         # the function octet itself may be hit: the length of the awaited answer tells
         if awaited is not None and code & ~EXCEPTION_BIT == awaited.function:
-            return Injury(None, Damage.CHECK)
-        return Injury(count, Damage.CHECK) if awaited is not None and count == awaited.length else None
+            return DamagedFrame(None, Damage.CHECK)
+        return DamagedFrame(count, Damage.CHECK) if awaited is not None and count == awaited.length else None
     if not heard and not (1 <= unit <= MAX_UNIT or (unit == BROADCAST and function.writes)):
         return None
     lengths = [r.length for r in readings(octets, 0, count) if r.length != MORE]
@@ -74,13 +67,13 @@ def injury(
     if not (fits or heard or (heard is None and alone and code & ~EXCEPTION_BIT in _COMMON)):
         return None
     if fits:
-        return Injury(count, Damage.CHECK)
+        return DamagedFrame(count, Damage.CHECK)
     right = awaited.length if answers and awaited is not None and not code & EXCEPTION_BIT else None
     if right is None:
         right = predicted(octets)
     if right is None or count < right:
-        return Injury(right, Damage.SHORT)
-    return Injury(right, Damage.LONG)
+        return DamagedFrame(right, Damage.SHORT)
+    return DamagedFrame(right, Damage.LONG)
 
 
 def cut_echo_of(octets: bytes, expected: Expected | None) -> int | None:
@@ -94,7 +87,7 @@ def cut_echo_of(octets: bytes, expected: Expected | None) -> int | None:
         return None
     if not 3 <= count < len(expected.octets) or not expected.octets.startswith(octets):
         return None
-    if count == 3 and readings(octets, 0, count)[-1:] == (Reading(expected.length or 0, False, True),):
+    if count == 3 and readings(octets, 0, count)[-1:] == (LengthGuess(expected.length or 0, False, True),):
         return None  # its third octet is the byte count of the answer as well
     return len(expected.octets)
 

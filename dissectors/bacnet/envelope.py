@@ -1,4 +1,4 @@
-"""Making MS/TP frames: octets from type, addresses and data. Nothing is checked; bad frames are made the same way."""
+"""The envelope of MS/TP: octets from type, addresses and data. Nothing is checked; bad frames are made the same way."""
 
 from __future__ import annotations
 

@@ -13,9 +13,9 @@ from dissectors.modbus.functions import (
     EXCEPTION_BIT,
     EXCEPTION_LENGTH,
     FUNCTIONS,
-    Octets,
     answer_length,
 )
+from dissectors.modbus.lengths import Octets
 
 EXACT = 14
 """Bits that an answer of the right station, function and length is worth."""
