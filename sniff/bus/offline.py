@@ -16,6 +16,7 @@ from sniff.engine.verdict_join import Settled, Settling, Wanted
 
 if TYPE_CHECKING:
     from sniff.engine.blocks import Block
+    from sniff.engine.column_join import SettledRows
 
 
 def outputs(items: Iterable[Item], session: Session, pairing: bool = True) -> Iterator[Output | LineEvent]:
@@ -90,6 +91,22 @@ def settled_in_bulk(
     from sniff.engine.table_join import TableJoin
 
     joining = TableJoin(wanted)
+    try:
+        for item in tables(capture.blocks(), session):
+            if not isinstance(item, LineEvent):
+                yield from joining.add(item)
+    except CaptureError:
+        yield from joining.flush()
+        raise
+    yield from joining.flush()
+
+
+def settled_columns(capture: Source, session: Session) -> Iterator[SettledRows]:
+    """All rows of `settled`, as columns. Raises CaptureError as `settled` does."""
+    from sniff.engine.bulk import tables
+    from sniff.engine.column_join import ColumnJoin
+
+    joining = ColumnJoin()
     try:
         for item in tables(capture.blocks(), session):
             if not isinstance(item, LineEvent):
