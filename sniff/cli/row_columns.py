@@ -15,10 +15,13 @@ from dissectors.columns import NONE, VERDICTS, Times
 from dissectors.line import NS_PER_S
 from dissectors.manifest import Dissector
 from dissectors.tracker import Interval
+from dissectors.words import milliseconds
 from sniff.analysis.wording import describe, duration, is_error
 from sniff.cli import rows
 from sniff.engine.column_join import SettledRows
+from sniff.engine.engine import Row
 from sniff.engine.session import Session
+from sniff.engine.table import rows_at
 from sniff.engine.verdict_join import Settled
 
 MOST_SPECIMENS = 1 << 15
@@ -71,16 +74,11 @@ class RowColumns:
         fixed = [name for name in names if name not in _OF_ROW and not name.startswith("tx.")]
         columns: dict[str, list[Cell]] = {}
         if fixed:
-            held, nothing = [], (None,) * len(fixed)
-            for place, key in zip(places, _keys(settled, places), strict=True):
-                cells = known.get(key)
-                if cells is None and place in table.odd:
-                    cells = nothing
-                elif cells is None:
-                    if len(known) >= MOST_SPECIMENS:
-                        known.clear()
-                    cells = known[key] = tuple(map(render, self._values(Settled(table.row(place), None), fixed)))
-                held.append(cells)
+            keys = list(_keys(settled, places))
+            for key, row in _unknown(settled, places, keys, known):
+                known[key] = tuple(map(render, self._values(Settled(row, None), fixed)))
+            nothing = (None,) * len(fixed)  # of odd rows, see below
+            held = [known.get(key, nothing) for key in keys]
             columns.update(zip(fixed, map(list, zip(*held, strict=True)), strict=True))
         for name in names:
             if name not in columns:
@@ -148,33 +146,40 @@ class RowColumns:
         which = settled.which[at - settled.begin]
         last = _is_last(settled, at, which)
         seconds = [time / NS_PER_S for time in _since(table.frames.start[at], session)]
-        lines = zip(places, seconds, np.where(last, which, -1).tolist(), _keys(settled, places), strict=True)
-        for place, second, closed, key in lines:
+        keys = list(_keys(settled, places))
+        for key, row in _unknown(settled, places, keys, known):
+            known[key] = self._said(row)
+        lines = zip(places, seconds, _told(settled, np.where(last, which, -1)), keys, strict=True)
+        for place, second, (bad, words), key in lines:
             if place in table.odd:
                 yield rows.text_line(settled.item(place), self._dissector, session, colour)
                 continue
-            said = known.get(key)
-            if said is None:
-                if len(known) >= MOST_SPECIMENS:
-                    known.clear()
-                said = known[key] = self._said(Settled(table.row(place), None))
-            mark, text, note = said
-            if closed >= 0:
-                bad, notes = _verdict(settled, closed)
-                if notes:
-                    note = f"{note}; {notes}" if note else notes
-                mark = "!" if bad else mark
+            mark, text, note = known[key]
+            if words:
+                note = f"{note}; {words}" if note else words
+            mark = bad or mark
             line = "%6d %12.6f s  %s %s" % (table.first + place, second, mark, text)  # noqa: UP031  twice as fast
             if note:
                 line = f"{line}  [{note}]"
             yield f"\x1b[31m{line}\x1b[0m" if colour and mark == "!" else line
 
-    def _said(self, item: Settled) -> tuple[str, str, str]:
+    def _said(self, row: Row) -> tuple[str, str, str]:
         """The mark, the text and the note of a row by itself."""
-        row, text = item.row, describe(self._dissector, item.row)
+        text = describe(self._dissector, row)
         error = row.header.error if row.header is not None else None
         note = error if not getattr(row.event, "ok", True) and error and error not in text else ""
         return "!" if is_error(row) else " ", text, note or ""
+
+
+def _unknown(
+    settled: SettledRows, places: Sequence[int], keys: Sequence[Key], known: dict[Key, Any]
+) -> Iterator[tuple[Key, Row]]:
+    """A specimen for each key that is not known yet; of odd rows none. Makes room first."""
+    if len(known) > MOST_SPECIMENS:
+        known.clear()
+    odd = settled.table.odd
+    absent = {key: place for place, key in zip(places, keys, strict=True) if key not in known and place not in odd}
+    return zip(absent, rows_at(settled.table, list(absent.values())), strict=True)
 
 
 def _keys(settled: SettledRows, places: Sequence[int]) -> Iterator[Key]:
@@ -183,8 +188,8 @@ def _keys(settled: SettledRows, places: Sequence[int]) -> Iterator[Key]:
     frames, placed = table.frames, table.placed
     begins = frames.offset[at]
     ends = begins + frames.length[at]
-    first = int(begins.min(initial=0)) if not len(at) else int(begins[0])
-    held = table.octets[first : int(ends[-1]) if len(at) else first].tobytes()
+    first = int(begins[0]) if len(at) else 0
+    held = table.octets[first : int(ends[-1]) if len(at) else 0].tobytes()
     octets = [held[begin:end] for begin, end in zip((begins - first).tolist(), (ends - first).tolist(), strict=True)]
     inside = placed.tx[at] > 0
     made = (frames.check[at].astype(np.int64) << 16 | frames.found[at].astype(np.int64) << 8) | frames.damage[at]
@@ -205,15 +210,24 @@ def _is_last(settled: SettledRows, at: Times, which: Times) -> np.ndarray[Any, n
     return is_last
 
 
-def _verdict(settled: SettledRows, which: int) -> tuple[bool, str]:
-    """What a transaction's last row says of it: whether that is bad, and the words."""
-    closed = settled.closed
-    verdict, nominal = VERDICTS[closed.verdict[which]], int(closed.latency[which])
-    bad = verdict.value not in rows.GOOD_VERDICTS
-    notes = [verdict.words] if bad else []
-    if nominal != NONE:
-        notes.append(duration(Interval(nominal, int(closed.least[which]), int(closed.most[which]))))
-    return bad, "; ".join(notes)
+def _told(settled: SettledRows, which: Times) -> list[tuple[str, str]]:
+    """What the last row of each transaction says of it: "!" where that is bad, and the words; nothing for -1."""
+    closed, there = settled.closed, np.flatnonzero(which >= 0)
+    told = [("", "")] * len(which)
+    at = which[there]
+    columns = (closed.verdict, closed.latency, closed.least, closed.most)
+    entries = zip(there.tolist(), *(column[at].tolist() for column in columns), strict=True)
+    for place, verdict, nominal, least, most in entries:
+        bad, words = _VERDICTS[verdict]
+        if nominal != NONE:
+            exact = least == nominal == most
+            took = milliseconds(nominal) if exact else duration(Interval(nominal, least, most))
+            words = f"{words}; {took}" if words else took
+        told[place] = bad, words
+    return told
+
+
+_VERDICTS = [("", "") if one.value in rows.GOOD_VERDICTS else ("!", one.words) for one in VERDICTS]
 
 
 def _since(times: Times, session: Session) -> list[int]:
