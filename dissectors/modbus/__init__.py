@@ -33,6 +33,7 @@ __all__ = [
 
 packet = on_first_use("dissectors.modbus.packets:dissect")
 kernel = on_first_use("dissectors.modbus.kernel:kernel")
+reading_columns = on_first_use("dissectors.modbus.reading_columns:reading_columns")
 pairing = on_first_use("dissectors.modbus.block_pairing:pairing")
 
 
@@ -72,6 +73,7 @@ RTU = Dissector(
     judge=ModbusFindings,
     rules=RULES,
     readings=readings,
+    reading_columns=reading_columns,
     refusal=refusal,
     kernel=kernel,
     pairing=pairing,

@@ -10,7 +10,7 @@ from sniff.analysis.points import PointReader
 from sniff.engine.capture import CaptureError
 from sniff.engine.engine import Output
 from sniff.engine.follow_settings import SessionEngine, dissector_for
-from sniff.engine.observer import Observer, TableObserver, observe, observe_tables
+from sniff.engine.observer import Observer, observe, observe_tables
 from sniff.engine.session import Item, LineEvent, Session
 from sniff.engine.verdict_join import Settled, Settling, Wanted
 
@@ -19,10 +19,10 @@ if TYPE_CHECKING:
     from sniff.engine.column_join import SettledRows
 
 
-def outputs(items: Iterable[Item], session: Session, pairing: bool = True) -> Iterator[Output | LineEvent]:
+def outputs(items: Iterable[Item], session: Session) -> Iterator[Output | LineEvent]:
     """Run items through a new engine; line events pass through at their place. Raises CaptureError as `items` does,
-    when all that was whole before the damage has been given. `pairing`: else no row is placed in a transaction."""
-    engine = SessionEngine(session, pairing)
+    when all that was whole before the damage has been given."""
+    engine = SessionEngine(session)
     try:
         for item in items:
             output = engine.take(item)
@@ -49,9 +49,10 @@ class Source(Protocol):
 
 
 def survey(capture: Source, session: Session, *observers: Observer, reference: bool = False) -> None:
-    """Hand a whole capture to observers, many rows at a time. `reference`: one by one, for comparison; the same comes
-    of it. Raises CaptureError as the capture does, when all before the damage was handed on."""
-    if reference or not all(isinstance(one, TableObserver) for one in observers):
+    """Hand a whole capture to observers, many rows at a time where they take them so. `reference`: one by one, for
+    comparison; the same comes of it. Raises CaptureError as the capture does, when all before the damage was handed
+    on."""
+    if reference:
         observe(outputs(capture.items(), session), *observers)
         return
     from sniff.engine.bulk import tables

@@ -12,10 +12,10 @@ from typing import Any
 
 from dissectors.profiles import Entry, Profile, ProfileError
 from sniff.analysis.profile_guess import Guess, Guessing
-from sniff.bus.offline import outputs
+from sniff.bus.offline import survey
 from sniff.cli import UNREADABLE, USAGE, Failure, arguments, json_output, tables
+from sniff.cli.progress import Watched
 from sniff.devices import UnknownProfile, available, find, read
-from sniff.engine.engine import Output
 from sniff.engine.follow_settings import dissector_for
 
 TIE = 0.1
@@ -36,6 +36,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     guess = actions.add_parser("guess", help="profiles that fit the stations of a capture")
     arguments.add_files(guess)
     arguments.add_line(guess)
+    arguments.add_reference(guess)
     guess.add_argument("--json", action="store_true", help="one JSON object a guess")
 
 
@@ -157,9 +158,7 @@ def _guess(args: argparse.Namespace) -> int:
         capture = arguments.open_capture(path)
         session = arguments.settings_of(args, capture.session, path)
         guessing = Guessing(dissector_for(session))
-        for output in outputs(capture.items(), session):
-            if isinstance(output, Output):
-                guessing.add(output)
+        survey(Watched(capture), session, guessing, reference=args.reference)
         guesses = list(guessing.guesses(profiles))
         rows += [(guess.station, guess.profile.name, f"{guess.score:.0%}", guess.why) for guess in guesses]
         _say_ties(guesses)
