@@ -97,37 +97,36 @@ class TableSamples:
 
 def add_to(table: PointTable, samples: TableSamples) -> None:
     """Give a table of points the samples that follow; the same as one after the other."""
-    plain, others = samples.plain, list(samples.others)
+    plain = samples.plain
     keys, which = plain.points()
-    if others and len(plain):  # a point of which there are both goes one by one
-        both = {(sample.station, sample.name) for _, sample in others}
-        mixed = np.array([key in both for key in keys], bool)[which]
-        alone = plain.take(mixed)
-        others = sorted([*others, *zip(alone.order.tolist(), alone.samples(), strict=True)], key=lambda one: one[0])
-        plain = plain.take(~mixed)
-        keys, which = plain.points()
-    runs = sorted(_runs(plain, keys, which), key=lambda run: run.begin)
+    one_by_one = [((order, at), sample) for at, (order, sample) in enumerate(samples.others)]
+    both = {(sample.station, sample.name) for _, sample in samples.others}
+    mixed = np.array([key in both for key in keys], bool)
+    if mixed.any():  # a point of which there are both
+        places = np.flatnonzero(mixed[which])
+        orders = zip(plain.order[places].tolist(), places.tolist(), strict=True)
+        one_by_one += zip(orders, plain.take(places).samples(), strict=True)
+    one_by_one.sort(key=lambda one: one[0])
+    runs = [run for run, among in zip(_runs(plain, keys, which), mixed.tolist(), strict=True) if not among]
     at = 0
-    for run in runs:
-        while at < len(others) and others[at][0] < run.begin:
-            table.add([others[at][1]])
+    for run in sorted(runs, key=lambda run: run.begin):
+        while at < len(one_by_one) and one_by_one[at][0] < run.begin:
+            table.add([one_by_one[at][1]])
             at += 1
-        table.add_run(*run.values(plain))
-    table.add([sample for _, sample in others[at:]])
+        run.add_to(table, plain)
+    table.add([sample for _, sample in one_by_one[at:]])
 
 
 @dataclass(frozen=True, slots=True)
 class _Run:
-    """All samples of one point. `begin`: place of the exchange of the first; `places`: of each in the columns."""
+    """All samples of one point. `places`: of each in the columns; `begin`: of the first, its exchange before it."""
 
     key: Key
-    begin: int
+    begin: tuple[int, int]
     places: Times
 
-    def values(
-        self, plain: PlainSamples
-    ) -> tuple[Key, Sample, int, tuple[int, int], int | None, list[tuple[int, float]]]:
-        """What `PointTable.add_run` takes."""
+    def add_to(self, table: PointTable, plain: PlainSamples) -> None:
+        """Give a table of points all of them."""
         places = self.places
         raws = plain.raw[places]
         changes = np.flatnonzero(raws[1:] != raws[:-1])
@@ -136,7 +135,7 @@ class _Run:
         newest = places[-HISTORY:]
         history = list(zip(plain.time[newest].tolist(), plain.raw[newest].astype(float).tolist(), strict=True))
         first = int(raws[0]), int(plain.time[places[0]])
-        return self.key, last, len(places), first, changed, history
+        table.add_run(self.key, last, len(places), first, changed, history)
 
 
 def _runs(plain: PlainSamples, keys: Sequence[Key], which: Times) -> Iterator[_Run]:
@@ -144,4 +143,4 @@ def _runs(plain: PlainSamples, keys: Sequence[Key], which: Times) -> Iterator[_R
     ends = np.cumsum(np.bincount(which, minlength=len(keys)))
     for number, key in enumerate(keys):
         places = order[ends[number - 1] if number else 0 : ends[number]]
-        yield _Run(key, int(plain.order[places[0]]), places)
+        yield _Run(key, (int(plain.order[places[0]]), int(places[0])), places)

@@ -48,7 +48,7 @@ def run(args: argparse.Namespace) -> int:
         raise Failure(str(error), USAGE) from None
     margin = args.margin if args.margin is not None else 2.0 if args.around else 0.0
     stretch = stretch.widened(int(margin * 1e9))
-    count = writing.write(args, session, cutting.cut(capture.items(), stretch, session.line.char), [args.file])
+    count = writing.write(args, session, cutting.CutOut(capture, stretch, session.line.char), [args.file])
     if not count:
         raise Failure(f"{args.file}: nothing in that stretch; {args.output} is empty", USAGE)
     writing.say_incomplete(args.file, capture)

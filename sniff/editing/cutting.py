@@ -18,6 +18,7 @@ from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import Item, LineEvent, LineEventKind, Session, SettingsChange, settings_change
 
 if TYPE_CHECKING:
+    from sniff.engine.blocks import Block
     from sniff.engine.table import Table
 
 _SECONDS = re.compile(r"\+?(\d+(?:\.\d{1,9})?)")
@@ -135,6 +136,39 @@ def around_finding(capture: Source, session: Session, code: str, reference: bool
     return Stretch(min(start for start, _ in evidence), max(end for _, end in evidence))
 
 
+class CutOut:
+    """A stretch of a capture. `char`: ns an octet."""
+
+    def __init__(self, capture: Source, stretch: Stretch, char: int) -> None:
+        self._capture = capture
+        self._stretch = stretch
+        self._char = char
+
+    def items(self) -> Iterator[Item]:
+        """See `cut`."""
+        return cut(self._capture.items(), self._stretch, self._char)
+
+    def blocks(self) -> Iterator[Block | LineEvent]:
+        """The same as columns."""
+        import numpy as np
+
+        first, last = (min(max(time, -FOREVER), FOREVER) for time in (self._stretch.first, self._stretch.last))
+        searching: SettingsChange | None = None
+        for item in self._capture.blocks():
+            if isinstance(item, LineEvent):
+                given, searching = _cut_one(item, 0, self._stretch, searching)
+                yield from (one for one in given if isinstance(one, LineEvent))
+                continue
+            reads = item.reads
+            times = np.clip(reads.times, -FOREVER, FOREVER)
+            kept = item.take((times >= first) & (times - reads.lengths * self._char <= last))
+            if kept is not None:
+                if searching is not None:
+                    yield LineEvent(int(kept.reads.times[0]), LineEventKind.SETTINGS, str(searching))
+                searching = None
+                yield kept
+
+
 def cut(items: Iterable[Item], stretch: Stretch, char: int) -> Iterator[Item]:
     """The items that lie in a stretch; a read counts when any octet of it does (`char`: ns an octet).
 
@@ -142,13 +176,22 @@ def cut(items: Iterable[Item], stretch: Stretch, char: int) -> Iterator[Item]:
     """
     searching: SettingsChange | None = None  # as it stands before the stretch
     for item in items:
-        octets = len(getattr(item, "octets", b""))
-        change = settings_change(item)
-        if item.time < stretch.first:
-            if change is not None and (change.searching or searching is not None):
-                searching = None if change.found else SettingsChange(change.line, searching=True)
-        elif item.time - octets * char <= stretch.last:
-            if searching is not None and not (change is not None and change.searching):
-                yield LineEvent(item.time, LineEventKind.SETTINGS, str(searching))
-            searching = None
-            yield item
+        duration = len(getattr(item, "octets", b"")) * char
+        given, searching = _cut_one(item, duration, stretch, searching)
+        yield from given
+
+
+def _cut_one(
+    item: Item, duration: int, stretch: Stretch, searching: SettingsChange | None
+) -> tuple[list[Item], SettingsChange | None]:
+    """What is given for an item that took `duration`, ns; and the search that stands as the stretch begins."""
+    change = settings_change(item)
+    if item.time < stretch.first:
+        if change is not None and (change.searching or searching is not None):
+            searching = None if change.found else SettingsChange(change.line, searching=True)
+        return [], searching
+    if item.time - duration > stretch.last:
+        return [], searching
+    if searching is not None and not (change is not None and change.searching):
+        return [LineEvent(item.time, LineEventKind.SETTINGS, str(searching)), item], None
+    return [item], None
