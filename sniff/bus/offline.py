@@ -17,6 +17,7 @@ from sniff.engine.verdict_join import Settled, Settling, Wanted
 if TYPE_CHECKING:
     from sniff.engine.blocks import Block
     from sniff.engine.column_join import SettledRows
+    from sniff.engine.table import Table
 
 
 def outputs(items: Iterable[Item], session: Session) -> Iterator[Output | LineEvent]:
@@ -84,14 +85,12 @@ def settled(
 def settled_in_bulk(
     capture: Source, session: Session, devices: Devices | None = None, wanted: Wanted | None = None
 ) -> Iterator[Settled]:
-    """The same as `settled`, by way of tables: rows that a filter leaves out never become objects."""
-    if devices:
-        yield from settled(capture.items(), session, devices, wanted)
-        return
+    """The same as `settled`, by way of tables: rows that a filter leaves out never become objects, unless something
+    is to be said of devices."""
     from sniff.engine.bulk import tables
     from sniff.engine.table_join import TableJoin
 
-    joining = TableJoin(wanted)
+    joining = _Spoken(PointReader(dissector_for(session), devices), wanted) if devices else TableJoin(wanted)
     try:
         for item in tables(capture.blocks(), session):
             if not isinstance(item, LineEvent):
@@ -100,6 +99,24 @@ def settled_in_bulk(
         yield from joining.flush()
         raise
     yield from joining.flush()
+
+
+class _Spoken:
+    """Joins rows of tables with their verdicts and with what they mean to devices."""
+
+    def __init__(self, points: PointReader, wanted: Wanted | None) -> None:
+        self._points = points
+        self._settling = Settling(points, wanted)
+
+    def add(self, table: Table) -> Iterator[Settled]:
+        """Take the table that follows; give the rows that are settled by it."""
+        for output in table.outputs():
+            self._points.remember(output)
+            yield from self._settling.add(output)
+
+    def flush(self) -> Iterator[Settled]:
+        """Give all that is left."""
+        yield from self._settling.flush()
 
 
 def settled_columns(capture: Source, session: Session) -> Iterator[SettledRows]:

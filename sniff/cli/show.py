@@ -166,7 +166,14 @@ def _chosen(some: SettledRows, wanted: Filter) -> list[int]:
     odd = some.table.odd
     if wanted.exact:
         return [place for place in places if place not in odd or wanted(odd[place], some.transaction(place))]
-    return [place for place in places if wanted(some.table.row(place), some.transaction(place))]
+    from sniff.engine.table import AT_ONCE, rows_at
+
+    chosen: list[int] = []
+    for begin in range(0, len(places), AT_ONCE):
+        part = places[begin : begin + AT_ONCE]
+        rows_of = zip(part, rows_at(some.table, part), strict=True)
+        chosen += [place for place, row in rows_of if wanted(row, some.transaction(place))]
+    return chosen
 
 
 def _write(
