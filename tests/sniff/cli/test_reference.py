@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from itertools import chain
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -30,7 +31,7 @@ CUTS = ("--frames 3-9", "--from +0.2 --to +1.5")
 
 
 @pytest.mark.parametrize("words", WORDS)
-def test_the_same_is_said(words: str, sniff485: Callable) -> None:
+def test_the_same_is_said(words: str, sniff485: Callable[..., Any]) -> None:
     for path in NAMES:
         command = [str(path) if word == "FILE" else word for word in words.split()]
         command += [] if "FILE" in words else [str(path)]
@@ -40,7 +41,7 @@ def test_the_same_is_said(words: str, sniff485: Callable) -> None:
 @pytest.mark.parametrize(
     "words", ["convert FILE OUT -f", *(f"cut FILE -f -o OUT {cut}" for cut in CUTS), "merge FILE FILE -f -o OUT"]
 )
-def test_the_same_is_written(words: str, tmp_path: Path, sniff485: Callable) -> None:
+def test_the_same_is_written(words: str, tmp_path: Path, sniff485: Callable[..., Any]) -> None:
     for path in NAMES:
         files = []
         for name, reference in (("one.mcap", []), ("two.mcap", ["--reference"])):
