@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from dissectors.columns import NONE, VERDICTS, Times
+from dissectors.columns import FOUNDS, NONE, ROLES, VERDICTS, Times
 from dissectors.line import NS_PER_S
 from dissectors.manifest import Dissector
 from dissectors.tracker import Interval
@@ -21,7 +21,7 @@ from sniff.cli import rows
 from sniff.engine.column_join import SettledRows
 from sniff.engine.engine import Row
 from sniff.engine.session import Session
-from sniff.engine.table import rows_at
+from sniff.engine.table import Table, rows_at
 from sniff.engine.verdict_join import Settled
 
 MOST_SPECIMENS = 1 << 15
@@ -71,8 +71,8 @@ class RowColumns:
         self, settled: SettledRows, places: Sequence[int], names: Sequence[str], render: Render, instants: bool
     ) -> Iterator[tuple[Cell, ...]]:
         table, known = settled.table, self._cells
-        fixed = [name for name in names if name not in _OF_ROW and not name.startswith("tx.")]
-        columns: dict[str, list[Cell]] = {}
+        columns = {name: _held(table, places, name, render) for name in names if name in _HELD}
+        fixed = [name for name in names if name not in (*_OF_ROW, *_HELD) and not name.startswith("tx.")]
         if fixed:
             keys = list(_keys(settled, places))
             for key, row in _unknown(settled, places, keys, known):
@@ -169,6 +169,50 @@ class RowColumns:
         error = row.header.error if row.header is not None else None
         note = error if not getattr(row.event, "ok", True) and error and error not in text else ""
         return "!" if is_error(row) else " ", text, note or ""
+
+
+def _held(table: Table, places: Sequence[int], name: str, render: Render) -> list[Cell]:
+    """A column that the table holds; right for plain rows."""
+    at = np.asarray(places, np.int64)
+    if name == "hex":
+        octets = table.octets.tobytes()
+        begins, lengths = table.frames.offset[at].tolist(), table.frames.length[at].tolist()
+        return [render(octets[one : one + size].hex()) for one, size in zip(begins, lengths, strict=True)]
+    values, texts = _HELD[name](table)
+    numbers = values[at].tolist()
+    if texts is not None:
+        words = [render(text) for text in texts]
+        return [words[number] for number in numbers]
+    none = render(None)
+    return [none if number == NONE else number for number in numbers]
+
+
+Held = tuple[np.ndarray[Any, np.dtype[Any]], Sequence[str | bool | None] | None]
+"""Numbers of rows (`NONE` for none), or their places in some texts."""
+
+
+def _placed(table: Table, name: str) -> np.ndarray[Any, np.dtype[Any]]:
+    """What its exchange says of a row, else its header."""
+    placed: np.ndarray[Any, np.dtype[Any]] = np.where(
+        table.placed.tx > 0, getattr(table.placed, name), getattr(table.frames, name)
+    )
+    return placed
+
+
+_HELD: dict[str, Callable[[Table], Held]] = {
+    "proto": lambda table: (np.zeros(len(table), np.uint8), [table.protocol]),
+    "src": lambda table: (_placed(table, "source"), None),
+    "dst": lambda table: (_placed(table, "destination"), None),
+    "role": lambda table: (_placed(table, "role"), [role.value for role in ROLES]),
+    "kind": lambda table: (table.frames.kind, table.frames.names),
+    "ok": lambda table: (table.good.astype(np.uint8), [False, True]),
+    "error": lambda table: (table.frames.error, [None, *table.frames.names[1:]]),
+    "found": lambda table: (table.frames.found, [found.value for found in FOUNDS]),
+    "noise_before": lambda table: (np.zeros(len(table), np.uint8), None),
+    "frame.len": lambda table: (table.frames.length, None),
+    "hex": lambda table: (table.frames.length, None),
+}
+"""Columns of rows that a table holds."""
 
 
 def _unknown(
