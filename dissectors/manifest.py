@@ -24,6 +24,7 @@ from dissectors.tracker import Tracker
 if TYPE_CHECKING:
     # columns need numpy, which takes longer to import than a small capture to read; simulated buses are seldom wanted
     from dissectors.columns import Kernel, Pairing
+    from dissectors.reading_columns import BulkReadings
     from dissectors.simulated import SimulatedBus
 
 RARE_BITS = 8.0
@@ -66,6 +67,7 @@ class Dissector:
     `judge`: makes the rules at work on a bus; `rules`: their catalogue, by code.
     `ring`: how its token ring is watched and shown, if it passes a token.
     `readings`: what exchanges say of the things inside a station; `refusal`: the code with which one refuses.
+    `reading_columns`: `readings` of many exchanges at once, as far as they are plain registers or say nothing.
     `packet_file`: how its frames lie in packet files.
     `renamer`: makes what gives stations other numbers and blanks texts, checks made right again.
     `kernel`: framer and peek for clean stretches of many frames at once (`dissectors/columns.py`).
@@ -91,6 +93,7 @@ class Dissector:
     rules: Mapping[str, Rule] = field(default_factory=dict)
     ring: TokenRing | None = None
     readings: Readings | None = None
+    reading_columns: BulkReadings | None = None
     refusal: Refusal | None = None
     packet_file: PacketFile | None = None
     renamer: Callable[[], Renamer] | None = None

@@ -39,6 +39,7 @@ __all__ = [
 
 packet = on_first_use("dissectors.bacnet.packets:packet")
 kernel = on_first_use("dissectors.bacnet.kernel:kernel")
+reading_columns = on_first_use("dissectors.bacnet.reading_columns:reading_columns")
 pairing = on_first_use("dissectors.bacnet.block_pairing:pairing")
 
 
@@ -74,6 +75,7 @@ MSTP = Dissector(
     rules=RULES,
     ring=RING,
     readings=readings,
+    reading_columns=reading_columns,
     packet_file=PacketFile((165, 252), "mstp", least=8, longer=True),
     renamer=MstpRenamer,
     makers={"mstp": frame},

@@ -36,6 +36,7 @@ kernel = on_first_use("dissectors.modbus.kernel:kernel")
 pairing = on_first_use("dissectors.modbus.block_pairing:rtu_pairing")
 ascii_kernel = on_first_use("dissectors.modbus.ascii_kernel:kernel")
 ascii_pairing = on_first_use("dissectors.modbus.block_pairing:ascii_pairing")
+reading_columns = on_first_use("dissectors.modbus.reading_columns:reading_columns")
 
 
 def rtu_bits(frame: Frame) -> float:
@@ -74,6 +75,7 @@ RTU = Dissector(
     judge=ModbusFindings,
     rules=RULES,
     readings=readings,
+    reading_columns=reading_columns,
     refusal=refusal,
     kernel=kernel,
     pairing=pairing,

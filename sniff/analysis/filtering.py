@@ -182,8 +182,15 @@ def compile_filter(text: str, dissector: Dissector) -> Filter:
     """Turn a filter into a test of a row with its transaction. An empty filter is always true. Raises FilterError."""
     tokens = _lex(text)
     if len(tokens) == 1:
-        return Filter(lambda row, tx: True)
+        return Filter(lambda row, tx: True, _every, exact=True)
     return _Parser(tokens, dissector).parse()
+
+
+def _every(table: Table) -> Masks:
+    import numpy as np
+
+    every: Masks = np.ones(len(table), bool)
+    return every
 
 
 def _lex(text: str) -> list[_Token]:

@@ -10,6 +10,7 @@ import math
 from collections import OrderedDict, deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from dissectors.frame import Frame, Role
 from dissectors.manifest import Dissector
@@ -18,6 +19,10 @@ from dissectors.profiles.decoding import Quality, Value, decode, say
 from dissectors.readings import How
 from dissectors.tracker import Transaction, Verdict
 from sniff.engine.engine import Output, Row
+
+if TYPE_CHECKING:
+    from sniff.analysis.point_columns import TableSamples
+    from sniff.engine.table import Table
 
 MOST_OPEN = 20_000
 """Frames remembered while their transaction is open."""
@@ -32,8 +37,8 @@ BROADCAST = 0
 ALL = "all"
 """Name of the device that a broadcast is for."""
 
-_WHOLE = frozenset({Verdict.ANSWERED, Verdict.RETRY})
-_ALONE = frozenset({Verdict.BROADCAST, Verdict.DATA})
+WHOLE = frozenset({Verdict.ANSWERED, Verdict.RETRY})
+ALONE = frozenset({Verdict.BROADCAST, Verdict.DATA})
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +60,7 @@ class Sample:
     @property
     def station(self) -> str:
         """The device in words: "5", or "all"."""
-        return ALL if self.device is None else str(self.device)
+        return station_name(self.device)
 
     @property
     def finite(self) -> bool:
@@ -63,34 +68,48 @@ class Sample:
         return not isinstance(self.value.value, str) and math.isfinite(self.value.value)
 
 
+def station_name(device: int | None) -> str:
+    """A device in words: "5", or "all"."""
+    return ALL if device is None else str(device)
+
+
 @dataclass(frozen=True, slots=True)
-class _Remembered:
+class Remembered:
+    """A good frame and its number."""
+
     no: int
     frame: Frame
 
 
 @dataclass(frozen=True, slots=True)
-class _Exchange:
+class Exchange:
     """A transaction whose values count. `response`: None where none was to come."""
 
     transaction: Transaction
-    request: _Remembered
-    response: _Remembered | None
+    request: Remembered
+    response: Remembered | None
 
 
 class PointReader:
-    """Takes values out of what the engine gives. Bounded memory."""
+    """Takes values out of what the engine gives. Bounded memory. `frames`: good ones whose transaction is open, by
+    number; `asked`: requests of closed transactions, by its id."""
 
     def __init__(self, dissector: Dissector, devices: Devices | None = None) -> None:
         self.devices = devices or Devices()
-        self._dissector = dissector
+        self.dissector = dissector
         self._readings = dissector.readings
-        self._frames: OrderedDict[int, Frame] = OrderedDict()
-        self._asked: OrderedDict[int, _Remembered] = OrderedDict()
+        self.frames: OrderedDict[int, Frame] = OrderedDict()
+        self.asked: OrderedDict[int, Remembered] = OrderedDict()
 
     def add(self, output: Output) -> list[Sample]:
         """Take rows and closed transactions; give the samples that these complete, in the order of closing."""
-        return [sample for exchange in self._exchanges(output) for sample in self._samples(exchange)]
+        return [sample for exchange in self._exchanges(output) for sample in self.samples(exchange)]
+
+    def add_table(self, table: Table) -> TableSamples:
+        """Take many rows and closed transactions; the same samples."""
+        from sniff.analysis.table_points import samples_of
+
+        return samples_of(self, table)
 
     def remember(self, output: Output) -> None:
         """Take rows and closed transactions for `words` alone: no value is worked out."""
@@ -102,44 +121,49 @@ class PointReader:
 
         An answer needs its request: ask when its transaction has closed, not much later.
         """
-        asked = self._asked.get(row.placement.tx) if row.placement is not None else None
-        return words(self._dissector, self.devices, row, asked.frame if asked is not None else None)
+        asked = self.asked.get(row.placement.tx) if row.placement is not None else None
+        return words(self.dissector, self.devices, row, asked.frame if asked is not None else None)
 
-    def _exchanges(self, output: Output) -> Iterator[_Exchange]:
+    def _exchanges(self, output: Output) -> Iterator[Exchange]:
         if self._readings is None:
             return
         for row in output.rows:
             if isinstance(row.event, Frame) and row.event.ok:
-                self._frames[row.no] = row.event
+                self.frames[row.no] = row.event
         for transaction in output.transactions:
             exchange = self._exchange(transaction)
             if exchange is not None:
                 yield exchange
-        while len(self._frames) > MOST_OPEN:
-            self._frames.popitem(last=False)
+        while len(self.frames) > MOST_OPEN:
+            self.frames.popitem(last=False)
 
-    def _exchange(self, transaction: Transaction) -> _Exchange | None:
+    def _exchange(self, transaction: Transaction) -> Exchange | None:
         """The frames of a transaction that tells something."""
         request = self._take(transaction.request)
         response = self._take(transaction.response)
         if request is not None:
-            self._asked[transaction.id] = request
-            if len(self._asked) > MOST_ASKED:
-                self._asked.popitem(last=False)
+            self.ask(transaction.id, request)
         verdict = transaction.verdict
         if verdict is Verdict.LATE and transaction.of is not None:
-            request = self._asked.get(transaction.of)
+            request = self.asked.get(transaction.of)
             if request is not None:
-                self._asked[transaction.id] = request
+                self.ask(transaction.id, request)
         if request is None:
             return None
-        if verdict in _ALONE:
-            return _Exchange(transaction, request, None)
-        if response is not None and (verdict in _WHOLE or verdict is Verdict.LATE):
-            return _Exchange(transaction, request, response)
+        if verdict in ALONE:
+            return Exchange(transaction, request, None)
+        if response is not None and (verdict in WHOLE or verdict is Verdict.LATE):
+            return Exchange(transaction, request, response)
         return None
 
-    def _samples(self, exchange: _Exchange) -> Iterator[Sample]:
+    def ask(self, tx: int, request: Remembered) -> None:
+        """Remember what a transaction asked, for an answer that comes late."""
+        self.asked[tx] = request
+        if len(self.asked) > MOST_ASKED:
+            self.asked.popitem(last=False)
+
+    def samples(self, exchange: Exchange) -> Iterator[Sample]:
+        """What an exchange tells."""
         request, response = exchange.request, exchange.response
         readings = self._readings(request.frame, response.frame if response else None) if self._readings else ()
         if not readings:
@@ -153,9 +177,9 @@ class PointReader:
             carrier = response if response is not None and value.how is How.READ else request
             yield Sample(confirmed, station, value, (response or carrier).no if value.how is How.REPORT else carrier.no)
 
-    def _take(self, no: int | None) -> _Remembered | None:
-        frame = self._frames.pop(no, None) if no is not None else None
-        return _Remembered(no, frame) if frame is not None and no is not None else None
+    def _take(self, no: int | None) -> Remembered | None:
+        frame = self.frames.pop(no, None) if no is not None else None
+        return Remembered(no, frame) if frame is not None and no is not None else None
 
 
 def words(dissector: Dissector, devices: Devices, row: Row, request: Frame | None) -> str:
@@ -241,6 +265,33 @@ class PointTable:
                 point = self._points[key] = Point(sample)
             point.add(sample)
             self.version += 1
+
+    def add_run(
+        self,
+        key: Key,
+        last: Sample,
+        count: int,
+        first: tuple[float, int],
+        changed: int | None,
+        history: Iterable[tuple[int, float]],
+    ) -> None:
+        """Take `count` samples of one point, numbers all, of which `last` is the last. `first`: value and time of the
+        first; `changed`: ns, of the last that was another one than the one before it among them, None where none was;
+        `history`: of the last `HISTORY`."""
+        point = self._points.get(key)
+        if point is None:
+            if len(self._points) >= MOST_POINTS:
+                self.dropped += count
+                return
+            point = self._points[key] = Point(last)
+        elif point.sample.value.value != first[0]:
+            point.changed = first[1]
+        if changed is not None:
+            point.changed = changed
+        point.sample = last
+        point.count += count
+        point.history.extend(history)
+        self.version += count
 
     def merge(self, later: PointTable) -> None:
         """Take a table of a later stretch of the same bus."""

@@ -12,6 +12,7 @@ from dissectors.readings import Reading
 from dissectors.tracker import Verdict
 from sniff.analysis.points import PointReader
 from sniff.engine.engine import Output
+from sniff.engine.session import LineEvent
 
 LEAST = 0.3
 """Score under which a profile is not proposed."""
@@ -67,6 +68,9 @@ class Guessing:
                 self._of(transaction.station).refused.add(place)
         while len(self._asked) > MOST_PLACES:
             del self._asked[next(iter(self._asked))]
+
+    def add_line_event(self, event: LineEvent) -> None:
+        """It says nothing of a station."""
 
     def guesses(self, profiles: Iterable[Profile]) -> Iterator[Guess]:
         """Profiles for every station, the best first."""

@@ -4,12 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from dissectors.readings import How
-from sniff.analysis.points import Sample
+from sniff.analysis.points import PointReader, Sample
+
+if TYPE_CHECKING:
+    from dissectors.manifest import Dissector
+    from sniff.engine.engine import Output
+    from sniff.engine.session import LineEvent
+    from sniff.engine.table import Table
 
 MOST_SAMPLES = 512
 """Answers of one block that are kept: beyond it every second one is let go, and so on."""
@@ -54,11 +61,15 @@ class Block:
 
 
 class RegisterSeries:
-    """Fed the samples of a bus; gives blocks. `written`: device, space and register of what a master wrote."""
+    """Fed the samples of one bus or more; gives blocks. `written`: device, space, register of what a master wrote."""
 
     def __init__(self) -> None:
         self._blocks: dict[tuple[int, str, int, int], Block] = {}
         self.written: set[tuple[int, str, int]] = set()
+
+    def of(self, dissector: Dissector) -> SeriesReader:
+        """An observer that feeds it what a bus answers."""
+        return SeriesReader(self, PointReader(dissector))
 
     def add(self, samples: Iterable[Sample]) -> None:
         """Take samples of one exchange or more, in their order."""
@@ -91,6 +102,25 @@ class RegisterSeries:
                 return
             block = self._blocks[key] = Block(*key)
         block.add(first.time, tuple((sample.value.reading.raw or 0) & 0xFFFF for sample in run))
+
+
+@dataclass(frozen=True, slots=True)
+class SeriesReader:
+    """An observer (`engine.observer`) of one bus."""
+
+    series: RegisterSeries
+    reader: PointReader
+
+    def add(self, output: Output) -> None:
+        """Take rows and closed transactions."""
+        self.series.add(self.reader.add(output))
+
+    def add_table(self, table: Table) -> None:
+        """Take many at once."""
+        self.series.add(self.reader.add_table(table).in_order())
+
+    def add_line_event(self, event: LineEvent) -> None:
+        """It says nothing of a register."""
 
 
 def _follows(before: Sample, sample: Sample) -> bool:

@@ -10,18 +10,20 @@ from sniff.analysis.points import PointReader
 from sniff.engine.capture import CaptureError
 from sniff.engine.engine import Output
 from sniff.engine.follow_settings import SessionEngine, dissector_for
-from sniff.engine.observer import Observer, TableObserver, observe, observe_tables
+from sniff.engine.observer import Observer, observe, observe_tables
 from sniff.engine.session import Item, LineEvent, Session
 from sniff.engine.verdict_join import Settled, Settling, Wanted
 
 if TYPE_CHECKING:
     from sniff.engine.blocks import Block
+    from sniff.engine.column_join import SettledRows
+    from sniff.engine.table import Table
 
 
-def outputs(items: Iterable[Item], session: Session, pairing: bool = True) -> Iterator[Output | LineEvent]:
+def outputs(items: Iterable[Item], session: Session) -> Iterator[Output | LineEvent]:
     """Run items through a new engine; line events pass through at their place. Raises CaptureError as `items` does,
-    when all that was whole before the damage has been given. `pairing`: else no row is placed in a transaction."""
-    engine = SessionEngine(session, pairing)
+    when all that was whole before the damage has been given."""
+    engine = SessionEngine(session)
     try:
         for item in items:
             output = engine.take(item)
@@ -48,9 +50,10 @@ class Source(Protocol):
 
 
 def survey(capture: Source, session: Session, *observers: Observer, reference: bool = False) -> None:
-    """Hand a whole capture to observers, many rows at a time. `reference`: one by one, for comparison; the same comes
-    of it. Raises CaptureError as the capture does, when all before the damage was handed on."""
-    if reference or not all(isinstance(one, TableObserver) for one in observers):
+    """Hand a whole capture to observers, many rows at a time where they take them so. `reference`: one by one, for
+    comparison; the same comes of it. Raises CaptureError as the capture does, when all before the damage was handed
+    on."""
+    if reference:
         observe(outputs(capture.items(), session), *observers)
         return
     from sniff.engine.bulk import tables
@@ -82,14 +85,46 @@ def settled(
 def settled_in_bulk(
     capture: Source, session: Session, devices: Devices | None = None, wanted: Wanted | None = None
 ) -> Iterator[Settled]:
-    """The same as `settled`, by way of tables: rows that a filter leaves out never become objects."""
-    if devices:
-        yield from settled(capture.items(), session, devices, wanted)
-        return
+    """The same as `settled`, by way of tables: rows that a filter leaves out never become objects, unless something
+    is to be said of devices."""
     from sniff.engine.bulk import tables
     from sniff.engine.table_join import TableJoin
 
-    joining = TableJoin(wanted)
+    joining = _Spoken(PointReader(dissector_for(session), devices), wanted) if devices else TableJoin(wanted)
+    try:
+        for item in tables(capture.blocks(), session):
+            if not isinstance(item, LineEvent):
+                yield from joining.add(item)
+    except CaptureError:
+        yield from joining.flush()
+        raise
+    yield from joining.flush()
+
+
+class _Spoken:
+    """Joins rows of tables with their verdicts and with what they mean to devices."""
+
+    def __init__(self, points: PointReader, wanted: Wanted | None) -> None:
+        self._points = points
+        self._settling = Settling(points, wanted)
+
+    def add(self, table: Table) -> Iterator[Settled]:
+        """Take the table that follows; give the rows that are settled by it."""
+        for output in table.outputs():
+            self._points.remember(output)
+            yield from self._settling.add(output)
+
+    def flush(self) -> Iterator[Settled]:
+        """Give all that is left."""
+        yield from self._settling.flush()
+
+
+def settled_columns(capture: Source, session: Session) -> Iterator[SettledRows]:
+    """All rows of `settled`, as columns. Raises CaptureError as `settled` does."""
+    from sniff.engine.bulk import tables
+    from sniff.engine.column_join import ColumnJoin
+
+    joining = ColumnJoin()
     try:
         for item in tables(capture.blocks(), session):
             if not isinstance(item, LineEvent):

@@ -14,6 +14,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", metavar="FILE", help="capture")
     writing.add_output(parser)
     arguments.add_line(parser)
+    arguments.add_reference(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -24,7 +25,7 @@ def run(args: argparse.Namespace) -> int:
     session = arguments.settings_of(args, capture.session, args.file)
     if not anonymising.knows(session.protocol):
         raise Failure(f"anonymise: does not know where {session.protocol} keeps addresses and texts", USAGE)
-    items = anonymising.anonymised(capture.items(), session)
+    items = writing.Items(anonymising.anonymised(capture.items(), session))
     writing.write(args, anonymising.anonymous_session(session), items, [args.file])
     writing.say_incomplete(args.file, capture)
     return 0

@@ -8,12 +8,12 @@ import argparse
 
 from dissectors.profiles import Devices
 from sniff.analysis.judging import Judging
-from sniff.bus.offline import outputs
+from sniff.bus.offline import survey
 from sniff.cli import arguments, writing
+from sniff.cli.progress import Watched
 from sniff.devices import with_devices
 from sniff.engine.capture import Capture
 from sniff.engine.follow_settings import dissector_for
-from sniff.engine.observer import observe
 from sniff.engine.session import Session
 from sniff.formats.linktypes import held_by_protocols
 
@@ -24,6 +24,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("output", metavar="OUT", help="capture to write")
     arguments.add_line(parser)
     arguments.add_devices(parser)
+    arguments.add_reference(parser)
     parser.add_argument(
         "--link-type",
         type=int,
@@ -43,16 +44,16 @@ def run(args: argparse.Namespace) -> int:
     devices = arguments.noted_devices(args, session)
     session = with_devices(session, devices)
     values = devices if args.output.lower().endswith(".mcap") else None
-    notes = _evidence(capture, session, devices) if args.output.lower().endswith(".pcapng") else None
-    writing.write(args, session, capture.items(), [args.source], options, devices=values, notes=notes)
+    notes = _evidence(capture, session, devices, args.reference) if args.output.lower().endswith(".pcapng") else None
+    writing.write(args, session, capture, [args.source], options, devices=values, notes=notes)
     writing.say_incomplete(args.source, capture)
     return 0
 
 
-def _evidence(capture: Capture, session: Session, devices: Devices) -> dict[int, str]:
+def _evidence(capture: Capture, session: Session, devices: Devices, reference: bool) -> dict[int, str]:
     """The findings in words, by the rows that show them."""
     judging = Judging(session, dissector_for(session), devices)
-    observe(outputs(capture.items(), session), judging)
+    survey(Watched(capture), session, judging, reference=reference)
     notes: dict[int, str] = {}
     for finding in judging.findings():
         said = f"{finding.code} {finding.subject}: {finding.seen}"

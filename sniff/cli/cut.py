@@ -7,6 +7,7 @@ from __future__ import annotations
 import argparse
 
 from sniff.cli import USAGE, Failure, arguments, writing
+from sniff.cli.progress import Watched
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -14,6 +15,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", metavar="FILE", help="capture")
     writing.add_output(parser)
     arguments.add_line(parser)
+    arguments.add_reference(parser)
     parser.add_argument("--from", dest="since", metavar="TIME", help="begin here")
     parser.add_argument("--to", dest="until", metavar="TIME", help="end here")
     parser.add_argument("--frames", metavar="A-B", help="these frames")
@@ -32,11 +34,12 @@ def run(args: argparse.Namespace) -> int:
         raise Failure("say what to keep: --from and --to, or --frames, or --around", USAGE)
     capture = arguments.open_capture(args.file)
     session = arguments.settings_of(args, capture.session, args.file)
+    watched = Watched(capture)
     try:
         if args.frames:
-            stretch = cutting.of_frames(capture, session, args.frames)
+            stretch = cutting.of_frames(watched, session, args.frames, args.reference)
         elif args.around:
-            stretch = cutting.around_finding(capture, session, args.around)
+            stretch = cutting.around_finding(watched, session, args.around, args.reference)
         else:
             first = cutting.parse_time(args.since, session) if args.since else -cutting.FOREVER
             last = cutting.parse_time(args.until, session) if args.until else cutting.FOREVER
@@ -45,7 +48,7 @@ def run(args: argparse.Namespace) -> int:
         raise Failure(str(error), USAGE) from None
     margin = args.margin if args.margin is not None else 2.0 if args.around else 0.0
     stretch = stretch.widened(int(margin * 1e9))
-    count = writing.write(args, session, cutting.cut(capture.items(), stretch, session.line.char), [args.file])
+    count = writing.write(args, session, cutting.CutOut(capture, stretch, session.line.char), [args.file])
     if not count:
         raise Failure(f"{args.file}: nothing in that stretch; {args.output} is empty", USAGE)
     writing.say_incomplete(args.file, capture)

@@ -7,7 +7,12 @@ from __future__ import annotations
 
 import argparse
 
+from sniff.bus.model import BusModel
+from sniff.bus.offline import survey
 from sniff.cli import arguments, tables
+from sniff.cli.progress import Watched
+from sniff.devices import noted_devices
+from sniff.engine.follow_settings import dissector_for
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -15,6 +20,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("before", metavar="BEFORE", help="capture")
     parser.add_argument("after", metavar="AFTER", help="capture")
     arguments.add_devices(parser)
+    arguments.add_reference(parser)
     style = parser.add_mutually_exclusive_group()
     style.add_argument("--json", action="store_const", const="json", dest="style", help="one JSON object a difference")
     style.add_argument("--csv", action="store_const", const="csv", dest="style", help="comma-separated values")
@@ -24,16 +30,16 @@ def configure(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Compare two captures."""
     from sniff.editing.comparing import Side, differences
-    from sniff.testing.capture_reading import read_capture
 
     said = arguments.devices_of(args)
     sides = []
     for path in (args.before, args.after):
-        arguments.open_capture(path)
-        reading = read_capture(path, said)
-        arguments.say_assumed(reading.session, path)
-        adapter = reading.session.adapter
-        sides.append(Side(path, reading.counts, reading.findings, adapter.latency, reading.points))
+        capture = arguments.open_capture(path)
+        session = capture.session
+        model = BusModel(session, dissector_for(session), said.over(noted_devices(session)))
+        survey(Watched(capture), session, model, reference=args.reference)
+        arguments.say_assumed(session, path)
+        sides.append(Side(path, model.summary, model.findings(), session.adapter.latency, tuple(model.points)))
     found = list(differences(*sides))
     rows = [(one.subject, one.what, one.before, one.after) for one in found]
     if rows or args.style != "text":

@@ -15,6 +15,7 @@ from sniff.engine.capture import CaptureError
 def configure(parser: argparse.ArgumentParser) -> None:
     """Options of `merge`."""
     arguments.add_files(parser)
+    arguments.add_reference(parser)
     writing.add_output(parser)
 
 
@@ -30,7 +31,7 @@ def run(args: argparse.Namespace) -> int:
         raise Failure(str(error), UNREADABLE) from None
     arguments.say_assumed(session, args.files[0])
     shared: Counter[type] = Counter()
-    writing.write(args, session, merged(captures, lambda item: shared.update([type(item)])), args.files)
+    writing.write(args, session, writing.Items(merged(captures, lambda item: shared.update([type(item)]))), args.files)
     if shared[Chunk]:
         print(f"sniff485: {counted(shared[Chunk], 'read')} in more than one capture, written once", file=sys.stderr)
     for path, capture in opened:

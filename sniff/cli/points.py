@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 import fnmatch
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 from dissectors.line import NS_PER_S
 from dissectors.profiles.decoding import number
@@ -15,12 +16,16 @@ from sniff.analysis.points import Point, PointReader, PointTable, Sample
 from sniff.bus.offline import outputs
 from sniff.bus.sample_row import COLUMNS, sample_row, shown_value
 from sniff.cli import USAGE, Failure, arguments, tables, writing
+from sniff.cli.progress import Watched
 from sniff.cli.rows import iso
 from sniff.cli.tables import Cell
 from sniff.engine.capture import Capture
 from sniff.engine.engine import Output
 from sniff.engine.follow_settings import dissector_for
-from sniff.engine.session import Session
+from sniff.engine.session import LineEvent, Session
+
+if TYPE_CHECKING:
+    from sniff.analysis.point_columns import TableSamples
 
 LATEST = ("device", "point", "value", "unit", "means", "quality", "age s", "changed s", "samples")
 SAMPLES = ("time", "device", "point", "value", "raw", "unit", "quality", "how", "frame", "means")
@@ -31,6 +36,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     arguments.add_files(parser)
     arguments.add_line(parser)
     arguments.add_devices(parser)
+    arguments.add_reference(parser)
     parser.add_argument("-n", "--name", action="append", default=[], metavar="GLOB", help="only points like output-*")
     parser.add_argument("--bits", action="store_true", help="in the table, also the single bits of registers")
     style = parser.add_mutually_exclusive_group()
@@ -55,7 +61,7 @@ def run(args: argparse.Namespace) -> int:
         for name, capture in arguments.open_captures(args.files):
             session = arguments.settings_of(args, capture.session, name)
             for samples in _samples(args, capture, session):
-                for sample in samples:
+                for sample in samples.in_order():
                     table.add(sample_row(sample))
             writing.say_incomplete(name, capture)
     return 0
@@ -68,29 +74,43 @@ def _print(args: argparse.Namespace) -> int:
         if latest:
             _print_latest(args, capture, session)
         else:
-            chosen = (_sample(sample) for samples in _samples(args, capture, session) for sample in samples)
+            chosen = (cells for samples in _samples(args, capture, session) for cells in _cells(samples))
             tables.write(SAMPLES, chosen, args.style)
         writing.say_incomplete(path, capture)
     return 0
 
 
-def _samples(args: argparse.Namespace, capture: Capture, session: Session) -> Iterator[list[Sample]]:
-    """The samples that the user wants, a step of the engine at a time."""
+def _samples(args: argparse.Namespace, capture: Capture, session: Session) -> Iterator[TableSamples]:
+    """The samples that the user wants, many at a time."""
+    from sniff.analysis.point_columns import TableSamples, no_samples
+    from sniff.engine.bulk import tables as tables_of
+
     reader = PointReader(dissector_for(session), arguments.noted_devices(args, session))
-    for output in outputs(capture.items(), session):
-        if isinstance(output, Output):
-            yield [sample for sample in reader.add(output) if _wanted(args, sample)]
+    watched = Watched(capture)
+    if args.reference:
+        for output in outputs(watched.items(), session):
+            if isinstance(output, Output):
+                yield _wanted(args, TableSamples(no_samples(), [(0, sample) for sample in reader.add(output)]))
+        return
+    for table in tables_of(watched.blocks(), session):
+        if not isinstance(table, LineEvent):
+            yield _wanted(args, reader.add_table(table))
 
 
-def _wanted(args: argparse.Namespace, sample: Sample) -> bool:
-    return not args.name or any(fnmatch.fnmatchcase(sample.name, name) for name in args.name)
+def _wanted(args: argparse.Namespace, samples: TableSamples) -> TableSamples:
+    """Those with a name that is asked for."""
+    if not args.name:
+        return samples
+    return samples.named(lambda point: any(fnmatch.fnmatchcase(point, name) for name in args.name))
 
 
 def _print_latest(args: argparse.Namespace, capture: Capture, session: Session) -> None:
+    from sniff.analysis.point_columns import add_to
+
     points, end = PointTable(), 0
     for samples in _samples(args, capture, session):
-        points.add(samples)
-        end = max([end, *(sample.time for sample in samples)])
+        add_to(points, samples)
+        end = max(end, samples.last or 0)
     shown = [point for point in points if args.bits or args.name or not point.sample.value.bit]
     shown.sort(key=lambda point: (point.sample.device is not None, point.sample.device or 0))
     tables.write(LATEST, [_latest(point, end, args.style) for point in shown], args.style)
@@ -103,6 +123,23 @@ def _latest(point: Point, end: int, style: str) -> tuple[Cell, ...]:
     changed = round((end - point.changed) / NS_PER_S, 3) if point.changed else None
     shown = _rounded(sample) if style == "text" else shown_value(sample)
     return (sample.station, sample.name, shown, value.unit, means, int(value.quality), age, changed, point.count)
+
+
+def _cells(samples: TableSamples) -> Iterator[tuple[Cell, ...]]:
+    """All samples as rows of a table."""
+    if samples.others:
+        yield from map(_sample, samples.in_order())
+        return
+    import numpy as np
+
+    from dissectors.reading_columns import HOWS
+
+    plain = samples.plain
+    (points, which), hows = plain.points(), [how.value for how in HOWS]
+    stamps = [f"{stamp}Z" for stamp in np.datetime_as_string(plain.time.view("M8[ns]")).tolist()]
+    columns = (which, plain.raw, plain.how, plain.frame)
+    for stamp, point, raw, how, frame in zip(stamps, *(column.tolist() for column in columns), strict=True):
+        yield stamp, *points[point], raw, raw, "", 0, hows[how], frame, ""
 
 
 def _sample(sample: Sample) -> tuple[Cell, ...]:

@@ -14,15 +14,14 @@ from typing import Any
 
 from dissectors.profiles import Entry, Profile, ProfileError
 from dissectors.profiles.decoding import number, plain_name
-from sniff.analysis.points import PointReader
 from sniff.analysis.profile_draft import drafted
 from sniff.analysis.profile_guess import Guess, Guessing
 from sniff.analysis.register_guess import Sure, guessed
 from sniff.analysis.register_series import RegisterSeries
-from sniff.bus.offline import outputs
+from sniff.bus.offline import survey
 from sniff.cli import UNREADABLE, USAGE, Failure, arguments, json_output, tables
+from sniff.cli.progress import Watched
 from sniff.devices import UnknownProfile, available, find, read
-from sniff.engine.engine import Output
 from sniff.engine.follow_settings import dissector_for
 
 TIE = 0.1
@@ -43,10 +42,12 @@ def configure(parser: argparse.ArgumentParser) -> None:
     guess = actions.add_parser("guess", help="profiles that fit the stations of a capture")
     arguments.add_files(guess)
     arguments.add_line(guess)
+    arguments.add_reference(guess)
     guess.add_argument("--json", action="store_true", help="one JSON object a guess")
     draft = actions.add_parser("draft", help="a profile of a station that has none, to be corrected by hand")
     arguments.add_files(draft)
     arguments.add_line(draft)
+    arguments.add_reference(draft)
     draft.add_argument("--station", type=int, metavar="N", help="which one, where several were heard")
     draft.add_argument("--name", default="device", help="of the profile (default: device)")
     draft.add_argument("-w", "--write", metavar="FILE", type=Path, help="write it there instead of standard output")
@@ -212,9 +213,7 @@ def _guess(args: argparse.Namespace) -> int:
         capture = arguments.open_capture(path)
         session = arguments.settings_of(args, capture.session, path)
         guessing = Guessing(dissector_for(session))
-        for output in outputs(capture.items(), session):
-            if isinstance(output, Output):
-                guessing.add(output)
+        survey(Watched(capture), session, guessing, reference=args.reference)
         guesses = list(guessing.guesses(profiles))
         rows += [(guess.station, guess.profile.name, f"{guess.score:.0%}", guess.why) for guess in guesses]
         _say_ties(guesses)
@@ -228,11 +227,9 @@ def _draft(args: argparse.Namespace) -> int:
         capture = arguments.open_capture(path)
         session = arguments.settings_of(args, capture.session, path)
         dissector = dissector_for(session)
-        reader, family = PointReader(dissector), dissector.profile_family
+        family = dissector.profile_family
         protocols[dissector.name] = None
-        for output in outputs(capture.items(), session):
-            if isinstance(output, Output):
-                series.add(reader.add(output))
+        survey(Watched(capture), session, series.of(dissector), reference=args.reference)
     found = list(guessed(series.blocks(), series.written))
     stations = sorted({one.device for one in found})
     if args.station is None and len(stations) > 1:

@@ -13,6 +13,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     """Options of `recover`."""
     parser.add_argument("file", metavar="FILE", help="capture, damaged or not")
     writing.add_output(parser)
+    arguments.add_reference(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -24,7 +25,7 @@ def run(args: argparse.Namespace) -> int:
     before = capture.completeness()
     if not before.whole:
         session = replace(session, notes={**session.notes, "recovered": before.text})
-    writing.write(args, session, capture.items(), [args.file])
+    writing.write(args, session, capture, [args.file])
     complete = capture.completeness()
     said = "was whole" if complete.whole else complete.text
     print(f"sniff485: {args.file}: {plain(said)}", file=sys.stderr)

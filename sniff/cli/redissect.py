@@ -14,6 +14,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", metavar="FILE", help="capture")
     writing.add_output(parser)
     arguments.add_line(parser)
+    arguments.add_reference(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -22,6 +23,6 @@ def run(args: argparse.Namespace) -> int:
         raise Failure(f"{args.output}: only .mcap holds what was found; for other formats use convert", USAGE)
     capture = arguments.open_capture(args.file)
     session = arguments.settings_of(args, capture.session, args.file)
-    writing.write(args, session, capture.items(), [args.file], with_frames=True)
+    writing.write(args, session, capture, [args.file], with_frames=True)
     writing.say_incomplete(args.file, capture)
     return 0

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from sniff.analysis.plain import plain
 from sniff.cli import UNREADABLE, USAGE, Failure, arguments, json_output
+from sniff.cli.progress import Watched
 from sniff.engine.capture import Capture
 from sniff.formats import READERS
 from sniff.reporting.collecting import collect
@@ -26,6 +27,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     arguments.add_files(parser)
     arguments.add_line(parser)
     arguments.add_devices(parser)
+    arguments.add_reference(parser)
     parser.add_argument(
         "-o",
         "--output",
@@ -78,4 +80,5 @@ def default_place(file: str) -> Path:
 
 def _numbers(path: str, capture: Capture, args: argparse.Namespace) -> Numbers:
     session = arguments.settings_of(args, capture.session, path)
-    return collect(Path(path).name, capture, session, arguments.noted_devices(args, session))
+    devices = arguments.noted_devices(args, session)
+    return collect(Path(path).name, capture, session, devices, Watched(capture), args.reference)

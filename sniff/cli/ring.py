@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import Any
 
 from dissectors.token_ring import RingObserver, TokenRing
-from sniff.bus.offline import outputs
+from sniff.bus.offline import Source, survey
 from sniff.cli import tables
 from sniff.engine.engine import Output
-from sniff.engine.observer import observe
-from sniff.engine.session import Item, LineEvent, Session
+from sniff.engine.session import LineEvent, Session
 
 
-def ring_of(items: Iterable[Item], session: Session, shown: TokenRing) -> Any:
-    """The ring that items show."""
+def ring_of(source: Source, session: Session, shown: TokenRing, reference: bool = False) -> Any:
+    """The ring that a capture shows. `reference`: row by row, for comparison."""
     watched = _Watched(shown.observer(session.timing))
-    observe(outputs(items, session, pairing=False), watched)
+    survey(source, session, watched, reference=reference)
     return watched.observer.ring()
 
 
@@ -38,9 +36,9 @@ class _Watched:
             self.observer.miss(event.time)
 
 
-def show(items: Iterable[Item], session: Session, shown: TokenRing, style: str) -> int:
+def show(source: Source, session: Session, shown: TokenRing, style: str, reference: bool) -> int:
     """Print the ring; the sentences only as text."""
-    ring = ring_of(items, session, shown)
+    ring = ring_of(source, session, shown, reference)
     tables.write(shown.headings, shown.rows(ring), style)
     if style == "text":
         print()

@@ -9,6 +9,7 @@ import argparse
 import csv
 import sys
 from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING, Any
 
 from dissectors import registry
 from dissectors.manifest import Dissector
@@ -16,8 +17,9 @@ from dissectors.profiles import Devices
 from sniff.analysis.filtering import Filter, FilterError, compile_filter
 from sniff.analysis.packet_tree import Field
 from sniff.analysis.row_tree import tree_of
-from sniff.bus.offline import settled, settled_in_bulk
-from sniff.cli import USAGE, Failure, arguments, rows, writing
+from sniff.bus.offline import settled, settled_columns, settled_in_bulk
+from sniff.cli import USAGE, Failure, arguments, json_output, rows, writing
+from sniff.cli.progress import Watched
 from sniff.cli.tables import safe_cell
 from sniff.config import nearest
 from sniff.engine.capture import Capture
@@ -25,6 +27,10 @@ from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import Session
 from sniff.engine.verdict_join import Settled
 from sniff.formats.parquet import ParquetWriter
+
+if TYPE_CHECKING:
+    from sniff.cli.row_columns import RowColumns
+    from sniff.engine.column_join import SettledRows
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -71,7 +77,10 @@ def _show_all(args: argparse.Namespace, table: ParquetWriter | None) -> int:
         devices = arguments.noted_devices(args, session)
         wanted = _filter(args, dissector)
         spoken = devices if not args.table or "text" in args.names else None
-        left = _show(args, _settled(args, capture, session, spoken, wanted), session, dissector, left, table)
+        if args.reference or spoken or args.tree or args.hex or args.fields:
+            left = _show(args, _settled(args, capture, session, spoken, wanted), session, dissector, left, table)
+        else:
+            left = _show_in_bulk(args, capture, session, wanted, left, table)
         writing.say_incomplete(path, capture)
         if left == 0:
             break
@@ -88,9 +97,10 @@ def _filter(args: argparse.Namespace, dissector: Dissector) -> Filter:
 def _settled(
     args: argparse.Namespace, capture: Capture, session: Session, devices: Devices | None, wanted: Filter
 ) -> Iterator[Settled]:
+    watched = Watched(capture)
     if args.reference:
-        return settled(capture.items(), session, devices, wanted)
-    return settled_in_bulk(capture, session, devices, wanted)
+        return settled(watched.items(), session, devices, wanted)
+    return settled_in_bulk(watched, session, devices, wanted)
 
 
 def _show(
@@ -122,6 +132,70 @@ def _show(
         if left == 0:
             break
     return left
+
+
+def _show_in_bulk(
+    args: argparse.Namespace,
+    capture: Capture,
+    session: Session,
+    wanted: Filter,
+    left: int | None,
+    table: ParquetWriter | None,
+) -> int | None:
+    from sniff.cli.row_columns import RowColumns
+
+    made = RowColumns(dissector_for(session), session)
+    for settled_rows in settled_columns(Watched(capture), session) if left != 0 else ():
+        places = _chosen(settled_rows, wanted)
+        if left is not None:
+            places = places[:left]
+            left -= len(places)
+        _write(args, made, settled_rows, places, table)
+        if left == 0:
+            break
+    return left
+
+
+def _chosen(some: SettledRows, wanted: Filter) -> list[int]:
+    """Places of the rows that a filter accepts."""
+    places = wanted.candidates(some.table)
+    if places is None:
+        places = list(range(some.begin, some.end))
+    else:
+        places = [place for place in places if some.begin <= place < some.end]
+    odd = some.table.odd
+    if wanted.exact:
+        return [place for place in places if place not in odd or wanted(odd[place], some.transaction(place))]
+    from sniff.engine.table import AT_ONCE, rows_at
+
+    chosen: list[int] = []
+    for begin in range(0, len(places), AT_ONCE):
+        part = places[begin : begin + AT_ONCE]
+        rows_of = zip(part, rows_at(some.table, part), strict=True)
+        chosen += [place for place, row in rows_of if wanted(row, some.transaction(place))]
+    return chosen
+
+
+def _write(
+    args: argparse.Namespace, made: RowColumns, some: SettledRows, places: list[int], table: ParquetWriter | None
+) -> None:
+    if not places:
+        return
+    if table is not None:
+        for cells in made.cells(some, places, rows.JSON_KEYS, lambda cell: cell, instants=True):
+            table.add(cells)
+    elif args.csv or args.table:
+        writer = csv.writer(sys.stdout, delimiter="," if args.csv else "\t", lineterminator="\n")
+        writer.writerows(made.cells(some, places, rows.JSON_KEYS if args.csv else args.names, _cell))
+    elif args.json:
+        form = "{" + ", ".join(f'"{key}": %s' for key in rows.JSON_KEYS) + "}\n"
+        sys.stdout.writelines(map(form.__mod__, made.cells(some, places, rows.JSON_KEYS, _as_json)))
+    else:
+        sys.stdout.writelines(f"{line}\n" for line in made.lines(some, places, arguments.colour()))
+
+
+def _as_json(cell: Any) -> Any:
+    return cell if isinstance(cell, int | float) and not isinstance(cell, bool) else json_output.dumps(cell)
 
 
 def _cells(item: Settled, names: list[str], dissector: Dissector, session: Session) -> list[str]:

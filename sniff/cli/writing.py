@@ -4,21 +4,30 @@ from __future__ import annotations
 
 import argparse
 import sys
-import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from dissectors.frame import Chunk
 from dissectors.profiles import Devices
 from sniff.analysis.plain import plain
+from sniff.bus.offline import Source
 from sniff.cli import UNREADABLE, USAGE, Failure
-from sniff.engine.capture import Capture, CaptureError
+from sniff.cli.progress import Watched
+from sniff.engine.capture import BlockWriter, Capture, CaptureError, CaptureWriter
 from sniff.engine.engine import Output
-from sniff.engine.session import Item, Session
+from sniff.engine.follow_settings import dissector_for, engine_for
+from sniff.engine.session import Item, LineEvent, Session
 from sniff.formats import create, parquet
 from sniff.formats.parquet import Kind, ParquetWriter
 from sniff.formats.records import RecordMaker
+
+if TYPE_CHECKING:
+    from sniff.analysis.points import Sample
+    from sniff.engine.blocks import Block
+    from sniff.engine.table import Table
 
 
 def add_output(parser: argparse.ArgumentParser) -> None:
@@ -30,50 +39,39 @@ def add_output(parser: argparse.ArgumentParser) -> None:
 def write(
     args: argparse.Namespace,
     session: Session,
-    items: Iterable[Item],
+    source: Source,
     sources: Sequence[str],
     options: Mapping[str, str] | None = None,
     with_frames: bool = False,
     devices: Devices | None = None,
     notes: Mapping[int, str] | None = None,
 ) -> int:
-    """Write items to `args.output`; say on standard error what it holds and what it lost. Gives the octets.
+    """Write a capture to `args.output`; say on standard error what it holds and what it lost. Gives the octets.
 
     `with_frames`: with what the engine finds in them, on /frames. `devices`: with their values, on /values.
     `notes`: by row number, for the comments of packets where OUT has such. Ends with exit code 2 when OUT is there.
     """
     target = Path(args.output)
     refuse_to_overwrite(target, sources, args.force)
-    chunks = octets = 0
-    progress = _Progress(target.name)
+    counts = _Counts()
+    watched = Watched(source)
     try:
         with create(target, session, options) as writer:
             if notes and isinstance(maker := getattr(writer, "maker", None), RecordMaker):
                 maker.notes = notes
-            frames = _Frames(writer, session) if with_frames else None
-            values = _Values(writer, session, devices) if devices else None
-            for item in items:
-                writer.write(item)
-                if frames is not None:
-                    frames.add(item)
-                if values is not None:
-                    values.add(item)
-                if isinstance(item, Chunk):
-                    chunks += 1
-                    octets += len(item.octets)
-                    progress.show(chunks)
-            if frames is not None:
-                frames.close()
-            if values is not None:
-                values.close()
+            takers: list[_Frames | _Values] = [_Frames(writer, session)] if with_frames else []
+            if devices:
+                takers.append(_Values(writer, session, devices))
+            if isinstance(writer, BlockWriter) and not args.reference:
+                _write_blocks(writer, watched.blocks(), session, takers, counts)
+            else:
+                _write_items(writer, watched.items(), session, takers, counts)
     except CaptureError as error:
         raise Failure(str(error), UNREADABLE) from None
-    finally:
-        progress.end()
-    print(f"{plain(target)}: {octets} octets in {chunks} reads", file=sys.stderr)
+    print(f"{plain(target)}: {counts.octets} octets in {counts.reads} reads", file=sys.stderr)
     for loss in getattr(writer, "losses", ()):
         print(f"sniff485: {plain(target)}: {plain(loss)}", file=sys.stderr)
-    return octets
+    return counts.octets
 
 
 def refuse_to_overwrite(target: Path, sources: Sequence[str], force: bool) -> None:
@@ -103,87 +101,147 @@ def say_incomplete(path: str, capture: Capture) -> None:
         print(f"sniff485: {plain(path)}: {plain(complete.text)}", file=sys.stderr)
 
 
+@dataclass(slots=True)
+class _Counts:
+    """What was written."""
+
+    reads: int = 0
+    octets: int = 0
+
+
+def _write_blocks(
+    writer: CaptureWriter,
+    blocks: Iterator[Block | LineEvent],
+    session: Session,
+    takers: Sequence[_Frames | _Values],
+    counts: _Counts,
+) -> None:
+    from sniff.engine.bulk import BulkEngine
+
+    assert isinstance(writer, BlockWriter)
+    engine = BulkEngine(session) if takers else None
+    for item in blocks:
+        if isinstance(item, LineEvent):
+            writer.write(item)
+        else:
+            writer.write_block(item)
+            counts.reads += len(item)
+            counts.octets += len(item.reads.octets)
+        if engine is not None:
+            table = engine.take(item)
+            for taker in takers:
+                taker.add_table(table)
+    if engine is not None:
+        table = engine.close()
+        for taker in takers:
+            taker.add_table(table)
+
+
+def _write_items(
+    writer: CaptureWriter,
+    items: Iterator[Item],
+    session: Session,
+    takers: Sequence[_Frames | _Values],
+    counts: _Counts,
+) -> None:
+    engine = engine_for(session) if takers else None
+    for item in items:
+        writer.write(item)
+        if isinstance(item, Chunk) and item.octets:
+            counts.reads += 1
+            counts.octets += len(item.octets)
+        if engine is not None:
+            output = engine.take(item)
+            for taker in takers:
+                taker.add(output)
+    if engine is not None:
+        output = engine.close()
+        for taker in takers:
+            taker.add(output)
+            taker.close()
+
+
+class Items:
+    """Items that something makes, as a capture to be written."""
+
+    def __init__(self, items: Iterator[Item]) -> None:
+        self._items = items
+
+    def items(self) -> Iterator[Item]:
+        """Once."""
+        return self._items
+
+    def blocks(self) -> Iterator[Block | LineEvent]:
+        """The same as columns, once."""
+        from sniff.engine.blocks import blocks_of
+
+        return blocks_of(self._items)
+
+
 class _Frames:
-    """Runs the engine beside the writing; its results go to /frames."""
+    """Writes what the engine finds to /frames."""
 
     AT_ONCE = 1000
 
     def __init__(self, writer: object, session: Session) -> None:
-        from sniff.engine.follow_settings import engine_for
         from sniff.recording.frames import SCHEMA, FrameLog
         from sniff.recording.topics import FRAMES
         from sniff.recording.writer import McapWriter
 
         assert isinstance(writer, McapWriter)
         self._writer = writer
-        self._engine = engine_for(session)
         self._log = FrameLog()
         self._topic, self._schema = FRAMES, SCHEMA.name
-        self._count = 0
+        self._octets = self._count = 0
 
-    def add(self, item: Item) -> None:
-        output = self._engine.take(item)
+    def add(self, output: Output) -> None:
         self._log.add(output)
         self._count += len(output.rows)
         if self._count >= self.AT_ONCE:
-            self._take()
+            self.close()
+
+    def add_table(self, table: Table) -> None:
+        from sniff.recording.frame_columns import messages
+
+        for message in messages(table, self._octets):
+            self._put(message)
+        self._octets += len(table.octets)
 
     def close(self) -> None:
-        self._log.add(self._engine.close())
-        self._take()
-
-    def _take(self) -> None:
         self._count = 0
-        message = self._log.take()
+        self._put(self._log.take())
+
+    def _put(self, message: tuple[int, int, bytes] | None) -> None:
         if message is not None:
             self._writer.derived(self._topic, self._schema, *message)
 
 
 class _Values:
-    """Runs the engine beside the writing; the values of known devices go to /values."""
+    """Writes the values of known devices to /values."""
 
     def __init__(self, writer: object, session: Session, devices: Devices) -> None:
         from sniff.analysis.points import PointReader
         from sniff.bus.value_topics import ValueChannels
-        from sniff.engine.follow_settings import engine_for
         from sniff.recording.writer import McapWriter
 
         assert isinstance(writer, McapWriter)
         self._writer = writer
-        self._engine = engine_for(session)
-        self._points = PointReader(self._engine.dissector, devices)
+        self._points = PointReader(dissector_for(session), devices)
         self._channels = ValueChannels(session.bus, devices)
 
-    def add(self, item: Item) -> None:
-        self._take(self._engine.take(item))
+    def add(self, output: Output) -> None:
+        self._put(self._points.add(output))
+
+    def add_table(self, table: Table) -> None:
+        self._put(self._points.add_table(table).in_order())
 
     def close(self) -> None:
-        self._take(self._engine.close())
+        """Nothing is held."""
 
-    def _take(self, output: Output) -> None:
-        for sample in self._points.add(output):
+    def _put(self, samples: Iterable[Sample]) -> None:
+        for sample in samples:
             message = self._channels.message(sample)
             if message is not None:
                 self._writer.derived(
                     message.topic, message.schema, message.time, message.time, message.data, message.metadata
                 )
-
-
-class _Progress:
-    """Says on a terminal, twice a second, how far a long work is."""
-
-    def __init__(self, name: str) -> None:
-        self.name = name
-        self.next = time.monotonic() + 1
-        self.shown = False
-
-    def show(self, chunks: int) -> None:
-        if chunks % 1024 or not sys.stderr.isatty() or time.monotonic() < self.next:
-            return
-        self.next = time.monotonic() + 0.5
-        self.shown = True
-        print(f"\r{self.name}: {chunks} reads", end="", file=sys.stderr, flush=True)
-
-    def end(self) -> None:
-        if self.shown:
-            print("\r\x1b[K", end="", file=sys.stderr)

@@ -6,17 +6,20 @@ import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from typing import TYPE_CHECKING
 
 from dissectors.findings import Finding
 from dissectors.line import NS_PER_S
 from sniff.analysis.judging import Judging
-from sniff.bus.offline import outputs
+from sniff.bus.offline import Source, survey
 from sniff.devices import noted_devices
-from sniff.engine.capture import Capture
-from sniff.engine.engine import Output
+from sniff.engine.engine import Output, Row
 from sniff.engine.follow_settings import dissector_for
-from sniff.engine.observer import observe
 from sniff.engine.session import Item, LineEvent, LineEventKind, Session, SettingsChange, settings_change
+
+if TYPE_CHECKING:
+    from sniff.engine.blocks import Block
+    from sniff.engine.table import Table
 
 _SECONDS = re.compile(r"\+?(\d+(?:\.\d{1,9})?)")
 _FRAMES = re.compile(r"(\d+)?(?:[-–:](\d+)?)?")
@@ -51,43 +54,119 @@ def parse_time(text: str, session: Session) -> int:
     return int(whole) * NS_PER_S + moment.microsecond * 1000
 
 
-def of_frames(capture: Capture, session: Session, text: str) -> Stretch:
-    """The stretch of the frames "12-40", "12-", "-40" or "12", by their numbers in `show`. Raises ValueError."""
+def of_frames(capture: Source, session: Session, text: str, reference: bool = False) -> Stretch:
+    """The stretch of the frames "12-40", "12-", "-40" or "12", by their numbers in `show`. Raises ValueError.
+    `reference`: row by row, for comparison."""
     match = _FRAMES.fullmatch(text.strip())
     if match is None or not (match[1] or match[2]):
         raise ValueError(f"frames {text!r}: expected numbers as 12-40")
     low = int(match[1] or 1)
     high = int(match[2]) if match[2] else low if text.strip().isdigit() else FOREVER
-    times = [time for no, time in _times(capture, session).items() if low <= no <= high]
-    if not times:
+    ends = _Ends(low, high)
+    survey(capture, session, ends, reference=reference)
+    if not ends.spans:
         raise ValueError(f"frames {text!r}: this capture has none of them")
-    return Stretch(times[0][0], times[-1][1])
+    return Stretch(ends.spans[0][0], ends.spans[-1][1])
 
 
-def _times(capture: Capture, session: Session) -> dict[int, tuple[int, int]]:
-    """Start and end of every row, ns, by its number."""
-    return {
-        row.no: (row.event.start, row.event.end)
-        for output in outputs(capture.items(), session)
-        if isinstance(output, Output)
-        for row in output.rows
-    }
+class _Ends:
+    """Start and end, ns, of the first and the last of the rows `low` … `high`."""
+
+    def __init__(self, low: int, high: int) -> None:
+        self._low, self._high = low, high
+        self.spans: list[tuple[int, int]] = []
+
+    def add(self, output: Output) -> None:
+        """Take rows."""
+        self._keep([row for row in output.rows if self._low <= row.no <= self._high])
+
+    def add_table(self, table: Table) -> None:
+        """Take many rows."""
+        first, last = max(self._low - table.first, 0), min(self._high - table.first, len(table) - 1)
+        self._keep([table.row(place) for place in (first, last)] if first <= last else [])
+
+    def _keep(self, rows: list[Row]) -> None:
+        if rows:
+            spans = [(row.event.start, row.event.end) for row in rows]
+            self.spans = [(self.spans or spans)[0], spans[-1]]
+
+    def add_line_event(self, event: LineEvent) -> None:
+        """Nothing of it is kept."""
 
 
-def around_finding(capture: Capture, session: Session, code: str) -> Stretch:
-    """The stretch from the first to the last evidence of the first finding with that code. Raises ValueError."""
+class _Times:
+    """Start and end, ns, of some rows by their numbers."""
+
+    def __init__(self, wanted: Iterable[int]) -> None:
+        self._wanted = sorted(set(wanted))
+        self.spans: dict[int, tuple[int, int]] = {}
+
+    def add(self, output: Output) -> None:
+        """Take rows."""
+        for row in output.rows:
+            if row.no in self._wanted:
+                self.spans[row.no] = row.event.start, row.event.end
+
+    def add_table(self, table: Table) -> None:
+        """Take many rows."""
+        for no in self._wanted:
+            if 0 <= no - table.first < len(table):
+                event = table.row(no - table.first).event
+                self.spans[no] = event.start, event.end
+
+    def add_line_event(self, event: LineEvent) -> None:
+        """Nothing of it is kept."""
+
+
+def around_finding(capture: Source, session: Session, code: str, reference: bool = False) -> Stretch:
+    """The stretch from the first to the last evidence of the first finding with that code. Raises ValueError.
+    `reference`: row by row, for comparison."""
     judging = Judging(session, dissector_for(session), noted_devices(session))
-    observe(outputs(capture.items(), session), judging)
+    survey(capture, session, judging, reference=reference)
     findings = judging.findings()
     chosen: Finding | None = next((finding for finding in findings if finding.code == code.upper()), None)
     if chosen is None:
         there = ", ".join(sorted({finding.code for finding in findings})) or "none"
         raise ValueError(f"finding {code!r}: not in this capture; there are: {there}")
-    times = _times(capture, session)
-    evidence = [times[no] for no in chosen.evidence if no in times]
+    times = _Times(chosen.evidence)
+    survey(capture, session, times, reference=reference)
+    evidence = list(times.spans.values())
     if not evidence:
         return Stretch(chosen.first, chosen.last)
     return Stretch(min(start for start, _ in evidence), max(end for _, end in evidence))
+
+
+class CutOut:
+    """A stretch of a capture. `char`: ns an octet."""
+
+    def __init__(self, capture: Source, stretch: Stretch, char: int) -> None:
+        self._capture = capture
+        self._stretch = stretch
+        self._char = char
+
+    def items(self) -> Iterator[Item]:
+        """See `cut`."""
+        return cut(self._capture.items(), self._stretch, self._char)
+
+    def blocks(self) -> Iterator[Block | LineEvent]:
+        """The same as columns."""
+        import numpy as np
+
+        first, last = (min(max(time, -FOREVER), FOREVER) for time in (self._stretch.first, self._stretch.last))
+        searching: SettingsChange | None = None
+        for item in self._capture.blocks():
+            if isinstance(item, LineEvent):
+                given, searching = _cut_one(item, 0, self._stretch, searching)
+                yield from (one for one in given if isinstance(one, LineEvent))
+                continue
+            reads = item.reads
+            times = np.clip(reads.times, -FOREVER, FOREVER)
+            kept = item.take((times >= first) & (times - reads.lengths * self._char <= last))
+            if kept is not None:
+                if searching is not None:
+                    yield LineEvent(int(kept.reads.times[0]), LineEventKind.SETTINGS, str(searching))
+                searching = None
+                yield kept
 
 
 def cut(items: Iterable[Item], stretch: Stretch, char: int) -> Iterator[Item]:
@@ -97,13 +176,22 @@ def cut(items: Iterable[Item], stretch: Stretch, char: int) -> Iterator[Item]:
     """
     searching: SettingsChange | None = None  # as it stands before the stretch
     for item in items:
-        octets = len(getattr(item, "octets", b""))
-        change = settings_change(item)
-        if item.time < stretch.first:
-            if change is not None and (change.searching or searching is not None):
-                searching = None if change.found else SettingsChange(change.line, searching=True)
-        elif item.time - octets * char <= stretch.last:
-            if searching is not None and not (change is not None and change.searching):
-                yield LineEvent(item.time, LineEventKind.SETTINGS, str(searching))
-            searching = None
-            yield item
+        duration = len(getattr(item, "octets", b"")) * char
+        given, searching = _cut_one(item, duration, stretch, searching)
+        yield from given
+
+
+def _cut_one(
+    item: Item, duration: int, stretch: Stretch, searching: SettingsChange | None
+) -> tuple[list[Item], SettingsChange | None]:
+    """What is given for an item that took `duration`, ns; and the search that stands as the stretch begins."""
+    change = settings_change(item)
+    if item.time < stretch.first:
+        if change is not None and (change.searching or searching is not None):
+            searching = None if change.found else SettingsChange(change.line, searching=True)
+        return [], searching
+    if item.time - duration > stretch.last:
+        return [], searching
+    if searching is not None and not (change is not None and change.searching):
+        return [LineEvent(item.time, LineEventKind.SETTINGS, str(searching)), item], None
+    return [item], None

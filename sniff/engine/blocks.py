@@ -18,7 +18,7 @@ from sniff.engine.capture_error import CaptureError
 from sniff.engine.session import Item, LineEvent
 
 if TYPE_CHECKING:
-    from dissectors.columns import Octets, Times
+    from dissectors.columns import Masks, Octets, Times
 
 BLOCK_OCTETS = 1 << 20
 BLOCK_READS = 1 << 17
@@ -37,6 +37,18 @@ class Block:
 
     def __len__(self) -> int:
         return len(self.reads)
+
+    def take(self, which: Masks) -> Block | None:
+        """Some of the reads; None for none of them."""
+        if which.all():
+            return self
+        if not which.any():
+            return None
+        reads = self.reads
+        octets = reads.octets[np.repeat(which, reads.lengths)]
+        kept = Reads(octets, reads.times[which], reads.lengths[which], reads.marked[which])
+        places = np.cumsum(which) - 1
+        return Block(kept, {int(places[at]): marks for at, marks in self.marks.items() if which[at]})
 
     def chunks(self, first: int = 0, end: int | None = None) -> Iterator[Chunk]:
         """Reads [first, end) as chunks."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from sniff.engine.capture_error import CaptureError as CaptureError
 from sniff.engine.session import Completeness, Item, LineEvent, Session
@@ -28,6 +28,15 @@ class Capture(Protocol):
 
     def completeness(self) -> Completeness:
         """Whether the file is whole (may need to have read it)."""
+        ...
+
+
+@runtime_checkable
+class BlockWriter(Protocol):
+    """A capture opened for writing that takes many reads at once."""
+
+    def write_block(self, block: Block) -> None:
+        """Add reads, in order of time; the same as one after the other."""
         ...
 
 

@@ -28,7 +28,7 @@ from dissectors.columns import (
     TransactionColumns,
     some,
 )
-from dissectors.frame import Check, Frame
+from dissectors.frame import Check, Frame, Header
 from dissectors.tracker import Placement, Transaction
 from sniff.engine.engine import Output, Row
 
@@ -43,6 +43,10 @@ TEXTS = frozenset(("kind", "error"))
 
 ROW_FORMS = ("i8", "i4", "i8", "i8", "u1", "u1", "u1", "i4", "i2", "i2", "u1", "u2", "i2", "i4", "i4", "?", "u2")
 TRANSACTION_FORMS = ("i8", "i2", "u2", "i8", "i8", "u1", "i8", "i8", "i8", "i8", "i8", "i4", "i8", "u2")
+
+
+AT_ONCE = 4096
+"""Rows made at a time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,16 +133,17 @@ class Table:
 
     def rows(self) -> Iterator[Row]:
         """All rows as objects."""
-        return map(self.row, range(len(self)))
+        for begin in range(0, len(self), AT_ONCE):
+            yield from rows_at(self, range(begin, min(begin + AT_ONCE, len(self))))
 
     def outputs(self) -> Iterator[Output]:
         """Row by row, each with the transactions that it closed; those that no row closed come last."""
         closed, at = self.closed_by.tolist(), 0
-        for place in range(len(self)):
+        for place, row in enumerate(self.rows()):
             begin = at
             while at < len(closed) and 0 <= closed[at] <= place:
                 at += 1
-            yield Output((self.row(place),), tuple(map(self.transaction, range(begin, at))))
+            yield Output((row,), tuple(map(self.transaction, range(begin, at))))
         if at < len(closed):
             yield Output((), tuple(map(self.transaction, range(at, len(closed)))))
 
@@ -153,6 +158,76 @@ class Table:
     def transaction(self, place: int) -> Transaction:
         """The transaction that closed as number `place` of the table, from 0."""
         return self.transactions.transaction(place)
+
+
+def rows_at(table: Table, places: Sequence[int]) -> list[Row]:
+    """Rows at some places, in that order: what `Table.row` gives, for less than half."""
+    at = np.asarray(places, np.int64)
+    frames, placed, protocol, names = table.frames, table.placed, table.protocol, table.frames.names
+    begins = frames.offset[at]
+    base = int(begins.min()) if len(at) else 0
+    ends = begins + frames.length[at]
+    octets = table.octets[base : int(ends.max()) if len(at) else base].tobytes()
+    of_frame = (
+        (begins - base).tolist(),
+        (ends - base).tolist(),
+        *(getattr(frames, name)[at].tolist() for name in ("start", "end", "check", "found", "damage", "expected")),
+        table.slack[at].tolist(),
+    )
+    of_header = (
+        getattr(frames, name)[at].tolist()
+        for name in ("source", "destination", "role", "kind", "function", "address", "count", "ok", "error")
+    )
+    of_place = (getattr(placed, name)[at].tolist() for name in ("tx", "role", "source", "destination"))
+    rows: list[Row] = []
+    for (
+        (place, begin, end, start, stop, check, found, damage, expected, slack),
+        (source, destination, role, kind, function, address, count, ok, error),
+        (tx, placed_role, placed_source, placed_destination),
+    ) in zip(
+        zip(places, *of_frame, strict=True), zip(*of_header, strict=True), zip(*of_place, strict=True), strict=True
+    ):
+        odd = table.odd.get(place)
+        if odd is not None:
+            rows.append(odd)
+            continue
+        no = table.first + place
+        frame = Frame(
+            protocol,
+            octets[begin:end],
+            start,
+            stop,
+            CHECKS[check],
+            FOUNDS[found],
+            DAMAGES[damage],
+            None if expected == NONE else expected,
+            0,
+            slack,
+        )
+        header = Header(
+            protocol,
+            None if source == NONE else source,
+            None if destination == NONE else destination,
+            ROLES[role],
+            names[kind],
+            None if function == NONE else function,
+            None if address == NONE else address,
+            None if count == NONE else count,
+            ok,
+            names[error] if error else None,
+        )
+        if not tx:
+            rows.append(Row(no, frame, header))
+            continue
+        placement = Placement(
+            no,
+            tx,
+            ROLES[placed_role],
+            None if placed_source == NONE else placed_source,
+            None if placed_destination == NONE else placed_destination,
+        )
+        rows.append(Row(no, frame, header, placement))
+    return rows
 
 
 def joined(protocol: str, first: int, parts: Sequence[Table]) -> Table:

@@ -8,11 +8,8 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from sniff.engine.engine import Output
-from sniff.engine.table import Table
+from sniff.engine.table import AT_ONCE, Table, rows_at
 from sniff.engine.verdict_join import Settled, Settling, Wanted
-
-AT_ONCE = 4096
-"""Rows made at a time."""
 
 
 @runtime_checkable
@@ -39,7 +36,7 @@ class TableJoin:
             places = list(range(len(table)))
         yield from self._settling.add(Output((), self._closed(table, places)))
         for begin in range(0, len(places), AT_ONCE):
-            rows = tuple(table.row(place) for place in places[begin : begin + AT_ONCE])
+            rows = tuple(rows_at(table, places[begin : begin + AT_ONCE]))
             yield from self._settling.add(Output(rows, ()))
 
     def flush(self) -> Iterator[Settled]:

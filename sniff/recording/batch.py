@@ -119,6 +119,22 @@ class Batcher:
         self._held = 0
         self._lines: list[Message] = []
 
+    def take(self) -> tuple[list[int], list[bytes]]:
+        """Times and octets of the entries of the batch that is open, which no entry is in any more. Its marks and
+        events stay, for the message that these entries are in after all."""
+        entries = self._times, self._octets
+        self._times, self._octets, self._held = [], [], 0
+        self.next -= len(entries[0])
+        return entries
+
+    def closed(self, data: bytes, count: int, first: int, last: int) -> list[Message]:
+        """The messages of a batch whose `count` entries, read from `first` to `last` (ns), are packed already: those
+        that follow."""
+        messages, self._lines = self._lines, []
+        messages.append(Message(RAW, stamp(last), stamp(first), self.next % (1 << 32), data))
+        self.next += count
+        return messages
+
     def _fits(self, time: int) -> bool:
         """Whether a chunk of that time may join the batch: none is earlier than the one before it."""
         return (

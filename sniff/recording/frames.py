@@ -11,7 +11,7 @@ thing in /raw and here because a framer loses none.
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from typing import TYPE_CHECKING, Any
@@ -163,19 +163,28 @@ def encode(rows: Sequence[Row], transactions: Sequence[Transaction], offset: int
     strings: dict[str, int] = {}
     events = []
     for row in rows:
-        events.append(_event_values(row, offset))
+        events.append(event_values(row, offset))
         offset += len(row.event.octets)
     tables: tuple[tuple[tuple[Column, ...], list[tuple[Any, ...]]], ...] = (
         (EVENTS, events),
         (MARKS, [(at, mark.offset, mark.error.value) for at, row in enumerate(rows) for mark in row.event.marks]),
         (TRANSACTIONS, [_transaction_values(transaction) for transaction in transactions]),
     )
-    columns = [_pack(columns, values, strings) for columns, values in tables]
+    return message_of([(columns, _pack(columns, values, strings)) for columns, values in tables], strings)
+
+
+def message_of(
+    tables: Iterable[tuple[tuple[Column, ...], Sequence[npt.NDArray[Any]]]], strings: Mapping[str, int]
+) -> bytes:
+    """A message of the three tables, each with its columns packed, and the texts that they refer to, by number."""
+    packed = [values for _, values in tables]
     texts = b"".join(text.encode("utf-8", "replace").replace(_TEXT_END, b"?") + _TEXT_END for text in strings)
-    return b"".join((_HEAD.pack(len(texts), *(len(values) for _, values in tables)), texts, *columns))
+    head = _HEAD.pack(len(texts), *(len(values[0]) for values in packed))
+    return b"".join((head, texts, *(column.tobytes() for values in packed for column in values)))
 
 
-def _event_values(row: Row, offset: int) -> tuple[Any, ...]:
+def event_values(row: Row, offset: int) -> tuple[Any, ...]:
+    """A row in the order of `EVENTS`."""
     event, header, placement = row.event, row.header, row.placement
     values: tuple[Any, ...] = (row.no, offset, len(event.octets), event.start, event.end)
     if isinstance(event, Frame):
@@ -201,16 +210,20 @@ def _transaction_values(one: Transaction) -> tuple[Any, ...]:
     return (*values, *latency, one.attempt, one.of, one.error)
 
 
-def _pack(columns: Iterable[Column], rows: Sequence[tuple[Any, ...]], strings: dict[str, int]) -> bytes:
+def _pack(
+    columns: Sequence[Column], rows: Sequence[tuple[Any, ...]], strings: dict[str, int]
+) -> list[npt.NDArray[Any]]:
     import numpy as np
 
-    parts = []
-    for column, values in zip(columns, zip(*rows, strict=True), strict=True) if rows else ():
-        parts.append(np.array([_number(column, value, strings) for value in values], column.form).tobytes())
-    return b"".join(parts)
+    parts = zip(*rows, strict=True) if rows else ((),) * len(columns)
+    return [
+        np.array([number_of(column, value, strings) for value in values], column.form)
+        for column, values in zip(columns, parts, strict=True)
+    ]
 
 
-def _number(column: Column, value: Any, strings: dict[str, int]) -> int:
+def number_of(column: Column, value: Any, strings: dict[str, int]) -> int:
+    """A value as it lies in a column; a new text gets a number."""
     if value is None:
         return column.least
     if column.kind == "text":

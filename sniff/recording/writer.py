@@ -14,6 +14,7 @@ from collections import deque
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from dissectors.frame import Chunk
 from sniff.engine.session import (
@@ -28,10 +29,14 @@ from sniff.engine.session import (
 from sniff.formats.files import NewFile, explain
 from sniff.recording import keeper
 from sniff.recording.batch import Batcher, Message, loss_message, stamp
+from sniff.recording.block_batches import add_block
 from sniff.recording.keeper import CHECK, CLOSE, SYNC, Flush, Keeper, Parcel
 from sniff.recording.part import PartFile
 from sniff.recording.rotation import Rotation
 from sniff.recording.topics import LINE, RAW
+
+if TYPE_CHECKING:
+    from sniff.engine.blocks import Block
 
 FLUSH_AFTER = 900_000_000
 """ns that something may wait before it is written: with a tick when it is `due`, all is in the file within 1 s."""
@@ -88,6 +93,11 @@ class McapWriter:
             self._batcher.add_event(item)
         else:
             self._add(self._batcher.add(item))
+
+    def write_block(self, block: Block) -> None:
+        """Add reads; the same file as one after the other. Raises CaptureError."""
+        for messages in add_block(self._batcher, block):
+            self._add(messages)
 
     def close(self) -> None:
         """Finish the file and give it its name; again is harmless. Raises CaptureError."""

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from typing import Any
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
 
 from dissectors.findings import Finding, Severity, under_causes
 from dissectors.manifest import Dissector
@@ -14,14 +15,13 @@ from dissectors.words import milliseconds
 from sniff.analysis.health import Health
 from sniff.analysis.judging import rules_over
 from sniff.analysis.nodes import Node
-from sniff.analysis.summary import Summary
+from sniff.analysis.summary import Summary, ranked
 from sniff.analysis.wording import describe
 from sniff.bus.model import BusModel
-from sniff.bus.offline import outputs
+from sniff.bus.offline import Source, outputs, survey
 from sniff.engine.capture import Capture
-from sniff.engine.engine import Output
+from sniff.engine.engine import Output, Row
 from sniff.engine.follow_settings import dissector_for
-from sniff.engine.observer import observe
 from sniff.engine.session import DEVICES_NOTE, LineEvent, Session
 from sniff.formats.text import iso
 from sniff.reporting.numbers import (
@@ -39,28 +39,40 @@ from sniff.reporting.numbers import (
 )
 from sniff.reporting.timeline import Timeline
 
+if TYPE_CHECKING:
+    from sniff.engine.table import Table
+
 EVIDENCE_SHOWN, EVIDENCE_OF_NOTES = 5, 2
 HAPPENINGS_SHOWN = 200
 LONGEST_TEXT = 180
 GOOD = frozenset((Verdict.ANSWERED, Verdict.BROADCAST, Verdict.DATA, Verdict.OPEN, Verdict.UNDECIDED))
 
 
-def collect(source: str, capture: Capture, session: Session, devices: Devices) -> Numbers:
-    """Read a capture to its end. `session`: with the settings to use. Raises CaptureError."""
+def collect(
+    source: str,
+    capture: Capture,
+    session: Session,
+    devices: Devices,
+    watched: Source | None = None,
+    reference: bool = False,
+) -> Numbers:
+    """Read a capture to its end. `session`: with the settings to use; `watched`: the same capture, whose reading is
+    told; `reference`: row by row, for comparison. Raises CaptureError."""
+    read = watched or capture
     dissector = dissector_for(session)
     model, timeline, told = (
         BusModel(session, dissector, devices, with_points=False),
         Timeline(session.line.char),
         _Told(session),
     )
-    observe(outputs(capture.items(), session), model, timeline, told)
+    survey(read, session, model, timeline, told, reference=reference)
     summary, findings, healths = model.summary, model.findings(), model.health()
     health = healths.bus if summary.octets else None
     stations = tuple(
         _station(node, told.trouble.get(node.address, Counter()), healths.stations.get(node.address))
         for node in summary.nodes.present()
     )
-    found = _found(findings, _words(capture, session, dissector, findings), session, dissector)
+    found = _found(findings, _words(read, session, dissector, findings, reference), session, dissector)
     complete = capture.completeness()
     load = summary.load
     return Numbers(
@@ -81,10 +93,10 @@ def collect(source: str, capture: Capture, session: Session, devices: Devices) -
         findings=found,
         stations=stations,
         polled_only=tuple(summary.nodes.absent()),
-        kinds=dict(summary.kinds.most_common()),
-        verdicts={verdict.value: count for verdict, count in summary.verdicts.most_common()},
-        damages=dict(summary.damages.most_common()),
-        line_errors=dict(summary.marks.most_common()),
+        kinds=ranked(summary.kinds),
+        verdicts=ranked({verdict.value: count for verdict, count in summary.verdicts.items()}),
+        damages=ranked(summary.damages),
+        line_errors=ranked(summary.marks),
         response=Distribution.of(summary.latency),
         part=timeline.width / 1e9 if timeline.origin is not None else 0.0,
         timeline=_parts(timeline, session),
@@ -182,23 +194,35 @@ def _parts(timeline: Timeline, session: Session) -> tuple[TimePart, ...]:
 
 
 def _words(
-    capture: Capture, session: Session, dissector: Dissector, findings: tuple[Finding, ...]
+    capture: Source, session: Session, dissector: Dissector, findings: tuple[Finding, ...], reference: bool
 ) -> dict[int, tuple[float, str]]:
     """Time and text of the rows that findings show."""
     wanted = {no for finding in findings for no in _shown(finding)}
     words: dict[int, tuple[float, str]] = {}
     if not wanted:
         return words
-    last = max(wanted)
-    for item in outputs(capture.items(), session):
-        if not isinstance(item, Output):
-            continue
-        for row in item.rows:
-            if row.no in wanted:
-                words[row.no] = (seconds_since(session.started, row.event.start), _cut(describe(dissector, row)))
-        if item.rows and item.rows[-1].no >= last:
-            break
+    for row in _rows(capture, session, wanted, reference):
+        words[row.no] = (seconds_since(session.started, row.event.start), _cut(describe(dissector, row)))
     return words
+
+
+def _rows(capture: Source, session: Session, wanted: set[int], reference: bool) -> Iterator[Row]:
+    """The rows with these numbers; what follows the last of them is not read."""
+    last = max(wanted)
+    if reference:
+        for output in outputs(capture.items(), session):
+            rows = output.rows if isinstance(output, Output) else ()
+            yield from (row for row in rows if row.no in wanted)
+            if rows and rows[-1].no >= last:
+                return
+        return
+    from sniff.engine.bulk import tables
+
+    for table in tables(capture.blocks(), session):
+        if not isinstance(table, LineEvent):
+            yield from (table.row(no - table.first) for no in sorted(wanted) if 0 <= no - table.first < len(table))
+            if table.first + len(table) > last:
+                return
 
 
 def _found(
@@ -285,8 +309,21 @@ class _Told:
     def add(self, output: Output) -> None:
         """Count transactions that did not go well."""
         for transaction in output.transactions:
-            if transaction.station is not None and transaction.verdict not in GOOD:
-                self.trouble.setdefault(transaction.station, Counter())[_trouble(transaction)] += 1
+            self._count(transaction)
+
+    def add_table(self, table: Table) -> None:
+        """The same of many."""
+        import numpy as np
+
+        from dissectors.columns import VERDICTS
+
+        ill = np.array([verdict not in GOOD for verdict in VERDICTS])[table.transactions.verdict]
+        for place in np.flatnonzero(ill).tolist():
+            self._count(table.transaction(place))
+
+    def _count(self, transaction: Transaction) -> None:
+        if transaction.station is not None and transaction.verdict not in GOOD:
+            self.trouble.setdefault(transaction.station, Counter())[_trouble(transaction)] += 1
 
     def add_line_event(self, event: LineEvent) -> None:
         """Keep the first of them."""

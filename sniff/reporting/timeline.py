@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from dissectors.frame import Frame
 from dissectors.tracker import Transaction, Verdict
 from sniff.engine.engine import Output, Row
 from sniff.engine.session import LineEvent
+
+if TYPE_CHECKING:
+    from dissectors.columns import Masks, Numbers, Times
+    from sniff.engine.table import Table
 
 MOST_PARTS = 240
 FIRST_WIDTH = 100_000_000
@@ -56,6 +61,52 @@ class Timeline:
         if self.origin is not None:
             for transaction in output.transactions:
                 self.add_transaction(transaction)
+
+    def add_table(self, table: Table) -> None:
+        """Take many rows at once; the same comes of it."""
+        import numpy as np
+
+        from dissectors.columns import VERDICTS
+
+        heard, odd = table.heard, table.odd
+        if self.origin is None:
+            if not heard.any():
+                return
+            first = int(heard.argmax())
+            self.origin = odd[first].event.start if first in odd else int(table.frames.start[first])
+        for row in odd.values():
+            if row.searched is None:
+                self.add_row(row)
+        plain = heard.copy()
+        plain[list(odd)] = False
+        self._add_plain(table.frames.end[plain], table.frames.length[plain], table.good[plain])
+        counted = np.array([verdict in FAILED or verdict is Verdict.EXCEPTION for verdict in VERDICTS])
+        for place in np.flatnonzero(counted[table.transactions.verdict]).tolist():
+            self.add_transaction(table.transaction(place))
+
+    def _add_plain(self, ends: Times, lengths: Numbers, good: Masks) -> None:
+        """Count frames without line errors."""
+        import numpy as np
+
+        origin = self.origin or 0
+        if not len(ends):
+            return
+        self._part(max(int(ends.max()), origin))  # as many halvings as it takes
+        ends = np.maximum(ends - origin, 0)
+        starts = np.maximum(ends - lengths.astype(np.int64) * self.char, 0)
+        at, began = ends // self.width, starts // self.width
+        inside = (np.maximum(ends - 1, starts) // self.width == began) & (starts < ends)
+        whole = {
+            "damaged": np.bincount(at, ~good, int(at.max()) + 1),
+            "busy": np.bincount(began[inside], (ends - starts)[inside], int(at.max()) + 1),
+        }
+        touched = np.unique(np.concatenate([at, began[inside]])).tolist()
+        for number in touched:
+            part = self._part(origin + number * self.width)
+            part.damaged += int(whole["damaged"][number])
+            part.busy += int(whole["busy"][number])
+        for begin, end in zip(starts[~inside].tolist(), ends[~inside].tolist(), strict=True):
+            self._spread(origin + begin, origin + end)
 
     def add_line_event(self, event: LineEvent) -> None:
         """Nothing of it is counted here."""

@@ -15,11 +15,10 @@ from dissectors.tracker import Transaction
 from sniff.analysis.points import Point
 from sniff.analysis.summary import Summary
 from sniff.bus.model import BusModel
-from sniff.bus.offline import outputs
+from sniff.bus.offline import survey
 from sniff.devices import noted, noted_devices
 from sniff.engine.engine import Output, Row
 from sniff.engine.follow_settings import dissector_for
-from sniff.engine.observer import observe
 from sniff.engine.session import Completeness, LineEvent, Session
 from sniff.engine.verdict_join import Settled
 from sniff.formats import read
@@ -68,7 +67,7 @@ def read_capture(path: str | Path, said: Devices | None = None) -> CaptureReadin
     known, unknown = noted(session)
     devices = (said or Devices()).over(noted_devices(session))
     model, kept = BusModel(session, dissector, devices), _Kept()
-    observe(outputs(capture.items(), session), model, kept)
+    survey(capture, session, model, kept)
     closed = {transaction.id: transaction for transaction in kept.transactions}
     return CaptureReading(
         path=place,

@@ -1,4 +1,5 @@
-"""Whole commands on long captures, against tshark on the same frames, in pairs A B A B in one run.
+"""Whole commands on long captures, against tshark on the same frames, or against the same command row by row
+(`--reference`) where tshark has no such thing, in pairs A B A B in one run.
 
     python -m tests.bench.bulk_commands [FRAMES [ROUNDS]]        1000000 frames, 2 rounds
 
@@ -44,12 +45,13 @@ class Cost:
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One line of the table; `peer` None where there is none."""
+    """One line of the table; `peer` None where there is none, else `against`."""
 
     work: str
     frames: int
     ours: Cost
     peer: Cost | None
+    against: str = "tshark"
 
 
 def captures(folder: Path, frames: int) -> dict[str, Path]:
@@ -95,6 +97,53 @@ def rows(files: dict[str, Path], frames: int, rounds: int) -> Iterator[Row]:
         least = min(frames, PEER_FRAMES)
         yield _pair(f"info, {name}", least, ("info", short), (*peer, *counting), rounds)
         yield _pair(f"check, {name}", least, ("check", short), (*peer, *counting), 1)
+    yield from _rows_of_lines(files, frames, rounds)
+    yield from _rows_of_copies(files, frames, rounds)
+
+
+LINES = {
+    "show": ((), ()),
+    "show -Y": (("-Y", "dst == 3"), ("-Y", "mstp.dst == 3")),
+    "-T fields": (
+        ("-T", "fields", "-e", "no", "-e", "src", "-e", "dst", "-e", "kind"),
+        ("-T", "fields", "-e", "frame.number", "-e", "mstp.src", "-e", "mstp.dst", "-e", "mstp.frame_type"),
+    ),
+    "--csv": (("--csv",), ("-T", "fields", "-e", "frame.number", "-e", "mstp.src", "-e", "mstp.dst")),
+}
+"""What is listed, by us and by tshark."""
+
+
+def _rows_of_lines(files: dict[str, Path], frames: int, rounds: int) -> Iterator[Row]:
+    """A line a frame: all of them, those that a filter accepts, some columns."""
+    for name in ("mstp", "mstp-damaged"):
+        for work, (words, theirs) in LINES.items():
+            peer = ("tshark", "-n", "-r", str(files[f"{name}.pcap"]), *theirs)
+            yield _pair(f"{work}, {name}", frames, ("show", str(files[name]), *words), peer, rounds)
+    yield _pair("show, rtu", frames, ("show", str(files["rtu"])), None, rounds)
+
+
+def _rows_of_copies(files: dict[str, Path], frames: int, rounds: int) -> Iterator[Row]:
+    """What tshark has nothing like: values, copies; against the same row by row, on no more frames than that stands."""
+    out = str(files["mstp"].with_name("copy.mcap"))
+    works = {
+        "points, rtu": ("points", "rtu"),
+        "points --csv, rtu": ("points", "--csv", "rtu"),
+        "points, mstp": ("points", "mstp"),
+        "report, mstp": ("report", "--json", "mstp"),
+        "convert, rtu": ("convert", "rtu", out, "-f"),
+        "convert, pcap": ("convert", "mstp.pcap", out, "-f"),
+        "redissect, mstp": ("redissect", "mstp", "-f", "-o", out),
+        "cut --from, rtu": ("cut", "rtu", "-f", "-o", out, "--from", "+10", "--to", "+60"),
+        "cut --frames, mstp": ("cut", "mstp", "-f", "-o", out, "--frames", "2000-50000"),
+        "merge, mstp": ("merge", "mstp", "mstp-damaged", "-f", "-o", out),
+    }
+    for work, words in works.items():
+        command = tuple(str(files.get(word, word)) for word in words)
+        if frames <= PEER_FRAMES:
+            peer = (sys.executable, "-m", "sniff", *command, "--reference")
+            yield replace(_pair(work, frames, command, peer, rounds), against="row by row")
+        else:
+            yield _pair(work, frames, command, None, rounds)
 
 
 def _pair(work: str, frames: int, words: Sequence[str], peer: Sequence[str] | None, rounds: int) -> Row:
@@ -125,13 +174,13 @@ def _least(costs: Sequence[Cost]) -> Cost:
 def lines(frames: int, rounds: int) -> Iterator[str]:
     """The table, line by line as it is measured."""
     titles = f"{'work':<26}{'frames':>9}  {'ours: CPU s':>11}{'wall s':>8}"
-    yield f"{titles}  {'tshark: CPU s':>13}{'wall s':>8}  {'ratio':>6}"
+    yield f"{titles}  {'peer: CPU s':>13}{'wall s':>8}  {'ratio':>6}"
     with tempfile.TemporaryDirectory() as folder:
         for row in rows(captures(Path(folder), frames), frames, rounds):
             line = f"{row.work:<26}{row.frames:>9}  {row.ours.processor:>11.2f}{row.ours.wall:>8.2f}"
             if row.peer is not None:
                 ratio = row.peer.processor / row.ours.processor
-                line += f"  {row.peer.processor:>13.2f}{row.peer.wall:>8.2f}  {ratio:>5.1f}×"
+                line += f"  {row.peer.processor:>13.2f}{row.peer.wall:>8.2f}  {ratio:>5.1f}×  {row.against}"
             yield line
 
 
