@@ -19,7 +19,7 @@ from dissectors.manifest import Dissector
 from dissectors.tracker import Transaction
 from sniff.engine.blocks import Block
 from sniff.engine.capture import CaptureError
-from sniff.engine.engine import Output, Row
+from sniff.engine.engine import Engine, Output, Row
 from sniff.engine.follow_settings import SessionEngine
 from sniff.engine.framing import BulkFraming, Clean
 from sniff.engine.late_columns import LateColumns
@@ -66,12 +66,35 @@ class BulkEngine:
         reference = self._reference
         if reference is not None:
             items = item.chunks() if isinstance(item, Block) else (item,)
-            return _of_outputs(reference, [reference.take(one) for one in items])
+            was_searching = reference.searching
+            table = _of_outputs(reference, [reference.take(one) for one in items])
+            if was_searching and not reference.searching:
+                self._go_on(reference)
+            return table
         if not isinstance(item, Block):
             return self._happen(item)
         if int(item.reads.times.min()) < -FAR or int(item.reads.times.max()) > FAR:
             return self._one_by_one(item)
         return self._leg.take(item)
+
+    def advance(self, now: int) -> Table:
+        """Say that no read returned up to `now` (ns)."""
+        reference = self._reference
+        return self._leg.advance(now) if reference is None else _of_outputs(reference, [reference.advance(now)])
+
+    def deadline(self) -> int | None:
+        """When to call `advance` next (ns), or None."""
+        return self._leg.deadline() if self._reference is None else self._reference.deadline()
+
+    @property
+    def searching(self) -> bool:
+        """Whether settings are searched for."""
+        return self._reference is not None and self._reference.searching
+
+    @property
+    def dissector(self) -> Dissector:
+        """The protocol; a stand-in as long as nobody knows it."""
+        return self._leg.dissector if self._reference is None else self._reference.dissector
 
     def close(self) -> Table:
         """End of the capture."""
@@ -99,6 +122,12 @@ class BulkEngine:
         self._reference = SessionEngine(self._session, first=leg.next, before_tx=leg.last_tx)
         return joined(leg.dissector.name, leg.next, [one for one in (table, self.take(block)) if one])
 
+    def _go_on(self, reference: SessionEngine) -> None:
+        """A search is over: from here on many rows at once again, where all that is known can be handed over."""
+        leg = _Leg.after(reference.engine)
+        if leg is not None and leg.timing == reference.session.timing:
+            self._session, self._leg, self._reference = reference.session, leg, None
+
     def _restart(self) -> Table:
         table, before = self._leg.close(), self._leg
         self._leg = _Leg(before.dissector, before.timing, before.next, before.last_tx)
@@ -124,11 +153,37 @@ class _Leg:
         self._late = LateColumns(timing)
         self._tracker = dissector.tracker(timing)
 
+    @classmethod
+    def after(cls, engine: Engine) -> _Leg | None:
+        """Go on where another engine has taken reads one by one; None where their times ran backwards."""
+        times = [read.time for read in engine.late.kept]
+        if times != sorted(times) or any(abs(time) > FAR for time in times):
+            return None
+        leg = cls(engine.dissector, engine.timing, engine.next, engine.last_tx)
+        leg._before_tx = engine.before_tx
+        leg._framing = BulkFraming(engine.dissector, engine.timing, engine.framer, times[-1] if times else None)
+        leg._late = LateColumns.after(engine.late, engine.timing)
+        leg._tracker = engine.tracker
+        return leg
+
     def take(self, block: Block) -> Table:
         """Take reads."""
         self._late.see(block.reads)
         made = [self._clean(one) if isinstance(one, Clean) else self._events(one) for one in self._framing.take(block)]
         return joined(self.dissector.name, self.next, made)
+
+    def advance(self, now: int) -> Table:
+        """Say that no read returned up to `now`."""
+        events = self._framing.advance(now)
+        made = [self._events(events)] if events else []
+        if self._framing.deadline() is None:  # else octets still held may be the answer that the tracker waits for
+            closed = self._numbered(self._tracker.advance(now))
+            made += [Table.of(self.dissector.name, self.next, [], closed)] if closed else []
+        return joined(self.dissector.name, self.next, made)
+
+    def deadline(self) -> int | None:
+        """When to call `advance` next, or None."""
+        return self._framing.deadline()
 
     def close(self) -> Table:
         """Give everything that is held."""
