@@ -20,6 +20,7 @@ from sniff.analysis.nodes import Node
 from sniff.analysis.summary import Summary
 from sniff.bus.model import BusModel
 from sniff.engine.engine import Output
+from sniff.engine.table import Table
 
 WINDOW = NS_PER_S
 JUDGED_EVERY = 5
@@ -70,11 +71,19 @@ class BusChannels:
         """Take what the engine gave, and the model took."""
         self._window.add(output)
 
+    def add_table(self, table: Table) -> None:
+        """The same with many rows at once."""
+        self._window.add_table(table)
+
+    def is_due(self, now: int) -> bool:
+        """Whether a window has ended by `now`: what was heard until then should be counted in it."""
+        return self._begin is not None and now - self._begin >= WINDOW
+
     def due(self, now: int) -> list[DerivedMessage]:
         """What a window that has ended by `now` (ns, the capture's clock) gives; nothing in between."""
         if self._begin is None:
             self._begin = now
-        if now - self._begin < WINDOW:
+        if not self.is_due(now):
             return []
         begin, window = self._begin, self._window
         self._begin, self._window = now, Summary(self._session.line)

@@ -61,6 +61,13 @@ class BulkEngine:
         """The bus; after a search, with what was found."""
         return self._session if self._reference is None else self._reference.session
 
+    def take_some(self, block: Block) -> list[Output | Table]:
+        """Take reads that follow; row by row where nothing was gained by columns, which few rows cost dearly."""
+        if self._reference is None and _is_sane(block):
+            return self._leg.take_some(block)
+        table = self.take(block)
+        return [table] if table else []
+
     def take(self, item: Block | LineEvent) -> Table:
         """Take what follows."""
         reference = self._reference
@@ -73,14 +80,16 @@ class BulkEngine:
             return table
         if not isinstance(item, Block):
             return self._happen(item)
-        if int(item.reads.times.min()) < -FAR or int(item.reads.times.max()) > FAR:
+        if not _is_sane(item):
             return self._one_by_one(item)
         return self._leg.take(item)
 
-    def advance(self, now: int) -> Table:
+    def advance(self, now: int) -> list[Output | Table]:
         """Say that no read returned up to `now` (ns)."""
-        reference = self._reference
-        return self._leg.advance(now) if reference is None else _of_outputs(reference, [reference.advance(now)])
+        if self._reference is None:
+            return self._leg.advance(now)
+        output = self._reference.advance(now)
+        return [output] if output else []
 
     def deadline(self) -> int | None:
         """When to call `advance` next (ns), or None."""
@@ -134,6 +143,10 @@ class BulkEngine:
         return table
 
 
+def _is_sane(block: Block) -> bool:
+    return int(block.reads.times.min()) >= -FAR and int(block.reads.times.max()) <= FAR
+
+
 def _of_outputs(engine: SessionEngine, outputs: list[Output]) -> Table:
     rows = [row for output in outputs for row in output.rows]
     closed = [one for output in outputs for one in output.transactions]
@@ -166,20 +179,28 @@ class _Leg:
         leg._tracker = engine.tracker
         return leg
 
+    def take_some(self, block: Block) -> list[Output | Table]:
+        """Take reads; row by row where the reference has read them all."""
+        self._late.see(block.reads)
+        stretches = self._framing.take(block)
+        if not any(isinstance(one, Clean) for one in stretches):
+            return self._outputs([event for one in stretches if not isinstance(one, Clean) for event in one])
+        made = [self._clean(one) if isinstance(one, Clean) else self._events(one) for one in stretches]
+        return [joined(self.dissector.name, self.next, made)]
+
     def take(self, block: Block) -> Table:
         """Take reads."""
         self._late.see(block.reads)
         made = [self._clean(one) if isinstance(one, Clean) else self._events(one) for one in self._framing.take(block)]
         return joined(self.dissector.name, self.next, made)
 
-    def advance(self, now: int) -> Table:
+    def advance(self, now: int) -> list[Output | Table]:
         """Say that no read returned up to `now`."""
-        events = self._framing.advance(now)
-        made = [self._events(events)] if events else []
+        outputs = self._outputs(self._framing.advance(now))
         if self._framing.deadline() is None:  # else octets still held may be the answer that the tracker waits for
             closed = self._numbered(self._tracker.advance(now))
-            made += [Table.of(self.dissector.name, self.next, [], closed)] if closed else []
-        return joined(self.dissector.name, self.next, made)
+            outputs += [Output((), tuple(closed))] if closed else []
+        return outputs
 
     def deadline(self) -> int | None:
         """When to call `advance` next, or None."""
@@ -215,6 +236,9 @@ class _Leg:
 
     def _events(self, events: list[Event]) -> Table:
         """Rows of the reference framer."""
+        return self._placed(self._rows(events))
+
+    def _rows(self, events: list[Event]) -> list[Row]:
         rows = []
         ends: Times = np.array([event.end for event in events if isinstance(event, Frame)], np.int64)
         slacks = iter(self._late.slack(ends).tolist())
@@ -225,7 +249,7 @@ class _Leg:
                 rows.append(Row(no, event, self.dissector.peek(event)))
             else:
                 rows.append(Row(no, event))
-        return self._placed(rows)
+        return rows
 
     def _placed(self, rows: list[Row]) -> Table:
         """The same rows where the tracker places them, with what they close."""
@@ -239,6 +263,15 @@ class _Leg:
             closed_by += [place] * len(ended)
         first, self.next = self.next, self.next + len(rows)
         return Table.of(self.dissector.name, first, placed, closed, closed_by)
+
+    def _outputs(self, events: list[Event]) -> list[Output | Table]:
+        """The same row by row."""
+        outputs: list[Output | Table] = []
+        for row in self._rows(events) if events else ():
+            made, closed = self._track(row)
+            outputs.append(Output((made,), tuple(closed)))
+        self.next += len(outputs)
+        return outputs
 
     def _track(self, row: Row) -> tuple[Row, list[Transaction]]:
         """The row with its place, and what it closed."""

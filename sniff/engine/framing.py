@@ -74,13 +74,19 @@ class BulkFraming:
 
     def take(self, block: Block) -> list[Stretch]:
         """Take the reads that follow; give the rows that are certain by now."""
-        reads = replace(block.reads, before=self._before)
-        work = _Work(self, block, reads)
-        stretches = work.run()
-        self._base += len(reads.octets)
-        last = int(reads.times.max())
+        if self._dissector.kernel is None or len(block.reads.octets) < LEAST:
+            stretches = self._one_by_one(block)
+        else:
+            stretches = _Work(self, block, replace(block.reads, before=self._before)).run()
+        self._base += len(block.reads.octets)
+        last = int(block.reads.times.max())
         self._before = last if self._before is None else max(self._before, last)
         return stretches
+
+    def _one_by_one(self, block: Block) -> list[Stretch]:
+        events = [event for chunk in block.chunks() for event in self._framer.feed(chunk)]
+        self._given += sum(len(event.octets) for event in events)
+        return [events] if events else []
 
     def advance(self, now: int) -> list[Event]:
         """Say that no read returned up to `now` (ns); what the silence completes."""
@@ -129,8 +135,7 @@ class _Work:
         self._begins = reads.begins
         self._size = len(reads.octets)
         kernel = framing._dissector.kernel
-        usable = kernel is not None and self._size >= LEAST and _is_forward(reads)
-        self._columns = kernel(reads, framing._timing) if kernel is not None and usable else None
+        self._columns = kernel(reads, framing._timing) if kernel is not None and _is_forward(reads) else None
         self._last: Times | None = None
         if self._columns is not None and len(self._columns):
             self._columns, self._last = _chains(self._columns, self._size - MARGIN)

@@ -61,8 +61,9 @@ def start(folder: Path, number: int, protocol: str) -> Bus:
     tty.setraw(slave)
     os.set_blocking(master, False)
     file = folder / f"bus{number}.mcap"
+    said = ["record", os.ttyname(slave), "-s", "115200,8N1", "-p", protocol, "-w", str(file)]
     process = subprocess.Popen(
-        [sys.executable, "-m", "sniff", "record", os.ttyname(slave), "-s", "115200,8N1", "-p", protocol, "-w", str(file)],
+        [sys.executable, "-m", "sniff", *said],
         env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])},
         stderr=subprocess.PIPE, text=True, start_new_session=True,
     )  # fmt: skip
@@ -122,9 +123,7 @@ def measure(count: int, seconds: float, protocol: str, every: float, folder: Pat
         used = sum(late[part] - early[part] for late, early in zip(after, before, strict=True))
         print(f"{part:8} {used / took:6.1%} of a core  {used / frames * 1e6:6.1f} us a frame")
     used = sum(sum(late.values()) - sum(early.values()) for late, early in zip(after, before, strict=True))
-    print(
-        f"{'together':8} {used / took:6.1%} of a core  {used / frames * 1e6:6.1f} us a frame, {count} buses, {took:.0f} s"
-    )
+    print(f"together {used / took:6.1%} of a core  {used / frames * 1e6:6.1f} us a frame; {count} buses, {took:.0f} s")
     print(f"stopping took {stopping:.1f} s; writes refused: {sum(bus.refused for bus in buses)}")
     whole = True
     for bus, words in zip(buses, said, strict=True):
