@@ -100,13 +100,15 @@ class CaptureLink:
         record: RecordSpec | None = None,
         duration: float | None = None,
         count: int | None = None,
+        watched: bool = True,
     ) -> CaptureLink:
         """Start listening; returns when all ports are open and all files begun.
 
         `duration`: seconds, `count`: frames after which it ends, whatever becomes of this process; None for no end.
-        Raises PortError or CaptureError with the reason.
+        `watched`: as `CaptureConfig` has it. Raises PortError or CaptureError with the reason.
         """
-        config = CaptureConfig(tuple(sources), record, None if duration is None else int(duration * 1e9), count)
+        limit = None if duration is None else int(duration * 1e9)
+        config = CaptureConfig(tuple(sources), record, limit, count, watched)
         words = [source.spec for source in config.sources] + ([config.record.path] if config.record else [])
         link = cls(spawn(words))
         try:

@@ -130,7 +130,7 @@ def start(
     Recording and `duration` begin at once, also with something to `search` for; `LiveBus.searching` says how far it is.
     `duration` (seconds) and `count` (frames) are limits of the capture process, whatever becomes of this one.
     """
-    link = start_link(source, record, duration, count)
+    link = start_link(source, record, duration, count, watched)
     try:
         adapter = link.session(0).adapter
         detecting = search.detecting(adapter.latency, adapter.reports) if search is not None else None
@@ -141,11 +141,15 @@ def start(
 
 
 def start_link(
-    source: SourceSpec, record: RecordSpec | None, duration: float | None = None, count: int | None = None
+    source: SourceSpec,
+    record: RecordSpec | None,
+    duration: float | None = None,
+    count: int | None = None,
+    watched: bool = True,
 ) -> CaptureLink:
     """Start the capture process without an engine. Ends with exit code 4 for the port, 3 for the file."""
     try:
-        return CaptureLink.start([source], record, duration, count)
+        return CaptureLink.start([source], record, duration, count, watched)
     except PortError as error:
         raise Failure(str(error), PORT_TROUBLE) from None
     except CaptureError as error:

@@ -2,9 +2,10 @@
 
     python -m tests.bench.ten_buses [--buses 10] [--minutes 1] [--protocol mstp | modbus-rtu] [--every 2]
 
-Each bus is given 11520 octets a second (115200 Bd without a pause) in frames of 8 octets, what is due `--every` ms at
-a time, as an adapter hands it over. Said is the CPU time of all processes of `record` (without the one that sends) as
-part of one core and by frame, how long stopping took, and whether the files hold what was sent.
+Each bus is given 11520 octets a second (115200 Bd without a pause) in frames of 8 octets on average (tokens; requests
+and answers), what is due `--every` ms at a time, as an adapter hands it over. Said is the CPU time of all processes of
+`record` (without the one that sends) as part of one core and by frame, how long stopping took, and whether the files
+hold what was sent.
 """
 
 from __future__ import annotations
@@ -44,14 +45,18 @@ class Bus:
 
 
 def traffic(protocol: str) -> bytes:
-    """Some seconds of a full bus, in frames of 8 octets, to be sent again and again."""
+    """Some seconds of a full bus, in frames of 8 octets on average, to be sent again and again."""
     if protocol == "mstp":
         masters = 24
         return b"".join(mstp_frame(0, (at + 1) % masters, at) for at in range(masters)) * 60
     frames = []
-    for turn in range(720):  # a register is written and the answer is the same again
-        body = bytes((1 + turn % 8, 6, 0, turn // 8 % 16, turn >> 8, turn & 0xFF))
-        frames += [body + crc16.modbus(body).to_bytes(2, "little")] * 2
+    for turn in range(1440):  # one and two registers of 8 stations in turn
+        unit, count = 1 + turn % 8, 1 + turn // 8 % 2
+        for body in (
+            bytes((unit, 3, 0, turn // 16 % 16, 0, count)),
+            bytes((unit, 3, 2 * count, 0, turn % 200, 1, turn % 99)[: 3 + 2 * count]),
+        ):
+            frames.append(body + crc16.modbus(body).to_bytes(2, "little"))
     return b"".join(frames)
 
 
