@@ -201,12 +201,14 @@ class LiveBus:
             if self._patience and (waited is None or 0 <= waited < self._patience):
                 return []
             items = self._look()
-        if now is not None:
-            self._now = None
-            deadline = self.engine.deadline()
-            if deadline is None or now >= deadline:
-                items += self._some(self.engine.advance(now))
-        return items
+        return [*items, *self._advance()]
+
+    def _advance(self) -> list[LiveTables]:
+        """What silence completes."""
+        now, self._now = self._now, None
+        deadline = self.engine.deadline()
+        due = now is not None and (deadline is None or now >= deadline)
+        return self._some(self.engine.advance(now)) if due and now is not None else []
 
     def end(self) -> None:
         """Have the capture end; `poll` gives the rest, and Ended last. Again: without waiting for a slow disk."""
@@ -254,7 +256,7 @@ class LiveBus:
             self._values.pass_time(now)
         if self._bus_channels is None:
             return []
-        items = self._look() if self._bus_channels.is_due(now) else []
+        items = [*self._look(), *self._advance()] if self._bus_channels.is_due(now) else []
         messages = self._bus_channels.due(now)
         if messages:
             self._send(messages)

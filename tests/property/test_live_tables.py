@@ -22,6 +22,9 @@ from sniff.formats import read
 from tests.bench import bulk_rtu
 from tests.property.test_tables import NAMES, Bus, _hidden, _mstp, _rtu
 
+LATE = 50_000_000
+"""ns; what is vouched for may be older than what has come."""
+
 Said = tuple[list[Row], list[Transaction]]
 
 
@@ -58,7 +61,7 @@ def live(items: list[Item], session: Session, dice: random.Random, most: int) ->
             continue
         until = after.time - len(after.octets) * session.line.char + session.adapter.latency
         if until > item.time:
-            for now in sorted(dice.randint(item.time, until - 1) for _ in range(dice.randint(0, 2))):
+            for now in sorted(dice.randint(item.time - LATE, until - 1) for _ in range(dice.randint(0, 2))):
                 keep(engine.advance(now))
     keep(engine.take_some(gathering.take()) if gathering.count else [])
     keep([engine.close()])
