@@ -31,6 +31,10 @@ FAR = 1 << 61
 """ns; times beyond it are not reckoned with in columns."""
 
 
+MANY = 64
+"""Rows of the reference from which on a table of them costs its observers less than one after the other."""
+
+
 def tables(blocks: Iterable[Block | LineEvent], session: Session) -> Iterator[Table | LineEvent]:
     """What a capture holds, as tables; line events pass through at their place. Raises what `blocks` raises, and
     registry.UnknownProtocol."""
@@ -62,7 +66,7 @@ class BulkEngine:
         return self._session if self._reference is None else self._reference.session
 
     def take_some(self, block: Block) -> list[Output | Table]:
-        """Take reads that follow; row by row where nothing was gained by columns, which few rows cost dearly."""
+        """Take reads that follow; few rows, which cost dearly as a table, one by one."""
         if self._reference is None and _is_sane(block):
             return self._leg.take_some(block)
         table = self.take(block)
@@ -180,11 +184,12 @@ class _Leg:
         return leg
 
     def take_some(self, block: Block) -> list[Output | Table]:
-        """Take reads; row by row where the reference has read them all."""
+        """Take reads; few rows that the reference has read come one by one."""
         self._late.see(block.reads)
         stretches = self._framing.take(block)
         if not any(isinstance(one, Clean) for one in stretches):
-            return self._outputs([event for one in stretches if not isinstance(one, Clean) for event in one])
+            events = [event for one in stretches if not isinstance(one, Clean) for event in one]
+            return self._outputs(events) if len(events) < MANY else [self._events(events)]
         made = [self._clean(one) if isinstance(one, Clean) else self._events(one) for one in stretches]
         return [joined(self.dissector.name, self.next, made)]
 
