@@ -48,8 +48,6 @@ UNWATCHED = NS_PER_S // 2
 NODES_A_SECOND, NODES_AT_ONCE = 0.5, 600
 """What goes back into the recording of the numbers of stations: `sniff/bus/thinning.py`."""
 
-NODES = "/nodes/"
-
 LiveItem = Output | LineEvent | Status | Ended
 LiveTables = Table | Output | LineEvent | Status | Ended
 """Few rows come as objects, many as a table."""
@@ -257,7 +255,7 @@ class LiveBus:
         if self._bus_channels is None:
             return []
         items = [*self._look(), *self._advance()] if self._bus_channels.is_due(now) else []
-        messages = self._bus_channels.due(now)
+        messages = self._bus_channels.due(now, self._nodes_budget.take)
         if messages:
             self._send(messages)
         return items
@@ -300,8 +298,6 @@ class LiveBus:
     def _send(self, messages: list[DerivedMessage]) -> None:
         """Send statistics and findings back into the file, best effort."""
         for one in messages:
-            if one.topic.startswith(NODES) and not self._nodes_budget.take(one.topic, one.log_time):
-                continue
             self.link.derived(self.bus, one.topic, one.schema, one.log_time, one.publish_time, one.data, one.metadata)
 
 

@@ -18,13 +18,17 @@ import sys
 import tempfile
 import time
 import tty
+from bisect import bisect_right
 from dataclasses import dataclass
+from itertools import accumulate
 from pathlib import Path
 
 from fastcrc import crc16
 
 from dissectors.bacnet.frame_making import frame as mstp_frame
 from dissectors.frame import Chunk
+from sniff.analysis.summary import Summary
+from sniff.bus.offline import survey
 from sniff.formats import read
 
 OCTETS_A_SECOND = 11520
@@ -44,11 +48,11 @@ class Bus:
     refused: int = 0
 
 
-def traffic(protocol: str) -> bytes:
-    """Some seconds of a full bus, in frames of 8 octets on average, to be sent again and again."""
+def traffic(protocol: str) -> list[bytes]:
+    """Some seconds of a full bus, frames of 8 octets on average, to be sent again and again."""
     if protocol == "mstp":
         masters = 24
-        return b"".join(mstp_frame(0, (at + 1) % masters, at) for at in range(masters)) * 60
+        return [mstp_frame(0, (at + 1) % masters, at) for at in range(masters)] * 60
     frames = []
     for turn in range(1440):  # one and two registers of 8 stations in turn
         unit, count = 1 + turn % 8, 1 + turn // 8 % 2
@@ -57,7 +61,7 @@ def traffic(protocol: str) -> bytes:
             bytes((unit, 3, 2 * count, 0, turn % 200, 1, turn % 99)[: 3 + 2 * count]),
         ):
             frames.append(body + crc16.modbus(body).to_bytes(2, "little"))
-    return b"".join(frames)
+    return frames
 
 
 def start(folder: Path, number: int, protocol: str) -> Bus:
@@ -75,18 +79,21 @@ def start(folder: Path, number: int, protocol: str) -> Bus:
     return Bus(master, slave, file, process)
 
 
-def send(buses: list[Bus], octets: bytes, seconds: float, every: float) -> float:
-    """Send to all of them for so long, at the speed of the line; how long it took."""
-    twice, begin = octets * 2, time.monotonic()
+def send(buses: list[Bus], frames: list[bytes], seconds: float, every: float) -> float:
+    """Send whole frames to all of them for so long, at the speed of the line; how long it took."""
+    octets = b"".join(frames)
+    ends = [0, *accumulate(map(len, frames))]
+    begin = time.monotonic()
     now = begin
     while now - begin < seconds:
         due = int((now - begin) * OCTETS_A_SECOND)
         for bus in buses:
-            wanted = due - bus.sent
-            if wanted > 0:
-                at = bus.sent % len(octets)
+            turn, at = divmod(bus.sent, len(octets))
+            until = min(due - turn * len(octets), len(octets))
+            until = ends[bisect_right(ends, until) - 1]
+            if until > at:
                 try:
-                    bus.sent += os.write(bus.master, twice[at : at + min(wanted, len(octets))])
+                    bus.sent += os.write(bus.master, octets[at:until])
                 except BlockingIOError:
                     bus.refused += 1
         time.sleep(max(0.0, every - (time.monotonic() - now)))
@@ -109,26 +116,29 @@ def _seconds(pid: int) -> float:
 
 def measure(count: int, seconds: float, protocol: str, every: float, folder: Path) -> bool:
     """Run it and say what came of it; whether every file holds what was sent."""
-    octets = traffic(protocol)
+    frames = traffic(protocol)
+    octets = b"".join(frames)
     buses = [start(folder, number, protocol) for number in range(count)]
     until = time.monotonic() + 120
     while not all(bus.file.exists() for bus in buses) and time.monotonic() < until:
         time.sleep(0.1)
     time.sleep(3)  # so that what a start costs is not counted
     before = [cpu_of(bus.process.pid) for bus in buses]
-    took = send(buses, octets, seconds, every)
+    took = send(buses, frames, seconds, every)
     after = [cpu_of(bus.process.pid) for bus in buses]
     time.sleep(0.3)
     for bus in buses:
         bus.process.send_signal(signal.SIGINT)
     begin, said = time.monotonic(), [bus.process.communicate()[1] for bus in buses]
     stopping = time.monotonic() - begin
-    frames = sum(bus.sent for bus in buses) / FRAME
+    sent_frames = sum(bus.sent for bus in buses) / FRAME
     for part in ("front", "capture"):
         used = sum(late[part] - early[part] for late, early in zip(after, before, strict=True))
-        print(f"{part:8} {used / took:6.1%} of a core  {used / frames * 1e6:6.1f} us a frame")
+        print(f"{part:8} {used / took:6.1%} of a core  {used / sent_frames * 1e6:6.1f} us a frame")
     used = sum(sum(late.values()) - sum(early.values()) for late, early in zip(after, before, strict=True))
-    print(f"together {used / took:6.1%} of a core  {used / frames * 1e6:6.1f} us a frame; {count} buses, {took:.0f} s")
+    print(
+        f"together {used / took:6.1%} of a core  {used / sent_frames * 1e6:6.1f} us a frame; {count} buses, {took:.0f} s"
+    )
     print(f"stopping took {stopping:.1f} s; writes refused: {sum(bus.refused for bus in buses)}")
     whole = True
     for bus, words in zip(buses, said, strict=True):
@@ -141,7 +151,10 @@ def measure(count: int, seconds: float, protocol: str, every: float, folder: Pat
             print(f"{bus.file.name}: sent {len(sent)}, in the file {len(held)}, exit code {bus.process.returncode}")
             print(words)
     print(f"sent {sum(bus.sent for bus in buses)} octets: {'all of them are in the files' if whole else 'LOSS'}")
-    print(said[0].strip().replace("\r", "\n").splitlines()[-3:])
+    print(*said[0].strip().replace("\r", "\n").splitlines()[-3:], sep="\n")
+    again = Summary(read(buses[0].file).session.line)
+    survey(read(buses[0].file), read(buses[0].file).session, again)
+    print(f"read again from its file: {again.frames} frames ({again.damaged} damaged), {again.noise} octets of noise")
     return whole
 
 
