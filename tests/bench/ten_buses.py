@@ -136,9 +136,8 @@ def measure(count: int, seconds: float, protocol: str, every: float, folder: Pat
         used = sum(late[part] - early[part] for late, early in zip(after, before, strict=True))
         print(f"{part:8} {used / took:6.1%} of a core  {used / sent_frames * 1e6:6.1f} us a frame")
     used = sum(sum(late.values()) - sum(early.values()) for late, early in zip(after, before, strict=True))
-    print(
-        f"together {used / took:6.1%} of a core  {used / sent_frames * 1e6:6.1f} us a frame; {count} buses, {took:.0f} s"
-    )
+    print(f"together {used / took:6.1%} of a core  {used / sent_frames * 1e6:6.1f} us a frame")
+    print(f"{count} buses, {took:.0f} s")
     print(f"stopping took {stopping:.1f} s; writes refused: {sum(bus.refused for bus in buses)}")
     whole = True
     for bus, words in zip(buses, said, strict=True):
