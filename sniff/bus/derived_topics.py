@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 from dissectors.findings import Finding, Severity
@@ -20,6 +20,7 @@ from sniff.analysis.nodes import Node
 from sniff.analysis.summary import Summary
 from sniff.bus.model import BusModel
 from sniff.engine.engine import Output
+from sniff.engine.table import Table
 
 WINDOW = NS_PER_S
 JUDGED_EVERY = 5
@@ -70,16 +71,27 @@ class BusChannels:
         """Take what the engine gave, and the model took."""
         self._window.add(output)
 
-    def due(self, now: int) -> list[DerivedMessage]:
-        """What a window that has ended by `now` (ns, the capture's clock) gives; nothing in between."""
+    def add_table(self, table: Table) -> None:
+        """The same with many rows at once."""
+        self._window.add_table(table)
+
+    def is_due(self, now: int) -> bool:
+        """Whether a window has ended by `now`: what was heard until then should be counted in it."""
+        return self._begin is not None and now - self._begin >= WINDOW
+
+    def due(self, now: int, has_turn: Callable[[str, int], bool] = lambda *_: True) -> list[DerivedMessage]:
+        """What a window that has ended by `now` (ns, the capture's clock) gives; nothing in between.
+
+        `has_turn`: whether the numbers of a station, by their topic, are to be told at that time.
+        """
         if self._begin is None:
             self._begin = now
-        if now - self._begin < WINDOW:
+        if not self.is_due(now):
             return []
         begin, window = self._begin, self._window
         self._begin, self._window = now, Summary(self._session.line)
         self._windows += 1
-        messages = [*self._of_window(begin, now, window)]
+        messages = [*self._of_window(begin, now, window, has_turn)]
         if self._windows % JUDGED_EVERY == 0:
             messages += self.findings(now)
         return messages
@@ -95,7 +107,9 @@ class BusChannels:
                 messages.append(_log(finding, self._bus, now))
         return messages
 
-    def _of_window(self, begin: int, end: int, window: Summary) -> Iterator[DerivedMessage]:
+    def _of_window(
+        self, begin: int, end: int, window: Summary, has_turn: Callable[[str, int], bool]
+    ) -> Iterator[DerivedMessage]:
         span = max(1, end - begin)
         errors = window.damaged + sum(window.verdicts[verdict] for verdict in _TROUBLE)
         content: dict[str, object] = {
@@ -110,8 +124,10 @@ class BusChannels:
         whole, each = self._turn_of_ring()
         yield DerivedMessage(f"/bus/{self._bus}", BUS, end, begin, _json(content | whole))
         for node in window.nodes.present():
-            told = _of_node(node) | each.get(node.address, {})
-            yield DerivedMessage(f"/nodes/{self._bus}/{node.address}", NODE, end, begin, _json(told))
+            topic = f"/nodes/{self._bus}/{node.address}"
+            if has_turn(topic, end):
+                told = _of_node(node) | each.get(node.address, {})
+                yield DerivedMessage(topic, NODE, end, begin, _json(told))
 
     def _turn_of_ring(self) -> tuple[dict[str, object], dict[int, dict[str, object]]]:
         """Numbers of the ring and of its stations since the last call."""

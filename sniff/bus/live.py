@@ -1,7 +1,9 @@
 """A bus being captured: what the capture process sends, through the engine, for whoever shows it.
 
-The engine may be behind what comes, without harm to the recording. It is never let run for long at a time, so that
-whoever shows it can draw, and once the capture is over what is left gets a second: its octets are counted as `unseen`.
+Reads are gathered and looked at together, all that has come at once: a frame is shown as soon as it is known to be one,
+and a busy bus costs little more than a quiet one. The engine may be behind what comes, without harm to the recording.
+It is never let run for long at a time, so that whoever shows it can draw, and once the capture is over what is left
+gets a second: its octets are counted as `unseen`.
 """
 
 from __future__ import annotations
@@ -9,24 +11,27 @@ from __future__ import annotations
 import os
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 
-from dissectors.frame import Chunk, Mark
+from dissectors.line import NS_PER_S
 from dissectors.manifest import Dissector
 from dissectors.profiles import Devices
 from sniff.analysis.autodetect import Detecting
-from sniff.analysis.points import PointReader, Sample
+from sniff.analysis.points import PointReader
 from sniff.bus.autodetect import Progress, Search
 from sniff.bus.derived_topics import BusChannels, DerivedMessage
 from sniff.bus.model import BusModel
-from sniff.bus.router import Router
-from sniff.bus.thinning import Budget, Room
-from sniff.bus.value_topics import ValueChannels
+from sniff.bus.recorded_values import RecordedValues
+from sniff.bus.router import Router, octets_of
+from sniff.bus.thinning import Budget
+from sniff.bus.value_topics import ValueMessage
 from sniff.capture.link import CaptureLink
-from sniff.capture.wire import Ended, Message, Received, Status, Tick
+from sniff.capture.wire import Batch, Ended, Heard, Received, Status, Tick, one_by_one
+from sniff.engine.blocks import Block, Gathering, blocks_of
+from sniff.engine.bulk import BulkEngine
 from sniff.engine.engine import Output
-from sniff.engine.follow_settings import engine_for
 from sniff.engine.session import LineEvent, Session
+from sniff.engine.table import Table
 
 AT_ONCE = 0.2
 """Seconds that one `poll` may spend with the engine."""
@@ -34,16 +39,18 @@ AT_ONCE = 0.2
 TO_THE_END = 1.0
 """Seconds that the engine gets for what had come when the capture ended."""
 
-PIECE = 2048
-"""Octets given to the engine at a time."""
+PIECE = 8192
+"""Octets that are not gathered any further: so many are given to the engine at a time."""
 
-VALUES_AT_ONCE = 4000
+UNWATCHED = NS_PER_S // 2
+"""ns that reads are gathered for where nobody looks at single rows: so much at once costs a tenth a frame."""
+
 NODES_A_SECOND, NODES_AT_ONCE = 0.5, 600
-"""What goes back into the recording of the values of points and of the numbers of stations: `sniff/bus/thinning.py`."""
-
-NODES = "/nodes/"
+"""What goes back into the recording of the numbers of stations: `sniff/bus/thinning.py`."""
 
 LiveItem = Output | LineEvent | Status | Ended
+LiveTables = Table | Output | LineEvent | Status | Ended
+"""Few rows come as objects, many as a table."""
 
 
 class LiveBus:
@@ -63,27 +70,33 @@ class LiveBus:
         devices: Devices | None = None,
         detecting: Detecting | None = None,
         router: Router | None = None,
+        watched: bool = True,
     ) -> None:
-        """`router`: shared by all buses of the link; a bus that is shown alone has its own."""
+        """`router`: shared by all buses of the link; a bus that is shown alone has its own. `watched`: whether somebody
+        looks at rows and values as they come; else rows may be half a second late, and `model.points` stays empty.
+        """
         self.link = link
         self._router = router or Router(link)
         self._router.open(bus)
         self.bus = bus
-        self.engine = engine_for(link.session(bus))
+        self.engine = BulkEngine(link.session(bus))
         self.search = None
         if detecting is not None:
             self.search = Search(link, detecting, "line" not in self.session.unknown, bus)
         self.status = Status(bus, path=link.paths[bus] if bus < len(link.paths) else "", priority=link.priority)
         self.ended: Ended | None = None
         self.devices = devices or Devices()
-        self._pending: deque[Message] = deque()
+        self._pending: deque[Batch] = deque()
+        self._gathering = Gathering()  # reads that wait for the engine
+        self._gathered_since = 0  # when the first of them came, ns
+        self._now: int | None = None  # up to when all that was heard has come here
+        self._patience = 0 if watched else UNWATCHED
         self._leave_at: float | None = None  # when what is pending is not looked at any more
         self._skipped = 0
-        self._channels = ValueChannels(self.session.bus, self.devices) if link.paths else None
-        self._room = Room()
-        self._values_budget = Budget(Room.LEAST, VALUES_AT_ONCE)
+        self._watched = watched
+        self._values = RecordedValues(self.session.bus, self.dissector, self.devices) if link.paths else None
         self._nodes_budget = Budget(NODES_A_SECOND, NODES_AT_ONCE)
-        self.model = BusModel(self.session, self.dissector, self.devices)
+        self.model = BusModel(self.session, self.dissector, self.devices, with_points=watched)
         self._settle()
 
     @property
@@ -117,11 +130,15 @@ class LiveBus:
         return bool(self.link.paths) and (not self.status.path or not os.path.exists(self.status.path))
 
     def poll(self, timeout: float = 0.0) -> list[LiveItem]:
-        """What has come, in order; waits up to `timeout` seconds. The end closes the engine and comes last.
+        """What has come, in order, row by row; waits up to `timeout` seconds. The end closes the engine and comes last.
 
         What takes longer than some tenths of a second waits for the next call.
         """
-        items: list[LiveItem] = []
+        return list(_row_by_row(self.poll_tables(timeout)))
+
+    def poll_tables(self, timeout: float = 0.0) -> list[LiveTables]:
+        """The same, many rows at a time."""
+        items: list[LiveTables] = []
         if self._pending:
             self.link.look()
         else:
@@ -136,21 +153,60 @@ class LiveBus:
             items += self._next()
             if not self._pending and self._leave_at is not None:  # the end is near: go there
                 self._pending.extend(self._router.receive(self.bus))
+        return items if self.ended is not None else [*items, *self._up_to_now()]
+
+    def _next(self) -> list[LiveTables]:
+        """Take the next message; once the time is over, reads are only counted."""
+        message = self._pending.popleft()
+        octets = octets_of(message)
+        if not octets:
+            return self._take(message)
+        if message.bus != self.bus:  # type: ignore[union-attr]
+            return []
+        if self._leave_at is not None and time.monotonic() >= self._leave_at:
+            self._skipped += octets
+            return []
+        if self._values is not None:
+            self._values.hear(octets, len(message.block) if isinstance(message, Heard) else 1)
+        if self.engine.searching:
+            return self._search_on(message)
+        item = message.block if isinstance(message, Heard) else message.item  # type: ignore[union-attr]
+        if not self._gathering.count:
+            self._gathered_since = int(item.reads.times[0]) if isinstance(item, Block) else item.time
+        self._gathering.add(item)  # type: ignore[arg-type]
+        return self._look() if self._gathering.octets >= PIECE else []
+
+    def _search_on(self, message: Batch) -> list[LiveTables]:
+        """Take reads while settings are searched for."""
+        items: list[LiveTables] = []
+        for one in one_by_one([message]):
+            if self.search is not None:
+                self.search.take(one)
+            if isinstance(one, Received):
+                items += self._some(self.engine.take(block) for block in blocks_of([one.item]))
         return items
 
-    def _next(self) -> list[LiveItem]:
-        """Take the next message, of a long read a piece; once the time is over, reads are only counted."""
-        message = self._pending.popleft()
-        if not isinstance(message, Received) or not isinstance(message.item, Chunk):
-            return self._take(message)
-        if self._leave_at is not None and time.monotonic() >= self._leave_at:
-            self._skipped += len(message.item.octets) if message.bus == self.bus else 0
-            return []
-        if len(message.item.octets) > PIECE:
-            piece, rest = cut(message.item, PIECE, self.session.line.char)
-            self._pending.appendleft(Received(message.bus, rest))
-            return self._take(Received(message.bus, piece))
-        return self._take(message)
+    def _look(self) -> list[LiveTables]:
+        """Give the engine what was gathered."""
+        return self._some(self.engine.take_some(self._gathering.take())) if self._gathering.count else []
+
+    def _up_to_now(self) -> list[LiveTables]:
+        """All that has come goes to the engine, unless more may be waited for; then what silence completes."""
+        items: list[LiveTables] = []
+        now = self._now
+        if self._gathering.count:
+            waited = None if now is None else now - self._gathered_since
+            if self._patience and (waited is None or 0 <= waited < self._patience):
+                return []
+            items = self._look()
+        return [*items, *self._advance()]
+
+    def _advance(self) -> list[LiveTables]:
+        """What silence completes."""
+        now, self._now = self._now, None
+        deadline = self.engine.deadline()
+        due = now is not None and (deadline is None or now >= deadline)
+        return self._some(self.engine.advance(now)) if due and now is not None else []
 
     def end(self) -> None:
         """Have the capture end; `poll` gives the rest, and Ended last. Again: without waiting for a slow disk."""
@@ -171,67 +227,83 @@ class LiveBus:
         recorded = self.link.paths and not self.engine.searching
         self._bus_channels = BusChannels(self.model) if recorded else None
 
-    def _take(self, message: Received | Tick | Status | Ended) -> list[LiveItem]:
-        if self.search is not None and self.engine.searching:
+    def _take(self, message: Batch) -> list[LiveTables]:
+        """Take anything but reads."""
+        if self.search is not None and self.engine.searching and not isinstance(message, Heard):
             self.search.take(message)
         if isinstance(message, Ended):
+            items = self._look()
             self.ended = message
             self.link.let_go()
-            return [*self._some(self.engine.close()), message]
+            return [*items, *self._some([self.engine.close()]), message]
         if message.bus != self.bus:
             return []
         if isinstance(message, Status):
             self.status = message
             return [message]
         if isinstance(message, Tick):
-            self._values_budget.rate = self._room.rate(message.now)
-            if self._bus_channels is not None and (messages := self._bus_channels.due(message.now)):
-                self._send(messages)
-            deadline = self.engine.deadline()
-            due = deadline is not None and message.now >= deadline
-            return self._some(self.engine.advance(message.now)) if due or deadline is None else []
-        if isinstance(message.item, Chunk):
-            self._room.add(len(message.item.octets))
+            return self._pass_time(message.now)
+        if isinstance(message, Received) and isinstance(message.item, LineEvent):
+            return self._happen(message.item)
+        return []
+
+    def _pass_time(self, now: int) -> list[LiveTables]:
+        """All that was heard up to `now` (ns) has come here."""
+        self._now = now
+        if self._values is not None:
+            self._values.pass_time(now)
+        if self._bus_channels is None:
+            return []
+        items = [*self._look(), *self._advance()] if self._bus_channels.is_due(now) else []
+        messages = self._bus_channels.due(now, self._nodes_budget.take)
+        if messages:
+            self._send(messages)
+        return items
+
+    def _happen(self, event: LineEvent) -> list[LiveTables]:
+        """Take what happened to the line."""
+        items = self._look()
         was_searching = self.engine.searching
-        output = self.engine.take(message.item)
+        table = self.engine.take(event)
         if was_searching and not self.engine.searching:
             self.model.settle(self.session, self.dissector)
+            if self._values is not None:
+                self._values.settle(self.dissector)
             self._settle()
-        if not isinstance(message.item, LineEvent):
-            return self._some(output)
-        self.model.add_line_event(message.item)
-        return [message.item, *self._some(output)]
+        self.model.add_line_event(event)
+        return [*items, event, *self._some([table])]
 
-    def _some(self, output: Output) -> list[LiveItem]:
-        if not output:
-            return []
-        self.model.add(output)
-        if self._bus_channels is not None:
-            self._bus_channels.add(output)
-        if self._channels is not None:
-            for sample in self.model.samples:
-                self._record(sample)
-        return [output]
+    def _some(self, made: Iterable[Output | Table]) -> list[LiveTables]:
+        items: list[LiveTables] = []
+        for one in made:
+            if not one:
+                continue
+            items.append(one)
+            for observer in (self.model, self._bus_channels):
+                if observer is not None and isinstance(one, Table):
+                    observer.add_table(one)
+                elif observer is not None and isinstance(one, Output):
+                    observer.add(one)
+            if self._values is not None:
+                told = self._values.of_samples(self.model.samples) if self._watched else self._values.of_rows(one)
+                for value in told:
+                    self._record(value)
+        return items
 
-    def _record(self, sample: Sample) -> None:
+    def _record(self, value: ValueMessage) -> None:
         """Send a value back into the file, best effort."""
-        message = self._channels.message(sample) if self._channels is not None else None
-        if message is not None and self._values_budget.take(message.topic, message.time):
-            self.link.derived(
-                self.bus, message.topic, message.schema, message.time, message.time, message.data, message.metadata
-            )
+        time = value.time
+        self.link.derived(self.bus, value.topic, value.schema, time, time, value.data, value.metadata)
 
     def _send(self, messages: list[DerivedMessage]) -> None:
         """Send statistics and findings back into the file, best effort."""
         for one in messages:
-            if one.topic.startswith(NODES) and not self._nodes_budget.take(one.topic, one.log_time):
-                continue
             self.link.derived(self.bus, one.topic, one.schema, one.log_time, one.publish_time, one.data, one.metadata)
 
 
-def cut(chunk: Chunk, at: int, char: int) -> tuple[Chunk, Chunk]:
-    """A read as two, of octets that followed each other at the speed of the line (`char`: ns an octet)."""
-    marks = tuple(mark for mark in chunk.marks if mark.offset < at)
-    rest = tuple(Mark(mark.offset - at, mark.error) for mark in chunk.marks if mark.offset >= at)
-    late = len(chunk.octets) - at
-    return Chunk(chunk.time - late * char, chunk.octets[:at], marks), Chunk(chunk.time, chunk.octets[at:], rest)
+def _row_by_row(items: list[LiveTables]) -> Iterator[LiveItem]:
+    for item in items:
+        if isinstance(item, Table):
+            yield from item.outputs()
+        else:
+            yield item

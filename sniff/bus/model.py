@@ -12,7 +12,9 @@ from sniff.analysis.judging import Judging
 from sniff.analysis.load import KEPT_SECONDS
 from sniff.analysis.points import PointReader, PointTable, Sample
 from sniff.analysis.summary import Summary
+from sniff.bus.telling_rows import telling_rows, telling_transactions
 from sniff.engine.engine import Output
+from sniff.engine.observer import TableObserver
 from sniff.engine.session import LineEvent, Session
 
 if TYPE_CHECKING:
@@ -66,14 +68,18 @@ class BusModel:
             self.points.add(self.samples)
 
     def add_table(self, table: Table) -> None:
-        """Take many rows at once: counted as columns, judged row by row."""
+        """Take many rows at once; who only takes row by row gets them so."""
         self.version += 1
         self.summary.add_table(table)
-        for output in table.outputs():
-            self.judging.add(output)
-            if self._with_points:
-                self.samples = self.reader.add(output)
-                self.points.add(self.samples)
+        judging: object = self.judging
+        if isinstance(judging, TableObserver):
+            judging.add_table(table)
+        else:
+            for output in table.outputs():
+                self.judging.add(output)
+        if self._with_points:
+            self.samples = self.reader.add(telling_rows(table, telling_transactions(table)))
+            self.points.add(self.samples)
 
     def add_line_event(self, event: LineEvent) -> None:
         """Take something that happened to the line."""

@@ -6,7 +6,7 @@ from collections import Counter, deque
 
 from dissectors.frame import Chunk
 from sniff.capture.link import CaptureLink
-from sniff.capture.wire import Ended, Message, Received, Tick
+from sniff.capture.wire import Batch, Ended, Heard, Received, Tick
 
 HELD = 4 << 20
 """Octets kept for a bus that nobody asks for; more are dropped, and counted. The recording has them."""
@@ -18,17 +18,17 @@ class Router:
     def __init__(self, link: CaptureLink) -> None:
         self.link = link
         self.dropped: Counter[int] = Counter()
-        self._queues: dict[int, deque[Message]] = {}
+        self._queues: dict[int, deque[Batch]] = {}
         self._held: Counter[int] = Counter()
 
     def open(self, bus: int) -> None:
         """From now on somebody asks for this bus; what comes of others is nobody's."""
         self._queues.setdefault(bus, deque())
 
-    def receive(self, bus: int, timeout: float = 0.0) -> list[Message]:
+    def receive(self, bus: int, timeout: float = 0.0) -> list[Batch]:
         """What has come of a bus, in order; waits up to `timeout` seconds for something of any."""
         queue = self._queues[bus]
-        for message in self.link.receive(0.0 if queue else timeout):
+        for message in self.link.receive_batches(0.0 if queue else timeout):
             self._hand_on(message)
         given = list(queue)
         queue.clear()
@@ -41,7 +41,7 @@ class Router:
         if killed is not None:
             self._hand_on(killed)
 
-    def _hand_on(self, message: Message) -> None:
+    def _hand_on(self, message: Batch) -> None:
         if isinstance(message, Ended):
             for queue in self._queues.values():
                 queue.append(message)
@@ -52,10 +52,17 @@ class Router:
         if isinstance(message, Tick) and queue_of and isinstance(queue_of[-1], Tick):
             queue_of[-1] = message  # the newer one says it all
             return
-        if isinstance(message, Received) and isinstance(message.item, Chunk):
-            octets = len(message.item.octets)
+        octets = octets_of(message)
+        if octets:
             if self._held[message.bus] + octets > HELD:
                 self.dropped[message.bus] += octets
                 return
             self._held[message.bus] += octets
         queue_of.append(message)
+
+
+def octets_of(message: Batch) -> int:
+    """How many octets of the line came with it."""
+    if isinstance(message, Heard):
+        return len(message.block.reads.octets)
+    return len(message.item.octets) if isinstance(message, Received) and isinstance(message.item, Chunk) else 0

@@ -7,6 +7,8 @@ computed from the octets whenever somebody asks.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from dissectors.line import NS_PER_S
 
 A_SECOND = 800.0
@@ -26,9 +28,9 @@ class Room:
         self._begin: int | None = None
         self._size = A_SECOND
 
-    def add(self, octets: int) -> None:
-        """A read came."""
-        self._reads += 1
+    def add(self, octets: int, reads: int = 1) -> None:
+        """Reads came, with so many octets."""
+        self._reads += reads
         self._octets += octets
 
     def rate(self, now: int) -> float:
@@ -54,16 +56,27 @@ class Budget:
 
     def take(self, channel: str, now: int) -> bool:
         """Whether a message of a channel is to be written at `now` (ns)."""
+        self._pass(now)
+        if not self._has_turn(channel, now):
+            return False
+        self._left -= 1
+        self._last[channel] = now
+        return True
+
+    def would_take(self, channels: Iterable[str], now: int) -> bool:
+        """Whether a message of any of these channels would be written at `now` (ns)."""
+        self._pass(now)
+        return any(self._has_turn(channel, now) for channel in channels)
+
+    def _pass(self, now: int) -> None:
         passed = 0 if self._at is None else max(0, now - self._at)
         self._at = now if self._at is None else max(self._at, now)
         self._left = min(self._burst, self._left + passed / NS_PER_S * self.rate)
+
+    def _has_turn(self, channel: str, now: int) -> bool:
         last = self._last.get(channel)
         if last is not None and self._left < self._burst / 2:
             turn = len(self._last) / self.rate * NS_PER_S
             if 0 <= now - last < turn:
                 return False
-        if self._left < 1:
-            return False
-        self._left -= 1
-        self._last[channel] = now
-        return True
+        return self._left >= 1

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from dissectors.profiles import Devices, Entry
@@ -36,18 +37,27 @@ class ValueChannels:
         self._schemas: dict[str, str] = {}
         self._metadata: dict[str, dict[str, str]] = {}
         self._bits: dict[str, object] = {}
+        self._topics: dict[tuple[str, str], str] = {}
 
-    def message(self, sample: Sample) -> ValueMessage | None:
-        """The message of a sample; None when there is nothing to write."""
+    def topic(self, sample: Sample) -> str:
+        """Where samples of its point go."""
+        key = sample.station, sample.name
+        topic = self._topics.get(key)
+        if topic is None:
+            topic = f"{self._prefix}/{sample.station}/{_safe(sample.name)}"
+            if len(self._topics) < MOST_CHANNELS:
+                self._topics[key] = topic
+        return topic
+
+    def message(self, sample: Sample, wanted: Callable[[str, int], bool] = lambda *_: True) -> ValueMessage | None:
+        """The message of a sample; None when there is nothing to write. `wanted`: whether a topic has its turn then."""
         value = sample.value
         text = isinstance(value.value, str)
         if not text and not sample.finite:
             return None  # JSON has no word for it
-        topic = f"{self._prefix}/{sample.station}/{_safe(sample.name)}"
-        if value.bit:
-            if self._bits.get(topic) == value.value:
-                return None
-            self._bits[topic] = value.value
+        topic = self.topic(sample)
+        if value.bit and self._bits.get(topic) == value.value:
+            return None
         schema = TEXTS if text else NUMBERS
         known = self._schemas.get(topic)
         if known is None:
@@ -57,6 +67,10 @@ class ValueChannels:
             self._metadata[topic] = self._describe(sample)
         elif known != schema:
             return None  # a channel has one schema
+        if not wanted(topic, sample.time):
+            return None
+        if value.bit:
+            self._bits[topic] = value.value
         content: dict[str, object] = {"value": value.value, "raw": value.raw}
         if value.raw is None:
             del content["raw"]

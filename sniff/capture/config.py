@@ -54,12 +54,16 @@ class RecordSpec:
 
 @dataclass(frozen=True, slots=True)
 class CaptureConfig:
-    """Everything the capture process is told. Its limits: `duration`, ns, and `count`, frames; None for no end."""
+    """Everything the capture process is told. Its limits: `duration`, ns, and `count`, frames; None for no end.
+
+    `watched`: whether somebody looks at what comes as it comes; else it is sent less often.
+    """
 
     sources: tuple[SourceSpec, ...]
     record: RecordSpec | None = None
     duration: int | None = None
     count: int | None = None
+    watched: bool = True
 
     def to_json(self) -> dict[str, Any]:
         """Plain values."""
@@ -84,4 +88,10 @@ class CaptureConfig:
             for source in value["sources"]
         )
         record = value["record"]
-        return cls(sources, None if record is None else RecordSpec(**record), value["duration"], value["count"])
+        return cls(
+            sources,
+            None if record is None else RecordSpec(**record),
+            value["duration"],
+            value["count"],
+            value["watched"],
+        )

@@ -15,6 +15,7 @@ from sniff.capture.config import CaptureConfig, RecordSpec, SourceSpec
 from sniff.capture.spawn import Spawned, spawn
 from sniff.capture.wire import (
     LOSSY,
+    Batch,
     Derived,
     Ended,
     Kind,
@@ -28,7 +29,8 @@ from sniff.capture.wire import (
     encode_item,
     encode_json,
     gap_event,
-    octets_of_chunk,
+    octets_in,
+    one_by_one,
 )
 from sniff.engine.capture import CaptureError
 from sniff.engine.session import Session, SettingsChange
@@ -98,13 +100,15 @@ class CaptureLink:
         record: RecordSpec | None = None,
         duration: float | None = None,
         count: int | None = None,
+        watched: bool = True,
     ) -> CaptureLink:
         """Start listening; returns when all ports are open and all files begun.
 
         `duration`: seconds, `count`: frames after which it ends, whatever becomes of this process; None for no end.
-        Raises PortError or CaptureError with the reason.
+        `watched`: as `CaptureConfig` has it. Raises PortError or CaptureError with the reason.
         """
-        config = CaptureConfig(tuple(sources), record, None if duration is None else int(duration * 1e9), count)
+        limit = None if duration is None else int(duration * 1e9)
+        config = CaptureConfig(tuple(sources), record, limit, count, watched)
         words = [source.spec for source in config.sources] + ([config.record.path] if config.record else [])
         link = cls(spawn(words))
         try:
@@ -148,10 +152,15 @@ class CaptureLink:
         return self._connection.fileno()
 
     def receive(self, timeout: float = 0.0) -> list[Message]:
-        """What has come, in order; waits up to `timeout` seconds for something. After Ended always empty."""
+        """What has come, in order, each read by itself; waits up to `timeout` seconds for something. After Ended always
+        empty."""
+        return list(one_by_one(self.receive_batches(timeout)))
+
+    def receive_batches(self, timeout: float = 0.0) -> list[Batch]:
+        """The same, many reads at a time."""
         if self.ended is not None:
             return []
-        messages: list[Message] = []
+        messages: list[Batch] = []
         alive = self.look(0.0 if self._waiting else timeout)
         try:
             given = 0
@@ -184,7 +193,7 @@ class CaptureLink:
         self._kill()
         return Ended(f"capture process: {error}", clean=False)
 
-    def _finish(self, messages: list[Message], ended: Ended) -> list[Message]:
+    def _finish(self, messages: list[Batch], ended: Ended) -> list[Batch]:
         self.ended = ended
         if not messages or messages[-1] is not ended:
             messages.append(ended)
@@ -214,16 +223,16 @@ class CaptureLink:
 
     def _keep(self, kind: int, bus: int, body: bytes) -> None:
         """Have a message wait for the caller; reads are dropped when too much waits already."""
-        if kind == Kind.CHUNK:
+        if kind in (Kind.CHUNK, Kind.READS):
             gap = self._gap.get(bus, 0)
             if self._waiting_size > (MOST_WAITING // 2 if gap else MOST_WAITING):
-                octets = octets_of_chunk(body)[1]
+                octets = octets_in(kind, body)[1]
                 self._gap[bus] = gap + octets
                 self.dropped[bus] = self.dropped.get(bus, 0) + octets
                 return
             if gap:
                 self._gap[bus] = 0
-                event = gap_event(octets_of_chunk(body)[0], gap)
+                event = gap_event(octets_in(kind, body)[0], gap)
                 for message in MessageSplitter().feed(encode_item(bus, event)):
                     self._add(*message)
         elif kind == Kind.ENDED:

@@ -1,24 +1,23 @@
 """The capture loop: wait for octets, stamp them, hand them to recorder and pipe. Nothing in it waits but the poll.
 
 Time is cut into beats. In each beat what came is gathered and goes into the pipe in one write, closed by a Tick for
-every bus: all that the bus gave up to then has been sent. Beats are 20 ms apart while octets come and shortly after,
-250 ms in silence.
+every bus: all that the bus gave up to then has been sent. Beats are 20 ms apart while octets come and shortly after
+(100 ms where nobody watches), 250 ms in silence.
 """
 
 from __future__ import annotations
 
-import contextlib
-import selectors
 import socket
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 from dissectors.frame import Chunk
 from dissectors.line import NS_PER_S, LineSettings
 from sniff.capture.disk_watch import DiskWatch
 from sniff.capture.frame_counter import FrameCounter
 from sniff.capture.outlet import Outlet
+from sniff.capture.waiting import Waiting
 from sniff.capture.wire import (
     LOSSY,
     NOTHING_MORE,
@@ -36,6 +35,7 @@ from sniff.sources import PortError, Source
 from sniff.sources.clock import NS_PER_MS, STEP, Clock
 
 BEAT = 20 * NS_PER_MS
+UNWATCHED_BEAT = 100 * NS_PER_MS
 IDLE_BEAT = 250 * NS_PER_MS
 BUSY_FOR = 100 * NS_PER_MS
 """After the last octet beats stay short for so long."""
@@ -67,6 +67,7 @@ class _Bus:
 
     index: int
     source: Source
+    recorder: Recorder | None = None
     fd: int | None = None
     due: int = _FAR
     octets: int = 0
@@ -78,7 +79,8 @@ class CaptureLoop:
     """Runs until somebody says `stop`. `commands`: the connection that the main process sends on, None for none.
 
     `sessions`: of the sources, in their order; where settings are searched for, the first item of a bus says so.
-    `end_at`, `count`: its limits, ns on the clock and frames of all buses.
+    `end_at`, `count`: its limits, ns on the clock and frames of all buses. `watched`: whether somebody looks at what
+    comes as it comes.
     """
 
     clock: Clock
@@ -91,31 +93,38 @@ class CaptureLoop:
     end_at: int | None = None
     count: int | None = None
     sessions: list[Session] = field(default_factory=list)
+    watched: bool = True
     reason: str | None = None
     closing: bool = False
     _hurried: bool = False
     _offset: int = 0
     _due: int = _FAR
+    _heard: bool = False  # since the last step
     _buses: list[_Bus] = field(default_factory=list)
 
     def run(self) -> str:
         """Capture; why it ended, in words."""
-        self._selector = selectors.DefaultSelector()
-        self._buses = [_Bus(index, source) for index, source in enumerate(self.sources)]
+        self._waiting = Waiting()
+        recorders: list[Recorder | None] = [*self.recorders] or [None] * len(self.sources)
+        self._buses = [
+            _Bus(index, source, recorder)
+            for index, (source, recorder) in enumerate(zip(self.sources, recorders, strict=True))
+        ]
         self._splitter = MessageSplitter()
         self._counters = [FrameCounter(session) for session in self.sessions] if self.count is not None else []
         self._watches = [DiskWatch() for _ in self.recorders]
         self._seeking = {index for index, session in enumerate(self.sessions) if "line" in session.unknown}
         self._unknown = {index for index, session in enumerate(self.sessions) if session.unknown}
+        self._beat_while_busy = BEAT if self.watched or self._unknown or self._counters else UNWATCHED_BEAT
         now = self.clock.now()
         self._beat_at = self._status_at = now
         self._busy_until = now
         if self.commands is not None:
             self.commands.setblocking(False)
-            self._selector.register(self.commands, selectors.EVENT_READ, self._take_commands)
+            self._waiting.register(self.commands.fileno(), self._take_commands)
         if self.waker is not None:
             waker = self.waker
-            self._selector.register(waker, selectors.EVENT_READ, lambda: (waker.recv(64), None)[1])
+            self._waiting.register(waker.fileno(), lambda: waker.recv(64))
         for session, bus in zip(self.sessions, self._buses, strict=False):
             if session.unknown:  # before the first octet: it was heard with settings that are only tried
                 self._settings(bus, SettingsChange(session.line, searching=True))
@@ -145,9 +154,9 @@ class CaptureLoop:
                 said = now + CLOSING_EVERY
                 self._send_status()
                 self.outlet.flush()
-            for key, _ in self._selector.select(LOOK_EVERY):
-                if key.fd not in [bus.fd for bus in self._buses]:
-                    key.data()
+            for fd, call in self._waiting.wait(LOOK_EVERY):
+                if fd not in [bus.fd for bus in self._buses]:
+                    call()
         until = time.monotonic() + SYNC_PATIENCE
         for recorder in self.recorders:
             recorder.give_up()
@@ -166,10 +175,13 @@ class CaptureLoop:
 
     def _step(self) -> None:
         wait = min(self._beat_at, self._due) - self.clock.now()
-        for key, _ in self._selector.select(max(0, wait) / 1e9):
-            call: Callable[[], None] = key.data
+        for _, call in self._waiting.wait(max(0, wait) / 1e9):
             call()
         now = self.clock.now()
+        if self._heard:
+            self._heard = False
+            self._busy_until = now + BUSY_FOR
+            self._beat_at = min(self._beat_at, now + self._beat_while_busy)
         if self._due <= now:
             for bus in self._buses:
                 if bus.due <= now:
@@ -187,12 +199,13 @@ class CaptureLoop:
             if isinstance(item, Chunk):
                 bus.octets += len(item.octets)
         if items:
-            self._hurry()
+            self._heard = True
         fd = source.fileno()
         if fd != bus.fd:
             self._watch(bus, fd)
         deadline = source.deadline()
-        self._set_due(bus, _FAR if deadline is None else deadline)
+        if deadline != bus.due:
+            self._set_due(bus, _FAR if deadline is None else deadline)
         if source.ended and not bus.ended:
             bus.ended = True
             self._set_due(bus, _FAR)
@@ -207,28 +220,22 @@ class CaptureLoop:
             self._due = min(other.due for other in self._buses)
 
     def _keep(self, index: int, item: Item) -> None:
-        if self.recorders:
+        recorder = self._buses[index].recorder
+        if recorder is not None:
             if isinstance(item, Chunk):
-                self.recorders[index].chunk(item)
+                recorder.chunk(item)
             else:
-                self.recorders[index].line(item)
+                recorder.line(item)
         if self._counters:
             self._counters[index].item(item)
         self.outlet.item(index, item)
 
-    def _hurry(self) -> None:
-        now = self.clock.now()
-        self._busy_until = now + BUSY_FOR
-        if self._beat_at > now + BEAT:
-            self._beat_at = now + BEAT
-
     def _watch(self, bus: _Bus, fd: int | None) -> None:
         if bus.fd is not None:
-            with contextlib.suppress(KeyError, ValueError, OSError):
-                self._selector.unregister(bus.fd)
+            self._waiting.unregister(bus.fd)
         bus.fd = fd
         if fd is not None:
-            self._selector.register(fd, selectors.EVENT_READ, lambda: (self._take(bus), None)[1])
+            self._waiting.register(fd, partial(self._take, bus))
 
     # -- beats -------------------------------------------------------------------------------------------------
 
@@ -244,7 +251,7 @@ class CaptureLoop:
             self._send_status()
         self.outlet.flush()
         busy = now < self._busy_until or self.outlet.size
-        self._beat_at = now + (BEAT if busy else IDLE_BEAT)
+        self._beat_at = now + (self._beat_while_busy if busy else IDLE_BEAT)
         for recorder in self.recorders:
             if recorder.due is not None:
                 self._beat_at = min(self._beat_at, max(now, recorder.due))
@@ -322,7 +329,7 @@ class CaptureLoop:
         except WireError:
             data = b""  # not our main process: stop listening to it
         if not data:
-            self._selector.unregister(self.commands)
+            self._waiting.unregister(self.commands.fileno())
             self.commands = None
             if self.closing:
                 return

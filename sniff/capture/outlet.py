@@ -7,7 +7,8 @@ import socket
 import time
 from collections import deque
 
-from sniff.capture.wire import encode_item, gap_event
+from dissectors.frame import Chunk
+from sniff.capture.wire import A_READ, encode_item, encode_reads, gap_event
 from sniff.engine.session import Item
 
 BACKLOG = 2 * 1024 * 1024
@@ -17,14 +18,21 @@ AT_ONCE = 256 * 1024
 """Octets given to the connection in one call, and asked for as its buffer."""
 
 
+TOGETHER = 64 * 1024
+"""Octets of reads of one bus that become one message."""
+
+
 class Outlet:
-    """Sends messages over a connection. `dropped[bus]`: octets of the line that were not sent."""
+    """Sends messages over a connection; reads of a bus that follow one another go together. `dropped[bus]`: octets of
+    the line that were not sent."""
 
     def __init__(self, connection: socket.socket, buses: int, backlog: int = BACKLOG) -> None:
         self._connection: socket.socket | None = connection.dup()  # closed here; others may still wait on theirs
         self._backlog = backlog
         self._parts: deque[bytes] = deque()
         self._size = 0
+        self._reads: list[list[Chunk]] = [[] for _ in range(buses)]  # that are no message yet
+        self._unsealed = [0] * buses  # octets that they will take
         self._gap = [0] * buses  # octets dropped since the last that were sent
         self.dropped = [0] * buses
         connection.setblocking(False)
@@ -44,7 +52,7 @@ class Outlet:
         """Send a chunk or line event, unless the reader is too far behind."""
         if self._connection is None:
             return
-        octets = getattr(item, "octets", b"")
+        octets = item.octets if isinstance(item, Chunk) else b""
         if self._size > self._backlog or (self._gap[bus] and self._size > self._backlog // 2):
             self._gap[bus] += max(1, len(octets))
             self.dropped[bus] += len(octets)
@@ -52,6 +60,14 @@ class Outlet:
         if self._gap[bus]:
             self.post(encode_item(bus, gap_event(item.time, self._gap[bus])))
             self._gap[bus] = 0
+        if isinstance(item, Chunk) and octets and not item.marks:
+            taken = len(octets) + A_READ
+            self._reads[bus].append(item)
+            self._unsealed[bus] += taken
+            self._size += taken
+            if self._unsealed[bus] > TOGETHER:
+                self._seal(bus)
+            return
         self.post(encode_item(bus, item))
 
     def droppable(self, message: bytes) -> None:
@@ -61,12 +77,29 @@ class Outlet:
 
     def post(self, message: bytes) -> None:
         """Send a message that must arrive; `flush` does it."""
+        self._seal_all()
+        self._add(message)
+
+    def _add(self, message: bytes) -> None:
         if self._connection is not None:
             self._parts.append(message)
             self._size += len(message)
 
+    def _seal_all(self) -> None:
+        for bus, reads in enumerate(self._reads):
+            if reads:
+                self._seal(bus)
+
+    def _seal(self, bus: int) -> None:
+        """Make a message of the reads of a bus."""
+        reads, self._reads[bus] = self._reads[bus], []
+        self._size -= self._unsealed[bus]
+        self._unsealed[bus] = 0
+        self._add(encode_reads(bus, reads))
+
     def flush(self) -> None:
         """Give the connection what it takes now."""
+        self._seal_all()
         while self._parts and self._connection is not None:
             data = b"".join(self._parts) if len(self._parts) > 1 else self._parts[0]
             data, rest = data[:AT_ONCE], data[AT_ONCE:]
@@ -99,6 +132,8 @@ class Outlet:
         """Nobody reads any more: forget what was held."""
         connection, self._connection = self._connection, None
         self._parts.clear()
+        self._reads = [[] for _ in self._reads]
+        self._unsealed = [0] * len(self._unsealed)
         self._size = 0
         if connection is not None:
             with contextlib.suppress(OSError):

@@ -8,6 +8,7 @@ it is told to stop (`kill PID`), its time is over, or its ports are gone for goo
 from __future__ import annotations
 
 import contextlib
+import gc
 import os
 import signal
 import socket
@@ -114,11 +115,20 @@ def _capture(
     }
     outlet.post(encode_json(Kind.HELLO, hello))
     loop = CaptureLoop(
-        clock, sources, recorders, outlet, connection, priority=priority, count=config.count, sessions=sessions
+        clock,
+        sources,
+        recorders,
+        outlet,
+        connection,
+        priority=priority,
+        count=config.count,
+        sessions=sessions,
+        watched=config.watched,
     )
     if config.duration is not None:
         loop.end_at = clock.now() + config.duration
     waker = _end_on_signals(loop)
+    gc.freeze()  # what is there by now stays: no need to look through it again and again
     try:
         reason = loop.run()
     except BaseException:

@@ -10,12 +10,16 @@ from __future__ import annotations
 
 import json
 import struct
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from enum import IntEnum
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from dissectors.frame import Chunk, LineError, Mark
 from sniff.engine.session import Item, LineEvent, LineEventKind
+
+if TYPE_CHECKING:
+    from sniff.engine.blocks import Block
 
 LIMIT = 16 * 1024 * 1024
 """Longest message, octets."""
@@ -35,6 +39,7 @@ class Kind(IntEnum):
     TICK = 5
     STATUS = 6  # JSON
     ENDED = 7  # text
+    READS = 8  # of one bus, in which no line error was reported
 
     CONFIG = 32  # JSON
     DERIVED = 33
@@ -48,6 +53,13 @@ class Received(NamedTuple):
 
     bus: int
     item: Item
+
+
+class Heard(NamedTuple):
+    """Reads of a bus, one or more, which follow one another."""
+
+    bus: int
+    block: Block
 
 
 class Tick(NamedTuple):
@@ -104,6 +116,8 @@ class Ended:
 
 
 Message = Received | Tick | Status | Ended
+Batch = Heard | Message
+"""What comes of many reads at a time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,6 +135,9 @@ class Derived:
 
 _FRAME = struct.Struct("<IBB")
 _CHUNK = struct.Struct("<qH")
+_COUNT = struct.Struct("<I")
+A_READ = 12
+"""Octets that a read takes beside what it holds."""
 _MARK = struct.Struct("<IB")
 _TICK = struct.Struct("<q")
 _LINE = struct.Struct("<qqB")
@@ -148,6 +165,14 @@ def encode_item(bus: int, item: Item) -> bytes:
     return encode(Kind.LINE, bus, _LINE.pack(item.time, item.count, _LINE_CODES[item.kind]) + text)
 
 
+def encode_reads(bus: int, chunks: Sequence[Chunk]) -> bytes:
+    """Reads that hold octets and no marks, at least one: u32 n, i64 time[n], u32 length[n], the octets."""
+    count = len(chunks)
+    times = struct.pack(f"<{count}q", *[chunk.time for chunk in chunks])
+    lengths = struct.pack(f"<{count}I", *[len(chunk.octets) for chunk in chunks])
+    return encode(Kind.READS, bus, b"".join((_COUNT.pack(count), times, lengths, *[chunk.octets for chunk in chunks])))
+
+
 def gap_event(time: int, octets: int) -> LineEvent:
     """What stands where the main process misses octets that it was too slow for."""
     return LineEvent(
@@ -155,12 +180,14 @@ def gap_event(time: int, octets: int) -> LineEvent:
     )
 
 
-def octets_of_chunk(body: bytes) -> tuple[int, int]:
-    """Time (ns) and number of the octets in the body of a CHUNK. Raises WireError."""
+def octets_in(kind: int, body: bytes) -> tuple[int, int]:
+    """Time (ns, of the first read) and number of the octets in the body of a CHUNK or of READS. Raises WireError."""
     try:
+        if kind == Kind.READS:
+            return _TICK.unpack_from(body, _COUNT.size)[0], max(0, len(body) - _octets_at(_COUNT.unpack_from(body)[0]))
         time, marks = _CHUNK.unpack_from(body)
     except struct.error as error:
-        raise WireError(f"message {Kind.CHUNK}: {error}") from error
+        raise WireError(f"message {kind}: {error}") from error
     return time, max(0, len(body) - _CHUNK.size - marks * _MARK.size)
 
 
@@ -187,9 +214,11 @@ def encode_derived(derived: Derived) -> bytes:
     return encode(Kind.DERIVED, derived.bus, head + topic + schema + metadata + derived.data)
 
 
-def decode_message(kind: int, bus: int, body: bytes) -> Message | None:
+def decode_message(kind: int, bus: int, body: bytes) -> Batch | None:
     """A message to the main process; None for kinds that are not for it. Raises WireError."""
     try:
+        if kind == Kind.READS:
+            return Heard(bus, _decode_reads(body))
         if kind == Kind.CHUNK:
             return Received(bus, _decode_chunk(body))
         if kind == Kind.TICK:
@@ -205,6 +234,38 @@ def decode_message(kind: int, bus: int, body: bytes) -> Message | None:
     except (struct.error, IndexError, TypeError, ValueError) as error:
         raise WireError(f"message {kind}: {error}") from error
     return None
+
+
+def one_by_one(messages: Iterable[Batch]) -> Iterator[Message]:
+    """The same with every read by itself."""
+    for message in messages:
+        if isinstance(message, Heard):
+            for chunk in message.block.chunks():
+                yield Received(message.bus, chunk)
+        else:
+            yield message
+
+
+def _octets_at(count: int) -> int:
+    """Where the octets of so many reads begin in the body of READS."""
+    return _COUNT.size + A_READ * count
+
+
+def _decode_reads(body: bytes) -> Block:
+    import numpy as np  # which the capture process does without
+
+    from sniff.engine.blocks import Block, plain_reads
+
+    (count,) = _COUNT.unpack_from(body)
+    begin = _octets_at(count)
+    if not count or begin > len(body):
+        raise WireError(f"{count} reads in {len(body)} octets")
+    times = np.frombuffer(body, "<i8", count, _COUNT.size).astype(np.int64)
+    lengths = np.frombuffer(body, "<u4", count, _COUNT.size + 8 * count).astype(np.int64)
+    octets = np.frombuffer(body, np.uint8, offset=begin)
+    if int(lengths.min()) < 1 or int(lengths.sum()) != len(octets):
+        raise WireError(f"reads of {int(lengths.sum())} octets, of which {len(octets)} came")
+    return Block(plain_reads(octets, times, lengths))
 
 
 def _decode_chunk(body: bytes) -> Chunk:

@@ -18,7 +18,7 @@ from dissectors.profiles import Devices
 from dissectors.words import milliseconds
 from sniff.analysis.plain import plain
 from sniff.analysis.summary import Summary
-from sniff.bus.live import LiveBus
+from sniff.bus.live import LiveBus, LiveItem, LiveTables
 from sniff.capture.config import RecordSpec, SourceSpec
 from sniff.capture.link import CaptureLink
 from sniff.capture.wire import NOTHING_MORE, Ended, Status
@@ -123,28 +123,33 @@ def start(
     devices: Devices | None = None,
     search: Unknowns | None = None,
     count: int | None = None,
+    watched: bool = True,
 ) -> LiveBus:
-    """Start the capture process. Ends with exit code 4 for the port, 3 for the file.
+    """Start the capture process. Ends with exit code 4 for the port, 3 for the file. `watched`: as `LiveBus` has it.
 
     Recording and `duration` begin at once, also with something to `search` for; `LiveBus.searching` says how far it is.
     `duration` (seconds) and `count` (frames) are limits of the capture process, whatever becomes of this one.
     """
-    link = start_link(source, record, duration, count)
+    link = start_link(source, record, duration, count, watched)
     try:
         adapter = link.session(0).adapter
         detecting = search.detecting(adapter.latency, adapter.reports) if search is not None else None
-        return LiveBus(link, devices=devices, detecting=detecting)
+        return LiveBus(link, devices=devices, detecting=detecting, watched=watched)
     except BaseException:
         link.stop()  # a capture outlives its starter unless it is told to end
         raise
 
 
 def start_link(
-    source: SourceSpec, record: RecordSpec | None, duration: float | None = None, count: int | None = None
+    source: SourceSpec,
+    record: RecordSpec | None,
+    duration: float | None = None,
+    count: int | None = None,
+    watched: bool = True,
 ) -> CaptureLink:
     """Start the capture process without an engine. Ends with exit code 4 for the port, 3 for the file."""
     try:
-        return CaptureLink.start([source], record, duration, count)
+        return CaptureLink.start([source], record, duration, count, watched)
     except PortError as error:
         raise Failure(str(error), PORT_TROUBLE) from None
     except CaptureError as error:
@@ -188,7 +193,11 @@ class Printer:
         """What was counted."""
         return self.live.model.summary
 
-    def take(self, items: list[Output | LineEvent | Status | Ended]) -> None:
+    def poll(self, timeout: float) -> list[LiveItem] | list[LiveTables]:
+        """What has come; waits up to `timeout` seconds."""
+        return self.live.poll_tables(timeout) if self.quiet else self.live.poll(timeout)
+
+    def take(self, items: list[LiveItem] | list[LiveTables]) -> None:
         """Print what has come."""
         if self.live.session is not self._session:
             self._settle()
@@ -267,7 +276,7 @@ def run(printer: Printer, progress: bool = True) -> int:
     heeded = 0
     with until_interrupted() as caught, _stopped_by_its_reader(live):
         while live.ended is None:
-            items = live.poll(0.1)
+            items = printer.poll(0.1)
             if search_meter is not None:
                 search_meter.follow(live)
                 search_meter = None if live.searching is None else search_meter

@@ -38,7 +38,9 @@ def run(args: argparse.Namespace) -> int:
     if args.keep and not args.rotate:
         raise Failure("--keep: of which rotation? say when a new file begins with --rotate size:64MB or time:1h", USAGE)
     record = RecordSpec(path, args.rotate, args.keep)
-    live = listening.start(target.source, record, args.duration, target.devices, target.search, args.count)
+    live = listening.start(
+        target.source, record, args.duration, target.devices, target.search, args.count, watched=False
+    )
     try:
         printer = listening.Printer(live, quiet=True)
         code = listening.run(printer, not args.quiet)

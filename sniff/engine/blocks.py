@@ -83,7 +83,7 @@ def blocks_of(items: Iterable[Item | Reads]) -> Iterator[Block | LineEvent]:
     """Any items as blocks, and any columns without marks, none of which exceeds a block, between them. Empty chunks,
     which only say that time passed, are left out. Raises CaptureError as `items` does, when all before it was given.
     """
-    held = _Held()
+    held = Gathering()
     try:
         for item in items:
             if isinstance(item, LineEvent):
@@ -102,7 +102,7 @@ def blocks_of(items: Iterable[Item | Reads]) -> Iterator[Block | LineEvent]:
         yield held.take()
 
 
-class _Held:
+class Gathering:
     """Reads for one block: `count` of them with so many `octets`."""
 
     def __init__(self) -> None:
@@ -111,8 +111,11 @@ class _Held:
         self._chunks: list[Chunk] = []  # after the pieces
         self._marks: dict[int, tuple[Mark, ...]] = {}
 
-    def add(self, item: Chunk | Reads) -> None:
+    def add(self, item: Chunk | Reads | Block) -> None:
         """Take the next."""
+        if isinstance(item, Block):
+            self._marks.update({self.count + index: marks for index, marks in item.marks.items()})
+            item = item.reads
         if isinstance(item, Chunk):
             if not item.octets:
                 return
@@ -128,7 +131,7 @@ class _Held:
             self.octets += len(item.octets)
 
     def take(self) -> Block:
-        """All of them; none are held any more."""
+        """All of them, at least one; none are held any more."""
         self._close_chunks()
         block = Block(_joined(self._pieces), self._marks)
         self.count = self.octets = 0

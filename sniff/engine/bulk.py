@@ -19,7 +19,7 @@ from dissectors.manifest import Dissector
 from dissectors.tracker import Transaction
 from sniff.engine.blocks import Block
 from sniff.engine.capture import CaptureError
-from sniff.engine.engine import Output, Row
+from sniff.engine.engine import Engine, Output, Row
 from sniff.engine.follow_settings import SessionEngine
 from sniff.engine.framing import BulkFraming, Clean
 from sniff.engine.late_columns import LateColumns
@@ -29,6 +29,10 @@ from sniff.engine.table import Table, joined
 
 FAR = 1 << 61
 """ns; times beyond it are not reckoned with in columns."""
+
+
+MANY = 64
+"""Rows of the reference from which on a table of them costs its observers less than one after the other."""
 
 
 def tables(blocks: Iterable[Block | LineEvent], session: Session) -> Iterator[Table | LineEvent]:
@@ -61,17 +65,49 @@ class BulkEngine:
         """The bus; after a search, with what was found."""
         return self._session if self._reference is None else self._reference.session
 
+    def take_some(self, block: Block) -> list[Output | Table]:
+        """Take reads that follow; few rows, which cost dearly as a table, one by one."""
+        if self._reference is None and _is_sane(block):
+            return self._leg.take_some(block)
+        table = self.take(block)
+        return [table] if table else []
+
     def take(self, item: Block | LineEvent) -> Table:
         """Take what follows."""
         reference = self._reference
         if reference is not None:
             items = item.chunks() if isinstance(item, Block) else (item,)
-            return _of_outputs(reference, [reference.take(one) for one in items])
+            was_searching = reference.searching
+            table = _of_outputs(reference, [reference.take(one) for one in items])
+            if was_searching and not reference.searching:
+                self._go_on(reference)
+            return table
         if not isinstance(item, Block):
             return self._happen(item)
-        if int(item.reads.times.min()) < -FAR or int(item.reads.times.max()) > FAR:
+        if not _is_sane(item):
             return self._one_by_one(item)
         return self._leg.take(item)
+
+    def advance(self, now: int) -> list[Output | Table]:
+        """Say that no read returned up to `now` (ns)."""
+        if self._reference is None:
+            return self._leg.advance(now)
+        output = self._reference.advance(now)
+        return [output] if output else []
+
+    def deadline(self) -> int | None:
+        """When to call `advance` next (ns), or None."""
+        return self._leg.deadline() if self._reference is None else self._reference.deadline()
+
+    @property
+    def searching(self) -> bool:
+        """Whether settings are searched for."""
+        return self._reference is not None and self._reference.searching
+
+    @property
+    def dissector(self) -> Dissector:
+        """The protocol; a stand-in as long as nobody knows it."""
+        return self._leg.dissector if self._reference is None else self._reference.dissector
 
     def close(self) -> Table:
         """End of the capture."""
@@ -99,10 +135,20 @@ class BulkEngine:
         self._reference = SessionEngine(self._session, first=leg.next, before_tx=leg.last_tx)
         return joined(leg.dissector.name, leg.next, [one for one in (table, self.take(block)) if one])
 
+    def _go_on(self, reference: SessionEngine) -> None:
+        """A search is over: from here on many rows at once again, where all that is known can be handed over."""
+        leg = _Leg.after(reference.engine)
+        if leg is not None and leg.timing == reference.session.timing:
+            self._session, self._leg, self._reference = reference.session, leg, None
+
     def _restart(self) -> Table:
         table, before = self._leg.close(), self._leg
         self._leg = _Leg(before.dissector, before.timing, before.next, before.last_tx)
         return table
+
+
+def _is_sane(block: Block) -> bool:
+    return int(block.reads.times.min()) >= -FAR and int(block.reads.times.max()) <= FAR
 
 
 def _of_outputs(engine: SessionEngine, outputs: list[Output]) -> Table:
@@ -124,11 +170,46 @@ class _Leg:
         self._late = LateColumns(timing)
         self._tracker = dissector.tracker(timing)
 
+    @classmethod
+    def after(cls, engine: Engine) -> _Leg | None:
+        """Go on where another engine has taken reads one by one; None where their times ran backwards."""
+        times = [read.time for read in engine.late.kept]
+        if times != sorted(times) or any(abs(time) > FAR for time in times):
+            return None
+        leg = cls(engine.dissector, engine.timing, engine.next, engine.last_tx)
+        leg._before_tx = engine.before_tx
+        leg._framing = BulkFraming(engine.dissector, engine.timing, engine.framer, times[-1] if times else None)
+        leg._late = LateColumns.after(engine.late, engine.timing)
+        leg._tracker = engine.tracker
+        return leg
+
+    def take_some(self, block: Block) -> list[Output | Table]:
+        """Take reads; few rows that the reference has read come one by one."""
+        self._late.see(block.reads)
+        stretches = self._framing.take(block)
+        if not any(isinstance(one, Clean) for one in stretches):
+            events = [event for one in stretches if not isinstance(one, Clean) for event in one]
+            return self._outputs(events) if len(events) < MANY else [self._events(events)]
+        made = [self._clean(one) if isinstance(one, Clean) else self._events(one) for one in stretches]
+        return [joined(self.dissector.name, self.next, made)]
+
     def take(self, block: Block) -> Table:
         """Take reads."""
         self._late.see(block.reads)
         made = [self._clean(one) if isinstance(one, Clean) else self._events(one) for one in self._framing.take(block)]
         return joined(self.dissector.name, self.next, made)
+
+    def advance(self, now: int) -> list[Output | Table]:
+        """Say that no read returned up to `now`."""
+        outputs = self._outputs(self._framing.advance(now))
+        if self._framing.deadline() is None:  # else octets still held may be the answer that the tracker waits for
+            closed = self._numbered(self._tracker.advance(now))
+            outputs += [Output((), tuple(closed))] if closed else []
+        return outputs
+
+    def deadline(self) -> int | None:
+        """When to call `advance` next, or None."""
+        return self._framing.deadline()
 
     def close(self) -> Table:
         """Give everything that is held."""
@@ -160,6 +241,9 @@ class _Leg:
 
     def _events(self, events: list[Event]) -> Table:
         """Rows of the reference framer."""
+        return self._placed(self._rows(events))
+
+    def _rows(self, events: list[Event]) -> list[Row]:
         rows = []
         ends: Times = np.array([event.end for event in events if isinstance(event, Frame)], np.int64)
         slacks = iter(self._late.slack(ends).tolist())
@@ -170,7 +254,7 @@ class _Leg:
                 rows.append(Row(no, event, self.dissector.peek(event)))
             else:
                 rows.append(Row(no, event))
-        return self._placed(rows)
+        return rows
 
     def _placed(self, rows: list[Row]) -> Table:
         """The same rows where the tracker places them, with what they close."""
@@ -184,6 +268,15 @@ class _Leg:
             closed_by += [place] * len(ended)
         first, self.next = self.next, self.next + len(rows)
         return Table.of(self.dissector.name, first, placed, closed, closed_by)
+
+    def _outputs(self, events: list[Event]) -> list[Output | Table]:
+        """The same row by row."""
+        outputs: list[Output | Table] = []
+        for row in self._rows(events) if events else ():
+            made, closed = self._track(row)
+            outputs.append(Output((made,), tuple(closed)))
+        self.next += len(outputs)
+        return outputs
 
     def _track(self, row: Row) -> tuple[Row, list[Transaction]]:
         """The row with its place, and what it closed."""

@@ -49,7 +49,7 @@ class Engine:
     """Runs one protocol over one bus.
 
     `next`: the number of the event to come, from `first` on. `last_tx`: of the transactions so far, all later than
-    `before_tx`.
+    `before_tx`. `late`: what the times of reads say.
     """
 
     def __init__(
@@ -60,14 +60,14 @@ class Engine:
         self.timing = timing
         self.next = first
         self.last_tx = before_tx
-        self._before_tx = before_tx
-        self._late = LateReads(timing)
+        self.before_tx = before_tx
+        self.late = LateReads(timing)
         self.framer = dissector.framer(timing)
         self.tracker: Tracker = dissector.tracker(timing) if pairing else Unpaired()
 
     def feed(self, chunk: Chunk) -> Output:
         """Take one read."""
-        self._late.see(chunk)
+        self.late.see(chunk)
         return self._track(self.framer.feed(chunk))
 
     def advance(self, now: int) -> Output:
@@ -92,7 +92,7 @@ class Engine:
             return NOTHING
         rows: list[Row] = []
         closed: list[Transaction] = []
-        peek, track, late = self.dissector.peek, self.tracker.track, self._late
+        peek, track, late = self.dissector.peek, self.tracker.track, self.late
         for event in events:
             if isinstance(event, Frame):
                 event = late.with_slack(event)
@@ -104,8 +104,8 @@ class Engine:
             if tracked.assembly is not None and isinstance(event, Frame):
                 event = replace(event, assembly=tracked.assembly)
             if placement is not None:
-                if self._before_tx:
-                    placement = replace(placement, tx=placement.tx + self._before_tx)
+                if self.before_tx:
+                    placement = replace(placement, tx=placement.tx + self.before_tx)
                 if placement.tx > self.last_tx:
                     self.last_tx = placement.tx
             rows.append(Row(no, event, header, placement))
@@ -115,7 +115,7 @@ class Engine:
 
     def _renumbered(self, closed: tuple[Transaction, ...]) -> tuple[Transaction, ...]:
         """Transactions with their numbers on the whole bus, where another engine has numbered before this one."""
-        before = self._before_tx
+        before = self.before_tx
         if not before:
             return closed
         return tuple(replace(one, id=one.id + before, of=None if one.of is None else one.of + before) for one in closed)

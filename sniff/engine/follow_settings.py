@@ -33,7 +33,7 @@ MOST_HELD_READS = 200_000
 
 class SessionEngine:
     """Items of a capture in, rows and transactions out. `session`: as it is known by now, after a search with what
-    was found.
+    was found. `engine`: the one at work.
 
     Raises registry.UnknownProtocol.
     """
@@ -47,26 +47,26 @@ class SessionEngine:
         self._since: int | None = None  # when the present attempt began, None before the first octet
         self._held: list[Chunk] = []
         self._held_octets = 0
-        self._engine = Engine(registry.get(session.protocol), session.timing, first, before_tx, pairing)
+        self.engine = Engine(registry.get(session.protocol), session.timing, first, before_tx, pairing)
 
     @property
     def dissector(self) -> Dissector:
         """The protocol; a stand-in as long as nobody knows it."""
-        return self._engine.dissector
+        return self.engine.dissector
 
     def take(self, item: Item) -> Output:
         """Take a read or what happened to the line."""
         if isinstance(item, Chunk):
             return self.feed(item)
         if item.kind.is_hole:  # what was asked before it and what is answered after it belong to nothing
-            return NOTHING if self.searching and not self._counts_anyhow else self._restart(self._engine.timing)
+            return NOTHING if self.searching and not self._counts_anyhow else self._restart(self.engine.timing)
         change = settings_change(item)
         return NOTHING if change is None else self._change(change, item.time)
 
     def feed(self, chunk: Chunk) -> Output:
         """Take one read."""
         if not self.searching or self._counts_anyhow:
-            return self._engine.feed(chunk)
+            return self.engine.feed(chunk)
         self._held.append(chunk)
         self._held_octets += len(chunk.octets)
         if self._held_octets > MOST_HELD_OCTETS or len(self._held) > MOST_HELD_READS:
@@ -75,15 +75,15 @@ class SessionEngine:
 
     def advance(self, now: int) -> Output:
         """Say that no read returned up to `now` (ns)."""
-        return NOTHING if self.searching and not self._counts_anyhow else self._engine.advance(now)
+        return NOTHING if self.searching and not self._counts_anyhow else self.engine.advance(now)
 
     def close(self) -> Output:
         """End of capture."""
-        return _together(self._engine.close(), self._only_heard(self._let_go(), self._in_force))
+        return _together(self.engine.close(), self._only_heard(self._let_go(), self._in_force))
 
     def deadline(self) -> int | None:
         """When to call `advance` next (ns), or None."""
-        return self._engine.deadline()
+        return self.engine.deadline()
 
     @property
     def _counts_anyhow(self) -> bool:
@@ -106,8 +106,8 @@ class SessionEngine:
             return output
         if self.session.given:  # the user knows better
             return NOTHING
-        protocol = change.protocol or self._engine.dissector.name
-        if (line, protocol) == (self._engine.timing.line, self._engine.dissector.name):
+        protocol = change.protocol or self.engine.dissector.name
+        if (line, protocol) == (self.engine.timing.line, self.engine.dissector.name):
             return NOTHING
         self._in_force = line
         return self._restart(Timing(line, self.session.adapter.latency), protocol)
@@ -124,15 +124,15 @@ class SessionEngine:
             late = next((number for number, chunk in enumerate(held) if chunk.time > until), len(held))
             outputs.append(self._only_heard(held[:late], self._before))
             held = held[late:]
-        outputs += [self._engine.feed(chunk) for chunk in held]
+        outputs += [self.engine.feed(chunk) for chunk in held]
         return _together(*outputs)
 
     def _restart(self, timing: Timing, protocol: str | None = None) -> Output:
         """Close the engine and go on with another, whose numbers follow."""
-        before = self._engine
+        before = self.engine
         output = before.close()
         dissector = before.dissector if protocol is None else registry.get(protocol)
-        self._engine = Engine(dissector, timing, before.next, before.last_tx, self._pairing)
+        self.engine = Engine(dissector, timing, before.next, before.last_tx, self._pairing)
         return output
 
     def _let_go(self) -> list[Chunk]:
@@ -145,8 +145,8 @@ class SessionEngine:
         for chunk in chunks:
             start = chunk.time - len(chunk.octets) * line.char
             noise = Noise(chunk.octets, start, chunk.time, Place.BETWEEN, Reason.NO_FRAME, chunk.marks)
-            rows.append(Row(self._engine.next, noise, searched=line))
-            self._engine.next += 1
+            rows.append(Row(self.engine.next, noise, searched=line))
+            self.engine.next += 1
         return Output(tuple(rows))
 
 

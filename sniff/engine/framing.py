@@ -20,8 +20,12 @@ from dissectors.manifest import Dissector
 from sniff.engine.blocks import Block
 from sniff.engine.table import Table, transaction_columns
 
-MARGIN = 4096
-"""Octets before the end of a block from which on nothing is taken from a kernel: what follows may decide them."""
+MARGIN = 520
+"""Octets before the end of a block from which on nothing is taken from a kernel: what follows may decide them. Two of
+the longest RTU frames; the frames of MS/TP end where they say."""
+
+LEAST = 1536
+"""Octets that a block must hold for a kernel to be worth its while; the reference is as fast with fewer."""
 
 SHORTEST = 3
 """Rows that a chain must still hold for it to be worth taking up."""
@@ -56,29 +60,51 @@ Stretch = Clean | list[Event]
 class BulkFraming:
     """Blocks in, stretches of rows out; the same rows as the reference framer alone gives."""
 
-    def __init__(self, dissector: Dissector, timing: Timing) -> None:
+    def __init__(
+        self, dissector: Dissector, timing: Timing, framer: Framer | None = None, before: int | None = None
+    ) -> None:
+        """`framer`: to go on with, which has taken octets; the nominal end of the newest of them was `before`, ns."""
         self._dissector = dissector
         self._timing = timing
-        self._framer: Framer = dissector.framer(timing)
+        self._framer: Framer = framer if framer is not None else dissector.framer(timing)
         self._known = 0  # octets handed to the framer whose events were given already
         self._given = 0  # octets of the stream that are in rows
         self._base = 0  # octets of the stream before the block at work
-        self._before: int | None = None  # nominal end of the newest octet
+        self._before = before  # nominal end of the newest octet
 
     def take(self, block: Block) -> list[Stretch]:
         """Take the reads that follow; give the rows that are certain by now."""
-        reads = replace(block.reads, before=self._before)
-        work = _Work(self, block, reads)
-        stretches = work.run()
-        self._base += len(reads.octets)
-        last = int(reads.times.max())
+        if self._dissector.kernel is None or len(block.reads.octets) < LEAST:
+            stretches = self._one_by_one(block)
+        else:
+            stretches = _Work(self, block, replace(block.reads, before=self._before)).run()
+        self._base += len(block.reads.octets)
+        last = int(block.reads.times.max())
         self._before = last if self._before is None else max(self._before, last)
         return stretches
 
+    def _one_by_one(self, block: Block) -> list[Stretch]:
+        events = [event for chunk in block.chunks() for event in self._framer.feed(chunk)]
+        self._given += sum(len(event.octets) for event in events)
+        return [events] if events else []
+
+    def advance(self, now: int) -> list[Event]:
+        """Say that no read returned up to `now` (ns); what the silence completes."""
+        return self._of_end(self._framer.advance(now))
+
+    def deadline(self) -> int | None:
+        """When silence will mean something next (ns), or None when it never will."""
+        return self._framer.deadline()
+
     def close(self) -> list[Stretch]:
         """End of the capture, or of its settings: everything still held."""
-        events = self._fresh(self._framer.close())
+        events = self._of_end(self._framer.close())
         return [events] if events else []
+
+    def _of_end(self, events: list[Event]) -> list[Event]:
+        """Events between two blocks, where the framer has given all that was known before."""
+        self._given += sum(len(event.octets) for event in events)
+        return events
 
     def _fresh(self, events: Sequence[Event]) -> list[Event]:
         """Those of the framer's events that were not given already."""
@@ -109,8 +135,7 @@ class _Work:
         self._begins = reads.begins
         self._size = len(reads.octets)
         kernel = framing._dissector.kernel
-        usable = kernel is not None and self._size > MARGIN and _is_forward(reads)
-        self._columns = kernel(reads, framing._timing) if kernel is not None and usable else None
+        self._columns = kernel(reads, framing._timing) if kernel is not None and _is_forward(reads) else None
         self._last: Times | None = None
         if self._columns is not None and len(self._columns):
             self._columns, self._last = _chains(self._columns, self._size - MARGIN)
@@ -123,7 +148,10 @@ class _Work:
         """All stretches of the block."""
         framing = self._framing
         at = 0
-        while at < self._size:
+        while at < self._size or framing._known:
+            if at >= self._size:  # the framer has not said of all rows of the chain that it makes the same of them
+                at = self._give_back()
+                continue
             chunk, at = self._part(at, self._size)
             try:
                 fresh = framing._fresh(framing._framer.feed(chunk))
@@ -240,6 +268,8 @@ def _is_forward(reads: Reads) -> bool:
 def _chains(columns: FrameColumns, limit: int) -> tuple[FrameColumns, Times]:
     """The rows that end at or before `limit`, and for each the index of the last row of its chain."""
     columns = columns.take(slice(0, int(np.searchsorted(columns.offset + columns.length, limit, side="right"))))
+    if not len(columns):
+        return columns, np.zeros(0, np.int64)
     begins = np.flatnonzero(~columns.chained)
     ends = np.append(begins[1:], len(columns)) - 1
     return columns, np.repeat(ends, np.diff(np.append(begins, len(columns))))

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Self
+
 import numpy as np
 
 from dissectors.columns import Reads, Times
 from dissectors.line import Timing
-from sniff.engine.late_reads import ANOTHER, KEPT, MOST, OFTEN, RARELY, TOGETHER
+from sniff.engine.late_reads import ANOTHER, KEPT, MOST, OFTEN, RARELY, TOGETHER, LateReads
 from sniff.engine.read_times import FAST, Backlog
 
 
@@ -26,6 +28,19 @@ class LateColumns:
         self._pauses = np.full(0, -1, np.int64)
         self._latencies = np.zeros(0, np.int64)
         self._is_late = np.zeros(0, bool)
+
+    @classmethod
+    def after(cls, earlier: LateReads, timing: Timing) -> Self:
+        """Go on where reads were seen one by one."""
+        columns, kept = cls(timing), list(earlier.kept)
+        columns._latency, columns._backlog = earlier.latency, earlier.backlog
+        columns._seen, columns._before_run = earlier.seen, earlier.before_run
+        columns._times = np.array([read.time for read in kept], np.int64)
+        columns._starts = np.array([read.start for read in kept], np.int64)
+        columns._pauses = np.array([read.pause for read in kept], np.int64)
+        columns._latencies = np.array([read.latency for read in kept], np.int64)
+        columns._is_late = np.array([read.is_late for read in kept], bool)
+        return columns
 
     def see(self, reads: Reads) -> None:
         """Take the reads that follow."""

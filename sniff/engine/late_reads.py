@@ -51,41 +51,45 @@ class _Read:
 
 
 class LateReads:
-    """Fed every read, it gives frames the slack that the reads leave."""
+    """Fed every read, it gives frames the slack that the reads leave.
+
+    `latency`: how slow the adapter is known to be by now, ns; `backlog`: what proves it. `seen`: reads so far; `kept`:
+    the last of them. `before_run`: when the read came after which reads follow one another, ns.
+    """
 
     def __init__(self, timing: Timing) -> None:
         self._char = timing.char
         self._least = timing.latency + ANOTHER * timing.char
         self._together = timing.latency + TOGETHER
-        self._allowed = self._latency = timing.latency
-        self._backlog = Backlog(timing.char, timing.latency + timing.char)
-        self._seen = 0
+        self._allowed = self.latency = timing.latency
+        self.backlog = Backlog(timing.char, timing.latency + timing.char)
+        self.seen = 0
         self._before: int | None = None
-        self._before_run = 0  # when the read came after which reads follow one another
-        self._reads: deque[_Read] = deque(maxlen=KEPT)
+        self.before_run = 0
+        self.kept: deque[_Read] = deque(maxlen=KEPT)
 
     def see(self, chunk: Chunk) -> None:
         """Take the next read."""
         lasted = len(chunk.octets) * self._char
         if not lasted:
             return
-        self._seen += 1
-        if self._before is not None and self._backlog.add(chunk.time - self._before, len(chunk.octets)):
-            stretches = self._backlog.stretches
-            if stretches >= OFTEN and RARELY * stretches >= self._seen:
-                self._latency = min(MOST, max(self._latency, int(self._backlog.worst)))
+        self.seen += 1
+        if self._before is not None and self.backlog.add(chunk.time - self._before, len(chunk.octets)):
+            stretches = self.backlog.stretches
+            if stretches >= OFTEN and RARELY * stretches >= self.seen:
+                self.latency = min(MOST, max(self.latency, int(self.backlog.worst)))
         if self._before is None or chunk.time - lasted - self._before > self._together:
-            self._before_run = chunk.time - lasted if self._before is None else self._before
+            self.before_run = chunk.time - lasted if self._before is None else self._before
         start = chunk.time - lasted if self._before is None else max(chunk.time - lasted, self._before)
         is_long = lasted > self._least and self._before is not None
-        pause = min(start - self._before_run, MOST) if is_long else -1
-        self._reads.append(_Read(start, chunk.time, pause, self._latency))
+        pause = min(start - self.before_run, MOST) if is_long else -1
+        self.kept.append(_Read(start, chunk.time, pause, self.latency))
         self._before = chunk.time
 
     def with_slack(self, frame: Frame) -> Frame:
         """The frame; with more slack where it ended in a read that was late, or where many are."""
         slack = frame.slack
-        for read in reversed(self._reads):
+        for read in reversed(self.kept):
             if read.start < frame.end <= read.time:
                 if read.latency > self._allowed:
                     slack = max(slack, read.latency)

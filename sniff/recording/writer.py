@@ -165,6 +165,7 @@ class Recorder:
         self._flushes: deque[tuple[int, int]] = deque()  # number and oldest time of flushes that wait
         self._flush_number = 0
         self._checked: int | None = None
+        self._stepped = self._step_at = 0
         self._closed = False
         self._given_up = False
         self._session = session
@@ -184,8 +185,13 @@ class Recorder:
         if messages:
             self._send_raw(messages, self._batcher.first)
         self._open_octets += len(chunk.octets)
-        self._note(chunk.time)
-        self._step(chunk.time)
+        time = chunk.time
+        if self._oldest is None:
+            self._note(time)
+        if self._stepped <= time < self._step_at:
+            self._now = time
+        else:
+            self._step(time)
 
     def line(self, event: LineEvent) -> None:
         """Record what happened to the line."""
@@ -325,8 +331,10 @@ class Recorder:
         if self._oldest is None:
             self._oldest = time
             self._oldest_came = time if self._ticked is None else self._ticked
+            self._step_at = self._stepped  # there is more to be asked now
 
     def _step(self, now: int) -> None:
+        """Do what is due. Reads between `_stepped` and `_step_at` need not ask: nothing is due before."""
         self._now = now
         if self._oldest is not None and _due(self._oldest, now, FLUSH_AFTER):
             self._flush(now)
@@ -336,6 +344,9 @@ class Recorder:
         if self._checked is None or _due(self._checked, now, CHECK_EVERY):
             self._checked = now
             self._keeper.orders.put(CHECK)
+        self._stepped = now
+        since = [(self._checked, CHECK_EVERY), (self._oldest, FLUSH_AFTER), (self._unsynced, SYNC_AFTER)]
+        self._step_at = min(begin + after for begin, after in since if begin is not None)
 
     def _flush(self, now: int) -> None:
         self._close_batch()

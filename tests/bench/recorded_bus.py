@@ -60,7 +60,7 @@ class Link:
     def session(self, bus: int) -> Session:
         return SESSION
 
-    def receive(self, timeout: float = 0.0) -> list[Message]:
+    def receive_batches(self, timeout: float = 0.0) -> list[Message]:
         given = list(self.messages)
         self.messages.clear()
         return given
@@ -86,7 +86,7 @@ def record(
     """Record it; the octets of the file."""
     recorder = Recorder(path, SESSION)
     link = Link(recorder, wanted)
-    live = LiveBus(link, devices=Devices.parse(devices.split(",")) if devices else None)  # type: ignore[arg-type]
+    live = LiveBus(link, devices=Devices.parse(devices.split(",")) if devices else None, watched=False)  # type: ignore[arg-type]
     due = BASE
     for chunk in chunks:
         while chunk.time > due:

@@ -11,7 +11,6 @@ shorter than ours (SPEED), so that nobody waits for a bus that is only simulated
 from __future__ import annotations
 
 import os
-import selectors
 import socket
 import subprocess
 import sys
@@ -27,6 +26,7 @@ from dissectors.frame import Chunk  # noqa: E402
 from dissectors.line import LineSettings  # noqa: E402
 from sniff.capture import link  # noqa: E402
 from sniff.capture.spawn import Spawned  # noqa: E402
+from sniff.capture.waiting import Call, Waiting  # noqa: E402
 from sniff.engine.session import Adapter, Item, LineEvent, LineEventKind, SettingsChange  # noqa: E402
 from sniff.simulation.line_mix import low_times, receive  # noqa: E402
 from sniff.simulation.scenarios import bursts, scenario  # noqa: E402
@@ -51,11 +51,11 @@ class FastClock(Clock):
         return 0
 
 
-class FastSelector(selectors.DefaultSelector):
+class FastWaiting(Waiting):
     """Waits as long as the fast clock takes for a time."""
 
-    def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
-        return super().select(None if timeout is None else timeout / SPEED)
+    def wait(self, seconds: float) -> list[tuple[int, Call]]:
+        return super().wait(seconds / SPEED)
 
 
 def plan_of(spec: str) -> tuple[str, LineSettings, float]:
@@ -132,7 +132,7 @@ def main(arguments: list[str]) -> int:
 
         process.open_source = LineBusSource
         process.Clock = FastClock
-        loop.selectors.DefaultSelector = FastSelector
+        loop.Waiting = FastWaiting
         return process.main()
     from sniff.cli import main as sniff485
 

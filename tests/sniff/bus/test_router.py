@@ -32,7 +32,7 @@ class Link:
     def session(self, bus: int) -> Session:
         return Session(f"port{bus}", LineSettings.parse("19200,8E1"), "modbus-rtu", bus=f"bus{bus}")
 
-    def receive(self, timeout: float = 0.0) -> list[Message]:
+    def receive_batches(self, timeout: float = 0.0) -> list[Message]:
         given, self.messages = self.messages, []
         return given
 
@@ -83,7 +83,7 @@ def test_buses_that_are_shown_by_nobody_are_left_alone() -> None:
 
 
 def test_the_newest_tick_says_it_all() -> None:
-    link: Any = SimpleNamespace(receive=lambda timeout: [Tick(0, 1), Tick(0, 2), Tick(0, 3)])
+    link: Any = SimpleNamespace(receive_batches=lambda timeout: [Tick(0, 1), Tick(0, 2), Tick(0, 3)])
     router = Router(link)
     router.open(0)
     assert router.receive(0) == [Tick(0, 3)]

@@ -6,7 +6,7 @@ import pytest
 
 from dissectors.frame import Chunk
 from sniff.capture.outlet import Outlet
-from sniff.capture.wire import MessageSplitter, Received, decode_message, encode_tick
+from sniff.capture.wire import MessageSplitter, Received, decode_message, encode_tick, one_by_one
 from sniff.engine.session import LineEvent, LineEventKind
 
 
@@ -23,7 +23,7 @@ def receive(there: socket.socket) -> list[object]:
     messages: list[object] = []
     try:
         while data := there.recv(65536):
-            messages += [decode_message(*message) for message in splitter.feed(data)]
+            messages += one_by_one(filter(None, (decode_message(*message) for message in splitter.feed(data))))
     except BlockingIOError:
         pass
     return messages

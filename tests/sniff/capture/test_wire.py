@@ -22,8 +22,11 @@ from sniff.capture.wire import (
     encode,
     encode_derived,
     encode_item,
+    encode_reads,
     encode_status,
     encode_tick,
+    octets_in,
+    one_by_one,
 )
 from sniff.engine.session import LineEvent, LineEventKind
 
@@ -67,6 +70,21 @@ def test_results_cross(topic, data, metadata) -> None:
     ((kind, bus, body),) = MessageSplitter().feed(encode_derived(derived))
     assert kind == Kind.DERIVED
     assert decode_derived(bus, body) == derived
+
+
+@given(st.lists(st.tuples(st.integers(-(1 << 63), (1 << 63) - 1), st.binary(min_size=1, max_size=300)), min_size=1))
+def test_reads_cross_together(reads) -> None:
+    chunks = [Chunk(time, octets) for time, octets in reads]
+    (message,) = MessageSplitter().feed(encode_reads(3, chunks))
+    kind, _, body = message
+    assert octets_in(kind, body) == (chunks[0].time, sum(len(chunk.octets) for chunk in chunks))
+    assert list(one_by_one([decode_message(*message)])) == [Received(3, chunk) for chunk in chunks]
+
+
+@pytest.mark.parametrize("body", [b"", bytes(4), b"\1" + bytes(15), b"\1" + bytes(20), b"\xff" * 40])
+def test_reads_that_do_not_add_up_are_refused(body) -> None:
+    with pytest.raises(WireError):
+        decode_message(Kind.READS, 0, body)
 
 
 @given(st.integers(0, 255), st.integers(0, 255), st.binary(max_size=60))

@@ -1,0 +1,98 @@
+"""A live bus gives what its recording gives, in whatever batches it comes and whenever time passes."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from dissectors.frame import Chunk
+from dissectors.tracker import Transaction
+from sniff.bus.offline import outputs
+from sniff.engine.blocks import Block, Gathering
+from sniff.engine.bulk import BulkEngine
+from sniff.engine.capture import CaptureError
+from sniff.engine.engine import Output, Row
+from sniff.engine.session import Item, LineEvent, Session
+from sniff.engine.table import Table
+from sniff.formats import read
+from tests.bench import bulk_rtu
+from tests.property.test_tables import NAMES, Bus, _hidden, _mstp, _rtu
+
+LATE = 50_000_000
+"""ns; what is vouched for may be older than what has come."""
+
+Said = tuple[list[Row], list[Transaction]]
+
+
+def by_reference(items: Iterator[Item], session: Session) -> Said:
+    made = [output for output in outputs(items, session) if isinstance(output, Output)]
+    return [row for one in made for row in one.rows], [one for output in made for one in output.transactions]
+
+
+def live(items: list[Item], session: Session, dice: random.Random, most: int) -> Said:
+    """The same in batches of up to so many reads; in between time passes, as much as can be vouched for."""
+    engine, gathering = BulkEngine(session), Gathering()
+    rows: list[Row] = []
+    closed: list[Transaction] = []
+
+    def keep(made: list[Output | Table]) -> None:
+        for one in made:
+            for output in one.outputs() if isinstance(one, Table) else (one,):
+                rows.extend(output.rows)
+                closed.extend(output.transactions)
+
+    batch = dice.randint(1, most)
+    for at, item in enumerate(items):
+        if isinstance(item, LineEvent):
+            keep(engine.take_some(gathering.take()) if gathering.count else [])
+            keep([engine.take(item)])
+            continue
+        gathering.add(item)
+        if gathering.count < batch:
+            continue
+        keep(engine.take_some(gathering.take()))
+        batch = dice.randint(1, most)
+        after = items[at + 1] if at + 1 < len(items) else None
+        if not isinstance(after, Chunk):  # a silence that no octet ends is in no file
+            continue
+        until = after.time - len(after.octets) * session.line.char + session.adapter.latency
+        if until > item.time:
+            for now in sorted(dice.randint(item.time - LATE, until - 1) for _ in range(dice.randint(0, 2))):
+                keep(engine.advance(now))
+    keep(engine.take_some(gathering.take()) if gathering.count else [])
+    keep([engine.close()])
+    return rows, closed
+
+
+@pytest.mark.parametrize("path", NAMES, ids=lambda path: path.name)
+def test_a_capture_gives_the_same_live(path: Path) -> None:
+    try:
+        capture = read(path)
+        items = [item for item in capture.items() if isinstance(item, LineEvent) or item.octets]
+    except CaptureError as error:
+        pytest.skip(str(error))
+    expected = by_reference(iter(items), capture.session)
+    dice = random.Random(1)
+    for most in (1, 7, 400, 3000):
+        _assert_same(live(items, capture.session, dice, most), expected)
+
+
+def _assert_same(said: Said, expected: Said) -> None:
+    for row, other in zip(said[0], expected[0], strict=True):
+        assert row == other
+    assert said[1] == expected[1]
+
+
+@pytest.mark.parametrize("damaged", [0.0, 0.02])
+@pytest.mark.parametrize("bus", [_mstp, _rtu, partial(_rtu, timing=bulk_rtu.HELD_BACK), _hidden])
+def test_long_buses_give_the_same_live(bus: Bus, damaged: float) -> None:
+    """Columns in most batches, seams and times anywhere."""
+    session, reads = bus(damaged)
+    items: list[Item] = list(Block(reads).chunks())
+    expected = by_reference(iter(items), session)
+    for seed, most in ((1, 300), (2, 1000)):
+        _assert_same(live(items, session, random.Random(seed), most), expected)
