@@ -12,13 +12,13 @@ from pathlib import Path
 from dissectors.frame import Chunk
 from dissectors.profiles import Devices
 from sniff.analysis.plain import plain
+from sniff.bus.capture_writer import create
 from sniff.cli import UNREADABLE, USAGE, Failure
 from sniff.engine.capture import Capture, CaptureError
 from sniff.engine.engine import Output
 from sniff.engine.session import Item, Session
-from sniff.formats import create, parquet
+from sniff.formats import parquet
 from sniff.formats.parquet import Kind, ParquetWriter
-from sniff.formats.records import RecordMaker
 
 
 def add_output(parser: argparse.ArgumentParser) -> None:
@@ -47,9 +47,7 @@ def write(
     chunks = octets = 0
     progress = _Progress(target.name)
     try:
-        with create(target, session, options) as writer:
-            if notes and isinstance(maker := getattr(writer, "maker", None), RecordMaker):
-                maker.notes = notes
+        with create(target, session, options, notes) as writer:
             frames = _Frames(writer, session) if with_frames else None
             values = _Values(writer, session, devices) if devices else None
             for item in items:

@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 from dissectors.frame import Chunk, LineError, Mark
 from dissectors.line import LineSettings
 from sniff import formats
+from sniff.bus import capture_writer
 from sniff.engine.blocks import BLOCK_OCTETS, BLOCK_READS, Block, blocks_of, plain_reads
 from sniff.engine.capture import Capture, CaptureError
 from sniff.engine.session import Item, LineEvent, LineEventKind, Session, SettingsChange
@@ -121,7 +122,7 @@ def bus(reads: int, seed: int = 1, strange: float = 0.0) -> list[Item]:
 
 
 def written(path: Path, items: Iterable[Item], session: Session = SESSION, **options: str) -> Path:
-    with formats.create(path, session, options or None) as writer:
+    with capture_writer.create(path, session, options or None) as writer:
         for item in items:
             writer.write(item)
     return path

@@ -19,6 +19,7 @@ import pytest
 import sniff
 from dissectors import registry
 from dissectors.line import LineSettings
+from sniff.bus.capture_writer import create
 from sniff.bus.columns import FRAMES, TRANSACTIONS
 from sniff.bus.offline import outputs
 from sniff.cli import main
@@ -26,7 +27,7 @@ from sniff.data_frames import IncompleteCapture, NoDataFrames
 from sniff.devices import UnknownProfile
 from sniff.engine.capture import CaptureError
 from sniff.engine.engine import Output
-from sniff.formats import create, read
+from sniff.formats import read
 
 CAPTURES = Path(__file__).parents[2] / "captures"
 NAMES = sorted(

@@ -14,10 +14,11 @@ from hypothesis import strategies as st
 
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
+from sniff.bus.capture_writer import create
 from sniff.bus.offline import settled
 from sniff.engine.capture import CaptureError
 from sniff.engine.session import Adapter, Session
-from sniff.formats import create, read
+from sniff.formats import read
 from sniff.formats.text import parse
 
 MODBUS = """\
