@@ -68,7 +68,7 @@ class RecordMaker:
                         yield Record(time, RTAC, rtac_record(time - self.session.started, number, b""))
         comment = self._comment(item)
         if not isinstance(event, Frame) or not _readable(event):
-            yield Record(time, USER1, event.octets, comment)
+            yield Record(time, USER1, event.octets, comment, searched=row.searched)
             return
         header, placement = row.header, row.placement
         assert header is not None

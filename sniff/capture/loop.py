@@ -21,7 +21,6 @@ from sniff.capture.frame_counter import FrameCounter
 from sniff.capture.outlet import Outlet
 from sniff.capture.wire import (
     LOSSY,
-    NOTHING_MORE,
     Kind,
     MessageSplitter,
     Status,
@@ -30,7 +29,7 @@ from sniff.capture.wire import (
     encode_status,
     encode_tick,
 )
-from sniff.engine.session import Item, LineEvent, LineEventKind, Session, SettingsChange
+from sniff.engine.session import Item, LineEvent, LineEventKind, Session, SettingsChange, refusal
 from sniff.recording.writer import Recorder
 from sniff.sources import PortError, Source
 from sniff.sources.clock import NS_PER_MS, STEP, Clock
@@ -92,6 +91,7 @@ class CaptureLoop:
     count: int | None = None
     sessions: list[Session] = field(default_factory=list)
     reason: str | None = None
+    at_end: bool = False
     closing: bool = False
     _hurried: bool = False
     _offset: int = 0
@@ -198,7 +198,8 @@ class CaptureLoop:
             self._set_due(bus, _FAR)
             self._watch(bus, None)
             if all(other.ended for other in self._buses):
-                self.stop(NOTHING_MORE)
+                self.at_end = self.reason is None
+                self.stop("nothing more to read")
         return bool(items)
 
     def _set_due(self, bus: _Bus, due: int) -> None:
@@ -354,11 +355,12 @@ class CaptureLoop:
             )
         elif kind == Kind.RECONFIGURE and bus < len(self._buses):
             source = self._buses[bus].source
+            line = body.decode("ascii", "replace")
             self._take(self._buses[bus])  # what is there was heard with the settings before
             try:
-                source.reconfigure(LineSettings.parse(body.decode("ascii", "replace")))
+                source.reconfigure(LineSettings.parse(line))
             except (PortError, ValueError) as error:
-                self._keep(bus, LineEvent(self.clock.now(), LineEventKind.NOTE, str(error)))
+                self._keep(bus, LineEvent(self.clock.now(), LineEventKind.REFUSED, refusal(line, str(error))))
             self._take(self._buses[bus])
 
     def _settings(self, bus: _Bus, change: SettingsChange) -> None:

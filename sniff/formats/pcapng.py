@@ -13,12 +13,13 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
+from dissectors.line import LineSettings
 from sniff.engine.capture import CaptureError
 from sniff.engine.session import Completeness, Item, LineEvent, Session
 from sniff.formats.files import NewFile, open_capture
 from sniff.formats.linktypes import LINK_TYPES, USER1
 from sniff.formats.pcapng_interface import Interface
-from sniff.formats.records import SEARCHED, Record, SearchMarks, foreign_session, items_of, protocol_of
+from sniff.formats.records import Record, SearchMarks, foreign_session, items_of, protocol_of
 
 if TYPE_CHECKING:
     from dissectors.columns import Reads
@@ -34,6 +35,8 @@ LONGEST = 4 * 1024 * 1024
 LATEST = (1 << 33) * 1_000_000_000
 """ns since the epoch, in the year 2242; a record that says more, or as much before it, is given this time."""
 SESSION_MARK = "sniff485 session: "
+SEARCH_MARK = "sniff485 search: "
+"""Begins a comment of a packet that was heard in a search for settings; the line settings tried follow."""
 
 
 def read(path: Path) -> PcapngCapture:
@@ -109,7 +112,7 @@ class PcapngCapture:
         marks = SearchMarks(self.session)
         interfaces: list[Interface] = []
         with open_capture(self.path) as stream:
-            walk = PcapngWalk(stream, LONGEST, SEARCHED.encode())
+            walk = PcapngWalk(stream, LONGEST, SEARCH_MARK.encode())
             for one in walk.blocks():
                 if isinstance(one, OtherBlock):
                     record = self._record(one.order, one.kind, one.body, interfaces)
@@ -222,13 +225,24 @@ def _packet(order: str, kind: int, body: bytes, interfaces: list[Interface]) -> 
     factor, ticks = interface.resolution
     time = ((high << 32) | low) * factor // ticks + interface.offset * 1_000_000_000
     time = max(-LATEST, min(time, LATEST))
-    comment, crc_error = "", False
+    comment, crc_error, searched = "", False, None
     for code, value in _options(order, body[20 + kept + (-kept % 4) :]):
         if code == OPT_COMMENT:
-            comment = value.decode("utf-8", "replace")
+            text = value.decode("utf-8", "replace")
+            if text.startswith(SEARCH_MARK):
+                searched = _line(text[len(SEARCH_MARK) :])
+            else:
+                comment = text
         elif code == OPT_FLAGS and len(value) == 4:
             crc_error = bool(struct.unpack(order + "I", value)[0] & CRC_ERROR_FLAG)
-    return Record(time, interface.link_type, body[20 : 20 + kept], comment, crc_error)
+    return Record(time, interface.link_type, body[20 : 20 + kept], comment, crc_error, searched)
+
+
+def _line(text: str) -> LineSettings | None:
+    try:
+        return LineSettings.parse(text)
+    except ValueError:
+        return None
 
 
 def _options(order: str, data: bytes) -> Iterator[tuple[int, bytes]]:
@@ -291,6 +305,8 @@ class PcapngWriter:
         options = _option(OPT_FLAGS, struct.pack("<I", CRC_ERROR_FLAG)) if record.crc_error else b""
         if record.comment:
             options += _option(OPT_COMMENT, record.comment.encode()[:60_000])
+        if record.searched is not None:
+            options += _option(OPT_COMMENT, f"{SEARCH_MARK}{record.searched}".encode())
         head = struct.pack("<IIIII", number, time >> 32 & 0xFFFFFFFF, time & 0xFFFFFFFF, size, size)
         data = record.data + b"\0" * (-size % 4)
         self._block(ENHANCED, head + data + (options + _option(OPT_END) if options else b""))

@@ -8,7 +8,6 @@ are as good as that program and its host were, which nobody knows: `FOREIGN_LATE
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,13 +26,17 @@ FOREIGN_LATENCY = 20_000_000
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """One packet of a packet file: `time` ns since the epoch, `comment` "" when none, `crc_error` as flagged."""
+    """One packet of a packet file: `time` ns since the epoch, `comment` "" when none, `crc_error` as flagged.
+
+    `searched`: line settings that a search listened with when these octets were heard; None outside a search.
+    """
 
     time: int
     link_type: int
     data: bytes
     comment: str = ""
     crc_error: bool = False
+    searched: LineSettings | None = None
 
 
 class FrameFile(Protocol):
@@ -67,17 +70,12 @@ def foreign_session(path: str, protocol: str | None, started: int, kind: str) ->
     )
 
 
-SEARCHED = "heard while searching for the settings, with "
-_SEARCHED = re.compile(rf"{SEARCHED}(\S+?)(?:;|$)")
-"""What `describe` says of a row of a search, in the comment of its packet."""
-
-
 class SearchMarks:
-    """Gives back to a file's items the settings that a search listened with, which packets keep as comments."""
+    """Gives back to a file's items the settings that a search listened with, which packets keep with them."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        self._with: str | None = None
+        self._with: LineSettings | None = None
 
     @property
     def searching(self) -> bool:
@@ -86,15 +84,14 @@ class SearchMarks:
 
     def before(self, record: Record) -> Iterator[LineEvent]:
         """What happened before a record."""
-        match = _SEARCHED.search(record.comment)
-        searched = match[1] if match is not None else None
+        searched = record.searched
         if searched == self._with:
             return
         line = self._session.line
         if searched is None:
             changes = [SettingsChange(line), SettingsChange(line, self._session.protocol, found=True)]
         else:
-            changes = [SettingsChange(SettingsChange.parse(f"line={searched}").line, searching=True)]
+            changes = [SettingsChange(searched, searching=True)]
         for change in changes:
             yield LineEvent(record.time, LineEventKind.SETTINGS, str(change))
         self._with = searched

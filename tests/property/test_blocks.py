@@ -262,7 +262,7 @@ RESOLUTIONS = [b"", b"\x09\x00\x01\x00\x09\0\0\0", b"\x09\x00\x01\x00\x94\0\0\0"
 @pytest.mark.parametrize("resolution", RESOLUTIONS)
 def test_pcapng_of_others(tmp_path: Path, order: str, resolution: bytes) -> None:
     comment = struct.pack(order + "HH", 1, 5) + b"hello\0\0\0" + bytes(4)
-    said = b"heard while searching for the settings, with 9600,8N1; more"
+    said = b"sniff485 search: 9600,8N1"
     searched = struct.pack(order + "HH", 1, len(said)) + said + bytes(-len(said) % 4 + 4)
     parts = [ng_section(order, (165, resolution), (148, resolution), (1, b""), (165, RESOLUTIONS[1]))]
     for number, (time, octets) in enumerate(records(800)):
