@@ -9,7 +9,7 @@ from dissectors.findings import Finding, Severity, under_causes
 from dissectors.manifest import Dissector
 from dissectors.profiles import Devices
 from dissectors.token_ring import TokenRing
-from dissectors.tracker import Transaction, Verdict
+from dissectors.tracker import Verdict
 from dissectors.words import milliseconds
 from sniff.analysis.health import Health
 from sniff.analysis.judging import rules_over
@@ -22,13 +22,12 @@ from sniff.engine.capture import Capture
 from sniff.engine.engine import Output
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.observer import observe
-from sniff.engine.session import DEVICES_NOTE, LineEvent, Session
+from sniff.engine.session import DEVICES_NOTE, Session
 from sniff.formats.text import iso
 from sniff.reporting.numbers import (
     Distribution,
     Evidence,
     Found,
-    Happening,
     Measurement,
     Numbers,
     RingNumbers,
@@ -38,11 +37,10 @@ from sniff.reporting.numbers import (
     seconds_since,
 )
 from sniff.reporting.timeline import Timeline
+from sniff.reporting.told import Told
 
 EVIDENCE_SHOWN, EVIDENCE_OF_NOTES = 5, 2
-HAPPENINGS_SHOWN = 200
 LONGEST_TEXT = 180
-GOOD = frozenset((Verdict.ANSWERED, Verdict.BROADCAST, Verdict.DATA, Verdict.OPEN, Verdict.UNDECIDED))
 
 
 def collect(source: str, capture: Capture, session: Session, devices: Devices) -> Numbers:
@@ -51,7 +49,7 @@ def collect(source: str, capture: Capture, session: Session, devices: Devices) -
     model, timeline, told = (
         BusModel(session, dissector, devices, with_points=False),
         Timeline(session.line.char),
-        _Told(session),
+        Told(session),
     )
     observe(outputs(capture.items(), session), model, timeline, told)
     summary, findings, healths = model.summary, model.findings(), model.health()
@@ -129,15 +127,6 @@ def _many(addresses: list[int]) -> str:
 
 def _subject(finding: Found) -> str:
     return f"{finding.subject}: {finding.title}" if finding.title else f"{finding.subject}: {finding.seen}"
-
-
-def _trouble(transaction: Transaction) -> str:
-    """What kind of trouble: an exception by its name, else how the exchange ended."""
-    if transaction.verdict is Verdict.EXCEPTION and transaction.error:
-        return transaction.error
-    if transaction.is_passing and transaction.verdict is Verdict.NO_RESPONSE:
-        return "token unused"
-    return transaction.verdict.words
 
 
 def _station(node: Node, kinds: Counter[str], health: Health | None) -> Station:
@@ -272,24 +261,3 @@ def _measurement(session: Session, dissector: Dissector) -> Measurement:
 def _ring(shown: TokenRing, ring: Any) -> RingNumbers:
     """What the token ring of a capture comes to."""
     return RingNumbers(shown.order(ring), shown.headings, tuple(shown.rows(ring)), tuple(shown.sentences(ring)))
-
-
-class _Told:
-    """What happened to the line, and what troubles each station."""
-
-    def __init__(self, session: Session) -> None:
-        self._started = session.started
-        self.happenings: list[Happening] = []
-        self.trouble: dict[int, Counter[str]] = {}
-
-    def add(self, output: Output) -> None:
-        """Count transactions that did not go well."""
-        for transaction in output.transactions:
-            if transaction.station is not None and transaction.verdict not in GOOD:
-                self.trouble.setdefault(transaction.station, Counter())[_trouble(transaction)] += 1
-
-    def add_line_event(self, event: LineEvent) -> None:
-        """Keep the first of them."""
-        if len(self.happenings) < HAPPENINGS_SHOWN:
-            at = seconds_since(self._started, event.time)
-            self.happenings.append(Happening(at, event.kind.value, event.text, event.count))
