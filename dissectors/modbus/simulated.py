@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
 
+from dissectors.line import MS
 from dissectors.modbus.adu import seal_ascii, seal_rtu, unseal
 from dissectors.modbus.functions import (
     BROADCAST,
@@ -28,8 +29,6 @@ from dissectors.modbus.functions import (
     MEI_DEVICE_IDENTIFICATION,
 )
 from dissectors.simulated import Send
-
-MILLISECOND = 1_000_000
 
 ILLEGAL_FUNCTION, ILLEGAL_ADDRESS, ILLEGAL_VALUE = 1, 2, 3
 
@@ -97,7 +96,7 @@ class ModbusServer:
         discrete: Bank | None = None,
         *,
         is_ascii: bool = False,
-        delay: int = 5 * MILLISECOND,
+        delay: int = 5 * MS,
         functions: frozenset[int] = frozenset((1, 2, 3, 4, 5, 6, 7, 8, 11, 15, 16, 17, 22, 23, 43)),
         codes: Mapping[tuple[int, int], int] | None = None,
         longest: int = 256,

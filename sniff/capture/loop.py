@@ -15,7 +15,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 from dissectors.frame import Chunk
-from dissectors.line import NS_PER_S, LineSettings
+from dissectors.line import MS, NS_PER_S, LineSettings
 from sniff.capture.disk_watch import DiskWatch
 from sniff.capture.frame_counter import FrameCounter
 from sniff.capture.outlet import Outlet
@@ -32,14 +32,14 @@ from sniff.capture.wire import (
 from sniff.engine.session import Item, LineEvent, LineEventKind, Session, SettingsChange, refusal
 from sniff.recording.writer import Recorder
 from sniff.sources import PortError, Source
-from sniff.sources.clock import NS_PER_MS, STEP, Clock
+from sniff.sources.clock import STEP, Clock
 
-BEAT = 20 * NS_PER_MS
-IDLE_BEAT = 250 * NS_PER_MS
-BUSY_FOR = 100 * NS_PER_MS
+BEAT = 20 * MS
+IDLE_BEAT = 250 * MS
+BUSY_FOR = 100 * MS
 """After the last octet beats stay short for so long."""
 
-STATUS_EVERY = 1000 * NS_PER_MS
+STATUS_EVERY = 1000 * MS
 FLUSH_AT = 32 * 1024
 """Octets gathered that are sent before the beat."""
 
@@ -278,7 +278,7 @@ class CaptureLoop:
         offset = self.clock.drift()
         if abs(offset - self._offset) > STEP:
             self._offset = offset
-            text = f"wall clock is {offset / 1e6:+.3f} ms from the capture's"
+            text = f"wall clock is {offset / MS:+.3f} ms from the capture's"
             for bus in self._buses:
                 event = LineEvent(now, LineEventKind.CLOCK, text, offset)
                 self._keep(bus.index, event)

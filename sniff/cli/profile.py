@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from dissectors.line import MS
 from dissectors.profiles import Entry, Profile, ProfileError
 from sniff.analysis.profile_guess import Guess, Guessing
 from sniff.bus.offline import outputs
@@ -75,7 +76,7 @@ def _show(args: argparse.Namespace) -> int:
         if limits.frame is not None:
             print(f"{family} longest frame: {limits.frame} octets")
         if limits.response is not None:
-            print(f"{family} answers within: {limits.response / 1e6:g} ms")
+            print(f"{family} answers within: {limits.response / MS:g} ms")
     for family, codes in profile.exceptions.items():
         for code, words in codes.items():
             print(f"{family} error {code:02d} ({code:02X}h): {words}")

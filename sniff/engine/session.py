@@ -11,8 +11,8 @@ from enum import Enum
 
 from dissectors import registry
 from dissectors.frame import Chunk
-from dissectors.line import LineSettings, Timing
-from sniff.engine.read_times import MS, ReadTimes, held_back
+from dissectors.line import MS, LineSettings, Timing
+from sniff.engine.read_times import ReadTimes, held_back
 
 DEVICES_NOTE = "devices"
 """Note of a session: which station is which device, as on the command line: "1=teco-e510,*=teco-f510"."""

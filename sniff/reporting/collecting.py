@@ -6,6 +6,7 @@ from collections import Counter
 from typing import Any
 
 from dissectors.findings import Finding, Severity, under_causes
+from dissectors.line import MS
 from dissectors.manifest import Dissector
 from dissectors.profiles import Devices
 from dissectors.token_ring import TokenRing
@@ -249,7 +250,7 @@ def _measurement(session: Session, dissector: Dissector) -> Measurement:
         program=session.program,
         adapter=adapter.name,
         driver=adapter.driver,
-        latency_ms=adapter.latency / 1e6,
+        latency_ms=adapter.latency / MS,
         latency_from=adapter.latency_from,
         reports=adapter.reports,
         detail=adapter.detail,

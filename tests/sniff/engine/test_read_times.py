@@ -10,11 +10,11 @@ from pathlib import Path
 import pytest
 
 from dissectors.frame import Chunk, Frame
-from dissectors.line import LineSettings, Timing
+from dissectors.line import MS, LineSettings, Timing
 from dissectors.modbus.adu import seal_rtu
 from sniff.bus.capture_writer import create
 from sniff.bus.offline import outputs
-from sniff.engine.read_times import MS, ReadTimes, held_back
+from sniff.engine.read_times import ReadTimes, held_back
 from sniff.engine.session import INFERRED, Adapter, LineEvent, LineEventKind, Session, with_settings
 from sniff.formats import read
 from sniff.simulation.scenarios import simulate
