@@ -10,10 +10,10 @@ from dataclasses import dataclass
 
 from dissectors import registry
 from dissectors.line import LineSettings
-from sniff import __version__
 from sniff.cli import PORT_TROUBLE, UNREADABLE, USAGE, Failure, arguments
 from sniff.config import AUTO, Config, ConfigError, load
 from sniff.formats.linktypes import link_type_for
+from sniff.version import __version__
 
 PREFIX = "sniff485:"
 
