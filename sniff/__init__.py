@@ -9,10 +9,10 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from sniff.version import __version__ as __version__
+
 if TYPE_CHECKING:
     from sniff.data_frames import DataCapture
-
-__version__ = "0.1.0"
 
 
 def read(

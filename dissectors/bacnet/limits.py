@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-MS = 1_000_000
+from dissectors.line import MS as MS
 
 T_NO_TOKEN = 500 * MS  # silence after which the token counts as lost
 T_SLOT = 10 * MS  # back-off slot, times the node's own address, before it makes a new token

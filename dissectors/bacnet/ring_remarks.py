@@ -8,8 +8,7 @@ from typing import NamedTuple
 from dissectors.bacnet.ring import Happened, Ring
 from dissectors.bacnet.rules import RULES
 from dissectors.findings import EVIDENCE_MAX, Finding, Severity, found
-
-_MS = 1_000_000
+from dissectors.line import MS
 
 
 class Remark(NamedTuple):
@@ -70,9 +69,7 @@ def _pair(happened: Happened, mac: int | None) -> str:
 
 def milliseconds(duration: int | None) -> str:
     """A duration (ns) for people, "?" where it is not known."""
-    return (
-        "?" if duration is None else f"{duration / _MS:.3g} ms" if duration < 1000 * _MS else f"{duration / 1e9:.2f} s"
-    )
+    return "?" if duration is None else f"{duration / MS:.3g} ms" if duration < 1000 * MS else f"{duration / 1e9:.2f} s"
 
 
 def listed(numbers: Iterable[int]) -> str:

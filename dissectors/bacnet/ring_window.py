@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 from dissectors.bacnet.ring import Node, Ring, What
 from dissectors.histogram import Histogram
-
-MS = 1_000_000
+from dissectors.line import MS
 
 Numbers = Mapping[str, int | float]
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dissectors.bacnet.ring import Ring, What
 from dissectors.histogram import Histogram
+from dissectors.line import MS
 from dissectors.token_ring import Cell
 from dissectors.words import milliseconds
 
@@ -105,4 +106,4 @@ def _users(ring: Ring) -> list[str]:
 
 def _ms(durations: Histogram, share: float) -> float | None:
     value = durations.most if share == 1 else durations.quantile(share)
-    return None if value is None else value / 1e6
+    return None if value is None else value / MS

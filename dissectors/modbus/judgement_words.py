@@ -6,10 +6,9 @@ from collections.abc import Iterable
 from math import sqrt
 
 from dissectors.findings import Severity
+from dissectors.line import MS as MS
 from dissectors.line import NS_PER_S
 from dissectors.modbus.station_record import Key
-
-MS = 1_000_000
 
 
 def wilson(count: int, of: int) -> tuple[float, float]:

@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
 
+from dissectors.line import MS
 from dissectors.modbus.envelope import seal_ascii, seal_rtu, unseal
 from dissectors.modbus.functions import BROADCAST, DIAGNOSTIC_LISTEN_ONLY, DIAGNOSTIC_LOOPBACK, EXCEPTION_BIT, FUNCTIONS
 from dissectors.modbus.layout import (
@@ -24,8 +25,6 @@ from dissectors.modbus.layout import (
     MEI_DEVICE_IDENTIFICATION,
 )
 from dissectors.simulated import Send
-
-MILLISECOND = 1_000_000
 
 ILLEGAL_FUNCTION, ILLEGAL_ADDRESS, ILLEGAL_VALUE = 1, 2, 3
 
@@ -93,7 +92,7 @@ class ModbusServer:
         discrete: Bank | None = None,
         *,
         is_ascii: bool = False,
-        delay: int = 5 * MILLISECOND,
+        delay: int = 5 * MS,
         functions: frozenset[int] = frozenset((1, 2, 3, 4, 5, 6, 7, 8, 11, 15, 16, 17, 22, 23, 43)),
         codes: Mapping[tuple[int, int], int] | None = None,
         longest: int = 256,

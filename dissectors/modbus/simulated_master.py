@@ -11,12 +11,10 @@ from __future__ import annotations
 import struct
 from collections.abc import Callable, Sequence
 
-from dissectors.line import LineSettings
+from dissectors.line import MS, LineSettings
 from dissectors.modbus.envelope import seal_ascii, seal_rtu, unseal
 from dissectors.modbus.functions import BROADCAST, EXCEPTION_BIT
 from dissectors.simulated import Send
-
-MILLISECOND = 1_000_000
 
 
 def read_holding(unit: int, start: int, quantity: int) -> bytes:
@@ -53,11 +51,11 @@ class PollingMaster:
         *,
         is_ascii: bool = False,
         start: int = 0,
-        interval: int = 1_000 * MILLISECOND,
-        pause: int = 10 * MILLISECOND,
-        timeout: int = 500 * MILLISECOND,
+        interval: int = 1_000 * MS,
+        pause: int = 10 * MS,
+        timeout: int = 500 * MS,
         retries: int = 2,
-        turnaround: int = 100 * MILLISECOND,
+        turnaround: int = 100 * MS,
     ) -> None:
         if not requests:
             raise ValueError("a master needs at least one request")

@@ -105,8 +105,8 @@ def phrase(value: Value) -> str:
         return f"{value.name} {value.text}"
     if entry.role is Role.COMMAND and entry.bits:
         return value.text
-    if value.words.startswith("no "):
-        return value.words  # "no fault" says what of
+    if value.words == f"no {entry.title}":
+        return value.words  # which says what of
     title = entry.title
     if _PARAMETER.fullmatch(entry.name) and entry.name not in title:
         title = f"{entry.name} {title}"

@@ -209,12 +209,17 @@ def words(dissector: Dissector, devices: Devices, row: Row, request: Frame | Non
 
 @dataclass(slots=True)
 class Point:
-    """The latest of one point. `changed`: ns, when its value last became another one; `history`: (ns, value)."""
+    """The latest of one point. `changed`: ns, when its value last became another one, 0 when it never did; `history`:
+    (ns, value). `first`: value and time, ns, of the earliest sample."""
 
     sample: Sample
     count: int = 0
     changed: int = 0
     history: deque[tuple[int, float]] = field(default_factory=lambda: deque(maxlen=HISTORY))
+    first: tuple[int | float | str, int] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.first = self.sample.value.value, self.sample.time
 
     @property
     def entry(self) -> Entry | None:
@@ -239,6 +244,22 @@ class Point:
         self.count += 1
         if sample.finite and not isinstance(sample.value.value, str):
             self.history.append((sample.time, float(sample.value.value)))
+
+    def copy(self) -> Point:
+        """The same, which goes on by itself."""
+        copy = Point(self.sample, self.count, self.changed, self.history.copy())
+        copy.first = self.first
+        return copy
+
+    def go_on(self, later: Point) -> None:
+        """Take what a later stretch saw of the same point."""
+        if later.changed:
+            self.changed = later.changed
+        elif later.first[0] != self.sample.value.value:
+            self.changed = later.first[1]
+        self.sample = later.sample
+        self.count += later.count
+        self.history.extend(later.history)
 
 
 Key = tuple[str, str]
@@ -284,6 +305,7 @@ class PointTable:
                 self.dropped += count
                 return
             point = self._points[key] = Point(last)
+            point.first = first
         elif point.sample.value.value != first[0]:
             point.changed = first[1]
         if changed is not None:
@@ -293,18 +315,22 @@ class PointTable:
         point.history.extend(history)
         self.version += count
 
-    def merge(self, later: PointTable) -> None:
-        """Take a table of a later stretch of the same bus."""
+    def merge(self, later: PointTable) -> PointTable:
+        """With a table of a later stretch of the same bus, as a new value: the table of both stretches. Where either
+        was full, what it dropped stays dropped."""
+        whole = PointTable()
+        whole.dropped = self.dropped + later.dropped
+        whole._points = {key: point.copy() for key, point in self._points.items()}
         for key, point in later._points.items():
-            mine = self._points.setdefault(key, Point(point.sample))
-            if mine.count and point.sample.value.value != mine.sample.value.value and not point.changed:
-                mine.changed = point.history[0][0] if point.history else point.sample.time
-            mine.changed = max(mine.changed, point.changed)
-            mine.count += point.count
-            mine.sample = point.sample
-            mine.history.extend(point.history)
-        self.dropped += later.dropped
-        self.version += later.version + 1
+            mine = whole._points.get(key)
+            if mine is not None:
+                mine.go_on(point)
+            elif len(whole._points) < MOST_POINTS:
+                whole._points[key] = point.copy()
+            else:
+                whole.dropped += point.count
+        whole.version = sum(point.count for point in whole._points.values())
+        return whole
 
     def __len__(self) -> int:
         return len(self._points)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dissectors import registry
 from dissectors.frame import Event, Frame, LineError, Noise, Place, Role
+from dissectors.line import MS
 from dissectors.manifest import Dissector
 from dissectors.tracker import Interval
 from dissectors.words import milliseconds
@@ -55,7 +56,7 @@ def duration(interval: Interval) -> str:
 
 
 def _short(value: int) -> str:
-    ms = value / 1e6
+    ms = value / MS
     return f"{ms:.0f}" if ms >= 10 or ms == int(ms) else f"{ms:.1f}" if ms >= 0.1 else f"{ms:.2f}"
 
 

@@ -15,7 +15,7 @@ from dissectors.line import NS_PER_S, LineSettings
 from sniff.analysis.autodetect import Detecting, Outcome
 from sniff.capture.link import CaptureLink
 from sniff.capture.wire import Ended, Message, Received, Tick
-from sniff.engine.session import LineEvent, LineEventKind, settings_change
+from sniff.engine.session import LineEvent, refused_line, settings_change
 
 ANSWER_PATIENCE = 3 * NS_PER_S
 """How long a change of settings may take to be confirmed, ns, before it is asked for again."""
@@ -101,8 +101,8 @@ class Search:
         if change is not None:
             self._in_force = change.line or self._in_force
         elif isinstance(item, LineEvent):
-            refused = item.kind is LineEventKind.NOTE and str(self._asked) in item.text
-            if refused and self._asked == self.detecting.wanted:
+            refused = refused_line(item)
+            if refused is not None and refused == self.detecting.wanted:
                 self.detecting.refuse()
         elif self._hears_what_is_wanted:  # anything else was heard with settings that nobody asks about
             self.detecting.feed(item)

@@ -15,11 +15,11 @@ import numpy.typing as npt
 
 from dissectors.columns import DAMAGES, FOUNDS, NONE, ROLES, VERDICTS, Masks, Times
 from dissectors.frame import Frame
+from dissectors.line import MS
 from sniff.engine.engine import Row
 from sniff.engine.table import Table
 
 Values = npt.NDArray[Any]
-NS_PER_MS = 1e6
 SEARCHING, NOISE = "searching", "noise"
 
 
@@ -218,7 +218,7 @@ class TableColumns:
         _add(into["station"], held.station, held.station == NONE)
         untimed = held.latency == NONE
         for name, values in (("latency", held.latency), ("latency_low", held.least), ("latency_high", held.most)):
-            _add(into[f"{name}_ms"], values / NS_PER_MS, untimed)
+            _add(into[f"{name}_ms"], values / MS, untimed)
 
     def _join(self, name: str, ids: Times, told: Column) -> None:
         """What the transactions say, for their frames."""

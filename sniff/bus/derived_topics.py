@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 from dissectors.findings import Finding, Severity
 from dissectors.histogram import Histogram
-from dissectors.line import NS_PER_S
+from dissectors.line import MS, NS_PER_S
 from dissectors.tracker import Verdict
 from sniff.analysis.health import health_of, station_health
 from sniff.analysis.nodes import Node
@@ -158,7 +158,7 @@ def _latency(latency: Histogram) -> dict[str, object]:
         ("latency_p95_ms", latency.quantile(0.95)),
         ("latency_max_ms", latency.most),
     )
-    return {name: value / 1e6 for name, value in named if value is not None}
+    return {name: value / MS for name, value in named if value is not None}
 
 
 def _log(finding: Finding, bus: str, now: int) -> DerivedMessage:

@@ -13,14 +13,13 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 
 from dissectors.frame import Chunk
-from dissectors.line import NS_PER_S, LineSettings
+from dissectors.line import MS, NS_PER_S, LineSettings
 from sniff.capture.disk_watch import DiskWatch
 from sniff.capture.frame_counter import FrameCounter
 from sniff.capture.outlet import Outlet
 from sniff.capture.waiting import Waiting
 from sniff.capture.wire import (
     LOSSY,
-    NOTHING_MORE,
     Kind,
     MessageSplitter,
     Status,
@@ -29,18 +28,18 @@ from sniff.capture.wire import (
     encode_status,
     encode_tick,
 )
-from sniff.engine.session import Item, LineEvent, LineEventKind, Session, SettingsChange
+from sniff.engine.session import Item, LineEvent, LineEventKind, Session, SettingsChange, refusal
 from sniff.recording.writer import Recorder
 from sniff.sources import PortError, Source
-from sniff.sources.clock import NS_PER_MS, STEP, Clock
+from sniff.sources.clock import STEP, Clock
 
-BEAT = 20 * NS_PER_MS
-UNWATCHED_BEAT = 100 * NS_PER_MS
-IDLE_BEAT = 250 * NS_PER_MS
-BUSY_FOR = 100 * NS_PER_MS
+BEAT = 20 * MS
+UNWATCHED_BEAT = 100 * MS
+IDLE_BEAT = 250 * MS
+BUSY_FOR = 100 * MS
 """After the last octet beats stay short for so long."""
 
-STATUS_EVERY = 1000 * NS_PER_MS
+STATUS_EVERY = 1000 * MS
 FLUSH_AT = 32 * 1024
 """Octets gathered that are sent before the beat."""
 
@@ -95,6 +94,7 @@ class CaptureLoop:
     sessions: list[Session] = field(default_factory=list)
     watched: bool = True
     reason: str | None = None
+    at_end: bool = False
     closing: bool = False
     _hurried: bool = False
     _offset: int = 0
@@ -211,7 +211,8 @@ class CaptureLoop:
             self._set_due(bus, _FAR)
             self._watch(bus, None)
             if all(other.ended for other in self._buses):
-                self.stop(NOTHING_MORE)
+                self.at_end = self.reason is None
+                self.stop("nothing more to read")
         return bool(items)
 
     def _set_due(self, bus: _Bus, due: int) -> None:
@@ -284,7 +285,7 @@ class CaptureLoop:
         offset = self.clock.drift()
         if abs(offset - self._offset) > STEP:
             self._offset = offset
-            text = f"wall clock is {offset / 1e6:+.3f} ms from the capture's"
+            text = f"wall clock is {offset / MS:+.3f} ms from the capture's"
             for bus in self._buses:
                 event = LineEvent(now, LineEventKind.CLOCK, text, offset)
                 self._keep(bus.index, event)
@@ -361,11 +362,12 @@ class CaptureLoop:
             )
         elif kind == Kind.RECONFIGURE and bus < len(self._buses):
             source = self._buses[bus].source
+            line = body.decode("ascii", "replace")
             self._take(self._buses[bus])  # what is there was heard with the settings before
             try:
-                source.reconfigure(LineSettings.parse(body.decode("ascii", "replace")))
+                source.reconfigure(LineSettings.parse(line))
             except (PortError, ValueError) as error:
-                self._keep(bus, LineEvent(self.clock.now(), LineEventKind.NOTE, str(error)))
+                self._keep(bus, LineEvent(self.clock.now(), LineEventKind.REFUSED, refusal(line, str(error))))
             self._take(self._buses[bus])
 
     def _settings(self, bus: _Bus, change: SettingsChange) -> None:

@@ -20,7 +20,7 @@ from sniff.capture.config import CaptureConfig, SourceSpec
 from sniff.capture.loop import CaptureLoop
 from sniff.capture.outlet import Outlet
 from sniff.capture.priority import raise_priority
-from sniff.capture.wire import Kind, MessageSplitter, WireError, decode_json, encode, encode_json
+from sniff.capture.wire import Kind, MessageSplitter, WireError, decode_json, encode_ended, encode_json
 from sniff.engine.capture import CaptureError
 from sniff.engine.session import Session
 from sniff.recording.rotation import Rotation
@@ -140,7 +140,7 @@ def _capture(
             source.close()
     code = loop.finish()
     waker.close()
-    outlet.finish(encode(Kind.ENDED, 0, reason.encode()), FAREWELL)
+    outlet.finish(encode_ended(reason, loop.at_end), FAREWELL)
     return code
 
 

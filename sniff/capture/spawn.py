@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
 
-import sniff
+from sniff import version
 
 CONNECT_PATIENCE = 20.0
 _TOKEN_SIZE = 32
@@ -85,7 +85,7 @@ def _proves(connection: socket.socket, token: bytes) -> bool:
 
 def _environment() -> dict[str, str]:
     """The process must find this very package, and nothing in the current folder."""
-    root = str(Path(sniff.__file__).resolve().parents[1])
+    root = str(Path(version.__file__).resolve().parents[1])
     environment = dict(os.environ)
     if not root.endswith(("site-packages", "dist-packages")):
         paths = [root, *filter(None, [environment.get("PYTHONPATH")])]

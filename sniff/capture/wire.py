@@ -38,7 +38,7 @@ class Kind(IntEnum):
     LINE = 4
     TICK = 5
     STATUS = 6  # JSON
-    ENDED = 7  # text
+    ENDED = 7  # 1 when nothing is left to read, else 0; text
     READS = 8  # of one bus, in which no line error was reported
 
     CONFIG = 32  # JSON
@@ -97,22 +97,21 @@ class Status:
 LOSSY = 3
 """Exit code of a capture process that could not record everything."""
 
-NOTHING_MORE = "nothing more to read"
-"""Why a capture ended whose ports are gone for good, or whose file is at its end."""
-
 
 @dataclass(frozen=True, slots=True)
 class Ended:
-    """The capture is over and its files are closed, unless `clean` is False.
+    """The capture is over and its files are closed, unless `clean` is False. `reason`: why, in words.
 
-    `lossy`: it recorded less than it heard; without this its last `Status` says whether it did. `unheard`: this side
-    was too slow for its last words, and nobody knows how many octets went with them (they are recorded).
+    `at_end`: whether it ended by itself, because its ports are gone for good or its file is at its end. `lossy`: it
+    recorded less than it heard; without this its last `Status` says whether it did. `unheard`: this side was too slow
+    for its last words, and nobody knows how many octets went with them (they are recorded).
     """
 
     reason: str
     clean: bool = True
     lossy: bool = False
     unheard: bool = False
+    at_end: bool = False
 
 
 Message = Received | Tick | Status | Ended
@@ -214,6 +213,11 @@ def encode_derived(derived: Derived) -> bytes:
     return encode(Kind.DERIVED, derived.bus, head + topic + schema + metadata + derived.data)
 
 
+def encode_ended(reason: str, at_end: bool) -> bytes:
+    """The end of a capture: see `Ended`."""
+    return encode(Kind.ENDED, 0, bytes((at_end,)) + reason.encode())
+
+
 def decode_message(kind: int, bus: int, body: bytes) -> Batch | None:
     """A message to the main process; None for kinds that are not for it. Raises WireError."""
     try:
@@ -230,7 +234,7 @@ def decode_message(kind: int, bus: int, body: bytes) -> Batch | None:
         if kind == Kind.STATUS:
             return Status(**decode_json(body))
         if kind == Kind.ENDED:
-            return Ended(body.decode("utf-8", "replace"))
+            return Ended(body[1:].decode("utf-8", "replace"), at_end=body[0] == 1)
     except (struct.error, IndexError, TypeError, ValueError) as error:
         raise WireError(f"message {kind}: {error}") from error
     return None

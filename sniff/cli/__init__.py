@@ -16,9 +16,9 @@ from types import ModuleType
 from typing import cast
 
 from dissectors import registry
-from sniff import __version__
 from sniff.cli import standard_streams
 from sniff.engine.capture import CaptureError
+from sniff.version import __version__
 
 COMMANDS: dict[str, str] = {
     "ports": "serial ports: adapter, driver, latency, what line errors they can report, who holds them",

@@ -25,7 +25,11 @@ def add_line(parser: argparse.ArgumentParser, auto: bool = False) -> None:
         "-s", "--line", type=kinds[0], metavar="LINE", help=f"line settings, for instance 19200,8E1 or 9600,8N1{also}"
     )
     parser.add_argument(
-        "-p", "--protocol", type=kinds[1], metavar="PROTOCOL", help=f"one of {', '.join(registry.BUILT_IN)}{also}"
+        "-p",
+        "--protocol",
+        type=kinds[1],
+        metavar="PROTOCOL",
+        help=f"one of {', '.join(registry.BUILT_IN)}, a plug-in's{also}",
     )
 
 

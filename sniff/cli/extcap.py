@@ -10,10 +10,10 @@ from dataclasses import dataclass
 
 from dissectors import registry
 from dissectors.line import LineSettings
-from sniff import __version__
 from sniff.cli import PORT_TROUBLE, UNREADABLE, USAGE, Failure, arguments
 from sniff.config import AUTO, Config, ConfigError, load
 from sniff.formats.linktypes import link_type_for
+from sniff.version import __version__
 
 PREFIX = "sniff485:"
 
@@ -105,12 +105,12 @@ def _config(bus: _Bus) -> int:
 def _capture(bus: _Bus, fifo: str) -> int:
     from pathlib import Path
 
+    from sniff.bus.capture_writer import live_pcapng
     from sniff.capture.config import SourceSpec
     from sniff.capture.link import CaptureLink
     from sniff.capture.wire import Ended, Received, Tick
     from sniff.cli.interruption import until_interrupted
     from sniff.engine.capture import CaptureError
-    from sniff.formats.pcapng import PcapngWriter
     from sniff.sources import PortError
 
     if not Path(fifo).exists():
@@ -122,13 +122,13 @@ def _capture(bus: _Bus, fifo: str) -> int:
     ended: Ended | None = None
     with link, until_interrupted() as caught:
         try:
-            writer = PcapngWriter(Path(fifo), link.session(0), {}, live=True)
+            writer = live_pcapng(fifo, link.session(0))
             while ended is None and not caught:
                 for message in link.receive(0.2):
                     if isinstance(message, Received):
                         writer.write(message.item)
                     elif isinstance(message, Tick):
-                        writer.put(writer.maker.advance(message.now))
+                        writer.advance(message.now)
                     elif isinstance(message, Ended):
                         ended = message
             writer.close()

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+from dissectors.line import MS
 from dissectors.tracker import Verdict
 from dissectors.words import milliseconds
 from sniff.analysis.nodes import Node
@@ -89,7 +90,7 @@ def _as_json(path: str, capture: Capture, session: Session, summary: Summary) ->
         "line_assumed": session.line_is_assumed,
         "port": session.port,
         "adapter": session.adapter.name,
-        "adapter_latency_ms": session.adapter.latency / 1e6,
+        "adapter_latency_ms": session.adapter.latency / MS,
         "unknown": list(session.unknown),
         "octets": summary.octets + summary.searched,
         "searched_octets": summary.searched,
@@ -116,7 +117,7 @@ def _response_times(summary: Summary) -> dict[str, float | None]:
         "p95": summary.latency.quantile(0.95),
         "most": summary.latency.most,
     }
-    return {name: None if time is None else time / 1e6 for name, time in times.items()}
+    return {name: None if time is None else time / MS for name, time in times.items()}
 
 
 def _node_as_json(node: Node) -> dict[str, Any]:

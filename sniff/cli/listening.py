@@ -21,7 +21,7 @@ from sniff.analysis.summary import Summary
 from sniff.bus.live import LiveBus, LiveItem, LiveTables
 from sniff.capture.config import RecordSpec, SourceSpec
 from sniff.capture.link import CaptureLink
-from sniff.capture.wire import NOTHING_MORE, Ended, Status
+from sniff.capture.wire import Ended, Status
 from sniff.cli import INTERRUPTED, PORT_TROUBLE, UNREADABLE, USAGE, Failure, arguments, rows, searching
 from sniff.cli.interruption import until_interrupted
 from sniff.cli.searching import Unknowns
@@ -224,7 +224,7 @@ class Printer:
     def _say_event(self, event: LineEvent) -> None:
         if event.kind in (LineEventKind.UNPLUGGED, LineEventKind.REPLUGGED):
             print(f"sniff485: {plain(event.text)}", file=sys.stderr)  # names the port
-        elif event.kind is LineEventKind.NOTE:
+        elif event.kind in (LineEventKind.NOTE, LineEventKind.REFUSED):
             self._say(event.text)
         elif event.kind is not LineEventKind.SETTINGS:  # those of a search are said where it is shown
             self._say(f"{event.kind.value} {event.text}".strip())
@@ -315,7 +315,7 @@ def lost_something(live: LiveBus) -> bool:
 
 def _gone_for_good(live: LiveBus) -> bool:
     """Whether the port ended the capture. A capture file that stands in for one simply ends."""
-    ended = live.ended is not None and live.ended.reason == NOTHING_MORE
+    ended = live.ended is not None and live.ended.at_end
     return ended and not live.session.port.lower().endswith(tuple(READERS))
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 
+from dissectors.line import MS
 from dissectors.words import milliseconds
 from sniff.analysis.plain import plain
 from sniff.cli import json_output
@@ -27,7 +28,7 @@ def run(args: argparse.Namespace) -> int:
                 "adapter": adapter.name,
                 "driver": adapter.driver or None,
                 "serial_number": adapter.serial_number or None,
-                "latency_ms": adapter.latency / 1e6,
+                "latency_ms": adapter.latency / MS,
                 "latency_from": adapter.latency_from,
                 "reports": None if adapter.reports is None else list(adapter.reports),
                 "detail": adapter.detail,

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from dissectors.line import MS
 from dissectors.profiles import Entry, Profile, ProfileError
 from dissectors.profiles.decoding import number, plain_name
 from sniff.analysis.profile_draft import drafted
@@ -89,7 +90,7 @@ def _show(args: argparse.Namespace) -> int:
         if limits.frame is not None:
             print(f"{family} longest frame: {limits.frame} octets")
         if limits.response is not None:
-            print(f"{family} answers within: {limits.response / 1e6:g} ms")
+            print(f"{family} answers within: {limits.response / MS:g} ms")
         if limits.stations is not None:
             print(f"{family} station numbers: {limits.stations[0]} … {limits.stations[1]}")
         if limits.functions is not None:

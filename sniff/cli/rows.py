@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 from typing import Any
 
 from dissectors.frame import Frame, Role
-from dissectors.line import NS_PER_S
+from dissectors.line import MS, NS_PER_S
 from dissectors.manifest import Dissector
 from sniff.analysis.plain import ascii_of
 from sniff.analysis.wording import describe, duration, is_error
@@ -68,7 +68,7 @@ def to_json(item: Settled, dissector: Dissector, session: Session, with_fields: 
         "noise_before": frame.skipped if frame is not None else 0,
         "tx": placement.tx if placement else None,
         "verdict": transaction.verdict.value if transaction is not None else None,
-        "latency_ms": round(latency.nominal / 1e6, 6) if latency is not None else None,
+        "latency_ms": round(latency.nominal / MS, 6) if latency is not None else None,
         "text": _in_words(describe(dissector, row), item),
         "hex": event.octets.hex(),
     }
@@ -114,9 +114,9 @@ def fields_of(item: Settled, dissector: Dissector) -> dict[str, int | float | st
         fields["tx.verdict"] = transaction.verdict.value
         fields["tx.attempt"] = transaction.attempt
         if transaction.latency is not None:
-            fields["tx.latency_ms"] = transaction.latency.nominal / 1e6
-            fields["tx.latency_low_ms"] = transaction.latency.low / 1e6
-            fields["tx.latency_high_ms"] = transaction.latency.high / 1e6
+            fields["tx.latency_ms"] = transaction.latency.nominal / MS
+            fields["tx.latency_low_ms"] = transaction.latency.low / MS
+            fields["tx.latency_high_ms"] = transaction.latency.high / MS
     if isinstance(event, Frame):
         fields.update(dissector.fields(event, role_of(item)))
     return fields

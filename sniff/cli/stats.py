@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from dissectors import registry
 from dissectors.histogram import Histogram
-from dissectors.line import NS_PER_S
+from dissectors.line import MS, NS_PER_S
 from dissectors.tracker import Verdict
 from sniff.analysis.health import HealthReport
 from sniff.analysis.load import Second
@@ -89,7 +89,7 @@ def run(args: argparse.Namespace) -> int:
         tables.write(("kind", "verdict", "count"), words, args.style)
     elif table == "latency":
         rows = [(node.address, *_quantiles(node.latency)) for node in summary.nodes if node.latency.count]
-        bound = session.adapter.latency / 1e6
+        bound = session.adapter.latency / MS
         tables.write(LATENCY_HEADINGS, [(*row, bound) for row in rows], args.style)
     else:
         tables.write(LOAD_HEADINGS, _load(summary, int(args.every * NS_PER_S)), args.style)
@@ -170,7 +170,7 @@ def _node(node: Node) -> tuple[Cell, ...]:
 
 def _quantiles(latency: Histogram) -> tuple[Cell, ...]:
     values = (latency.least, latency.quantile(0.5), latency.quantile(0.95), latency.most)
-    return (latency.count, *(None if value is None else value / 1e6 for value in values))
+    return (latency.count, *(None if value is None else value / MS for value in values))
 
 
 def _load(summary: Summary, every: int) -> list[tuple[Cell, ...]]:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from dissectors.frame import Chunk
 from dissectors.profiles import Devices
 from sniff.analysis.plain import plain
+from sniff.bus.capture_writer import create
 from sniff.bus.offline import Source
 from sniff.cli import UNREADABLE, USAGE, Failure
 from sniff.cli.progress import Watched
@@ -20,9 +21,8 @@ from sniff.engine.capture import BlockWriter, Capture, CaptureError, CaptureWrit
 from sniff.engine.engine import Output
 from sniff.engine.follow_settings import dissector_for, engine_for
 from sniff.engine.session import Item, LineEvent, Session
-from sniff.formats import create, parquet
+from sniff.formats import parquet
 from sniff.formats.parquet import Kind, ParquetWriter
-from sniff.formats.records import RecordMaker
 
 if TYPE_CHECKING:
     from sniff.analysis.points import Sample
@@ -56,9 +56,7 @@ def write(
     counts = _Counts()
     watched = Watched(source)
     try:
-        with create(target, session, options) as writer:
-            if notes and isinstance(maker := getattr(writer, "maker", None), RecordMaker):
-                maker.notes = notes
+        with create(target, session, options, notes) as writer:
             takers: list[_Frames | _Values] = [_Frames(writer, session)] if with_frames else []
             if devices:
                 takers.append(_Values(writer, session, devices))

@@ -24,7 +24,6 @@ from sniff.engine.session import (
     ASSUMED,
     DEVICES_NOTE,
     LINE_NOTE,
-    Adapter,
     Item,
     LineEvent,
     LineEventKind,
@@ -39,8 +38,6 @@ ERROR_NAMES = frozenset(("parity", "framing", "break", "overrun", "buffer overru
 def anonymous_session(session: Session) -> Session:
     """The session without the names of ports, devices and places."""
     adapter = replace(session.adapter, serial_number="")
-    if adapter.name.startswith("another program's"):
-        adapter = Adapter("another program's file", latency=adapter.latency, latency_from=adapter.latency_from)
     return replace(session, port="anonymised", bus="bus", adapter=adapter, notes=_renamed_devices(session), profiles={})
 
 

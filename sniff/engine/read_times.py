@@ -20,9 +20,8 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from dissectors.line import LineSettings
+from dissectors.line import MS, LineSettings
 
-MS = 1_000_000
 LOOKED_AT = 2048
 """Reads of a capture that are looked at."""
 

@@ -11,8 +11,8 @@ from enum import Enum
 
 from dissectors import registry
 from dissectors.frame import Chunk
-from dissectors.line import LineSettings, Timing
-from sniff.engine.read_times import MS, ReadTimes, held_back
+from dissectors.line import MS, LineSettings, Timing
+from sniff.engine.read_times import ReadTimes, held_back
 
 DEVICES_NOTE = "devices"
 """Note of a session: which station is which device, as on the command line: "1=teco-e510,*=teco-f510"."""
@@ -201,6 +201,7 @@ class LineEventKind(Enum):
     SETTINGS = "settings"  # line settings or protocol changed from here on; `text` as in `SettingsChange`
     ERRORS = "errors"  # errors that the driver counted without saying where; `count` of them, `text` = kind
     NOTE = "note"
+    REFUSED = "refused"  # line settings that were asked for and not taken; `text` as `refusal` makes it
 
     @property
     def is_hole(self) -> bool:
@@ -262,6 +263,21 @@ def settings_change(item: Chunk | LineEvent) -> SettingsChange | None:
     if isinstance(item, LineEvent) and item.kind is LineEventKind.SETTINGS:
         return SettingsChange.parse(item.text)
     return None
+
+
+def refusal(line: LineSettings | str, why: str) -> str:
+    """Text of a REFUSED event."""
+    return f"{line}: {why}"
+
+
+def refused_line(event: LineEvent) -> LineSettings | None:
+    """The line settings that were not taken, of a REFUSED event; None of any other."""
+    if event.kind is not LineEventKind.REFUSED:
+        return None
+    try:
+        return LineSettings.parse(event.text.partition(":")[0])
+    except ValueError:
+        return None
 
 
 Item = Chunk | LineEvent

@@ -1,11 +1,13 @@
 """Capture files by suffix: one file a format, chosen here.
 
-`read(path)` gives a Capture (session, items in order, completeness), `create(path, session)` a CaptureWriter.
+`read(path)` gives a Capture (session, items in order, completeness). `create_of_items(path, session)` gives a
+CaptureWriter, which takes the same; `create_of_frames` a FrameFile, which takes frames as records of packets. Who has
+items and wants a file of any kind asks `sniff.bus.capture_writer`, which has an engine.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -15,6 +17,7 @@ from dissectors.frame import Chunk
 from sniff.engine.capture import Capture, CaptureError, CaptureWriter
 from sniff.engine.read_times import LOOKED_AT, ReadTimes
 from sniff.engine.session import Item, LineEventKind, Session
+from sniff.formats.records import FrameFile
 
 READERS: dict[str, str] = {
     ".cap.txt": "sniff.formats.text:read",
@@ -30,6 +33,8 @@ READERS: dict[str, str] = {
 WRITERS: dict[str, str] = {
     ".cap.txt": "sniff.formats.text:create",
     ".mcap": "sniff.recording.writer:create",
+}
+FRAME_WRITERS: dict[str, str] = {
     ".pcap": "sniff.formats.pcap:create",
     ".pcapng": "sniff.formats.pcapng:create",
 }
@@ -74,13 +79,20 @@ def with_first_reads(session: Session, items: Iterable[Item]) -> Session:
     return replace(session, reads=ReadTimes.of(reads)).with_latency_of_reads()
 
 
-def create(path: str | Path, session: Session, options: Mapping[str, str] | None = None) -> CaptureWriter:
-    """Create a capture by its suffix; `options` are the format's own ("link-type" of pcap). Raises CaptureError."""
-    path = Path(path)
-    make = _find(WRITERS, path)
-    if options and path.suffix not in {".pcap", ".pcapng"}:
-        raise CaptureError(f"{path}: this format has no option {', '.join(options)}")
-    made: CaptureWriter = make(path, session, options) if options else make(path, session)
+def keeps_frames(path: str | Path) -> bool:
+    """Whether the format of a file to write keeps frames instead of reads."""
+    return any(Path(path).name.lower().endswith(suffix) for suffix in FRAME_WRITERS)
+
+
+def create_of_items(path: str | Path, session: Session) -> CaptureWriter:
+    """Create a capture that keeps items as they are, by its suffix. Raises CaptureError."""
+    made: CaptureWriter = _find(WRITERS, Path(path))(Path(path), session)
+    return made
+
+
+def create_of_frames(path: str | Path, session: Session, link_type: int, live: bool = False) -> FrameFile:
+    """Create a packet file, by its suffix; `live` pushes everything through at once. Raises CaptureError."""
+    made: FrameFile = _find(FRAME_WRITERS, Path(path))(Path(path), session, link_type, live)
     return made
 
 

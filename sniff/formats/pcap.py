@@ -6,7 +6,7 @@ It keeps frames and their ends. It keeps neither line settings nor adapter, nor 
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
@@ -16,7 +16,7 @@ from sniff.engine.session import Completeness, Item, LineEvent, Session
 from sniff.formats.files import NewFile, open_capture
 from sniff.formats.linktypes import LINK_TYPES, OWN, USER1
 from sniff.formats.linktypes import protocol_of as protocol_of_link
-from sniff.formats.records import Record, RecordMaker, foreign_session, items_of, protocol_of
+from sniff.formats.records import Record, foreign_session, items_of, protocol_of
 
 if TYPE_CHECKING:
     from dissectors.columns import Reads
@@ -123,35 +123,32 @@ class PcapCapture:
             yield Record(seconds * 1_000_000_000 + ticks * self._tick, self._link_type, data)
 
 
-def create(path: Path, session: Session, options: Mapping[str, str] | None = None) -> PcapWriter:
-    """Create a pcap file. Raises CaptureError."""
-    return PcapWriter(path, session, options or {})
+def create(path: Path, session: Session, link_type: int, live: bool = False) -> PcapWriter:
+    """Create a pcap file of one link type. Raises CaptureError."""
+    return PcapWriter(path, link_type, live)
 
 
 class PcapWriter:
-    """Writes frames; `losses` says what the format could not keep."""
+    """Writes the records of one link type; `losses` says what the format could not keep. `live`: pushed through."""
 
-    def __init__(self, path: Path, session: Session, options: Mapping[str, str]) -> None:
+    def __init__(self, path: Path, link_type: int, live: bool = False) -> None:
         self.losses: list[str] = [
             "pcap keeps no line settings, adapter, line errors or read limits; .pcapng keeps more"
         ]
+        self._live = live
         self._left_out = 0
-        try:
-            self._maker = RecordMaker(session, int(options["link-type"]) if "link-type" in options else None)
-        except ValueError as error:
-            raise CaptureError(f"{path}: {error}") from None
         self._file = NewFile(path)
-        self._file.write(struct.pack("<IHHiIII", 0xA1B23C4D, 2, 4, 0, 0, LONGEST, self._maker.link_type))
+        self._file.write(struct.pack("<IHHiIII", 0xA1B23C4D, 2, 4, 0, 0, LONGEST, link_type))
 
-    def write(self, item: Item) -> None:
-        """Add a chunk or line event."""
-        for record in self._maker.add(item):
+    def put(self, records: Iterable[Record]) -> None:
+        """Add records."""
+        for record in records:
             self._put(record)
+        if self._live:
+            self._file.stream.flush()
 
     def close(self) -> None:
-        """Write what is held and finish the file."""
-        for record in self._maker.close():
-            self._put(record)
+        """Finish the file."""
         if self._left_out:
             what = "1 octet that is" if self._left_out == 1 else f"{self._left_out} octets that are"
             was = "was" if self._left_out == 1 else "were"
@@ -159,14 +156,9 @@ class PcapWriter:
             self._left_out = 0
         self._file.close()
 
-    def __enter__(self) -> PcapWriter:
-        return self
-
-    def __exit__(self, *exc: object) -> None:
-        if exc and exc[0] is not None:
-            self._file.discard()
-        else:
-            self.close()
+    def discard(self) -> None:
+        """Give the file up."""
+        self._file.discard()
 
     def _put(self, record: Record) -> None:
         if record.link_type == USER1:

@@ -9,16 +9,17 @@ from __future__ import annotations
 
 import json
 import struct
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
+from dissectors.line import LineSettings
 from sniff.engine.capture import CaptureError
 from sniff.engine.session import Completeness, Item, LineEvent, Session
 from sniff.formats.files import NewFile, open_capture
 from sniff.formats.linktypes import LINK_TYPES, USER1
 from sniff.formats.pcapng_interface import Interface
-from sniff.formats.records import SEARCHED, Record, RecordMaker, SearchMarks, foreign_session, items_of, protocol_of
+from sniff.formats.records import Record, SearchMarks, foreign_session, items_of, protocol_of
 
 if TYPE_CHECKING:
     from dissectors.columns import Reads
@@ -34,6 +35,8 @@ LONGEST = 4 * 1024 * 1024
 LATEST = (1 << 33) * 1_000_000_000
 """ns since the epoch, in the year 2242; a record that says more, or as much before it, is given this time."""
 SESSION_MARK = "sniff485 session: "
+SEARCH_MARK = "sniff485 search: "
+"""Begins a comment of a packet that was heard in a search for settings; the line settings tried follow."""
 
 
 def read(path: Path) -> PcapngCapture:
@@ -109,7 +112,7 @@ class PcapngCapture:
         marks = SearchMarks(self.session)
         interfaces: list[Interface] = []
         with open_capture(self.path) as stream:
-            walk = PcapngWalk(stream, LONGEST, SEARCHED.encode())
+            walk = PcapngWalk(stream, LONGEST, SEARCH_MARK.encode())
             for one in walk.blocks():
                 if isinstance(one, OtherBlock):
                     record = self._record(one.order, one.kind, one.body, interfaces)
@@ -222,13 +225,24 @@ def _packet(order: str, kind: int, body: bytes, interfaces: list[Interface]) -> 
     factor, ticks = interface.resolution
     time = ((high << 32) | low) * factor // ticks + interface.offset * 1_000_000_000
     time = max(-LATEST, min(time, LATEST))
-    comment, crc_error = "", False
+    comment, crc_error, searched = "", False, None
     for code, value in _options(order, body[20 + kept + (-kept % 4) :]):
         if code == OPT_COMMENT:
-            comment = value.decode("utf-8", "replace")
+            text = value.decode("utf-8", "replace")
+            if text.startswith(SEARCH_MARK):
+                searched = _line(text[len(SEARCH_MARK) :])
+            else:
+                comment = text
         elif code == OPT_FLAGS and len(value) == 4:
             crc_error = bool(struct.unpack(order + "I", value)[0] & CRC_ERROR_FLAG)
-    return Record(time, interface.link_type, body[20 : 20 + kept], comment, crc_error)
+    return Record(time, interface.link_type, body[20 : 20 + kept], comment, crc_error, searched)
+
+
+def _line(text: str) -> LineSettings | None:
+    try:
+        return LineSettings.parse(text)
+    except ValueError:
+        return None
 
 
 def _options(order: str, data: bytes) -> Iterator[tuple[int, bytes]]:
@@ -241,64 +255,49 @@ def _options(order: str, data: bytes) -> Iterator[tuple[int, bytes]]:
         at += 4 + size + (-size % 4)
 
 
-def create(path: Path, session: Session, options: Mapping[str, str] | None = None) -> PcapngWriter:
-    """Create a pcapng file. Raises CaptureError."""
-    return PcapngWriter(path, session, options or {})
+def create(path: Path, session: Session, link_type: int, live: bool = False) -> PcapngWriter:
+    """Create a pcapng file whose frames are of one link type. Raises CaptureError."""
+    return PcapngWriter(path, session, link_type, live)
 
 
 class PcapngWriter:
-    """Writes frames, and what is no frame on interface 1; `losses` says what the format could not keep.
+    """Writes records, those that are no frame on interface 1; `losses` says what the format could not keep.
 
-    `live`: each frame at once and pushed through, for somebody who reads while we write.
+    `live`: pushed through at once, for somebody who reads while we write.
     """
 
-    def __init__(self, path: Path, session: Session, options: Mapping[str, str], live: bool = False) -> None:
+    def __init__(self, path: Path, session: Session, link_type: int, live: bool = False) -> None:
         self.losses: list[str] = [
             "pcapng keeps one time a frame (its end), no limits of reads, no line events; of line errors only how many "
             "octets of a frame had one, in its comment"
         ]
-        self.live = live
-        try:
-            self.maker = RecordMaker(session, int(options["link-type"]) if "link-type" in options else None, live)
-        except ValueError as error:
-            raise CaptureError(f"{path}: {error}") from None
+        self._live = live
         self._file = NewFile(path)
         about = SESSION_MARK + json.dumps(session.to_metadata())
         section = struct.pack("<IHHq", BYTE_ORDER, 1, 0, -1) + _option(OPT_COMMENT, about.encode()) + _option(OPT_END)
         self._block(SECTION, section)
-        for link_type, name in ((self.maker.link_type, session.bus), (USER1, f"{session.bus}: no frame")):
-            described = struct.pack("<HHI", link_type, 0, 0) + _option(OPT_NAME, name.encode())
+        for number, name in ((link_type, session.bus), (USER1, f"{session.bus}: no frame")):
+            described = struct.pack("<HHI", number, 0, 0) + _option(OPT_NAME, name.encode())
             self._block(INTERFACE, described + _option(OPT_TSRESOL, b"\x09") + _option(OPT_END))
-        self.flush()
-
-    def write(self, item: Item) -> None:
-        """Add a chunk or line event."""
-        self.put(self.maker.add(item))
+        self._flush()
 
     def put(self, records: Iterable[Record]) -> None:
-        """Add records as they come from `maker`."""
+        """Add records."""
         for record in records:
             self._packet(record)
-        self.flush()
-
-    def flush(self) -> None:
-        """Push through what was written, when live."""
-        if self.live:
-            self._file.stream.flush()
+        self._flush()
 
     def close(self) -> None:
-        """Write what is held and finish the file."""
-        self.put(self.maker.close())
+        """Finish the file."""
         self._file.close()
 
-    def __enter__(self) -> PcapngWriter:
-        return self
+    def discard(self) -> None:
+        """Give the file up."""
+        self._file.discard()
 
-    def __exit__(self, *exc: object) -> None:
-        if exc and exc[0] is not None:
-            self._file.discard()
-        else:
-            self.close()
+    def _flush(self) -> None:
+        if self._live:
+            self._file.stream.flush()
 
     def _packet(self, record: Record) -> None:
         time, size = max(0, record.time), len(record.data)
@@ -306,6 +305,8 @@ class PcapngWriter:
         options = _option(OPT_FLAGS, struct.pack("<I", CRC_ERROR_FLAG)) if record.crc_error else b""
         if record.comment:
             options += _option(OPT_COMMENT, record.comment.encode()[:60_000])
+        if record.searched is not None:
+            options += _option(OPT_COMMENT, f"{SEARCH_MARK}{record.searched}".encode())
         head = struct.pack("<IIIII", number, time >> 32 & 0xFFFFFFFF, time & 0xFFFFFFFF, size, size)
         data = record.data + b"\0" * (-size % 4)
         self._block(ENHANCED, head + data + (options + _option(OPT_END) if options else b""))

@@ -38,7 +38,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
 from dissectors.frame import Chunk
-from dissectors.line import LineSettings
+from dissectors.line import MS, LineSettings
 from sniff.engine.capture import CaptureError
 from sniff.engine.session import DEVICES_NOTE, Completeness, Item, LineEvent, Session, settings_change
 from sniff.formats.files import NewFile, explain, open_capture
@@ -242,7 +242,7 @@ def header_lines(session: Session) -> Iterator[str]:
         if key == "start":
             value = iso(readable_time(session.started))
         elif key == "latency":
-            value = milliseconds(min(session.adapter.latency, LATEST))
+            value = exact_milliseconds(min(session.adapter.latency, LATEST))
         if key in _ALWAYS or record.get(name) != default.get(name):
             yield f"# {key}: {_quoted(value)}"
     devices = session.notes.get(DEVICES_NOTE, "").split(",")
@@ -284,9 +284,9 @@ def readable_time(time: int) -> int:
     return min(max(time, -LATEST), LATEST)
 
 
-def milliseconds(time: int) -> str:
+def exact_milliseconds(time: int) -> str:
     """ns ≥ 0 as ms with as many decimals as it takes: 8200000 → "8.2"."""
-    whole, part = divmod(time, 1_000_000)
+    whole, part = divmod(time, MS)
     return f"{whole}.{part:06}".rstrip("0").rstrip(".")
 
 
@@ -302,7 +302,7 @@ def iso(time: int) -> str:
 
 
 def _delay(time: int) -> str:
-    return f"-{milliseconds(-time)}" if time < 0 else f"+{milliseconds(time)}"
+    return f"-{exact_milliseconds(-time)}" if time < 0 else f"+{exact_milliseconds(time)}"
 
 
 def _quoted(value: str) -> str:

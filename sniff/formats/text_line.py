@@ -8,7 +8,7 @@ from datetime import UTC, datetime, timedelta
 from typing import NoReturn
 
 from dissectors.frame import Chunk, LineError, Mark
-from dissectors.line import LineSettings
+from dissectors.line import MS, LineSettings
 from sniff.engine.capture import CaptureError
 from sniff.engine.session import DEVICES_NOTE, LineEvent, LineEventKind
 
@@ -92,7 +92,7 @@ class Line:
         if match is None:
             self.expected("+D, ~D or -D with D in milliseconds, at most six decimals")
         self.at = match.end()
-        delay = int(match[2]) * 1_000_000 + int((match[3] or "").ljust(6, "0"))
+        delay = int(match[2]) * MS + int((match[3] or "").ljust(6, "0"))
         return match[1], -delay if match[1] == "-" else delay
 
     def check_time(self, time: int, at: int) -> None:
@@ -201,7 +201,7 @@ class Line:
         match = _DELAY.fullmatch(f"+{value.removesuffix('ms').strip()}")
         if match is None:
             self.expected("milliseconds, at most six decimals", at)
-        return int(match[2]) * 1_000_000 + int((match[3] or "").ljust(6, "0"))
+        return int(match[2]) * MS + int((match[3] or "").ljust(6, "0"))
 
     def unquoted(self, value: str, at: int) -> str:
         value = value.strip()

@@ -19,9 +19,9 @@ from typing import TYPE_CHECKING, Any
 from dissectors.frame import Check, Damage, Found, Frame, Header, LineError, Mark, Noise, Place, Reason, Role
 from dissectors.line import LineSettings
 from dissectors.tracker import Interval, Placement, Transaction, Verdict
-from sniff import __version__
 from sniff.engine.engine import Output, Row
 from sniff.recording.topics import SchemaText
+from sniff.version import __version__
 
 if TYPE_CHECKING:
     import numpy as np

@@ -13,7 +13,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import BinaryIO
 
-from sniff import __version__
 from sniff.engine.session import Session
 from sniff.recording import frames
 from sniff.recording.batch import Message
@@ -28,6 +27,7 @@ from sniff.recording.topics import (
     SESSION_RECORD,
     VERSION,
 )
+from sniff.version import __version__
 
 CHUNK_SIZE = 1 << 20
 

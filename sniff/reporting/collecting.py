@@ -7,10 +7,11 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from dissectors.findings import Finding, Severity, under_causes
+from dissectors.line import MS
 from dissectors.manifest import Dissector
 from dissectors.profiles import Devices
 from dissectors.token_ring import TokenRing
-from dissectors.tracker import Transaction, Verdict
+from dissectors.tracker import Verdict
 from dissectors.words import milliseconds
 from sniff.analysis.health import Health
 from sniff.analysis.judging import rules_over
@@ -28,7 +29,6 @@ from sniff.reporting.numbers import (
     Distribution,
     Evidence,
     Found,
-    Happening,
     Measurement,
     Numbers,
     RingNumbers,
@@ -38,14 +38,13 @@ from sniff.reporting.numbers import (
     seconds_since,
 )
 from sniff.reporting.timeline import Timeline
+from sniff.reporting.told import Told
 
 if TYPE_CHECKING:
-    from sniff.engine.table import Table
+    pass
 
 EVIDENCE_SHOWN, EVIDENCE_OF_NOTES = 5, 2
-HAPPENINGS_SHOWN = 200
 LONGEST_TEXT = 180
-GOOD = frozenset((Verdict.ANSWERED, Verdict.BROADCAST, Verdict.DATA, Verdict.OPEN, Verdict.UNDECIDED))
 
 
 def collect(
@@ -63,7 +62,7 @@ def collect(
     model, timeline, told = (
         BusModel(session, dissector, devices, with_points=False),
         Timeline(session.line.char),
-        _Told(session),
+        Told(session),
     )
     survey(read, session, model, timeline, told, reference=reference)
     summary, findings, healths = model.summary, model.findings(), model.health()
@@ -141,15 +140,6 @@ def _many(addresses: list[int]) -> str:
 
 def _subject(finding: Found) -> str:
     return f"{finding.subject}: {finding.title}" if finding.title else f"{finding.subject}: {finding.seen}"
-
-
-def _trouble(transaction: Transaction) -> str:
-    """What kind of trouble: an exception by its name, else how the exchange ended."""
-    if transaction.verdict is Verdict.EXCEPTION and transaction.error:
-        return transaction.error
-    if transaction.is_passing and transaction.verdict is Verdict.NO_RESPONSE:
-        return "token unused"
-    return transaction.verdict.words
 
 
 def _station(node: Node, kinds: Counter[str], health: Health | None) -> Station:
@@ -284,7 +274,7 @@ def _measurement(session: Session, dissector: Dissector) -> Measurement:
         program=session.program,
         adapter=adapter.name,
         driver=adapter.driver,
-        latency_ms=adapter.latency / 1e6,
+        latency_ms=adapter.latency / MS,
         latency_from=adapter.latency_from,
         reports=adapter.reports,
         detail=adapter.detail,
@@ -296,37 +286,3 @@ def _measurement(session: Session, dissector: Dissector) -> Measurement:
 def _ring(shown: TokenRing, ring: Any) -> RingNumbers:
     """What the token ring of a capture comes to."""
     return RingNumbers(shown.order(ring), shown.headings, tuple(shown.rows(ring)), tuple(shown.sentences(ring)))
-
-
-class _Told:
-    """What happened to the line, and what troubles each station."""
-
-    def __init__(self, session: Session) -> None:
-        self._started = session.started
-        self.happenings: list[Happening] = []
-        self.trouble: dict[int, Counter[str]] = {}
-
-    def add(self, output: Output) -> None:
-        """Count transactions that did not go well."""
-        for transaction in output.transactions:
-            self._count(transaction)
-
-    def add_table(self, table: Table) -> None:
-        """The same of many."""
-        import numpy as np
-
-        from dissectors.columns import VERDICTS
-
-        ill = np.array([verdict not in GOOD for verdict in VERDICTS])[table.transactions.verdict]
-        for place in np.flatnonzero(ill).tolist():
-            self._count(table.transaction(place))
-
-    def _count(self, transaction: Transaction) -> None:
-        if transaction.station is not None and transaction.verdict not in GOOD:
-            self.trouble.setdefault(transaction.station, Counter())[_trouble(transaction)] += 1
-
-    def add_line_event(self, event: LineEvent) -> None:
-        """Keep the first of them."""
-        if len(self.happenings) < HAPPENINGS_SHOWN:
-            at = seconds_since(self._started, event.time)
-            self.happenings.append(Happening(at, event.kind.value, event.text, event.count))

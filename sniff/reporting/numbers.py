@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from dissectors.histogram import Histogram
-from dissectors.line import NS_PER_S
+from dissectors.line import MS, NS_PER_S
 
 CLASSES = tuple(round(10_000 * 10 ** (step / 24)) for step in range(169))
 """Edges of the classes of a distribution, ns: 24 a decade from 10 µs to 100 s."""
@@ -76,12 +76,12 @@ class Distribution:
             p50=_ms(histogram.quantile(0.5)),
             p95=_ms(histogram.quantile(0.95)),
             most=_ms(histogram.most),
-            classes=tuple((edges[number] / 1e6, counts[number]) for number in range(used[0], used[-1] + 1)),
+            classes=tuple((edges[number] / MS, counts[number]) for number in range(used[0], used[-1] + 1)),
         )
 
 
 def _ms(value: int | None) -> float | None:
-    return None if value is None else value / 1e6
+    return None if value is None else value / MS
 
 
 @dataclass(frozen=True, slots=True)

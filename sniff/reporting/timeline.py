@@ -32,35 +32,39 @@ class Part:
     exceptions: int = 0
     line_errors: int = 0
 
-    def add(self, other: Part) -> None:
-        """Take in the part that follows."""
-        self.busy += other.busy
-        self.damaged += other.damaged
-        self.noise += other.noise
-        self.failed += other.failed
-        self.exceptions += other.exceptions
-        self.line_errors += other.line_errors
+    def plus(self, other: Part) -> Part:
+        """Both together."""
+        return Part(
+            self.busy + other.busy,
+            self.damaged + other.damaged,
+            self.noise + other.noise,
+            self.failed + other.failed,
+            self.exceptions + other.exceptions,
+            self.line_errors + other.line_errors,
+        )
 
 
 @dataclass(slots=True)
 class Timeline:
-    """Parts by number, counted from `origin`, ns: where the first row began; None before there is one. `char`: ns an
-    octet takes. Times before the origin count as it."""
+    """Parts by number, each `width` ns: part n begins at n · `width` of the capture's clock, so that the parts of two
+    stretches are the same parts. `char`: ns an octet takes."""
 
     char: int
-    origin: int | None = None
     width: int = FIRST_WIDTH
     parts: dict[int, Part] = field(default_factory=dict)
-    _most: int = 0
+
+    @property
+    def origin(self) -> int | None:
+        """When the first part begins, ns; None before there is one."""
+        return min(self.parts) * self.width if self.parts else None
 
     def add(self, output: Output) -> None:
         """Take what the engine gave; what a search heard with other settings is left out."""
         for row in output.rows:
             if row.searched is None:
                 self.add_row(row)
-        if self.origin is not None:
-            for transaction in output.transactions:
-                self.add_transaction(transaction)
+        for transaction in output.transactions:
+            self.add_transaction(transaction)
 
     def add_table(self, table: Table) -> None:
         """Take many rows at once; the same comes of it."""
@@ -69,11 +73,6 @@ class Timeline:
         from dissectors.columns import VERDICTS
 
         heard, odd = table.heard, table.odd
-        if self.origin is None:
-            if not heard.any():
-                return
-            first = int(heard.argmax())
-            self.origin = odd[first].event.start if first in odd else int(table.frames.start[first])
         for row in odd.values():
             if row.searched is None:
                 self.add_row(row)
@@ -88,25 +87,22 @@ class Timeline:
         """Count frames without line errors."""
         import numpy as np
 
-        origin = self.origin or 0
         if not len(ends):
             return
-        self._part(max(int(ends.max()), origin))  # as many halvings as it takes
-        ends = np.maximum(ends - origin, 0)
-        starts = np.maximum(ends - lengths.astype(np.int64) * self.char, 0)
-        at, began = ends // self.width, starts // self.width
-        inside = (np.maximum(ends - 1, starts) // self.width == began) & (starts < ends)
-        whole = {
-            "damaged": np.bincount(at, ~good, int(at.max()) + 1),
-            "busy": np.bincount(began[inside], (ends - starts)[inside], int(at.max()) + 1),
-        }
-        touched = np.unique(np.concatenate([at, began[inside]])).tolist()
-        for number in touched:
-            part = self._part(origin + number * self.width)
-            part.damaged += int(whole["damaged"][number])
-            part.busy += int(whole["busy"][number])
+        starts = ends - lengths.astype(np.int64) * self.char
+        for outermost in (int(ends.max()), int(starts.min())):
+            self._part(outermost)  # as wide as it takes to hold both
+        ended, began = ends // self.width, starts // self.width
+        inside = (ends - 1) // self.width == began
+        base, count = int(began.min()), int(ended.max() - began.min()) + 1
+        damaged = np.bincount(ended - base, ~good, count)
+        busy = np.bincount((began - base)[inside], (ends - starts)[inside], count)
+        for number in np.union1d(ended, began[inside]).tolist():
+            part = self._part(number * self.width)
+            part.damaged += int(damaged[number - base])
+            part.busy += int(busy[number - base])
         for begin, end in zip(starts[~inside].tolist(), ends[~inside].tolist(), strict=True):
-            self._spread(origin + begin, origin + end)
+            self._spread(begin, end)
 
     def add_line_event(self, event: LineEvent) -> None:
         """Nothing of it is counted here."""
@@ -114,8 +110,6 @@ class Timeline:
     def add_row(self, row: Row) -> None:
         """Count one row: its octets where they were on the wire, its trouble where it ended."""
         event = row.event
-        if self.origin is None:
-            self.origin = event.start
         part = self._part(event.end)
         if isinstance(event, Frame):
             part.damaged += not event.ok
@@ -131,36 +125,48 @@ class Timeline:
         elif transaction.verdict is Verdict.EXCEPTION:
             self._part(transaction.start).exceptions += 1
 
+    def merge(self, later: Timeline) -> Timeline:
+        """Both together, as a new value."""
+        whole = Timeline(self.char)
+        for one in (self, later):
+            for number, part in one.parts.items():
+                whole._widen(one.width)
+                whole._put(number * one.width // whole.width, part)
+        return whole
+
     def listed(self) -> list[Part]:
         """All parts from the first to the last, empty ones too."""
-        return [self.parts.get(number, Part()) for number in range(self._most + 1)] if self.parts else []
+        if not self.parts:
+            return []
+        return [self.parts.get(number, Part()) for number in range(min(self.parts), max(self.parts) + 1)]
 
     def _spread(self, start: int, end: int) -> None:
-        origin = self.origin or 0
-        start, end = max(start, origin), max(end, origin)
         while start < end:
-            edge = min(end, origin + ((start - origin) // self.width + 1) * self.width)
-            self._part(start).busy += edge - start
+            part = self._part(start)
+            edge = min(end, (start // self.width + 1) * self.width)
+            part.busy += edge - start
             start = edge
 
     def _part(self, time: int) -> Part:
-        offset = max(0, time - (self.origin or 0))
-        while offset // self.width >= MOST_PARTS:
-            self._halve()
-        number = offset // self.width
-        self._most = max(self._most, number)
+        """The part that holds a time."""
+        number = time // self.width
         part = self.parts.get(number)
-        if part is None:
-            part = self.parts[number] = Part()
-        return part
+        return self._put(number, Part()) if part is None else part
 
-    def _halve(self) -> None:
-        before, self.parts = self.parts, {}
-        self.width *= 2
-        self._most //= 2
-        for number, part in sorted(before.items()):
-            kept = self.parts.get(number // 2)
-            if kept is None:
-                self.parts[number // 2] = part
-            else:
-                kept.add(part)
+    def _put(self, number: int, part: Part) -> Part:
+        """Count a part as one of ours; the part of ours that holds it by then."""
+        time = number * self.width
+        self.parts[number] = self.parts.get(number, Part()).plus(part)
+        while max(self.parts) - min(self.parts) >= MOST_PARTS:
+            self._widen(self.width * 2)
+        return self.parts[time // self.width]
+
+    def _widen(self, width: int) -> None:
+        """Draw parts together until they are at least so wide; `width` is ours, or ours doubled some times."""
+        if width <= self.width:
+            return
+        before, times, self.width = self.parts, width // self.width, width
+        self.parts = {}
+        for number, part in before.items():
+            at = number // times
+            self.parts[at] = self.parts.get(at, Part()).plus(part)

@@ -27,7 +27,7 @@ from sniff.simulation.ports import HAS_PTY, Port
 from sniff.simulation.scenarios import Scenario
 from sniff.simulation.wire import Factory, Sent
 
-PATIENCE = 10.0  # s for the process to answer or to end
+PATIENCE = 60.0  # s for the process to answer or to end: it starts an interpreter, and the machine may be busy
 SLICE = 1_000_000
 WHOLE = 1 << 60
 """As `slice`: a burst is handed out in one piece when it ends. On a host so busy that the kernel holds octets of a

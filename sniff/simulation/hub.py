@@ -198,14 +198,14 @@ class Hub:
         """One request of the other side, one reply: ("ok", value) or ("error", text)."""
         try:
             name, *arguments = self._control.recv()
-        except EOFError:
+        except (EOFError, ConnectionResetError):
             self._running = False
             return
         try:
             reply = ("ok", getattr(self, f"do_{name}")(*arguments))
         except (OSError, ValueError, KeyError) as trouble:
             reply = ("error", str(trouble))
-        with contextlib.suppress(BrokenPipeError):
+        with contextlib.suppress(BrokenPipeError, ConnectionResetError):
             self._control.send(reply)
 
     def do_begin(self) -> None:

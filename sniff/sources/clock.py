@@ -5,8 +5,9 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 
-NS_PER_MS = 1_000_000
-STEP = 1 * NS_PER_MS
+from dissectors.line import MS
+
+STEP = 1 * MS
 """Wall and capture clock further apart than this (ns) is worth a CLOCK event."""
 
 _TRIES = 50

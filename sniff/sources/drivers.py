@@ -10,8 +10,9 @@ import platform
 import re
 from dataclasses import dataclass, replace
 
-NS_PER_MS = 1_000_000
-USB_FRAME = 1 * NS_PER_MS
+from dissectors.line import MS
+
+USB_FRAME = 1 * MS
 """A full-speed USB host polls once a frame of 1 ms (USB 2.0, 5.3)."""
 
 ALL = ("parity", "framing", "break", "overrun")
@@ -36,38 +37,38 @@ DRIVERS: dict[str, Driver] = {
             "ftdi_sio",
             ALL,
             "one flag covers a whole USB packet of up to 62 octets: an error is somewhere among the octets marked",
-            17 * NS_PER_MS,
+            17 * MS,
             "latency timer at its default of 16 ms + 1 ms USB",
         ),
         Driver(
             "cp210x",
             ALL,
             "reported since Linux 5.9 and only while INPCK is set; no break on CP2102; some clones report nothing",
-            4 * NS_PER_MS,
+            4 * MS,
             "assumed for cp210x",
         ),
         Driver(
             "ch341",
             (),
             "the driver reports no line errors: none seen does not mean a clean line",
-            4 * NS_PER_MS,
+            4 * MS,
             "assumed for ch341",
         ),
-        Driver("pl2303", ALL, "one flag covers a whole USB transfer", 4 * NS_PER_MS, "assumed for pl2303"),
+        Driver("pl2303", ALL, "one flag covers a whole USB transfer", 4 * MS, "assumed for pl2303"),
         Driver(
             "cdc_acm",
             ("parity", "framing", "break", "overrun"),
             "one notification covers a whole transfer, and many devices send none",
-            4 * NS_PER_MS,
+            4 * MS,
             "assumed for cdc_acm",
         ),
-        Driver("8250", ALL, "per octet", 1 * NS_PER_MS, "FIFO timeout of 4 characters + 1 ms of scheduling", 4),
-        Driver("pl011", ALL, "per octet", 1 * NS_PER_MS, "FIFO timeout of 4 characters + 1 ms of scheduling", 4),
+        Driver("8250", ALL, "per octet", 1 * MS, "FIFO timeout of 4 characters + 1 ms of scheduling", 4),
+        Driver("pl011", ALL, "per octet", 1 * MS, "FIFO timeout of 4 characters + 1 ms of scheduling", 4),
         Driver(
             "pty",
             (),
             "a pseudo-terminal has no line, so no line errors",
-            3 * NS_PER_MS,
+            3 * MS,
             "one scheduler slice of the host",
         ),
     )
@@ -87,7 +88,7 @@ _ALIASES = {
 BY_VENDOR = {0x0403: "ftdi_sio", 0x10C4: "cp210x", 0x1A86: "ch341", 0x067B: "pl2303"}
 """USB vendor → driver, for systems that do not name one: how long the chip holds octets back is the same there."""
 
-UNKNOWN = Driver("", None, "unknown driver: errors may go unreported", 20 * NS_PER_MS, "assumed for an unknown driver")
+UNKNOWN = Driver("", None, "unknown driver: errors may go unreported", 20 * MS, "assumed for an unknown driver")
 
 
 def find_driver(name: str) -> Driver:

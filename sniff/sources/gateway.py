@@ -11,13 +11,13 @@ from dataclasses import dataclass
 from typing import Protocol
 from urllib.parse import urlsplit
 
-from dissectors.line import NS_PER_S, LineSettings
+from dissectors.line import MS, NS_PER_S, LineSettings
 from sniff.engine.session import Adapter, Item, LineEvent, LineEventKind
 from sniff.sources import PortError
-from sniff.sources.clock import NS_PER_MS, Clock
+from sniff.sources.clock import Clock
 from sniff.sources.reconnecting import Reconnecting
 
-LATENCY = 50 * NS_PER_MS
+LATENCY = 50 * MS
 RETRY_EVERY = 2 * NS_PER_S
 
 EXPECTED = "expected a serial port, socket://HOST:PORT, rfc2217://HOST:PORT or a capture file"

@@ -7,9 +7,9 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from dissectors.line import LineSettings
+from dissectors.line import MS, LineSettings
 from sniff.engine.session import Adapter
-from sniff.sources.drivers import NS_PER_MS, UNKNOWN, USB_FRAME, Driver, find_driver, guess_driver
+from sniff.sources.drivers import UNKNOWN, USB_FRAME, Driver, find_driver, guess_driver
 
 CAPTURE_PROCESS = b"sniff.capture.process"
 """In the command line of our own capture process; what follows says what it does."""
@@ -188,5 +188,5 @@ def _product(device: str) -> _Product:
 def _latency(device: str, driver: Driver, line: LineSettings) -> tuple[int, str]:
     timer = latency_timer(device)
     if timer is not None:
-        return timer * NS_PER_MS + USB_FRAME, f"latency timer {timer} ms + 1 ms USB"
+        return timer * MS + USB_FRAME, f"latency timer {timer} ms + 1 ms USB"
     return driver.hold + driver.hold_chars * line.char, driver.hold_from

@@ -6,11 +6,12 @@ import threading
 from collections.abc import Callable
 from typing import Generic, TypeVar
 
-from sniff.sources.clock import NS_PER_MS, Clock
+from dissectors.line import MS
+from sniff.sources.clock import Clock
 
 T = TypeVar("T")
 
-LOOK_EVERY = 50 * NS_PER_MS
+LOOK_EVERY = 50 * MS
 """Between looks at an attempt that runs."""
 
 

@@ -8,10 +8,10 @@ import os
 from dataclasses import dataclass
 
 from dissectors.frame import Chunk
-from dissectors.line import NS_PER_S, LineSettings
+from dissectors.line import MS, NS_PER_S, LineSettings
 from sniff.engine.session import Adapter, Item, LineEvent, LineEventKind
 from sniff.sources import PortError
-from sniff.sources.clock import NS_PER_MS, Clock
+from sniff.sources.clock import Clock
 from sniff.sources.identity import PortIdentity
 from sniff.sources.parmrk import ParmrkDecoder
 from sniff.sources.ports import Holder, describe_port, find_holders, is_pty, is_tty, list_ports
@@ -22,7 +22,7 @@ READ_SIZE = 65536
 COUNTERS_EVERY = 1 * NS_PER_S
 RETRY_EVERY = 1 * NS_PER_S
 
-POLL_EVERY = 1 * NS_PER_MS
+POLL_EVERY = 1 * MS
 """Between looks at a port that cannot be waited on (Windows)."""
 
 

@@ -9,6 +9,7 @@ import difflib
 from collections.abc import Iterator
 
 from dissectors.frame import Frame
+from dissectors.line import MS
 from sniff.analysis.plain import plain
 from sniff.analysis.points import Point
 from sniff.analysis.wording import describe, mark_names
@@ -34,7 +35,7 @@ def difference(expected: str, found: str, name: str) -> str:
 def _lines(reading: CaptureReading) -> Iterator[str]:
     session, counts = reading.session, reading.counts
     yield MAGIC
-    yield f"# {session.protocol} {session.line}, adapter holds octets up to {session.adapter.latency / 1e6:g} ms"
+    yield f"# {session.protocol} {session.line}, adapter holds octets up to {session.adapter.latency / MS:g} ms"
     yield f"# {counts.frames} frames, {counts.damaged} damaged, {counts.noise} octets of noise"
     if reading.devices:
         yield f"# devices: {', '.join(f'{word}={name}' for word, name in reading.devices.items())}"
@@ -95,4 +96,4 @@ def _row(reading: CaptureReading, item: Settled) -> str:
 
 
 def _ms(value: int) -> str:
-    return f"{value / 1e6:.3f} ms"
+    return f"{value / MS:.3f} ms"

@@ -18,10 +18,11 @@ from dissectors import registry
 from dissectors.frame import Chunk, LineError, Mark
 from dissectors.line import LineSettings
 from sniff.analysis.judging import Judging
+from sniff.bus.capture_writer import create
 from sniff.engine.capture import CaptureError
 from sniff.engine.follow_settings import SessionEngine
 from sniff.engine.session import Item, LineEvent, LineEventKind, Session
-from sniff.formats import WRITERS, create, read
+from sniff.formats import FRAME_WRITERS, WRITERS, read
 from sniff.simulation.scenarios import scenario, simulate
 from sniff.simulation.tap import CH340
 
@@ -127,7 +128,7 @@ def test_fuzz_readers(benchmark: Any, tmp_path: Path) -> None:
     """Files of every format with octets changed, cut, repeated: a capture or one line that says why not."""
     dice, samples = random.Random(SEED), good("modbus-rtu")
     whole: dict[str, bytes] = {}
-    for suffix in WRITERS:
+    for suffix in (*WRITERS, *FRAME_WRITERS):
         path = tmp_path / f"seed{suffix}"
         with create(path, Session("fuzz", LineSettings(19200, 8, "E", 1), "modbus-rtu", BASE)) as writer:
             for number, piece in enumerate(samples[:60]):

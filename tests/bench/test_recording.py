@@ -15,8 +15,9 @@ from mcap.writer import Writer
 
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
+from sniff.bus.capture_writer import create
 from sniff.engine.session import Session
-from sniff.formats import create, read
+from sniff.formats import read
 from sniff.recording.reader import McapCapture
 from sniff.recording.writer import Recorder
 

@@ -117,6 +117,14 @@ class Conversation:
             if answer.octets != sent.octets or answer.start - sent.end < SLOW:
                 yield (place + 1, *asked)
 
+    def hear_answers(self, bus: VirtualBus, count: int) -> None:
+        """Wait until the server has been heard so often on the line."""
+        until = time.monotonic() + 30
+        while sum(one.party == "server" and one.end > one.start for one in self.truth) < count:
+            assert time.monotonic() < until, "an answer never came"
+            time.sleep(0.01)
+            self.truth += bus.truth()
+
     def _wait_until_quiet(self, bus: VirtualBus) -> None:
         until = time.monotonic() + 10
         while time.monotonic() < until:
@@ -202,7 +210,7 @@ def test_lost_and_late_answers_are_told_apart() -> None:
         talk.ask("read input registers", "no-response")
         bus.switch([])
         talk.ask("read holding registers")
-        time.sleep(0.3)  # the late answer comes 250 ms after the client gave up
+        talk.hear_answers(bus, 3)  # the late one comes 250 ms after the client gave up
     _, transactions = talk.sniffed()
     asked = [t for t in transactions if t.request is not None]
     assert [t.verdict for t in asked] == [verdict for _, _, verdict in talk.asked]

@@ -292,8 +292,11 @@ def test_an_adapter_can_be_unplugged_and_plugged_in_again_under_one_name(
     bus.detach("tap")
     assert not os.path.lexists(link)
     assert os.read(tap.fd, 1) == b""  # hung up
+    said = bus.truth()
     client.write(b"two")
-    time.sleep(0.05)
+    until = time.monotonic() + 30
+    while b"two" not in b"".join(one.octets for one in said) and time.monotonic() < until:
+        said += bus.truth()
     bus.tap(link=link)
     again = open_pty(link)
     client.write(b"three")

@@ -9,9 +9,10 @@ import pytest
 
 from dissectors import registry
 from dissectors.frame import Chunk, Frame
+from dissectors.line import NS_PER_S
 from sniff.capture.config import SourceSpec
 from sniff.capture.link import CaptureLink
-from sniff.capture.wire import Received
+from sniff.capture.wire import Message, Received
 from sniff.engine.engine import Engine, Row
 from sniff.simulation import scenarios
 from sniff.simulation.bus import WHOLE, VirtualBus
@@ -20,6 +21,21 @@ from sniff.simulation.scenarios import Scenario, scenario
 from sniff.simulation.wire import Sent
 
 pytestmark = pytest.mark.skipif(not HAS_PTY, reason="this system has no pseudo-terminals")
+
+
+PATIENCE = 90
+"""s that a busy machine may take."""
+
+
+def _lasts(truth: list[Sent]) -> float:
+    """s from the first to the last that was said."""
+    return (truth[-1].end - truth[0].start) / NS_PER_S if truth else 0.0
+
+
+def _arrived(messages: list[Message], bus: int, truth: list[Sent]) -> bool:
+    """Whether as many octets were received as were sent."""
+    received = [one.item for one in messages if isinstance(one, Received) and one.bus == bus]
+    return sum(len(item.octets) for item in received if isinstance(item, Chunk)) >= sum(len(s.octets) for s in truth)
 
 
 def listen(plans: list[Scenario], seconds: float) -> list[tuple[list[Row], list[Sent]]]:
@@ -32,10 +48,18 @@ def listen(plans: list[Scenario], seconds: float) -> list[tuple[list[Row], list[
         with CaptureLink.start(sources) as link:
             for bus in buses:
                 bus.begin()
-            time.sleep(seconds)
-            truths = [bus.truth() for bus in buses]
-            time.sleep(0.2)  # all of that is on its way
-            messages = link.stop()
+            messages: list[Message] = []
+            truths: list[list[Sent]] = [[] for _ in plans]
+            until = time.monotonic() + PATIENCE
+            while min(_lasts(truth) for truth in truths) < seconds:
+                assert time.monotonic() < until, "a bus stands still"
+                messages += link.receive(0.1)
+                for truth, bus in zip(truths, buses, strict=True):
+                    truth += bus.truth()
+            while not all(_arrived(messages, index, truth) for index, truth in enumerate(truths)):
+                assert time.monotonic() < until, "what was said did not arrive"
+                messages += link.receive(0.1)
+            messages += link.stop()
             engines = [
                 Engine(registry.get(plan.protocol), link.session(index).timing) for index, plan in enumerate(plans)
             ]

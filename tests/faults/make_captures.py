@@ -14,9 +14,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from sniff.analysis.judging import rules_over
+from sniff.bus.capture_writer import create
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import DEVICES_NOTE, Item, Session
-from sniff.formats import create
 from tests.faults.case import Case
 from tests.faults.cases import CASES, FURTHER_CASES
 from tests.faults.judged import findings_of

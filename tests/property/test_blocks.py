@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 from dissectors.frame import Chunk, LineError, Mark
 from dissectors.line import LineSettings
 from sniff import formats
+from sniff.bus import capture_writer
 from sniff.engine.blocks import BLOCK_OCTETS, BLOCK_READS, Block, blocks_of, plain_reads
 from sniff.engine.capture import Capture, CaptureError
 from sniff.engine.session import Item, LineEvent, LineEventKind, Session, SettingsChange
@@ -121,7 +122,7 @@ def bus(reads: int, seed: int = 1, strange: float = 0.0) -> list[Item]:
 
 
 def written(path: Path, items: Iterable[Item], session: Session = SESSION, **options: str) -> Path:
-    with formats.create(path, session, options or None) as writer:
+    with capture_writer.create(path, session, options or None) as writer:
         for item in items:
             writer.write(item)
     return path
@@ -261,7 +262,7 @@ RESOLUTIONS = [b"", b"\x09\x00\x01\x00\x09\0\0\0", b"\x09\x00\x01\x00\x94\0\0\0"
 @pytest.mark.parametrize("resolution", RESOLUTIONS)
 def test_pcapng_of_others(tmp_path: Path, order: str, resolution: bytes) -> None:
     comment = struct.pack(order + "HH", 1, 5) + b"hello\0\0\0" + bytes(4)
-    said = b"heard while searching for the settings, with 9600,8N1; more"
+    said = b"sniff485 search: 9600,8N1"
     searched = struct.pack(order + "HH", 1, len(said)) + said + bytes(-len(said) % 4 + 4)
     parts = [ng_section(order, (165, resolution), (148, resolution), (1, b""), (165, RESOLUTIONS[1]))]
     for number, (time, octets) in enumerate(records(800)):

@@ -10,11 +10,12 @@ import pytest
 
 from dissectors.checksums import crc16_modbus
 from dissectors.frame import Chunk, Frame
+from sniff.bus.capture_writer import create
 from sniff.bus.offline import settled
 from sniff.editing.anonymising import anonymised, anonymous_session
 from sniff.editing.merging import merged
 from sniff.engine.session import Item, LineEvent, Session
-from sniff.formats import create, read
+from sniff.formats import read
 from sniff.formats.text import parse
 from sniff.simulation.scenarios import scenario, simulate
 from sniff.testing.capture_reading import read_capture

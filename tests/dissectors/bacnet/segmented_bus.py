@@ -14,10 +14,10 @@ from dissectors.bacnet.frame_types import FrameType
 from dissectors.bacnet.limits import MAX_DATA
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
+from sniff.bus.capture_writer import create
 from sniff.engine.engine import Engine, Output, Row
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import Session
-from sniff.formats import create
 
 LINE = LineSettings(38400)
 SESSION = Session("bus", LINE, "mstp", 1_772_359_200 * 10**9)

@@ -22,8 +22,8 @@ from dissectors.bacnet import apdu as apdus
 from dissectors.bacnet import message as messages
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
+from sniff.bus.capture_writer import create
 from sniff.engine.session import Session
-from sniff.formats import create
 from tests.dissectors.bacnet.captures import frame_of
 from tests.dissectors.bacnet.samples import (
     SEEDS,

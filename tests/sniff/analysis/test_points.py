@@ -145,12 +145,15 @@ def test_tables_add_up() -> None:
         whole.add(found)
         first.add(found[:cut])
         second.add(found[cut:])
-        first.merge(second)
-        assert [_facts(point) for point in first] == [_facts(point) for point in whole]
+        before = [_facts(point) for point in first]
+        both = first.merge(second)
+        assert [_facts(point) for point in both] == [_facts(point) for point in whole]
+        assert (both.version, both.dropped) == (whole.version, whole.dropped)
+        assert [_facts(point) for point in first] == before
 
 
 def _facts(point: Point) -> tuple[object, ...]:
-    return point.sample, point.count, point.changed, tuple(point.history)
+    return point.sample, point.first, point.count, point.changed, tuple(point.history)
 
 
 def test_memory_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,7 +7,7 @@ from functools import cache
 from itertools import pairwise
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dissectors.tracker import Transaction, Verdict
@@ -37,6 +37,7 @@ def counted(session: Session, items: tuple[Output | LineEvent, ...]) -> Summary:
 
 
 @pytest.mark.parametrize("name", ["modbus-rtu", "n2", "mstp"])
+@settings(max_examples=25, deadline=None)
 @given(cuts=st.lists(st.floats(0, 1), min_size=1, max_size=3))
 def test_parts_add_up_to_the_whole(name: str, cuts: list[float]) -> None:
     session, items = heard(name)

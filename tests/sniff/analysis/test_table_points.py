@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from dissectors.modbus.adu import make_rtu
 
 from dissectors.columns import FrameColumns
 from dissectors.frame import Check, Found, Frame
+from dissectors.modbus.envelope import make_rtu
 from dissectors.modbus.reading_columns import reading_columns
 from dissectors.modbus.readings import readings
 from dissectors.reading_columns import HOWS

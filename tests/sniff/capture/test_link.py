@@ -114,7 +114,7 @@ def test_unplugged_port_ends_the_capture(pty, collect) -> None:
     while link.ended is None:
         messages += link.receive(1)
     assert [m.item.kind for m in messages if isinstance(m, Received)] == [LineEventKind.UNPLUGGED]
-    assert link.ended == Ended("nothing more to read")
+    assert link.ended == Ended("nothing more to read", at_end=True)
     link.stop()
 
 

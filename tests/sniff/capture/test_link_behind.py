@@ -13,7 +13,7 @@ from dissectors.frame import Chunk
 from sniff.capture import link as link_module
 from sniff.capture.link import CaptureLink
 from sniff.capture.spawn import Spawned
-from sniff.capture.wire import LOSSY, Ended, Kind, Received, encode, encode_item
+from sniff.capture.wire import LOSSY, Ended, Received, encode_ended, encode_item
 from sniff.engine.session import LineEventKind
 
 
@@ -65,7 +65,7 @@ def test_the_end_is_seen_although_much_waits_before_it(ends) -> None:
     ends.theirs.sendall(chunks(0, 500))
     ends.link.look()
     assert not ends.link.closing
-    ends.theirs.sendall(encode(Kind.ENDED, 0, b"stopped"))
+    ends.theirs.sendall(encode_ended("stopped", at_end=False))
     ends.link.look()
     assert ends.link.closing
     assert ends.link.ended is None

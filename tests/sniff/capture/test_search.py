@@ -145,6 +145,6 @@ def test_a_refusal_is_in_the_file(tmp_path: Path, collect) -> None:
         port = f"socket://127.0.0.1:{server.getsockname()[1]}"
         with CaptureLink.start([SourceSpec(port, FIRST, unknown=UNKNOWN)], RecordSpec(str(path))) as link:
             link.reconfigure(0, SECOND)
-            collect(link, lambda got: any(getattr(item, "kind", None) is LineEventKind.NOTE for item in seen(got)))
-    notes = [item.text for item in read(path).items() if item.kind is LineEventKind.NOTE]
+            collect(link, lambda got: any(getattr(item, "kind", None) is LineEventKind.REFUSED for item in seen(got)))
+    notes = [item.text for item in read(path).items() if item.kind is LineEventKind.REFUSED]
     assert "sets its own line (19200,8E1 was asked for)" in notes[0]

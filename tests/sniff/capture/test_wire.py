@@ -19,7 +19,6 @@ from sniff.capture.wire import (
     WireError,
     decode_derived,
     decode_message,
-    encode,
     encode_derived,
     encode_item,
     encode_reads,
@@ -58,7 +57,7 @@ def test_text_that_is_no_unicode_crosses() -> None:
 
 def test_the_other_messages() -> None:
     status = Status(3, "night.mcap", 10, 20, 30, 40, "normal", "disk full")
-    stream = encode_tick(2, -5) + encode_status(status) + encode(Kind.ENDED, 0, b"stopped")
+    stream = encode_tick(2, -5) + encode_status(status) + wire.encode_ended("stopped", at_end=False)
     tick, told, ended = (decode_message(*message) for message in MessageSplitter().feed(stream))
     assert (tick, told) == (Tick(2, -5), status)
     assert ended == wire.Ended("stopped")

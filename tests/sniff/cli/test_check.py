@@ -9,8 +9,8 @@ from xml.etree import ElementTree
 
 import pytest
 
+from sniff.bus.capture_writer import create
 from sniff.cli import main
-from sniff.formats import create
 from sniff.simulation.scenarios import Scenario, simulate
 from tests.faults.buses import modbus
 

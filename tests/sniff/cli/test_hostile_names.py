@@ -8,9 +8,10 @@ import pytest
 
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
+from sniff.bus.capture_writer import create
 from sniff.cli import main
 from sniff.engine.session import Session
-from sniff.formats import create, read
+from sniff.formats import read
 
 TITLE = "\x1b]0;title\x07"
 POLL = bytes.fromhex("010300000002c40b")

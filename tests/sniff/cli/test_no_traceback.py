@@ -11,9 +11,9 @@ import pytest
 
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
+from sniff.bus.capture_writer import create
 from sniff.cli import main
 from sniff.engine.session import Session
-from sniff.formats import create
 
 CAPTURE = """#!sniff-capture 1
 # line: 19200,8E1

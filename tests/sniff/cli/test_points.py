@@ -108,7 +108,8 @@ def test_convert_writes_the_values(sniff485: Run, drive: Path, tmp_path: Path) -
 def test_a_file_may_not_name_a_profile_by_path(sniff485: Run, drive: Path, tmp_path: Path) -> None:
     from dataclasses import replace
 
-    from sniff.formats import create, read
+    from sniff.bus.capture_writer import create
+    from sniff.formats import read
 
     stolen = tmp_path / "stolen.toml"
     stolen.write_text('name = "stolen"\ntitle = "x"\nprotocols = []\nnoun = "STOLEN"\n', "utf-8")

@@ -10,12 +10,13 @@ from pathlib import Path
 import pytest
 
 from dissectors.frame import Chunk, Frame
-from dissectors.line import LineSettings, Timing
+from dissectors.line import MS, LineSettings, Timing
 from dissectors.modbus.envelope import seal_rtu
+from sniff.bus.capture_writer import create
 from sniff.bus.offline import outputs
-from sniff.engine.read_times import MS, ReadTimes, held_back
+from sniff.engine.read_times import ReadTimes, held_back
 from sniff.engine.session import INFERRED, Adapter, LineEvent, LineEventKind, Session, with_settings
-from sniff.formats import create, read
+from sniff.formats import read
 from sniff.simulation.scenarios import simulate
 from sniff.simulation.tap import EXACT, FTDI, OCTETS, TapModel
 from tests.bus_delivery import Wire, ftdi, laid_out, with_noise

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from dissectors.line import LineSettings
+from sniff.bus.capture_writer import create
 from sniff.engine.capture import CaptureError
 from sniff.engine.session import Session
-from sniff.formats import create
 from sniff.formats.files import NewFile
 
 SESSION = Session("port", LineSettings(), "modbus-rtu")

@@ -6,6 +6,7 @@ import contextlib
 import shutil
 import struct
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -14,10 +15,14 @@ from hypothesis import strategies as st
 
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
+from sniff.bus.capture_writer import create
 from sniff.bus.offline import settled
 from sniff.engine.capture import CaptureError
-from sniff.engine.session import Adapter, Session
-from sniff.formats import create, read
+from sniff.engine.session import Adapter, LineEvent, Session, SettingsChange, settings_change
+from sniff.formats import read
+from sniff.formats.linktypes import USER1
+from sniff.formats.pcapng import PcapngWriter
+from sniff.formats.records import Record
 from sniff.formats.text import parse
 
 MODBUS = """\
@@ -218,6 +223,20 @@ def test_findings_stand_in_the_comments_of_their_packets(tmp_path: Path) -> None
         comments = [record.comment for record in PcapngCapture(target)._records(stream)]
     assert "MB008 station 1: exception 2 (illegal data address)" in comments[-1]
     assert "MB008" not in comments[0]
+
+
+def test_what_a_search_heard_is_told_by_a_value_and_not_by_the_words_of_a_comment(tmp_path: Path) -> None:
+    session = replace(parse(MODBUS).session, unknown=("line",))
+    path, words = tmp_path / "x.pcapng", "10 octets heard while searching for the settings, with 4800,8N1"
+    tried = LineSettings.parse("4800,8N1")
+    with contextlib.closing(PcapngWriter(path, session, 147)) as writer:
+        writer.put([Record(1000, USER1, b"ab", words, searched=tried), Record(2000, USER1, b"cd", words)])
+    items = list(read(path).items())
+    assert [settings_change(item) for item in items if isinstance(item, LineEvent)] == [
+        SettingsChange(tried, searching=True),
+        SettingsChange(session.line),
+        SettingsChange(session.line, session.protocol, found=True),
+    ]
 
 
 def block(kind: int, body: bytes) -> bytes:

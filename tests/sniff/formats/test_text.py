@@ -8,9 +8,10 @@ import pytest
 
 from dissectors.frame import Chunk, LineError, Mark
 from dissectors.line import LineSettings
+from sniff.bus.capture_writer import create
 from sniff.engine.capture import CaptureError
 from sniff.engine.session import Adapter, Item, LineEvent, LineEventKind, Session
-from sniff.formats import create, read
+from sniff.formats import read
 from sniff.formats.text import LONGEST_LINE, parse, render
 
 P, F, B, O = LineError.PARITY, LineError.FRAMING, LineError.BREAK, LineError.OVERRUN  # noqa: E741

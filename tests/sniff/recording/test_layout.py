@@ -11,8 +11,9 @@ from mcap.reader import NonSeekingReader, make_reader
 
 from dissectors.frame import Chunk, LineError, Mark
 from dissectors.line import LineSettings
+from sniff.bus.capture_writer import create
 from sniff.engine.session import Item, LineEvent, LineEventKind, Session
-from sniff.formats import create, read
+from sniff.formats import read
 from sniff.recording import frames
 from sniff.recording.reader import McapCapture
 from sniff.recording.recovery import recover

@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 
 from dissectors.frame import Chunk, LineError, Mark
 from dissectors.line import LineSettings
+from sniff.bus.capture_writer import create
 from sniff.engine.session import Adapter, Item, LineEvent, LineEventKind, Session
-from sniff.formats import create, read
+from sniff.formats import read
 
 BASE = 1_772_359_200_000_000_000
 SESSION = Session(

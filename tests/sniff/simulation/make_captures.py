@@ -21,7 +21,7 @@ from dissectors.simulated_faults import (
     LostResponse,
     NoiseInGaps,
 )
-from sniff.formats import create
+from sniff.bus.capture_writer import create
 from sniff.simulation.scenarios import scenario, simulate
 from sniff.simulation.tap import EXACT, FTDI, UART, TapModel
 

@@ -12,6 +12,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.sniff.testing.other_pytest import pytest_command
+
 EXAMPLE = Path(__file__).parent / "example_plugin"
 GROUP = "sniff485.dissectors"
 Run = Callable[..., subprocess.CompletedProcess[str]]
@@ -62,14 +64,16 @@ def run(installed: Path) -> Run:
     environment["PYTHONPATH"] = str(installed)
 
     def python(*arguments: object) -> subprocess.CompletedProcess[str]:
-        command = [sys.executable, "-m", *map(str, arguments)]
+        module, *rest = arguments
+        is_pytest = module == "pytest"
+        command = pytest_command(*rest, hypothesis=True) if is_pytest else [sys.executable, "-m", *map(str, arguments)]
         return subprocess.run(command, cwd=installed, env=environment, capture_output=True, text=True, timeout=100)
 
     return python
 
 
 def test_its_framer_passes_the_contract(run: Run) -> None:
-    ran = run("pytest", "-q", "-p", "no:cacheprovider", "-p", "no:benchmark", "test_sniff485_nmea.py")
+    ran = run("pytest", "test_sniff485_nmea.py")
     assert ran.returncode == 0, ran.stdout
     assert "8 passed" in ran.stdout
 
@@ -80,7 +84,7 @@ def test_a_broken_framer_fails_it_and_says_why(run: Run, installed: Path) -> Non
     assert broken != module.read_text()
     module.write_text(broken)
     (installed / "conftest.py").write_text(UNSHRUNK)
-    ran = run("pytest", "-q", "-p", "no:cacheprovider", "-p", "no:benchmark", "-k", "clean", "test_sniff485_nmea.py")
+    ran = run("pytest", "-k", "clean", "test_sniff485_nmea.py")
     assert ran.returncode == 1, ran.stdout
     assert "AssertionError: assert [" in ran.stdout, "a failure inside the suite shows its values"
 

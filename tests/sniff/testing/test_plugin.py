@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.sniff.testing.other_pytest import pytest_command
+
 EXAMPLE = Path(__file__).parent / "example_project"
 Run = Callable[..., subprocess.CompletedProcess[str]]
 
@@ -24,8 +26,9 @@ def project(tmp_path: Path) -> Path:
 def run(project: Path) -> Run:
     def pytest_in(*arguments: str) -> subprocess.CompletedProcess[str]:
         environment = {key: value for key, value in os.environ.items() if not key.startswith(("PYTEST", "COV"))}
-        command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "no:benchmark", *arguments]
-        return subprocess.run(command, cwd=project, env=environment, capture_output=True, text=True, timeout=100)
+        return subprocess.run(
+            pytest_command(*arguments), cwd=project, env=environment, capture_output=True, text=True, timeout=100
+        )
 
     return pytest_in
 

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import os
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from sniff.testing.crafting import craft, makers
+from tests.sniff.testing.other_pytest import pytest_command
 
 CAPTURE = "#!sniff-capture 1\n# line: 19200,8E1\n# protocol: modbus-rtu\n+0 01 03 00 00 00 02 C4 0B\n"
 
 
 def pytest_in(folder: Path, *arguments: str) -> str:
     environment = {key: value for key, value in os.environ.items() if not key.startswith(("PYTEST", "COV"))}
-    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "no:benchmark", *arguments]
+    command = pytest_command(*arguments)
     return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=100).stdout
 
 

@@ -1,0 +1,81 @@
+"""Saving a capture into a file of any format: as it is, or frame by frame where the format keeps frames."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from sniff import formats
+from sniff.bus.packet_records import RecordMaker
+from sniff.engine.capture import CaptureError, CaptureWriter
+from sniff.engine.session import Item, Session
+from sniff.formats import pcapng
+from sniff.formats.linktypes import link_type_for
+from sniff.formats.records import FrameFile
+
+
+def create(
+    path: str | Path,
+    session: Session,
+    options: Mapping[str, str] | None = None,
+    notes: Mapping[int, str] | None = None,
+) -> CaptureWriter:
+    """Create a capture by its suffix. `options` are the format's own ("link-type" of packet files); `notes`, by row
+    number, are said in the comments of packets where the format has such. Raises CaptureError."""
+    if formats.keeps_frames(path):
+        link_type = _link_type(path, session, (options or {}).get("link-type"))
+        return FrameWriter(
+            formats.create_of_frames(path, session, link_type), RecordMaker(session, link_type, notes=notes)
+        )
+    if options:
+        raise CaptureError(f"{path}: this format has no option {', '.join(options)}")
+    return formats.create_of_items(path, session)
+
+
+def live_pcapng(path: str | Path, session: Session) -> FrameWriter:
+    """A pcapng file, whatever its suffix, for somebody who reads while we write: each frame at once, pushed through.
+    Raises CaptureError."""
+    link_type = _link_type(path, session, None)
+    return FrameWriter(pcapng.create(Path(path), session, link_type, live=True), RecordMaker(session, link_type, True))
+
+
+def _link_type(path: str | Path, session: Session, wanted: str | None) -> int:
+    try:
+        return link_type_for(session.protocol, int(wanted) if wanted is not None else None)
+    except ValueError as error:
+        raise CaptureError(f"{path}: {error}") from None
+
+
+class FrameWriter:
+    """A CaptureWriter of a packet file: items through the engine, each frame a record."""
+
+    def __init__(self, file: FrameFile, maker: RecordMaker) -> None:
+        self._file = file
+        self._maker = maker
+
+    @property
+    def losses(self) -> list[str]:
+        """What the format could not keep, in words; complete after `close`."""
+        return self._file.losses
+
+    def write(self, item: Item) -> None:
+        """Add a chunk or line event."""
+        self._file.put(self._maker.add(item))
+
+    def advance(self, now: int) -> None:
+        """Say that no read returned up to `now` (ns)."""
+        self._file.put(self._maker.advance(now))
+
+    def close(self) -> None:
+        """Write what is held and finish the file."""
+        self._file.put(self._maker.close())
+        self._file.close()
+
+    def __enter__(self) -> FrameWriter:
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        if exc and exc[0] is not None:
+            self._file.discard()
+        else:
+            self.close()
