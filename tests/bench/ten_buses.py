@@ -23,9 +23,9 @@ from dataclasses import dataclass
 from itertools import accumulate
 from pathlib import Path
 
-from dissectors.bacnet.frame_making import frame as mstp_frame
 from fastcrc import crc16
 
+from dissectors.bacnet.envelope import frame as mstp_frame
 from dissectors.frame import Chunk
 from sniff.analysis.summary import Summary
 from sniff.bus.offline import survey

@@ -6,9 +6,8 @@ import importlib.util
 from pathlib import Path
 from typing import Any
 
-from dissectors.bacnet.frame_making import npdu_frame
-
 from dissectors.bacnet.application import confirmed
+from dissectors.bacnet.envelope import npdu_frame
 from dissectors.bacnet.f510 import f510
 from dissectors.bacnet.readings import readings
 from dissectors.frame import Check, Found, Frame

@@ -16,7 +16,7 @@ from dissectors.modbus.envelope import seal_rtu
 from dissectors.profiles import parse_text
 from dissectors.profiles.model import Kind
 from sniff.engine.session import Session
-from sniff.formats import create
+from sniff.bus.capture_writer import create
 
 LINE = LineSettings.parse("9600,8E1")
 MS = 1_000_000
