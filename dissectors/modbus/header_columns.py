@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from functools import lru_cache
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
@@ -137,30 +138,54 @@ def _roles(octets: Octets, places: Times, codes: Codes, request: Masks, response
     return role
 
 
+class _Numbers(NamedTuple):
+    """Where numbers stand, by direction and code as one key (0: nowhere). `octets`: those that are no words."""
+
+    at: Codes
+    octets: dict[int, Number]
+
+    def read(self, octets: Octets, places: Times, keys: Names) -> Numbers:
+        at = self.at[keys]
+        there = places + at
+        values: Numbers = octets[there].astype(np.int32) << 8 | octets[there + 1]
+        values[at == 0] = NONE
+        for key, number in self.octets.items():
+            which = np.flatnonzero(keys == key)
+            values[which] = octets[there[which]] // number.divisor
+        return values
+
+
+@lru_cache(maxsize=1)
+def _ranges() -> tuple[_Numbers, _Numbers, Masks]:
+    """Where addresses, where quantities stand, and of which messages there is but one."""
+    address, quantity = (_Numbers(np.zeros(1024, np.uint8), {}) for _ in range(2))
+    single = np.zeros(1024, bool)
+    for direction, ranges in enumerate((ASKED, ANSWERED, SHARED)):
+        for code, told in ranges.items():
+            key = direction << 8 | code
+            single[key] = told.single
+            for numbers, number in ((address, told.address), (quantity, told.quantity)):
+                if number is not None:
+                    numbers.at[key] = number.at
+                    if number.size == 1:
+                        numbers.octets[key] = number
+    return address, quantity, single
+
+
+@lru_cache(maxsize=1)
+def _directions() -> Names:
+    """By role: the direction of its ranges, as the high octet of a key; the last has none."""
+    of = {REQUEST: 0, TO_ALL: 0, RESPONSE: 1, EITHER: 2}
+    return np.array([of.get(role, 3) << 8 for role in range(len(ROLES))], np.uint16)
+
+
 def _addresses(octets: Octets, places: Times, codes: Codes, role: Codes) -> tuple[Numbers, Numbers]:
     """First address and how many."""
-    address, count = np.full(len(places), NONE, np.int32), np.full(len(places), NONE, np.int32)
-    present = np.flatnonzero(np.bincount(codes, minlength=256)).tolist()
-    for ranges, roles in ((ASKED, (REQUEST, TO_ALL)), (ANSWERED, (RESPONSE,)), (SHARED, (EITHER,))):
-        of_roles = np.isin(role, roles)
-        for code in present:
-            told = ranges.get(code)
-            if told is None:
-                continue
-            which = np.flatnonzero((codes == code) & of_roles)
-            if told.address is not None:
-                address[which] = _numbers(octets, places[which], told.address)
-            if told.quantity is not None:
-                count[which] = _numbers(octets, places[which], told.quantity)
-            elif told.single:
-                count[which] = 1
-    return address, count
-
-
-def _numbers(octets: Octets, places: Times, number: Number) -> Numbers:
-    at = places + number.at
-    values = octets[at].astype(np.int32)
-    return values << 8 | octets[at + 1] if number.size == 2 else values // number.divisor
+    keys = _directions()[role] | codes
+    address, quantity, single = _ranges()
+    count = quantity.read(octets, places, keys)
+    count[single[keys]] = 1
+    return address.read(octets, places, keys), count
 
 
 def _contradicts_itself(octets: Octets, places: Times, codes: Codes, role: Codes) -> Masks:
@@ -169,7 +194,7 @@ def _contradicts_itself(octets: Octets, places: Times, codes: Codes, role: Codes
     for code, (quantity_at, count_at, bits) in AGREEMENTS.items():
         which = np.flatnonzero((codes == code) & (role != RESPONSE))
         place = places[which]
-        quantity = _numbers(octets, place, Number(quantity_at, 2))
+        quantity = octets[place + quantity_at].astype(np.int32) << 8 | octets[place + quantity_at + 1]
         needed = quantity * bits + 7 >> 3
         wrong[which] = octets[place + count_at] != needed
     return wrong

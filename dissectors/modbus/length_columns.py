@@ -223,17 +223,20 @@ def _word(octets: Octets, places: Times, at: int) -> npt.NDArray[np.int32]:
 
 def _shapes(message: Message, octets: Octets, places: Times) -> Bits:
     """As `shapes.shape_of`, of a message without groups."""
-    fits = np.ones(len(places), bool)
-    for place, values in held(message):
-        fits &= _among(_number(octets, places, place), values)
+    bits, penalty = told(message)
+    fits = [_among(_number(octets, places, place), values) for place, values in held(message)]
     count = counted(message)
     if count is not None and count.quantity is not None:
         needed = (_number(octets, places, count.quantity) * count.items.bits + 7 >> 3) + count.beside
-        fits &= _number(octets, places, count.count) == needed
-    elif count is not None and count.items.size > 1:
-        fits &= _number(octets, places, count.count) % count.items.size == 0
-    bits, penalty = told(message)
-    return np.where(fits, bits, penalty).astype(np.int16)
+        fits.append(octets[places + count.count.at] == needed)
+    elif count is not None and count.items.means is Means.REGISTERS:
+        fits.append(octets[places + count.count.at] & 1 == 0)
+    if not fits:
+        return np.full(len(places), bits, np.int16)
+    kept = fits[0]
+    for each in fits[1:]:
+        kept &= each
+    return np.where(kept, np.int16(bits), np.int16(penalty))
 
 
 def _among(numbers: Numbers, values: Collection[int]) -> Masks:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from enum import Enum, auto
-from typing import Final
+from typing import Final, NamedTuple
 
 HEAD: Final = 2
 """Octets before a message's first field: unit and function."""
@@ -74,8 +74,7 @@ Message = tuple[Field, ...]
 """The fields behind the function code, in order."""
 
 
-@dataclass(frozen=True, slots=True)
-class SubFunction:
+class SubFunction(NamedTuple):
     """A sub-function of diagnostics. `data`: what request and answer hold; `counter`: what only the answer holds, and
     the request as 0000 (else the answer repeats the request); without either nothing is known of its word."""
 
@@ -106,8 +105,7 @@ class Messages:
     repeats: int = 0
 
 
-@dataclass(frozen=True, slots=True)
-class Place:
+class Place(NamedTuple):
     """A field and where it stands: `at` octets from the unit."""
 
     at: int
@@ -130,8 +128,7 @@ class Counted:
         return self.count.at + self.count.field.size + self.beside
 
 
-@dataclass(frozen=True, slots=True)
-class Group:
+class Group(NamedTuple):
     """One of many alike. `size`: octets of its single fields. `type_at`, `type`: where an octet stands that is the same
     in all. `count_at`: where an octet counts what follows it; `many_at`: where a word tells the registers behind."""
 

@@ -131,7 +131,8 @@ def _all_held(holds: list[Test], bits: int, penalty: int) -> Shape:
 def _among(place: Place, values: Collection[int]) -> Rule:
     """The field has one of these values."""
     at, size = place.at, place.field.size
-    least, most, listed = min(values), max(values), frozenset(values)
+    listed = values if isinstance(values, range) else frozenset(values)
+    least, most = (values.start, values.stop - 1) if isinstance(values, range) else (min(values), max(values))
 
     def word_within(octets: Octets, start: int, length: int) -> bool:
         return least <= octets[start + at] << 8 | octets[start + at + 1] <= most
