@@ -25,6 +25,7 @@ from sniff.engine.follow_settings import dissector_for
 from sniff.engine.observer import observe
 from sniff.engine.session import DEVICES_NOTE, Session
 from sniff.formats.text import iso
+from sniff.reporting.happenings import Happenings
 from sniff.reporting.numbers import (
     Distribution,
     Evidence,
@@ -38,7 +39,6 @@ from sniff.reporting.numbers import (
     seconds_since,
 )
 from sniff.reporting.timeline import Timeline
-from sniff.reporting.told import Told
 
 EVIDENCE_SHOWN, EVIDENCE_OF_NOTES = 5, 2
 LONGEST_TEXT = 180
@@ -50,7 +50,7 @@ def collect(source: str, capture: Capture, session: Session, devices: Devices) -
     model, timeline, told = (
         BusModel(session, dissector, devices, with_points=False),
         Timeline(session.line.char),
-        Told(session),
+        Happenings(session),
     )
     observe(outputs(capture.items(), session), model, timeline, told)
     summary, findings, healths = model.summary, model.findings(), model.health()
