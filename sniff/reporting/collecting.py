@@ -25,6 +25,7 @@ from sniff.engine.engine import Output, Row
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import DEVICES_NOTE, LineEvent, Session
 from sniff.formats.text import iso
+from sniff.reporting.happenings import Happenings
 from sniff.reporting.numbers import (
     Distribution,
     Evidence,
@@ -38,7 +39,6 @@ from sniff.reporting.numbers import (
     seconds_since,
 )
 from sniff.reporting.timeline import Timeline
-from sniff.reporting.told import Told
 
 if TYPE_CHECKING:
     pass
@@ -62,7 +62,7 @@ def collect(
     model, timeline, told = (
         BusModel(session, dissector, devices, with_points=False),
         Timeline(session.line.char),
-        Told(session),
+        Happenings(session),
     )
     survey(read, session, model, timeline, told, reference=reference)
     summary, findings, healths = model.summary, model.findings(), model.health()

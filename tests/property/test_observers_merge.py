@@ -18,8 +18,8 @@ from sniff.engine.engine import Output
 from sniff.engine.observer import observe
 from sniff.engine.session import LineEvent, Session
 from sniff.formats import read
+from sniff.reporting.happenings import Happenings
 from sniff.reporting.timeline import Timeline
-from sniff.reporting.told import Told
 
 CAPTURES = Path(__file__).parents[2] / "captures"
 NAMES = ("rtu-usual-faults", "ascii-usual-faults", "n2-usual-faults", "mstp-usual-faults", "rtu-noisy-ftdi")
@@ -54,7 +54,7 @@ KINDS = {
     "load": Kind(lambda session: Summary(session.line), lambda summary: (summary.load.share(), summary.load.total)),
     "nodes": Kind(lambda session: Summary(session.line), lambda summary: list(summary.nodes.present())),
     "timeline": Kind(lambda session: Timeline(session.line.char)),
-    "report": Kind(Told, lambda told: (told.happenings, told.trouble)),
+    "report": Kind(Happenings, lambda told: (told.happenings, told.trouble)),
 }
 
 

@@ -17,7 +17,7 @@ HAPPENINGS_SHOWN = 200
 GOOD = frozenset((Verdict.ANSWERED, Verdict.BROADCAST, Verdict.DATA, Verdict.OPEN, Verdict.UNDECIDED))
 
 
-class Told:
+class Happenings:
     """`happenings`: the first of them; `trouble`: by station, how often what went wrong."""
 
     def __init__(self, session: Session) -> None:
@@ -50,9 +50,9 @@ class Told:
             at = seconds_since(self._session.started, event.time)
             self.happenings.append(Happening(at, event.kind.value, event.text, event.count))
 
-    def merge(self, later: Told) -> Told:
+    def merge(self, later: Happenings) -> Happenings:
         """Both together, as a new value; `later` is of the same capture."""
-        whole = Told(self._session)
+        whole = Happenings(self._session)
         whole.happenings = (self.happenings + later.happenings)[:HAPPENINGS_SHOWN]
         for part in (self, later):
             for station, kinds in part.trouble.items():
