@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import cache
+from typing import TYPE_CHECKING
 
 from dissectors.findings import Finding, Severity, Tally, counted, found, times
 from dissectors.frame import Chunk, Damage, Event, Frame, LineError, Noise, Place, Reason, Role
@@ -22,6 +23,9 @@ from sniff.analysis.unsure_strays import UnsureStrays
 from sniff.analysis.wording import station_word
 from sniff.engine.engine import Row
 from sniff.engine.session import LineEvent, LineEventKind, Session
+
+if TYPE_CHECKING:
+    from sniff.engine.table import Table
 
 STRAY_MOST = 3
 """So many octets that are no frame are stray ones; more are the remains of something."""
@@ -101,6 +105,14 @@ class LineFindings:
             self._see_noise(row.no, event)
         self._patterns.see(row.no, event, sender)
         self._use.see(row.no, event, row.placement.role if row.placement is not None else Role.UNKNOWN)
+
+    def add_table(self, table: Table) -> None:
+        """Take rows that were all heard with the settings of the bus, and what they closed; as one after the other."""
+        for output in table.outputs():
+            for row in output.rows:
+                self.see(row)
+            for transaction in output.transactions:
+                self.settle(transaction)
 
     def pass_by(self, row: Row) -> None:
         """Take a row of a search for settings: the bus was not silent, and that is all it says."""

@@ -66,12 +66,12 @@ class BusModel:
             self.points.add(self.samples)
 
     def add_table(self, table: Table) -> None:
-        """Take many rows at once: counted as columns, judged row by row."""
+        """Take many rows at once; values of points are read row by row."""
         self.version += 1
         self.summary.add_table(table)
-        for output in table.outputs():
-            self.judging.add(output)
-            if self._with_points:
+        self.judging.add_table(table)
+        if self._with_points:
+            for output in table.outputs():
                 self.samples = self.reader.add(output)
                 self.points.add(self.samples)
 

@@ -29,6 +29,7 @@ from dissectors.columns import (
     some,
 )
 from dissectors.frame import Check, Frame
+from dissectors.row_columns import in_order
 from dissectors.tracker import Placement, Transaction
 from sniff.engine.engine import Output, Row
 
@@ -133,14 +134,32 @@ class Table:
 
     def outputs(self) -> Iterator[Output]:
         """Row by row, each with the transactions that it closed; those that no row closed come last."""
-        closed, at = self.closed_by.tolist(), 0
-        for place in range(len(self)):
-            begin = at
-            while at < len(closed) and 0 <= closed[at] <= place:
-                at += 1
-            yield Output((self.row(place),), tuple(map(self.transaction, range(begin, at))))
-        if at < len(closed):
-            yield Output((), tuple(map(self.transaction, range(at, len(closed)))))
+        for place, closed in in_order(self):
+            yield Output(() if place is None else (self.row(place),), closed)
+
+    def part(self, begin: int, end: int) -> Table:
+        """Rows [begin, end) with what they closed; those that no row closed go with the last row.
+
+        They share their octets with the whole.
+        """
+        closed_by = np.maximum.accumulate(np.where(self.closed_by < 0, len(self), self.closed_by))
+        of_rows = slice(*np.searchsorted(closed_by, (begin, end if end < len(self) else len(self) + 1)).tolist())
+        rows, closed_by = slice(begin, end), self.closed_by[of_rows]
+        return replace(
+            self,
+            first=self.first + begin,
+            frames=self.frames.take(rows),
+            slack=self.slack[rows],
+            is_frame=self.is_frame[rows],
+            placed=PlacementColumns(*(getattr(self.placed, one.name)[rows] for one in fields(PlacementColumns))),
+            transactions=self.transactions.take(of_rows),
+            closed_by=np.where(closed_by < 0, -1, closed_by - begin),
+            odd={place - begin: row for place, row in self.odd.items() if begin <= place < end},
+        )
+
+    def without(self, torn: Masks) -> Table:
+        """The same rows without some of the transactions."""
+        return replace(self, transactions=self.transactions.take(~torn), closed_by=self.closed_by[~torn])
 
     def _placement(self, place: int) -> Placement | None:
         placed = self.placed
