@@ -6,6 +6,8 @@ station: it is slow when even the shortest reading is too long, too quick when e
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from dissectors.checksums import crc16_modbus
 from dissectors.findings import ExceptionWords, Finding, Tally
 from dissectors.frame import Damage, Event, Flaw, Frame, Header, Noise, Role
@@ -25,10 +27,14 @@ from dissectors.modbus.remembered import (
     OPEN_KEPT,
     SLOW_UNLEARNT,
     Remembered,
+    slow_limit,
 )
 from dissectors.modbus.response_groups import Answered
 from dissectors.modbus.station_record import Lost, Station
 from dissectors.tracker import Placement, Transaction, Verdict
+
+if TYPE_CHECKING:
+    from dissectors.row_columns import RowColumns
 
 TURNAROUND = 90 * MS
 """Nobody speaks so soon after a broadcast: the master waits 100 … 200 ms (Modbus over Serial Line V1.02, 2.4.1)."""
@@ -145,6 +151,12 @@ class ModbusFindings(Remembered):
             self.settle_request(station, transaction, asked, code, answer)
             if verdict is Verdict.DAMAGED_ANSWER and asked.no not in self.no_requests:
                 self._settle_damaged(station, transaction, asked, stray, flaw)
+
+    def take(self, rows: RowColumns) -> None:
+        """See `dissectors.row_columns.JudgesColumns`."""
+        from dissectors.modbus.judging_columns import take  # numpy is not needed for a bus that is heard live
+
+        take(self, rows)
 
     def word_exceptions(self, words: ExceptionWords) -> None:
         """See `dissectors.findings.WordsExceptions`."""
@@ -352,12 +364,8 @@ class ModbusFindings(Remembered):
 
     def _compare_with_timeout(self, station: Station, transaction: Transaction, least: int) -> None:
         """Whether an answer took long; counted anew when the timeout gets known, since the limit is another then."""
-        timeout = self.learnt.timeout
-        limit = None if timeout is None else timeout * 7 // 10
-        if (limit is None) != (station.slow_limit is None):
-            station.slow, station.slow_of = Tally(), 0
-        station.slow_limit = limit
-        station.slow_of += 1
+        limit = slow_limit(self.learnt.timeout)
+        station.compare_with(limit, 1)
         if least > (SLOW_UNLEARNT if limit is None else limit):
             self.gaps.took_long(station.slow, transaction)
 

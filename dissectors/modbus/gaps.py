@@ -7,6 +7,7 @@ the computer was busy, and had caught up when the next request came.
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from dissectors.findings import Tally
@@ -20,6 +21,9 @@ from dissectors.tracker import Placement, Transaction
 
 SPACING_KEPT = 64
 SPACING_LEAST = 8
+PAUSES_KEPT = 32
+"""The newest pauses, of which `Learnt` keeps no more."""
+
 _SLOW_KEPT = 2
 
 
@@ -69,19 +73,28 @@ class Gaps:
         while len(self._slow) > left:
             self._judge_slow(self._slow.popleft())
 
+    def pass_by(self, last: Frame) -> None:
+        """Go on behind good frames, of which `last` is the last one, and an answer."""
+        self.before = self.answered = last
+
+    def begins_soon(self, start: int, octets: bytes) -> bool:
+        """Whether a good frame begins too soon after the row before; frames that touch came in one read, which says
+        nothing of the silence between them."""
+        before = self.before
+        if before is None or before.octets == octets or before.end >= start:
+            return False
+        return max(0, start - before.end) + before.slack < self.close
+
     def _see_gap(self, no: int, frame: Frame, header: Header, placement: Placement) -> None:
         """Silences that are provably too short between frames, or too long inside one."""
-        before, sender = self.before, sender_of(placement)
+        sender = sender_of(placement)
         if placement.role is not Role.EITHER:
             self.seen.frames[sender] += 1
             self.seen.octets[sender] += max(len(frame.octets), frame.expected or 0)
         if frame.protocol != RTU_NAME:
             return
-        # frames that touch came in one read, which says nothing of the silence between them
-        if before is not None and header.ok and not frame.skipped and before.octets != frame.octets:
-            longest = max(0, frame.start - before.end) + before.slack
-            if before.end < frame.start and longest < self.close:
-                self.seen.too_close(sender, frame.start, no - 1, no)
+        if header.ok and not frame.skipped and self.begins_soon(frame.start, frame.octets):
+            self.seen.too_close(sender, frame.start, no - 1, no)
         if header.ok and not frame.marks:  # in a damaged one octets may be missing, and leave the same silence
             self._see_spacing(no, frame, sender)
 
@@ -119,12 +132,26 @@ class Gaps:
         if self.answered is None or placement.role is not Role.REQUEST or not header.ok:
             return
         pause = max(0, frame.start - self.answered.end)
-        if len(self.pauses) >= SPACING_LEAST and 2 * pause < middle(self.pauses) - self.latency:
+        if self.is_hurried(pause, self.pauses):
             self.hurried.append(no - 1)
-        self.pauses.append(pause)
-        self._learnt.paused(pause, 0)
+        self.paused((pause,))
+
+    def is_hurried(self, pause: int, before: Sequence[int]) -> bool:
+        """Whether a pause is far below the usual of those before."""
+        return len(before) >= SPACING_LEAST and 2 * pause < middle(before) - self.latency
+
+    def paused(self, pauses: Sequence[int]) -> None:
+        """The master's next pauses between an answer and a request, ns."""
+        self.pauses.extend(pauses)
+        for pause in pauses[-PAUSES_KEPT:]:
+            self._learnt.paused(pause, 0)
 
 
 def sender_of(placement: Placement) -> str:
     """Who sent a frame, as findings name him."""
     return "master" if placement.role is not Role.RESPONSE else f"station {placement.source}"
+
+
+def sender_name(unit: int) -> str:
+    """The same by the station's address; 0: the master."""
+    return f"station {unit}" if unit else "master"

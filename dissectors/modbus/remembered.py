@@ -27,8 +27,13 @@ BEGIN = 5
 """Octets of a request that no noise makes by chance: unit, function, address, half a quantity."""
 
 
+def slow_limit(timeout: int | None) -> int | None:
+    """From when on an answer is slow, ns, by the master's timeout; None while that is not known."""
+    return None if timeout is None else timeout * 7 // 10
+
+
 class Remembered:
-    """State of the rules between one row and the next; `findings.py` moves it on."""
+    """State of the rules between one row and the next; `findings.py` and `judging_columns.py` move it on."""
 
     def __init__(self, timing: Timing) -> None:
         self.timing = timing

@@ -218,6 +218,13 @@ class Station:
             same = self.same[key, request] = SameRequest()
         return same
 
+    def compare_with(self, limit: int | None, answers: int) -> None:
+        """Count answers that are compared with a limit; anew when there is one, or none any more."""
+        if (limit is None) != (self.slow_limit is None):
+            self.slow, self.slow_of = Tally(), 0
+        self.slow_limit = limit
+        self.slow_of += answers
+
     def flaw(self, flaw: Flaw) -> Tally:
         """The record of one way in which answers are damaged."""
         return self.flaws.setdefault(flaw, Tally())
