@@ -17,7 +17,9 @@ def memory(thing: Any) -> Any:
     if isinstance(thing, set | frozenset):
         return sorted(map(repr, thing))
     names = getattr(thing, "__slots__", None) or getattr(thing, "__dict__", None)
-    if names is None or callable(thing) or not type(thing).__module__.startswith("dissectors"):
+    if callable(thing):
+        return "asked for words"
+    if names is None or not type(thing).__module__.startswith("dissectors"):
         return thing
     return type(thing).__name__, [(name, _in_any_order(name, memory(getattr(thing, name)))) for name in names]
 
