@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dissectors import stretches
 from dissectors.columns import ROLES
 from dissectors.frame import Frame, Role
 from dissectors.modbus.adu import RTU_NAME
@@ -19,88 +20,51 @@ from dissectors.modbus.gaps import sender_name
 from dissectors.modbus.regular_exchanges import UNANSWERED, adus_of, regular
 from dissectors.modbus.remembered import FINAL_KEPT, MS, OPEN_KEPT
 from dissectors.modbus.stretch_evidence import Exchanged, StretchEvidence
+from dissectors.row_columns import in_turn
 
 if TYPE_CHECKING:
     from dissectors.modbus.findings import ModbusFindings
     from dissectors.row_columns import RowColumns
 
 _REQUEST = ROLES.index(Role.REQUEST)
-LEAST = 32
-"""Rows; fewer are judged sooner one by one."""
-
-FEW = 4
-"""Exchanges of a stretch; likewise."""
 
 
 def take(judge: ModbusFindings, rows: RowColumns) -> None:
     """What `dissectors.row_columns.JudgesColumns` asks for."""
+    if len(rows) < stretches.LEAST:
+        in_turn(judge, rows)
+        return
     judging = _Judging(judge, rows)
-    if len(rows) >= LEAST:
-        judging.by_stretches()
-    judging.to_the_end()
+    stretches.take(judge, rows, judging.found.stretches, judging.is_at_rest, judging.pass_by)
 
 
 class _Judging:
-    """One judge and some rows, from the first to the last."""
+    """One judge and the stretches of some rows."""
 
     def __init__(self, judge: ModbusFindings, rows: RowColumns) -> None:
         self._judge, self._rows = judge, rows
-        self._place = self._at = 0  # row and transaction to come
-        self._closed_by = rows.closed_by.tolist()
-
-    def by_stretches(self) -> None:
-        """Take rows up to the last stretch."""
-        rows = self._rows
         adus = adus_of(rows)
-        self._found = found = regular(rows, adus)
-        if not found.stretches:
-            return
-        self._silences = silences(rows, self._judge.timing, self._judge.gaps.close)
-        self._exchanged = exchanged = Exchanged.of(rows, found, adus)
-        evidence = StretchEvidence(self._judge, exchanged)
-        request, last = exchanged.request, exchanged.last
-        for begin, end in found.stretches:
-            self._see_until(request[begin])
-            while begin < end and not self._is_at_rest(begin, end):
-                self._see_until(last[begin] + 1)
-                begin += 1
-            if end - begin >= FEW:
-                self._pass(begin, end, evidence)
+        self.found = regular(rows, adus)
+        self._exchanged = Exchanged.of(rows, self.found, adus)
+        self._silences = silences(rows, judge.timing, judge.gaps.close)
+        self._evidence = StretchEvidence(judge, self._exchanged)
 
-    def to_the_end(self) -> None:
-        """Take what is left, row by row."""
-        self._see_until(len(self._rows))
-        for at in range(self._at, len(self._closed_by)):
-            self._judge.settle(self._rows.transaction(at))
-
-    def _see_until(self, end: int) -> None:
-        judge, rows, closed_by = self._judge, self._rows, self._closed_by
-        for place in range(self._place, end):
-            row = rows.row(place)
-            judge.see(row.no, row.event, row.header, row.placement)
-            while self._at < len(closed_by) and 0 <= closed_by[self._at] <= place:
-                judge.settle(rows.transaction(self._at))
-                self._at += 1
-        self._place = max(self._place, end)
-
-    def _is_at_rest(self, begin: int, end: int) -> bool:
+    def is_at_rest(self, begin: int, end: int) -> bool:
         """Whether nothing is open or held that a regular exchange would have to do with."""
         judge = self._judge
         if judge.open is not None or judge.broadcast is not None or judge.ends.newest is not None:
             return False
         if max(len(judge.asked), len(judge.codes), len(judge.answers)) >= OPEN_KEPT - 1:
             return False
-        return not judge.seen.pairs or not (self._found.became[begin:end] == UNANSWERED).any()
+        return not judge.seen.pairs or not (self.found.became[begin:end] == UNANSWERED).any()
 
-    # ---- a stretch
-
-    def _pass(self, begin: int, end: int, evidence: StretchEvidence) -> None:
+    def pass_by(self, begin: int, end: int) -> None:
         """Put the judge behind exchanges [begin, end)."""
         rows, judge, exchanged, which = self._rows, self._judge, self._exchanged, slice(begin, end)
         stretch = slice(exchanged.request[begin], exchanged.last[end - 1] + 1)
         self._count(stretch, which)
         pause_rows, pauses = self._see_gaps(stretch)
-        evidence.go_through(begin, end, pause_rows, pauses, hurried(judge.gaps, pauses))
+        self._evidence.go_through(begin, end, pause_rows, pauses, hurried(judge.gaps, pauses))
         closed = exchanged.closed
         judge.repeats.extend(closed.id[which][closed.attempt[which] > 1].tolist())
         self._keep_answers(begin, end)
@@ -109,11 +73,10 @@ class _Judging:
         judge.gaps.pass_by(last.event)
         judge.torn.see(last.no, last.event, None, is_good_frame=True)
         judge.newest = int(closed.id[end - 1])
-        self._place, self._at = stretch.stop, int(self._found.transaction[end - 1]) + 1
 
     def _count(self, stretch: slice, which: slice) -> None:
         """What is counted of frames."""
-        rows, judge, seen, found = self._rows, self._judge, self._judge.seen, self._found
+        rows, judge, seen, found = self._rows, self._judge, self._judge.seen, self.found
         frames, slack = rows.frames, rows.slack[stretch]
         seen.first = int(frames.start[stretch.start]) if seen.first is None else seen.first
         seen.now = max(seen.now, int(frames.end[stretch].max()))
@@ -152,7 +115,7 @@ class _Judging:
 
     def _keep_answers(self, begin: int, end: int) -> None:
         """The last answers, for those that come twice."""
-        found, exchanged, final = self._found, self._exchanged, self._judge.final
+        found, exchanged, final = self.found, self._exchanged, self._judge.final
         newest = begin + np.flatnonzero(found.answered[begin:end] & ~found.refused[begin:end])[-FINAL_KEPT:]
         for at in newest.tolist():
             final[int(exchanged.closed.id[at])] = exchanged.answer(at)

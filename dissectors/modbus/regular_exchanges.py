@@ -21,6 +21,7 @@ from dissectors.modbus.adu import RTU_NAME
 from dissectors.modbus.exchange import is_begin_of
 from dissectors.modbus.functions import EXCEPTION_BIT
 from dissectors.modbus.remembered import LAST_STANDARD_UNIT
+from dissectors.stretches import Stretches
 from dissectors.tracker import Verdict
 
 if TYPE_CHECKING:
@@ -56,8 +57,7 @@ class Regular:
     """Regular exchanges among rows, in their order, and the stretches they make.
 
     `transaction`: place among those that closed. `request`: row. `answered`: whether the next row is its answer;
-    `refused`: whether that is an exception. `became`: PLAIN … TO_ALL. `stretches`: the first
-    exchange of each, and the one behind its last.
+    `refused`: whether that is an exception. `became`: PLAIN … TO_ALL.
     """
 
     transaction: Times
@@ -65,7 +65,7 @@ class Regular:
     answered: Masks
     refused: Masks
     became: Times
-    stretches: list[tuple[int, int]]
+    stretches: Stretches
 
     def __len__(self) -> int:
         return len(self.request)
@@ -108,9 +108,8 @@ def regular(rows: RowColumns, adus: Adus) -> Regular:
     became[refused] = REFUSED
     became[closed.attempt > 1] = REPEATED
     became[unanswered], became[to_all] = UNANSWERED, TO_ALL
-    found = Regular(which, request[which], answered[which], (answered & refused)[which], became[which], [])
-    found.stretches.extend(_stretches(found, rows.closed_by, count))
-    return found
+    made = Stretches.of(which, request[which], answered[which], to_all[which], rows)
+    return Regular(which, request[which], answered[which], (answered & refused)[which], became[which], made)
 
 
 def _fine(rows: RowColumns, adus: Adus) -> Masks:
@@ -133,36 +132,6 @@ def _is_cut(length: Numbers, offset: Times, octets: Octets, request: Times, behi
         whole = octets[offset[asked] : offset[asked] + length[asked]].tobytes()
         cut[at] = is_begin_of(octets[offset[came] : offset[came] + length[came]].tobytes(), whole)
     return cut
-
-
-def _stretches(found: Regular, closed_by: Times, count: int) -> list[tuple[int, int]]:
-    """Where regular exchanges follow one another, and nothing else closes with their rows."""
-    size = len(found)
-    if not size:
-        return []
-    closings = np.bincount(closed_by[closed_by >= 0], minlength=count)
-    unanswered, to_all = found.became == UNANSWERED, found.became == TO_ALL
-    last = found.request + found.answered
-    follows = np.zeros(size, bool)
-    follows[1:] = (found.request[1:] == last[:-1] + 1) & (found.transaction[1:] == found.transaction[:-1] + 1)
-    due = np.append(0, unanswered[:-1]) * follows + to_all  # what the request's row should close
-    odd = (closings[found.request] != due) | (found.answered & (closings[last] != 1))
-    follows &= ~odd
-    follows[1:] &= ~odd[:-1]
-    begins = np.flatnonzero(~follows)
-    ends = np.append(begins[1:], size)
-    number = np.arange(size)
-    newest = np.maximum.accumulate(np.where(found.answered & ~odd, number, -1))[ends - 1] + 1
-    bare = closings[found.request] == to_all
-    pairs = ((_first(bare, begin, end), end) for begin, end in zip(begins.tolist(), newest.tolist(), strict=True))
-    return [pair for pair in pairs if pair[0] < pair[1]]
-
-
-def _first(bare: Masks, begin: int, end: int) -> int:
-    """The first exchange from `begin` on whose request closes nothing that came before."""
-    while begin < end and not bare[begin]:
-        begin += 1
-    return begin
 
 
 # --- unit and PDU ----------------------------------------------------------------------------------------------------

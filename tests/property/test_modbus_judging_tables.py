@@ -6,7 +6,7 @@ import random
 
 import pytest
 
-from dissectors.modbus import judging_columns
+from dissectors import stretches
 from dissectors.modbus.findings import ModbusFindings
 from dissectors.row_columns import in_turn
 from sniff.engine.blocks import Block
@@ -27,7 +27,7 @@ def test_what_is_remembered_is_the_same_wherever_tables_are_cut(seed: int, is_as
         in_turn(by_rows, table)
     dice, expected = random.Random(seed), memory(by_rows)
     found = by_rows.findings()
-    for most in (1 << 30, 200, judging_columns.LEAST + 8):
+    for most in (1 << 30, 200, stretches.LEAST + 8):
         by_columns = ModbusFindings(session.timing)
         for table in made:
             for part in cut(table, dice, most):
