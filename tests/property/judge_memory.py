@@ -14,6 +14,8 @@ def memory(thing: Any) -> Any:
         return [(memory(key), memory(value)) for key, value in order]
     if isinstance(thing, list | tuple | deque):
         return [memory(one) for one in thing]
+    if isinstance(thing, float):
+        return repr(thing)  # also of what is no number
     if isinstance(thing, set | frozenset):
         return sorted(map(repr, thing))
     names = getattr(thing, "__slots__", None) or getattr(thing, "__dict__", None)
