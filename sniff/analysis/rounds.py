@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     import numpy as np
     import numpy.typing as npt
 
+    from dissectors.columns import Octets, Times
     from sniff.engine.table import Table
 
 MOST_ROUNDS = 300
-_LONGEST = 1 << 12
-"""Octets of a frame that are looked at in columns; a table with a longer one is taken frame by frame."""
 
 
 @dataclass(slots=True)
@@ -42,14 +40,16 @@ class Rounds:
         elif len(self._rounds) < MOST_ROUNDS:
             self._rounds[octets] = _Round(start, start)
 
-    def take(self, table: Table, places: npt.NDArray[np.int64]) -> None:
+    def take(self, table: Table, places: Times) -> None:
         """Take the frames at some places of a table, ascending."""
         import numpy as np
+
+        from dissectors.fingerprints import LONGEST
 
         frames = table.frames.take(places)
         if not len(frames):
             return
-        if int(frames.length.max()) > _LONGEST or int(frames.length.min()) < 1:
+        if int(frames.length.max()) > LONGEST or int(frames.length.min()) < 1:
             for begin, length, start in zip(
                 frames.offset.tolist(), frames.length.tolist(), frames.start.tolist(), strict=True
             ):
@@ -82,11 +82,13 @@ class Rounds:
         """Say what columns know each of the frames by."""
         import numpy as np
 
+        from dissectors.fingerprints import LONGEST
+
         if len(self._by_mark) == len(self._rounds):
             return
         for octets, one in self._rounds.items():
             held = np.frombuffer(octets, np.uint8)
-            if 0 < len(held) <= _LONGEST:
+            if 0 < len(held) <= LONGEST:
                 mark = _marks(held, np.zeros(1, np.int64), np.array([len(held)], np.int64))
                 self._by_mark[int(mark[0])] = one
 
@@ -100,24 +102,7 @@ class Rounds:
         return False
 
 
-@cache
-def _weights() -> npt.NDArray[np.uint64]:
-    import numpy as np
+def _marks(octets: Octets, begins: Times, lengths: Times) -> npt.NDArray[np.uint64]:
+    from dissectors.fingerprints import fingerprints, gathered
 
-    return np.random.default_rng(485).integers(1 << 64, size=_LONGEST + 1, dtype=np.uint64)
-
-
-def _marks(
-    octets: npt.NDArray[np.uint8], begins: npt.NDArray[np.int64], lengths: npt.NDArray[np.int64]
-) -> npt.NDArray[np.uint64]:
-    """64 bits for the octets of each frame; those of two different ones agree by a chance of 1 in 2**64."""
-    import numpy as np
-
-    edges = np.cumsum(lengths) - lengths
-    inside = np.arange(int(lengths.sum())) - np.repeat(edges, lengths)
-    held = octets[inside + np.repeat(begins, lengths)].astype(np.uint64) + np.uint64(1)
-    weights = _weights()
-    sums: npt.NDArray[np.uint64] = np.add.reduceat(held * weights[inside], edges) + weights[-1] * lengths.astype(
-        np.uint64
-    )
-    return sums
+    return fingerprints(*gathered(octets, begins, lengths), lengths)
