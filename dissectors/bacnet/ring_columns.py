@@ -24,7 +24,7 @@ from dissectors.frame import Role
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from dissectors.columns import Masks, Times
+    from dissectors.columns import Masks
     from dissectors.line import Timing
     from dissectors.row_columns import RowColumns
 
@@ -148,10 +148,3 @@ def _before(mask: Masks) -> Masks:
     before: Masks = np.zeros(len(mask), bool)
     before[1:] = mask[:-1]
     return before
-
-
-def last_of(keys: Times, size: int) -> Times:
-    """Place of the last entry with each key, 0 … size - 1; -1 where there is none."""
-    last: Times = np.full(size, -1, np.int64)
-    last[keys] = np.arange(len(keys))
-    return last

@@ -1,215 +1,283 @@
-"""Counting clean rows of a ring: what `RingObserver` adds for each of them, for many at once."""
+"""Counting clean rows of a ring: what `RingObserver` adds for each of them, for many at once.
+
+What an observer asks for while it sees a single row (when a station got its token last, to whom it passed it …) is true
+at once; what only adds up is added at the end of a table, for all runs of clean rows together.
+"""
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dissectors.bacnet.limits import T_NO_TOKEN, T_USAGE_DELAY
-from dissectors.bacnet.ring_columns import RingColumns, last_of
 from dissectors.columns import counted
 from dissectors.histogram import add_grouped
 
 if TYPE_CHECKING:
-    from dissectors.bacnet.ring_tally import NodeTally, RingTally
+    from collections.abc import Callable
+
+    from dissectors.bacnet.ring_columns import RingColumns
+    from dissectors.bacnet.ring_tally import RingTally
     from dissectors.columns import Masks, Times
 
 HOLD_MAX = 64
 """Longest run of data frames that is counted by itself."""
 
 _ADDRESSES = 256
+_MANY = 2000
+"""Entries from which on arrays are faster than dictionaries."""
 
 
 class RingCounts:
-    """Clean rows [begin, end) of some columns; `count` adds them to a tally.
+    """Runs of clean rows of a table on their way into a tally."""
 
-    What they need is in the tally: every sender, every edge of a token, who is asked (`unknown`).
-    """
+    def __init__(self, columns: RingColumns, tally: RingTally, least_gap: int) -> None:
+        self._columns, self._tally, self._least_gap = columns, tally, least_gap
+        self._begins: list[int] = []
+        self._ends: list[int] = []
+        self._own = columns.data & ~columns.answers  # data that the holder of the token sends
+        self._sent = np.cumsum(self._own)
+        self._tokens = np.flatnonzero(columns.token)
+        self._edges = columns.source[self._tokens] << 8 | columns.destination[self._tokens]
+        self._before_same = _before_same(columns.destination[self._tokens], self._tokens)
+        self._polls = np.flatnonzero(columns.poll)
+        self._pairs = columns.source[self._polls] << 8 | columns.destination[self._polls]
+        self._asked, self._replies = np.flatnonzero(columns.asked), np.flatnonzero(columns.poll_reply)
+        self._known: tuple[set[int], ...] = (set(), set(), set(), set(), set())
+        # what the first token of a run says, by station
+        self._loops: list[tuple[int, int]] = []
+        self._holds: list[tuple[int, int]] = []
+        self._held: list[tuple[int, int]] = []
 
-    def __init__(self, columns: RingColumns, begin: int, end: int) -> None:
-        self._columns = columns
-        self._begin = begin
-        rows, before = slice(begin, end), slice(begin - 1, end - 1)
-        self.source, self.destination = columns.source[rows], columns.destination[rows]
-        self.token, self.poll, self.poll_reply = columns.token[rows], columns.poll[rows], columns.poll_reply[rows]
-        self._data, self._answers, self._asked = columns.data[rows], columns.answers[rows], columns.asked[rows]
-        self._start, self._end, self._slack = columns.start[rows], columns.end[rows], columns.slack[rows]
-        self._length, self._gap, self._to_all = columns.length[rows], columns.gap[rows], columns.to_all[rows]
-        self._behind_token, self._behind_poll = columns.token[before], columns.poll[before]
-        self._start_before, self._slack_before = columns.start[before], columns.slack[before]
-        self._source_before = columns.source[before]
-        self.own = self._data & ~self._answers  # data that the holder of the token sends
-        self._tokens = np.flatnonzero(self.token)
-        self._edges = self.source[self._tokens] << 8 | self.destination[self._tokens]
+    def unknown(self, begin: int, end: int) -> int:
+        """The first row that brings somebody or something new to the tally; `end` where none does.
 
-    def unknown(self, tally: RingTally) -> int | None:
-        """The first row that brings somebody or something new to a tally, counted from `begin`; None where none does.
-
-        It must be seen by itself, in its turn.
+        It must be seen by itself, in its turn: a sender, a way of the token, who is asked, polls or answers a poll.
         """
+        columns, nodes, edges = self._columns, self._tally.nodes, self._tally.edges
+
+        def polls(mac: int) -> bool:
+            node = nodes.get(mac)
+            return node is not None and bool(node.polls_sent and node.tokens_sent)
+
+        asked, replies = columns.destination[self._asked], columns.source[self._replies]
+        is_known: tuple[Callable[[int], object], ...] = (
+            lambda mac: mac in nodes and nodes[mac].first,
+            lambda edge: (edge >> 8, edge & 0xFF) in edges,
+            lambda mac: mac in nodes,
+            polls,
+            lambda mac: mac in nodes and nodes[mac].poll_replies_sent,
+        )
+        keyed = (
+            (np.arange(begin, end), columns.source[begin:end]),
+            self._of(self._tokens, self._edges, begin, end),
+            self._of(self._asked, asked, begin, end),
+            self._of(self._polls, self._pairs >> 8, begin, end),
+            self._of(self._replies, replies, begin, end),
+        )
         firsts: list[int] = []
-        nodes = tally.nodes
-        for source in np.flatnonzero(np.bincount(self.source)).tolist():
-            node = nodes.get(source)
-            if node is None or not node.first:
-                firsts.append(int((self.source == source).argmax()))
-        for edge in np.flatnonzero(np.bincount(self._edges)).tolist():
-            if (edge >> 8, edge & 0xFF) not in tally.edges:
-                firsts.append(int(self._tokens[(self._edges == edge).argmax()]))
-        for asked in np.flatnonzero(np.bincount(self.destination[self._asked])).tolist():
-            if asked not in nodes:
-                firsts.append(int((self._asked & (self.destination == asked)).argmax()))
-        return min(firsts, default=None)
+        for (places, keys), known, ask in zip(keyed, self._known, is_known, strict=True):
+            for key in _distinct(keys) - known:
+                if ask(key):
+                    known.add(key)
+                else:
+                    firsts.append(int(places[(keys == key).argmax()]))
+        return min(firsts, default=end)
 
-    def count(self, tally: RingTally, least_gap: int, hold: int, got: int | None) -> int:
-        """Add them. `hold`: data frames sent on the token that is held; of the newest one behind them it is given.
+    def _of(self, places: Times, keys: Times, begin: int, end: int) -> tuple[Times, Times]:
+        first, beyond = np.searchsorted(places, (begin, end)).tolist()
+        return places[first:beyond], keys[first:beyond]
 
-        `got`: when the holder got it, None where that is not known.
+    def take(self, begin: int, end: int, hold: int, got: int | None) -> int:
+        """Take clean rows, in which nothing is unknown.
+
+        `hold`: data frames sent on the token that is held; that of the newest one behind the rows is given. `got`: when
+        the holder got it, None where that is not known.
         """
-        tally.last = max(tally.last, int(self._end.max()))
-        tally.frames += len(self._end)
-        tally.octets += int(self._length.sum())
-        tally.impossible += int((self._gap + self._slack_before < least_gap).sum())
-        nodes = tally.nodes
-        octets = np.bincount(self.source, self._length, _ADDRESSES).astype(np.int64).tolist()
-        for source, last in _lasts(self.source):
-            nodes[source].last = int(self._end[last])
-            nodes[source].octets += octets[source]
-        used = self._behind_token
-        add_grouped(lambda mac: nodes[mac].use, self.source[used], self._gap[used])
-        self._count_polls(tally)
-        self._count_data(nodes)
-        return self._count_tokens(tally, hold, got)
+        columns, tally = self._columns, self._tally
+        self._begins.append(begin)
+        self._ends.append(end)
+        tally.last = max(tally.last, int(columns.end[begin:end].max()))
+        for mac, time in _lasts(columns.source[begin:end], columns.end[begin:end]).items():
+            tally.nodes[mac].last = time
+        self._poll(begin, end)
+        sent, before = int(self._sent[end - 1]), int(self._sent[begin - 1])
+        first, beyond = np.searchsorted(self._tokens, (begin, end)).tolist()
+        if first == beyond:
+            return hold + sent - before
+        row, newest = int(self._tokens[first]), int(self._tokens[beyond - 1])
+        source = int(columns.source[row])
+        self._holds.append((source, hold + int(self._sent[row]) - before))
+        if got is not None:
+            self._held.append((source, int(columns.end[row]) - got))
+        self._pass(first, beyond, begin)
+        return sent - int(self._sent[newest])
 
-    # Tokens
+    def _poll(self, begin: int, end: int) -> None:
+        tally, columns = self._tally, self._columns
+        places, pairs = self._of(self._polls, self._pairs, begin, end)
+        ends = columns.end[places]
+        for pair, time in _lasts(pairs, ends).items():
+            source, destination = pair >> 8, pair & 0xFF
+            tally.polled[source, destination] = time
+            tally.nodes[source].highest_polled = max(tally.nodes[source].highest_polled, destination)
+        counts = np.bincount(pairs & 0xFF, minlength=_ADDRESSES)
+        for mac, time in _lasts(pairs & 0xFF, ends).items():
+            if mac in tally.nodes:  # what was polled before it was heard is counted nowhere
+                tally.nodes[mac].last_polled = time
+                tally.nodes[mac].polls_received += int(counts[mac])
 
-    def _count_tokens(self, tally: RingTally, hold: int, got: int | None) -> int:
-        sent = np.cumsum(self.own)
-        tokens = self._tokens
-        if not len(tokens):
-            return hold + int(sent[-1])
-        self._count_edges(tally)
-        source, destination, ends = self.source[tokens], self.destination[tokens], self._end[tokens]
-        before = sent[tokens]
-        holds = np.diff(before, prepend=-hold)
-        for (mac, many), count in counted(source, np.minimum(holds, HOLD_MAX)):
-            tally.nodes[mac].holds[many] = tally.nodes[mac].holds.get(many, 0) + count
-        first = int(ends[0]) if got is None else got  # nothing is known of how long the first was held
-        held = np.maximum(np.diff(ends, prepend=first), 0)
-        of_source = np.bincount(source, held, _ADDRESSES).astype(np.int64).tolist()
-        for mac, count in _counts(source):
-            tally.nodes[mac].tokens_sent += count
-            tally.nodes[mac].held += of_source[mac]
-        self._count_loops(tally, destination, ends)
-        return int(sent[-1] - before[-1])
+    def _pass(self, first: int, beyond: int, begin: int) -> None:
+        """Tokens `first` … `beyond` of all, in a run that begins with row `begin`."""
+        tally, some = self._tally, slice(first, beyond)
+        edges, ends = self._edges[some], self._columns.end[self._tokens[some]]
+        new = np.flatnonzero(self._before_same[some] < begin)
+        for edge, time in zip(edges[new].tolist(), ends[new].tolist(), strict=True):
+            got = tally.nodes[edge & 0xFF].got
+            if got is not None:
+                self._loops.append((edge & 0xFF, time - got))
+        for mac, time in _lasts(edges & 0xFF, ends).items():
+            tally.nodes[mac].got = tally.nodes[mac].last_token = time
+        for edge, time in _lasts(edges, ends).items():
+            tally.edges[edge >> 8, edge & 0xFF].last = time
+        self._go_on(edges, first)
 
-    def _count_edges(self, tally: RingTally) -> None:
-        edges = self._edges
-        pairs = [(int(edge), count) for (edge,), count in counted(edges)]
-        lasts = dict(_lasts(edges))
-        senders = [edge >> 8 for edge, _ in pairs]
-        several: set[int] = {sender for sender in senders if senders.count(sender) > 1}
-        for edge, count in pairs:
+    def _go_on(self, edges: Times, first: int) -> None:
+        """How often stations have passed the token to the same one since they did to another."""
+        tally = self._tally
+        counts = Counter(edges.tolist()) if len(edges) <= _MANY else {edge: n for (edge,), n in counted(edges)}
+        ways = Counter(edge >> 8 for edge in counts)
+        for edge, count in counts.items():
             source, destination = edge >> 8, edge & 0xFF
-            one, node, row = tally.edges[source, destination], tally.nodes[source], int(self._tokens[lasts[edge]])
-            one.tokens += count
-            one.last = int(self._end[row])
-            if source not in several:
-                if node.next != destination:
-                    self._turn_to(tally, source, destination, int(self._tokens[(edges == edge).argmax()]))
-                one.streak += count
-        for row in self._tokens[np.isin(edges >> 8, sorted(several))].tolist() if several else ():
-            source, destination = int(self.source[row]), int(self.destination[row])
+            if ways[source] == 1:
+                if tally.nodes[source].next != destination:
+                    self._turn_to(source, destination, first + int((edges == edge).argmax()))
+                tally.edges[source, destination].streak += count
+        several = [source for source, count in ways.items() if count > 1]
+        for at in np.flatnonzero(np.isin(edges >> 8, several)).tolist() if several else ():
+            source, destination = int(edges[at]) >> 8, int(edges[at]) & 0xFF
             if tally.nodes[source].next != destination:
-                self._turn_to(tally, source, destination, row)
+                self._turn_to(source, destination, first + at)
             tally.edges[source, destination].streak += 1
 
-    def _turn_to(self, tally: RingTally, source: int, destination: int, row: int) -> None:
-        edge = tally.edges[source, destination]
-        tally.nodes[source].next, edge.since, edge.streak = destination, int(self._start[row]), 0
+    def _turn_to(self, source: int, destination: int, token: int) -> None:
+        edge = self._tally.edges[source, destination]
+        edge.since, edge.streak = int(self._columns.start[self._tokens[token]]), 0
+        self._tally.nodes[source].next = destination
 
-    def _count_loops(self, tally: RingTally, destination: Times, ends: Times) -> None:
-        order = np.argsort(destination, kind="stable")
-        held, times = destination[order], ends[order]
-        loops = np.diff(times, prepend=0)
-        again = np.append(False, held[1:] == held[:-1])
-        add_grouped(lambda mac: tally.nodes[mac].loop, held[again], loops[again])
-        begins = np.flatnonzero(~again)
-        counts = np.diff(np.append(begins, len(held)))
-        for place, count in zip(begins.tolist(), counts.tolist(), strict=True):
-            node = tally.nodes[int(held[place])]
-            node.tokens_received += count
-            if node.got is not None:
-                node.loop.add(int(times[place]) - node.got)
-            node.got = node.last_token = int(times[place + count - 1])
+    # What only adds up
 
-    # Polls
+    def add_up(self) -> None:
+        """Add all that was taken."""
+        if not self._begins:
+            return
+        columns, tally = self._columns, self._tally
+        begins, ends = np.array(self._begins), np.array(self._ends)
+        taken: Masks = np.zeros(len(columns), bool)
+        for begin, end in zip(self._begins, self._ends, strict=True):
+            taken[begin:end] = True
+        rows = np.flatnonzero(taken)
+        tally.frames += len(rows)
+        tally.octets += int(columns.length[rows].sum())
+        tally.impossible += int((columns.gap[rows] + columns.slack[rows - 1] < self._least_gap).sum())
+        octets = np.bincount(columns.source[rows], columns.length[rows], _ADDRESSES)
+        for mac in np.flatnonzero(octets).tolist():
+            tally.nodes[mac].octets += int(octets[mac])
+        used = rows[columns.token[rows - 1]]
+        add_grouped(lambda mac: tally.nodes[mac].use, columns.source[used], columns.gap[used])
+        tokens = self._tokens[taken[self._tokens]]
+        self._add_tokens(tokens, np.repeat(begins, ends - begins)[np.searchsorted(rows, tokens)], taken)
+        self._add_polls(rows)
+        self._add_data(rows)
 
-    def _count_polls(self, tally: RingTally) -> None:
-        nodes, polls = tally.nodes, np.flatnonzero(self.poll)
-        again = self.poll & self._behind_poll & (self.source == self._source_before)
-        repeated = dict(_counts(self.source[again]))
-        for mac, count in _counts(self.source[polls]):
-            node = nodes[mac]
-            node.polls_sent += count
-            node.polls_of_search += repeated.get(mac, 0) if node.tokens_sent else count
-        pairs = self.source[polls] << 8 | self.destination[polls]
-        for pair, last in _lasts(pairs):
-            source, destination = pair >> 8, pair & 0xFF
-            nodes[source].highest_polled = max(nodes[source].highest_polled, destination)
-            tally.polled[source, destination] = int(self._end[polls[last]])
-        polled = self.destination[polls]
-        for mac, count in _counts(polled):
-            if mac in nodes:
-                nodes[mac].polls_received += count
-        for mac, last in _lasts(polled):
-            if mac in nodes:
-                nodes[mac].last_polled = int(self._end[polls[last]])
-        for mac, count in _counts(self.source[self.poll_reply]):
-            nodes[mac].poll_replies_sent += count
-        add_grouped(lambda mac: nodes[mac].poll_reply, self.source[self.poll_reply], self._gap[self.poll_reply])
-        self._count_unanswered(tally, self._behind_poll & ~self.poll_reply)
+    def _add_tokens(self, tokens: Times, begins: Times, taken: Masks) -> None:
+        """`begins`: of the run of each."""
+        columns, nodes = self._columns, self._tally.nodes
+        source, destination = columns.source[tokens], columns.destination[tokens]
+        self._count("tokens_sent", source)
+        self._count("tokens_received", destination)
+        for (edge,), count in counted(source << 8 | destination):
+            self._tally.edges[edge >> 8, edge & 0xFF].tokens += count
+        same = self._before_same[taken[self._tokens]]
+        again = same >= begins
+        values = columns.end[tokens[again]] - columns.end[same[again]]
+        add_grouped(lambda mac: nodes[mac].loop, *_with(destination[again], values, self._loops))
+        again = tokens[:-1] >= begins[1:]
+        now, before = tokens[1:][again], tokens[:-1][again]
+        macs, holds = _with(columns.source[now], self._sent[now] - self._sent[before], self._holds)
+        for (mac, many), count in counted(macs, np.minimum(holds, HOLD_MAX)):
+            nodes[mac].holds[many] = nodes[mac].holds.get(many, 0) + count
+        macs, held = _with(columns.source[now], columns.end[now] - columns.end[before], self._held)
+        sums = np.bincount(macs, np.maximum(held, 0), _ADDRESSES)
+        for mac in np.flatnonzero(sums).tolist():
+            nodes[mac].held += int(sums[mac])
 
-    def _count_unanswered(self, tally: RingTally, gone_on: Masks) -> None:
-        nodes, source = tally.nodes, self.source[gone_on]
-        wasted = self._start[gone_on] - self._start_before[gone_on]
-        tally.poll_waste += int(np.clip(wasted, 0, T_NO_TOKEN).sum())
-        add_grouped(lambda mac: nodes[mac].poll_wait, source, self._gap[gone_on])
-        for mac, count in _counts(source):
-            nodes[mac].polls_unanswered += count
-        waited = self._gap[gone_on] - self._slack[gone_on] > T_USAGE_DELAY
-        for mac, count in _counts(source[waited]):
-            nodes[mac].polls_waited += count
+    def _add_polls(self, rows: Times) -> None:
+        columns, nodes = self._columns, self._tally.nodes
+        polls = rows[columns.poll[rows]]
+        source = columns.source[polls]
+        self._count("polls_sent", source)
+        again = columns.poll[polls - 1] & (columns.source[polls - 1] == source)
+        self._count("polls_of_search", source[again])
+        replies = rows[columns.poll_reply[rows]]
+        self._count("poll_replies_sent", columns.source[replies])
+        add_grouped(lambda mac: nodes[mac].poll_reply, columns.source[replies], columns.gap[replies])
+        gone_on = rows[columns.poll[rows - 1] & ~columns.poll_reply[rows]]
+        wasted = columns.start[gone_on] - columns.start[gone_on - 1]
+        self._tally.poll_waste += int(np.clip(wasted, 0, T_NO_TOKEN).sum())
+        source, waited = columns.source[gone_on], columns.gap[gone_on]
+        add_grouped(lambda mac: nodes[mac].poll_wait, source, waited)
+        self._count("polls_unanswered", source)
+        self._count("polls_waited", source[waited - columns.slack[gone_on] > T_USAGE_DELAY])
 
-    # Data
+    def _add_data(self, rows: Times) -> None:
+        columns, nodes = self._columns, self._tally.nodes
+        data = rows[columns.data[rows]]
+        self._count("data_sent", columns.source[data])
+        self._count("broadcasts_sent", columns.source[data[columns.to_all[data]]])
+        asked = data[columns.asked[data]]
+        self._count("requests_sent", columns.source[asked])
+        self._count("requests_received", columns.destination[asked])
+        replies = data[columns.answers[data]]
+        self._count("replies", columns.source[replies])
+        add_grouped(lambda mac: nodes[mac].reply, columns.source[replies], columns.gap[replies])
 
-    def _count_data(self, nodes: dict[int, NodeTally]) -> None:
-        for mac, count in _counts(self.source[self._data]):
-            nodes[mac].data_sent += count
-        for mac, count in _counts(self.source[self._to_all]):
-            nodes[mac].broadcasts_sent += count
-        for mac, count in _counts(self.source[self._asked]):
-            nodes[mac].requests_sent += count
-        for mac, count in _counts(self.destination[self._asked]):
-            nodes[mac].requests_received += count
-        replies = self._data & self._answers
-        for mac, count in _counts(self.source[replies]):
-            nodes[mac].replies += count
-        add_grouped(lambda mac: nodes[mac].reply, self.source[replies], self._gap[replies])
-
-
-def _counts(macs: Times) -> list[tuple[int, int]]:
-    """How often each address stands there."""
-    counts = np.bincount(macs)
-    distinct = np.flatnonzero(counts)
-    return list(zip(distinct.tolist(), counts[distinct].tolist(), strict=True))
+    def _count(self, what: str, macs: Times) -> None:
+        """One more of `what` for each time that an address stands there."""
+        counts = np.bincount(macs)
+        for mac in np.flatnonzero(counts).tolist():
+            node = self._tally.nodes[mac]
+            setattr(node, what, getattr(node, what) + int(counts[mac]))
 
 
-def _lasts(keys: Times) -> list[tuple[int, int]]:
-    """Where each key stands last."""
-    if not len(keys):
-        return []
-    last = last_of(keys, int(keys.max()) + 1)
+def _before_same(keys: Times, places: Times) -> Times:
+    """The place before each with the same key; -1 for the first."""
+    order = np.argsort(keys, kind="stable")
+    held, before = keys[order], np.full(len(keys), -1, np.int64)
+    same = np.flatnonzero(held[1:] == held[:-1])
+    before[order[same + 1]] = places[order[same]]
+    return before
+
+
+def _with(macs: Times, values: Times, more: list[tuple[int, int]]) -> tuple[Times, Times]:
+    """The same and some more."""
+    return (
+        np.concatenate([macs, np.array([mac for mac, _ in more], np.int64)]),
+        np.concatenate([values, np.array([value for _, value in more], np.int64)]),
+    )
+
+
+def _distinct(keys: Times) -> set[int]:
+    return set(keys.tolist()) if len(keys) <= _MANY else set(np.flatnonzero(np.bincount(keys)).tolist())
+
+
+def _lasts(keys: Times, values: Times) -> dict[int, int]:
+    """The last value of each key."""
+    if len(keys) <= _MANY:
+        return dict(zip(keys.tolist(), values.tolist(), strict=True))
+    last = np.full(int(keys.max()) + 1, -1, np.int64)
+    last[keys] = np.arange(len(keys))
     distinct = np.flatnonzero(last >= 0)
-    return list(zip(distinct.tolist(), last[distinct].tolist(), strict=True))
+    return dict(zip(distinct.tolist(), values[last[distinct]].tolist(), strict=True))

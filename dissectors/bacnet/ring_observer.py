@@ -42,6 +42,7 @@ from dissectors.line import Timing
 
 if TYPE_CHECKING:
     from dissectors.bacnet.ring_columns import RingColumns
+    from dissectors.bacnet.ring_counts import RingCounts
     from dissectors.row_columns import RowColumns
 
 _HOLD_MAX = 64  # longest run of data frames that is counted by itself
@@ -142,15 +143,17 @@ class RingObserver:
     def take(self, rows: RowColumns) -> None:
         """Take many rows: those in which all goes its way as columns, any other as `see` does."""
         from dissectors.bacnet.ring_columns import RingColumns
+        from dissectors.bacnet.ring_counts import RingCounts
 
         if not len(rows):
             return
         columns = RingColumns(rows, self._tally.timing, self._least_gap, self._storms.newest)
+        counts = RingCounts(columns, self._tally, self._least_gap)
         place = one_by_one = 0  # before that one, each is seen by itself
         while place < len(rows):
             end = columns.end_of_run(place)
             if place >= one_by_one and end - place >= _RUN_LEAST and self._is_calm(columns, place):
-                end = self._take_run(columns, place, end)
+                end = self._take_run(columns, counts, place, end)
                 if end - place >= _RUN_LEAST:
                     place = end
                     continue
@@ -158,6 +161,7 @@ class RingObserver:
             row = rows.row(place)
             self.see(row.no, row.event, row.header)
             place += 1
+        counts.add_up()
 
     def _is_calm(self, columns: RingColumns, begin: int) -> bool:
         """Whether nothing is known but what the row before `begin` says."""
@@ -173,25 +177,17 @@ class RingObserver:
             return False
         return asked is None if not asks else asked is not None and asked.no == columns.rows.first + before
 
-    def _take_run(self, columns: RingColumns, begin: int, end: int) -> int:
+    def _take_run(self, columns: RingColumns, counts: RingCounts, begin: int, end: int) -> int:
         """Take clean rows from `begin` on, up to the first that must be seen by itself; that row.
 
         None are taken where they are few.
         """
-        from dissectors.bacnet.ring_counts import RingCounts
-
         end = self._before_special(columns, begin, end)
-        if end - begin < _RUN_LEAST:
-            return end
-        counts = RingCounts(columns, begin, end)
-        unknown = counts.unknown(self._tally)
-        if unknown is not None:
-            end = begin + unknown
-            if unknown < _RUN_LEAST:
-                return end
-            counts = RingCounts(columns, begin, end)
-        self._hold = counts.count(self._tally, self._least_gap, self._hold, self._got)
-        self._move(columns, begin, end)
+        if end - begin >= _RUN_LEAST:
+            end = counts.unknown(begin, end)
+        if end - begin >= _RUN_LEAST:
+            self._hold = counts.take(begin, end, self._hold, self._got)
+            self._move(columns, begin, end)
         return end
 
     def _before_special(self, columns: RingColumns, begin: int, end: int) -> int:
@@ -215,17 +211,16 @@ class RingObserver:
 
     def _move(self, columns: RingColumns, begin: int, end: int) -> None:
         """Stand behind clean rows that have been counted."""
-        from dissectors.bacnet.ring_columns import last_of
         from dissectors.bacnet.turn_columns import teach
 
         rows, last, told = slice(begin, end), end - 1, columns.rows
         frame = told.frames.frame(last, told.octets, told.protocol, int(told.slack[last]))
         source, destination = int(columns.source[last]), int(columns.destination[last])
-        token = int(last_of(columns.token[rows].astype(int), 2)[1])
-        if token >= 0:
-            self._got = int(columns.end[begin + token])
+        tokens = columns.token[rows].nonzero()[0]
+        if len(tokens):
+            self._got = int(columns.end[begin + tokens[-1]])
             if self._given_up is not None:
-                passed = columns.destination[rows][columns.token[rows]]
+                passed = columns.destination[begin + tokens]
                 self._given_up = None if (passed == self._given_up.mac).any() else self._given_up
         self._holder, self._passed_by, self._token = int(columns.after[last]), None, None
         if columns.token[last]:
