@@ -74,7 +74,7 @@ class Judging:
 
     def add_table(self, table: Table) -> None:
         """Take many rows: the same as one after the other."""
-        if any(row.searched is not None for row in table.odd.values()):
+        if any(row.searched is not None for row in table.odd.values()) or not table.has_true_times:
             for output in table.outputs():
                 self.add(output)
             return

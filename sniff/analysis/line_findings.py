@@ -25,6 +25,8 @@ from sniff.engine.engine import Row
 from sniff.engine.session import LineEvent, LineEventKind, Session
 
 if TYPE_CHECKING:
+    from dissectors.columns import Masks, TransactionColumns
+    from sniff.analysis.line_columns import LineColumns
     from sniff.engine.table import Table
 
 STRAY_MOST = 3
@@ -35,6 +37,9 @@ MOST_RESTS = 16
 """Stretches that are no frame and are asked what they may be."""
 
 RUBBISH_TOLD = 40  # the same where it is known what they are
+COUNTED_OCTETS = 4096
+"""Of longer rows the octets are not counted by value."""
+
 READ_LATE = 1_000_000
 """ns of slack over the adapter's latency that prove a late read (`sniff.engine.late_reads`)."""
 
@@ -87,11 +92,18 @@ class LineFindings:
         self._rows += 1
         self._now = max(self._now, event.end)
         self._octets += len(event.octets)
-        if len(event.octets) <= 4096:
+        if len(event.octets) <= COUNTED_OCTETS:
             self._values.update(event.octets)
         if self._sampled < SAMPLE_OCTETS:
             self._sample.append(Chunk(event.end, event.octets[:SAMPLE_OCTETS], event.marks))
             self._sampled += len(event.octets)
+        sender = self._see_event(row)
+        self._patterns.see(row.no, event, sender)
+        self._use.see(row.no, event, row.placement.role if row.placement is not None else Role.UNKNOWN)
+
+    def _see_event(self, row: Row) -> str:
+        """Take what is not the same for every row; gives the sender."""
+        event = row.event
         self._senders.see_marks(event)
         if event.marks:
             self._see_marks(row.no, event)
@@ -99,20 +111,74 @@ class LineFindings:
             self._damaged += 1
             self._damaged_here += any(mark.error & LineError.OVERRUN for mark in event.marks)
         if isinstance(event, Frame):
-            sender = self._see_frame(row, event)
-        else:
-            sender = BUS
-            self._see_noise(row.no, event)
-        self._patterns.see(row.no, event, sender)
-        self._use.see(row.no, event, row.placement.role if row.placement is not None else Role.UNKNOWN)
+            return self._see_frame(row, event)
+        self._see_noise(row.no, event)
+        return BUS
 
     def add_table(self, table: Table) -> None:
         """Take rows that were all heard with the settings of the bus, and what they closed; as one after the other."""
-        for output in table.outputs():
-            for row in output.rows:
-                self.see(row)
-            for transaction in output.transactions:
-                self.settle(transaction)
+        begin = self._take_begin(table)
+        if begin < len(table):
+            self._take(table.part(begin, len(table)) if begin else table)
+        self._settle_many(table.transactions)
+
+    def _take_begin(self, table: Table) -> int:
+        """Take the first rows of the bus, of which octets are kept; how many."""
+        begin = 0
+        while begin < len(table) and (not self._rows or self._sampled < SAMPLE_OCTETS):
+            self.see(table.row(begin))
+            begin += 1
+        return begin
+
+    def _take(self, table: Table) -> None:
+        from sniff.analysis.line_columns import LineColumns
+
+        columns = LineColumns.of(table)
+        plain = columns.plain & ~columns.is_new(self._senders, self._nouns)
+        self._count_all(table)
+        self._patterns.take(table, columns.sound, columns.asks)
+        self._use.take(table, columns.broadcast)
+        for begin, end, odd in columns.runs(plain):
+            if begin < end:
+                self._see_run(columns, begin, end)
+            if odd is not None:
+                row = table.row(odd)
+                self._patterns.see_trouble(row.no, row.event, self._see_event(row))
+        self._count_plain(columns, plain)
+
+    def _count_plain(self, columns: LineColumns, plain: Masks) -> None:
+        """Count good frames of which columns say all, and at their senders."""
+        for name, count, octets in columns.sent(plain, self._nouns):
+            self._senders.count(name, count, octets)
+            self._frames += count
+            self._good += count
+            self._in_frames += octets
+
+    def _count_all(self, table: Table) -> None:
+        """Count what all rows have."""
+        import numpy as np
+
+        frames = table.frames
+        self._rows += len(table)
+        self._now = max(self._now, int(frames.end.max()))
+        self._octets += int(frames.length.sum())
+        held = table.octets[int(frames.offset[0]) : int(frames.offset[-1]) + int(frames.length[-1])]
+        counts = np.bincount(held, minlength=256)
+        for place in np.flatnonzero(frames.length > COUNTED_OCTETS).tolist():
+            begin = int(frames.offset[place])
+            counts -= np.bincount(table.octets[begin : begin + int(frames.length[place])], minlength=256)
+        self._values.update({value: count for value, count in enumerate(counts.tolist()) if count})
+
+    def _see_run(self, columns: LineColumns, begin: int, end: int) -> None:
+        """Take good frames that follow one another, which have been counted."""
+        table = columns.table
+        first, last = (columns.name(int(columns.sender[place]), self._nouns) for place in (begin, end - 1))
+        self._settle_strays(first, int(table.slack[begin]))
+        self._senders.see_good(last, int(table.frames.end[end - 1]))
+        role = columns.role_before(begin, end)
+        self._awaiting = self._awaiting if role is None else role is Role.REQUEST
+        self._before_ok = True
+        self._patterns.see_good(table.frames.end[begin:end])
 
     def pass_by(self, row: Row) -> None:
         """Take a row of a search for settings: the bus was not silent, and that is all it says."""
@@ -125,6 +191,18 @@ class LineFindings:
             self._echo.add(transaction.start, transaction.request)
         elif transaction.request is not None:
             self._asked += 1
+
+    def _settle_many(self, closed: TransactionColumns) -> None:
+        """Take transactions that closed."""
+        from dissectors.columns import NONE, VERDICTS
+
+        if not len(closed):
+            return
+        self._patterns.settle_many(closed)
+        echoes = closed.verdict == VERDICTS.index(Verdict.ECHO)
+        self._asked += int(((closed.request != NONE) & ~echoes).sum())
+        for start, no in zip(closed.start[echoes].tolist(), closed.request[echoes].tolist(), strict=True):
+            self._echo.add(start, None if no == NONE else no)
 
     def add_line_event(self, event: LineEvent) -> None:
         """Take something that happened to the line."""
@@ -168,14 +246,18 @@ class LineFindings:
             self._good += 1
             self._in_frames += len(frame.octets)
         self._senders.see(sender, row.no, frame)
-        if frame.slack <= self._session.timing.latency + READ_LATE:
+        self._settle_strays(sender, frame.slack)
+        return sender
+
+    def _settle_strays(self, sender: str, slack: int) -> None:
+        """A frame has come, read at most `slack` ns late: what the octets before it were."""
+        if slack <= self._session.timing.latency + READ_LATE:
             for no, noise in self._pending:
                 self._senders.stray(sender, "LN201", no, noise)
             self._begins.forget()
         else:
             self._begins.take_back(self._senders)
         self._pending.clear()  # before a frame that was read late they are the rest of one that was torn
-        return sender
 
     def _see_noise(self, no: int, noise: Noise) -> None:
         if noise.reason in (Reason.BREAK, Reason.PAD) or any(m.error & LineError.BREAK for m in noise.marks):

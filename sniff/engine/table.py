@@ -100,6 +100,12 @@ class Table:
         return heard
 
     @property
+    def has_true_times(self) -> bool:
+        """Whether the columns hold all times: those of a damaged file may be out of their range."""
+        ends, most = (self.frames.start, self.frames.end), 1 << 62
+        return not len(self) or all(-most < int(one.min()) and int(one.max()) < most for one in ends)
+
+    @property
     def good(self) -> Masks:
         """bool[n]: frames of which nothing is damaged, with a good check where they have one (`Frame.ok`)."""
         frames = self.frames
