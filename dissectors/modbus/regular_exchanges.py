@@ -20,7 +20,6 @@ from dissectors.frame import Role
 from dissectors.modbus.adu import RTU_NAME
 from dissectors.modbus.exchange import is_begin_of
 from dissectors.modbus.functions import EXCEPTION_BIT
-from dissectors.modbus.remembered import LAST_STANDARD_UNIT
 from dissectors.stretches import Stretches
 from dissectors.tracker import Verdict
 
@@ -101,7 +100,7 @@ def regular(rows: RowColumns, adus: Adus) -> Regular:
     unanswered &= (frames.role[request] == _REQUEST) & (request + 1 < count)
     unanswered &= ~_is_cut(frames.length, frames.offset, rows.octets, request, behind)
     to_all = asks & (verdict == _TO_ALL) & (role[request] == _BROADCAST) & (unit[request] == 0)
-    to_all &= (rows.closed_by == request) & (frames.length[request] != frames.length[behind])
+    to_all &= (rows.closed_by == request) & ~_may_repeat(frames.length, code, request, behind)
 
     which = np.flatnonzero(answered | unanswered | to_all)
     became = np.full(len(closed), PLAIN)
@@ -113,12 +112,17 @@ def regular(rows: RowColumns, adus: Adus) -> Regular:
 
 
 def _fine(rows: RowColumns, adus: Adus) -> Masks:
-    """Frames that are good and nothing but their columns, of units that the standard knows."""
+    """Frames that are good and nothing but their columns."""
     fine = rows.good & rows.is_frame & rows.frames.ok & adus.sound
     if rows.odd:
         fine[list(rows.odd)] = False
-    fine[fine] = adus.octets[adus.offset[fine]] <= LAST_STANDARD_UNIT
     return fine
+
+
+def _may_repeat(length: Numbers, code: Octets, request: Times, behind: Times) -> Masks:
+    """Whether the frame behind a broadcast may say the same: a station's answer in the shape of a request."""
+    same: Masks = (length[request] == length[behind]) & (code[request] == code[behind])
+    return same
 
 
 def _is_cut(length: Numbers, offset: Times, octets: Octets, request: Times, behind: Times) -> Masks:

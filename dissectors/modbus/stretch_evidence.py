@@ -12,7 +12,7 @@ from dissectors.frame import Frame
 from dissectors.modbus.asked import Asked
 from dissectors.modbus.learnt import READ
 from dissectors.modbus.regular_exchanges import REFUSED, TO_ALL, UNANSWERED
-from dissectors.modbus.remembered import BEGIN, OPEN_KEPT, SLOW_UNLEARNT, slow_limit
+from dissectors.modbus.remembered import BEGIN, LAST_STANDARD_UNIT, OPEN_KEPT, SLOW_UNLEARNT, slow_limit
 from dissectors.modbus.response_groups import ANSWERS_KEPT, Answered, SameRequest
 from dissectors.modbus.station_record import Key, Requested, Station
 from dissectors.tracker import Interval, Transaction
@@ -162,7 +162,9 @@ class StretchEvidence:
             if waiting is not None:
                 self._give_up(waiting, at)
                 waiting = None
-            what = became[at]
+            what, unit = became[at], one.unit[at]
+            if unit > LAST_STANDARD_UNIT:
+                self._see_reserved(at)
             if what > REFUSED:
                 self._see_unusual(at, what, said)
                 waiting = at if what == UNANSWERED else None
@@ -170,7 +172,7 @@ class StretchEvidence:
             request = requests.get(said)
             if request is None or request.address != one.address[at] or request.kind != one.kind[at]:
                 request = self._new_request(at, said)
-            unit, nominal = one.unit[at], one.nominal[at]
+            nominal = one.nominal[at]
             requested = request.requested
             requested.tries += 1
             requested.turns += 1
@@ -240,6 +242,12 @@ class StretchEvidence:
             code, answer = (one.octets[one.answer_begin[at] + 2], b"") if refused else (0, one.answer(at))
             judge.settle_request(judge.station(one.unit[at]), one.transaction(at), one.asked(at), code, answer)
             self._learn_timeout()
+
+    def _see_reserved(self, at: int) -> None:
+        """Frames to or from an address outside the standard."""
+        one, station = self._exchanged, self._judge.station(self._exchanged.unit[at])
+        for place in range(one.request[at], one.last[at] + 1):
+            station.reserved.add(int(one.rows.frames.start[place]), one.rows.first + place)
 
     def _give_up(self, before: int, at: int) -> None:
         """A request that nothing answered until the next one."""

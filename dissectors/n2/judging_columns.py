@@ -72,7 +72,7 @@ def _regular(rows: RowColumns) -> _Regular:
     fine = rows.good & rows.is_frame & frames.ok & (frames.length > 1)
     if rows.odd:
         fine[list(rows.odd)] = False
-    starts = rows.octets[np.minimum(frames.offset, len(rows.octets) - 1)]
+    starts = np.append(rows.octets, np.uint8(0))[frames.offset]
     request, response = closed.request - rows.first, closed.response - rows.first
     inside = (closed.request != NONE) & (request >= 0) & (request < count) & (closed.station != NONE)
     request = np.where(inside, request, 0)
