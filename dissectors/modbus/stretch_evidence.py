@@ -10,6 +10,7 @@ import numpy as np
 
 from dissectors.frame import Frame
 from dissectors.modbus.asked import Asked
+from dissectors.modbus.exchange_columns import SAMPLES
 from dissectors.modbus.learnt import READ
 from dissectors.modbus.regular_exchanges import REFUSED, TO_ALL, UNANSWERED
 from dissectors.modbus.remembered import BEGIN, LAST_STANDARD_UNIT, OPEN_KEPT, SLOW_UNLEARNT, slow_limit
@@ -116,12 +117,16 @@ class Exchanged:
 
 @dataclass(slots=True)
 class _Request:
-    """One request, octet for octet, where it counts, and its answers of this stretch that are compared, by place."""
+    """One request, octet for octet, where it counts, and its answers of this stretch that are compared, by place.
+
+    `took`: exchanges with its station that are not counted yet.
+    """
 
     key: Key
     address: int
     kind: int
     requested: Requested
+    took: list[int]
     same: SameRequest | None = None
     is_new: bool = True  # no answer that could be compared has come yet
     answers: list[int] = field(default_factory=list)
@@ -131,6 +136,7 @@ class _Request:
 class _Took:
     """A station, and the exchanges with it that are not counted yet, by place."""
 
+    unit: int
     station: Station
     exchanges: list[int] = field(default_factory=list)
 
@@ -154,37 +160,37 @@ class StretchEvidence:
         far below the usual."""
         self._pause_rows, self._pauses, self._hurried, self._paused = pause_rows, pauses, set(hurried), 0
         self._learn_timeout()
-        one, learnt, cycles = self._exchanged, self._judge.learnt, self._judge.seen.cycles
-        requests, took, became = self._requests, self._took, one.became
+        one, cycles, requests = self._exchanged, self._judge.seen.cycles, self._requests
+        octets, begins, ends, became, low = one.octets, one.begin, one.end, one.became, one.low
+        address, kind, started = one.address, one.kind, one.started
+        has_reserved = max(one.unit[begin:end]) > LAST_STANDARD_UNIT
         waiting: int | None = None  # the exchange before, if nothing answered it
         for at in range(begin, end):
-            said = one.octets[one.begin[at] : one.end[at]]
+            said = octets[begins[at] : ends[at]]
             if waiting is not None:
                 self._give_up(waiting, at)
                 waiting = None
-            what, unit = became[at], one.unit[at]
-            if unit > LAST_STANDARD_UNIT:
+            what = became[at]
+            if has_reserved and one.unit[at] > LAST_STANDARD_UNIT:
                 self._see_reserved(at)
             if what > REFUSED:
                 self._see_unusual(at, what, said)
                 waiting = at if what == UNANSWERED else None
                 continue
             request = requests.get(said)
-            if request is None or request.address != one.address[at] or request.kind != one.kind[at]:
+            if request is None or request.address != address[at] or request.kind != kind[at]:
                 request = self._new_request(at, said)
-            nominal = one.nominal[at]
             requested = request.requested
             requested.tries += 1
             requested.turns += 1
-            cycles.add(said, request.key, one.started[at])
-            if self._timeout is not None and nominal > self._timeout:
+            cycles.add(said, request.key, started[at])
+            teaches = self._timeout is not None and one.nominal[at] > self._timeout  # that the master waits longer
+            if teaches:
                 self._count_all()
-                learnt.answered(unit, READ, nominal)
-                self._learn_timeout()
-            else:
-                learnt.answered(unit, READ, nominal)
-            took[unit].exchanges.append(at)
-            if one.low[at] > self._slow:
+            request.took.append(at)
+            if teaches:
+                self._count_all()
+            if low[at] > self._slow:
                 self._took_long(at)
             if what == REFUSED:
                 self._refused(at, request.key)
@@ -205,9 +211,10 @@ class StretchEvidence:
         one, judge, unit = self._exchanged, self._judge, self._exchanged.unit[at]
         self._note_begin(said)
         station, key = judge.station(unit), one.key(at)
-        if unit not in self._took:
-            self._took[unit] = _Took(station)
-        request = _Request(key, one.address[at], one.kind[at], station.request(key))
+        took = self._took.get(unit)
+        if took is None:
+            took = self._took[unit] = _Took(unit, station)
+        request = _Request(key, one.address[at], one.kind[at], station.request(key), took.exchanges)
         self._requests[said] = request
         return request
 
@@ -261,7 +268,8 @@ class StretchEvidence:
     def _took_long(self, at: int) -> None:
         self._pause_until(self._exchanged.last[at])
         took = self._took[self._exchanged.unit[at]]
-        self._count(took)
+        if took.exchanges:
+            self._count(took)
         self._judge.gaps.took_long(took.station.slow, self._exchanged.transaction(at))
 
     # ---- what is put off until somebody asks
@@ -288,8 +296,8 @@ class StretchEvidence:
                 self._count(took)
 
     def _count(self, took: _Took) -> None:
-        """Answers of one station, which were all compared with the same limit."""
-        one, station, which, limit = self._exchanged, took.station, took.exchanges, self._limit
+        """Answers of one station, which are all compared with the same limit."""
+        one, station, which, learnt = self._exchanged, took.station, took.exchanges, self._judge.learnt
         station.asked += len(which)
         station.answered += len(which)
         station.last_start = one.started[which[-1]]
@@ -298,11 +306,15 @@ class StretchEvidence:
         station.times.extend(
             [one.low[at] for at in which], [one.nominal[at] for at in which], [one.high[at] for at in which]
         )
-        station.compare_with(limit, len(which))
+        for at in which[-SAMPLES:]:  # no more are kept
+            learnt.answered(took.unit, READ, one.nominal[at])
+        if learnt.timeout != self._timeout:
+            self._learn_timeout()
+        station.compare_with(self._limit, len(which))
         which.clear()
 
     def _learn_timeout(self) -> None:
-        """Ask anew from when on an answer is slow; nothing is uncounted."""
+        """Ask anew from when on an answer is slow; no answer before is uncounted."""
         self._timeout = self._judge.learnt.timeout
         self._limit = slow_limit(self._timeout)
         self._slow = SLOW_UNLEARNT if self._limit is None else self._limit
