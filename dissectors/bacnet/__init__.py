@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dissectors.bacnet import ring_words
+from dissectors.bacnet.bulk_ring_observer import BulkRingObserver
 from dissectors.bacnet.fields import fields
 from dissectors.bacnet.findings import MstpFindings, judge
 from dissectors.bacnet.frame_making import frame
@@ -48,7 +49,7 @@ def bits(frame: Frame) -> float:
 
 
 RING = TokenRing(
-    observer=RingObserver,
+    observer=BulkRingObserver,
     window=ring_window,
     order=lambda ring: ring.order,
     headings=ring_words.HEADINGS,

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable
 
+from dissectors.bacnet.bulk_ring_observer import BulkRingObserver
 from dissectors.bacnet.content_findings import ContentFindings
 from dissectors.bacnet.findings_of_damage import damage, duplicates
 from dissectors.bacnet.findings_of_use import polls, use
 from dissectors.bacnet.limits import MAX_MASTER, N_POLL, T_REPLY_DELAY, T_USAGE_DELAY
 from dissectors.bacnet.ring import COARSE_LIMIT, Node, Ring, What
-from dissectors.bacnet.ring_observer import RingObserver
 from dissectors.bacnet.ring_remarks import Remark, listed, milliseconds, of, plain
 from dissectors.bacnet.rules import RULES
 from dissectors.findings import Finding, Severity, Tally, as_consequence, counted, times
@@ -287,7 +287,7 @@ class MstpFindings:
     """Fed row by row; gives findings at any time."""
 
     def __init__(self, timing: Timing) -> None:
-        self._observer = RingObserver(timing)
+        self._observer = BulkRingObserver(timing)
         self._content = ContentFindings()
         self._asked: Counter[tuple[int, str]] = Counter()  # answered requests, by station and service
         self._refused: dict[tuple[int, str, str], Tally] = {}  # by station, service, and class and code in words

@@ -14,7 +14,7 @@ from dissectors.profiles import Devices
 from dissectors.row_columns import JudgesColumns, in_turn
 from dissectors.token_ring import WatchesRing
 from dissectors.tracker import Transaction, Verdict
-from sniff.analysis.line_findings import LineFindings
+from sniff.analysis.bulk_line_findings import BulkLineFindings
 from sniff.analysis.line_rules import LINE_RULES
 from sniff.analysis.plain import plain
 from sniff.analysis.profile_findings import PROFILE_RULES, ProfileFindings
@@ -35,7 +35,7 @@ class Judging:
 
     def __init__(self, session: Session, dissector: Dissector, devices: Devices | None = None) -> None:
         self.judge = dissector.judge(session.timing) if dissector.judge is not None else None
-        self.line = LineFindings(session)
+        self.line = BulkLineFindings(session)
         self._rules = rules_over(dissector)
         self.devices = ProfileFindings(session.timing, dissector, devices) if devices else None
         if devices and isinstance(self.judge, WordsExceptions):

@@ -101,7 +101,7 @@ class LostTogether:
         span = now - first
         while losses:
             moment = losses[0][1]  # the first miss: who answered after it was not lost then
-            together = [loss for loss in losses if loss[0] <= moment]
+            together = [loss for loss in losses if loss is losses[0] or loss[0] <= moment]
             names = sorted({loss[3] for loss in together})
             window = max(loss[1] for loss in together) - min(loss[0] for loss in together)
             losses = [loss for loss in losses if loss not in together]

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from dissectors.token_ring import RingObserver, TokenRing
-from sniff.bus.offline import outputs
+from dissectors.token_ring import RingObserver, TokenRing, WatchesColumns
+from sniff.bus.offline import Source, outputs, survey
 from sniff.cli import tables
 from sniff.engine.engine import Output
 from sniff.engine.observer import observe
 from sniff.engine.session import Item, LineEvent, Session
+
+if TYPE_CHECKING:
+    from sniff.engine.table import Table
 
 
 def ring_of(items: Iterable[Item], session: Session, shown: TokenRing) -> Any:
@@ -32,15 +35,25 @@ class _Watched:
             if row.searched is None:
                 self.observer.see(row.no, row.event, row.header)
 
+    def add_table(self, table: Table) -> None:
+        """The same of many rows."""
+        if isinstance(self.observer, WatchesColumns) and table.heard.all():
+            self.observer.take(table)
+        else:
+            for output in table.outputs():
+                self.add(output)
+
     def add_line_event(self, event: LineEvent) -> None:
         """Where octets were lost, what is missing says nothing."""
         if event.kind.is_hole:
             self.observer.miss(event.time)
 
 
-def show(items: Iterable[Item], session: Session, shown: TokenRing, style: str) -> int:
-    """Print the ring; the sentences only as text."""
-    ring = ring_of(items, session, shown)
+def show(source: Source, session: Session, shown: TokenRing, style: str, reference: bool = False) -> int:
+    """Print the ring; the sentences only as text. `reference`: see `survey`. Raises CaptureError as the source does."""
+    watched = _Watched(shown.observer(session.timing))
+    survey(source, session, watched, reference=reference)
+    ring = watched.observer.ring()
     tables.write(shown.headings, shown.rows(ring), style)
     if style == "text":
         print()

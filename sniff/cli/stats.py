@@ -68,7 +68,7 @@ def run(args: argparse.Namespace) -> int:
             raise Failure(f"ring: {session.protocol} passes no token; this table is for {passing}", USAGE)
         from sniff.cli import ring
 
-        return ring.show(source.items(), session, shown, args.style)
+        return ring.show(Watched(source), session, shown, args.style, reference=args.reference)
     if table == "health":
         devices = noted_devices(session)
         model = BusModel(session, dissector_for(session), devices, with_points=False)

@@ -10,21 +10,24 @@ from pathlib import Path
 
 import pytest
 
+from dissectors.bacnet import bulk_ring_observer
 from dissectors.columns import Reads
 from dissectors.line import Timing
 from dissectors.profiles import Devices
+from dissectors.token_ring import WatchesColumns
 from sniff.analysis.judging import Judging
 from sniff.bus.offline import outputs
 from sniff.devices import noted_devices
 from sniff.engine.blocks import Block, blocks_of
 from sniff.engine.bulk import tables
 from sniff.engine.capture import CaptureError
-from sniff.engine.engine import Output
+from sniff.engine.engine import Output, Row
 from sniff.engine.follow_settings import dissector_for
-from sniff.engine.session import Adapter, LineEvent, Session
+from sniff.engine.session import Adapter, LineEvent, LineEventKind, Session
 from sniff.engine.table import Table
 from sniff.formats import read
 from tests.bench import bulk_mstp, bulk_rtu
+from tests.property import mstp_buses
 
 Bus = Callable[[float], tuple[Session, Reads]]
 
@@ -79,6 +82,12 @@ def same(one: Judging, other: Judging) -> None:
     assert one.ring() == other.ring()
 
 
+@pytest.fixture(autouse=True)
+def short_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Even the shortest stretch is taken by columns: else only long captures would try them."""
+    monkeypatch.setattr(bulk_ring_observer, "RUN_LEAST", 1)
+
+
 @pytest.mark.parametrize("path", NAMES, ids=lambda path: path.name)
 def test_a_capture_is_judged_from_tables_as_row_by_row(path: Path) -> None:
     try:
@@ -129,3 +138,56 @@ def test_a_long_bus_is_judged_from_tables_as_row_by_row(bus: Bus, damaged: float
     dice = random.Random(7)
     for most in (1 << 30, 3000, 40):
         same(by_tables(items, judged(session), dice, most), expected)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_stations_that_do_anything_are_judged_from_tables_as_row_by_row(seed: int) -> None:
+    session = Session("x", mstp_buses.LINE, "mstp")
+    items = list(tables(blocks_of(iter(mstp_buses.conversation(random.Random(seed), 300))), session))
+    expected = by_rows(items, judged(session))
+    dice = random.Random(seed)
+    for most in (1 << 30, 100, 10):
+        same(by_tables(items, judged(session), dice, most), expected)
+
+
+def test_octets_lost_on_the_way_tear_the_same_transactions() -> None:
+    """The same hole between the same rows, wherever tables are cut: it is pending over several of them."""
+    session, reads = _mstp(0.01)
+    (table, *_) = (one for one in tables([Block(reads)], session) if isinstance(one, Table) and len(one))
+    head, tail = table.part(0, 5000), table.part(5000, len(table))
+    late = int(tail.frames.end[700])  # octets that were on their way are lost too
+    items = [head, LineEvent(late, LineEventKind.DROPPED, count=40), tail]
+    expected = by_rows(items, judged(session))
+    assert any(finding.code == "LN005" for finding in expected.findings())
+    dice = random.Random(3)
+    for most in (1 << 30, 300, 9):
+        same(by_tables(items, judged(session), dice, most), expected)
+
+
+@pytest.mark.parametrize("damaged", [0.0, 0.02])
+def test_a_ring_is_the_same_from_tables_and_row_by_row(damaged: float) -> None:
+    session, reads = _mstp(damaged)
+    one, other = (dissector_for(session).ring.observer(session.timing) for _ in range(2))  # type: ignore[union-attr]
+    assert isinstance(one, WatchesColumns)
+    for table in tables([Block(reads)], session):
+        assert isinstance(table, Table)
+        one.take(table)
+        for row in table.rows():
+            other.see(row.no, row.event, row.header)
+    assert one.ring() == other.ring()
+
+
+def test_most_rows_of_a_clean_ring_never_become_objects(monkeypatch: pytest.MonkeyPatch) -> None:
+    made = 0
+    row_of = Table.row
+
+    def counted(table: Table, place: int) -> Row:
+        nonlocal made
+        made += 1
+        return row_of(table, place)
+
+    session, reads = _mstp(0.0)
+    parts = [one for one in tables([Block(reads)], session) if isinstance(one, Table)]
+    monkeypatch.setattr(Table, "row", counted)
+    by_tables(parts, judged(session), random.Random(1), 1 << 30)
+    assert made < 0.1 * len(reads)
