@@ -9,9 +9,10 @@ A protocol brings its rules as `Dissector.judge`, a function Timing → `Judge`,
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
+from itertools import islice
 from typing import Protocol, runtime_checkable
 
 from dissectors.frame import Event, Header
@@ -162,6 +163,16 @@ class Tally:
         self.count += 1
         if len(self.evidence) < EVIDENCE_MAX:
             self.evidence.extend(no for no in frames if no is not None and no not in self.evidence)
+
+    def add_many(self, times: Sequence[int], frames: Iterable[int]) -> None:
+        """Count one more at each of `times`, with frames of their own; of these only the first few are asked for."""
+        if not times:
+            return
+        self.first = min(self.first, *times) if self.count else min(times)
+        self.last = max(self.last, *times) if self.count else max(times)
+        self.count += len(times)
+        for no in islice(frames, EVIDENCE_MAX - len(self.evidence)):
+            self.evidence.append(no)
 
     def found(self, rule: Rule, subject: str | Subject, seen: str, severity: Severity | None = None) -> Finding:
         """The finding that this adds up to."""

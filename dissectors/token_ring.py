@@ -8,6 +8,7 @@ from typing import Any, Protocol, runtime_checkable
 
 from dissectors.frame import Event, Header
 from dissectors.line import Timing
+from dissectors.row_columns import RowColumns
 
 Cell = str | int | float | None
 
@@ -39,6 +40,15 @@ class RingObserver(Protocol):
 
     def ring(self) -> Any:
         """The ring so far, a value of the protocol's own."""
+        ...
+
+
+@runtime_checkable
+class WatchesColumns(Protocol):
+    """An observer that takes many rows at once."""
+
+    def take(self, rows: RowColumns) -> None:
+        """Take rows; the same as one after the other. What they closed is nothing to it."""
         ...
 
 

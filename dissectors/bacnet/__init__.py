@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dissectors.bacnet import ring_words
+from dissectors.bacnet.bulk_ring_observer import BulkRingObserver
 from dissectors.bacnet.envelope import frame
 from dissectors.bacnet.fields import fields
 from dissectors.bacnet.findings import MstpFindings, judge
@@ -49,7 +50,7 @@ def bits(frame: Frame) -> float:
 
 
 RING = TokenRing(
-    observer=RingObserver,
+    observer=BulkRingObserver,
     window=ring_window,
     order=lambda ring: ring.order,
     headings=ring_words.HEADINGS,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from dissectors.bacnet import message as messages
 from dissectors.bacnet.content import Odd, Oddity, oddities
@@ -11,6 +12,10 @@ from dissectors.bacnet.frame_types import CARRIES_NPDU, HEADER
 from dissectors.bacnet.station_address import remote
 from dissectors.findings import Finding, Rule, Severity, Tally, times
 from dissectors.frame import Event, Frame, Header
+from dissectors.row_columns import RowColumns
+
+if TYPE_CHECKING:
+    from dissectors.bacnet.content_columns import Read
 
 CONTENT_RULES = (
     Rule(
@@ -76,6 +81,7 @@ class ContentFindings:
 
     def __init__(self) -> None:
         self._seen: dict[tuple[Odd, int], _Seen] = {}
+        self._read: Read | None = None  # made for the first table
 
     def see(self, no: int, event: Event, header: Header | None) -> None:
         """Take the next row."""
@@ -88,6 +94,16 @@ class ContentFindings:
             if key not in self._seen and len(self._seen) >= SENDERS_KEPT:
                 continue
             self._seen.setdefault(key, _Seen()).add(no, event, _whose(event, oddity))
+
+    def take(self, rows: RowColumns) -> None:
+        """Take many rows."""
+        if self._read is None:
+            from dissectors.bacnet.content_columns import Read
+
+            self._read = Read()
+        for place in self._read.suspicious(rows).tolist():
+            row = rows.row(place)
+            self.see(row.no, row.event, row.header)
 
     def findings(self) -> Iterable[Finding]:
         """What was found so far."""

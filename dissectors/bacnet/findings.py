@@ -5,18 +5,19 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable
 
+from dissectors.bacnet.bulk_ring_observer import BulkRingObserver
 from dissectors.bacnet.content_findings import ContentFindings
 from dissectors.bacnet.findings_of_damage import damage, duplicates
 from dissectors.bacnet.findings_of_use import polls, use
 from dissectors.bacnet.limits import MAX_MASTER, N_POLL, T_REPLY_DELAY, T_USAGE_DELAY
 from dissectors.bacnet.ring import COARSE_LIMIT, Node, Ring, What
-from dissectors.bacnet.ring_observer import RingObserver
 from dissectors.bacnet.ring_remarks import Remark, listed, milliseconds, of, plain
 from dissectors.bacnet.rules import RULES
 from dissectors.findings import Finding, Severity, Tally, as_consequence, counted, times
 from dissectors.frame import Event, Header
 from dissectors.line import Timing
-from dissectors.tracker import Placement, Transaction, Verdict
+from dissectors.row_columns import RowColumns
+from dissectors.tracker import PASSING, Placement, Transaction, Verdict
 
 _MS = 1_000_000
 LATE_SHARE = 0.01
@@ -286,7 +287,7 @@ class MstpFindings:
     """Fed row by row; gives findings at any time."""
 
     def __init__(self, timing: Timing) -> None:
-        self._observer = RingObserver(timing)
+        self._observer = BulkRingObserver(timing)
         self._content = ContentFindings()
         self._asked: Counter[tuple[int, str]] = Counter()  # answered requests, by station and service
         self._refused: dict[tuple[int, str, str], Tally] = {}  # by station, service, and class and code in words
@@ -307,6 +308,32 @@ class MstpFindings:
             key = station, transaction.kind, transaction.error or "error"
             if key in self._refused or len(self._refused) < REFUSED_KEPT:
                 self._refused.setdefault(key, Tally()).add(transaction.end, transaction.request, transaction.response)
+
+    def take(self, rows: RowColumns) -> None:
+        """Take many rows, and the transactions that closed with them."""
+        self._observer.take(rows)
+        self._content.take(rows)
+        self._settle_many(rows)
+
+    def _settle_many(self, rows: RowColumns) -> None:
+        import numpy as np
+
+        from dissectors.columns import NONE, VERDICTS, counted
+
+        closed = rows.transactions
+        passing = [code for code, name in enumerate(closed.names) if name in PASSING]
+        told = (closed.station != NONE) & ~np.isin(closed.kind, passing)
+        told &= np.isin(closed.verdict, [VERDICTS.index(verdict) for verdict in _ANSWERED])
+        kinds = list(counted(closed.station[told], closed.kind[told]))
+        if len(self._asked) + len(kinds) > REFUSED_KEPT:
+            for place in np.flatnonzero(told).tolist():
+                self.settle(rows.transaction(place))
+            return
+        refused = closed.verdict == VERDICTS.index(Verdict.EXCEPTION)
+        for place in np.flatnonzero(told & refused).tolist():
+            self.settle(rows.transaction(place))
+        for (station, kind), count in counted(closed.station[told & ~refused], closed.kind[told & ~refused]):
+            self._asked[station, closed.names[kind]] += count
 
     def ring(self) -> Ring:
         """The ring so far."""

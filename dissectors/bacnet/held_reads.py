@@ -49,6 +49,15 @@ class HeldReads:
         hasty = before.octets[2] == FrameType.POLL_FOR_MASTER and same and gap < T_USAGE_DELAY
         return () if hasty else late
 
+    @property
+    def is_settled(self) -> bool:
+        """Whether nothing is put aside."""
+        return not self._late
+
+    def pass_by(self, frame: Frame) -> None:
+        """Frames came in which nothing was late, while nothing was put aside. `frame`: the last of them."""
+        self._before = frame
+
     def forget(self) -> None:
         """Nothing of what was late may be said: octets were missed."""
         self._late, self._before = [], None

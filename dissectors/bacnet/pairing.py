@@ -24,6 +24,7 @@ from dissectors.bacnet.frame_types import HEADER
 from dissectors.bacnet.past_exchanges import Entry, Nets, PastExchanges
 from dissectors.bacnet.placed_rows import CODE, POLL_REPLY, REQUEST, TOKEN, WAITS, PlacedRows
 from dissectors.bacnet.tracker import LATE_WITHIN, POSTPONED_FOR, REMEMBERED, SEGMENTS_FOR, MstpTracker
+from dissectors.bacnet.turn_columns import teach
 from dissectors.columns import NONE, ROLES, FrameColumns, PlacementColumns, TransactionColumns
 from dissectors.frame import Frame, Role
 from dissectors.tracker import Interval, Verdict
@@ -37,9 +38,6 @@ if TYPE_CHECKING:
     from dissectors.line import Timing
 
 _RESPONSE = np.uint8(ROLES.index(Role.RESPONSE))
-_FEW = 4
-"""Rows after which it is certain whose turn it is, whatever was before."""
-_MANY = 1000
 
 
 class Run(NamedTuple):
@@ -241,25 +239,11 @@ class Pairing:
         past.add(_PairedRows(self, stretch), rows.keys[requests].tolist(), requests.tolist(), REMEMBERED)
 
     def _teach(self, turn: Turn, begin: int, end: int, frame: Frame) -> None:
-        """Who spoke to whom; the last four rows say whose turn it is. `frame`: the last."""
-        rows = self.rows
-        if end - begin > _FEW:
-            kinds = rows.kinds[begin:end]
-            passed = begin + np.flatnonzero((kinds == TOKEN) | (kinds == POLL_REPLY))
-            token = rows.kinds[passed] == TOKEN
-            sender, receiver = rows.source[passed], rows.destination[passed]
-            holder, following = np.where(token, sender, receiver), np.where(token, receiver, sender)
-            heard = rows.source[begin:end]
-            if end - begin > _MANY:
-                last = np.full(256, NONE, np.int64)
-                last[holder] = following
-                holder = np.flatnonzero(last != NONE)
-                following, heard = last[holder], np.flatnonzero(np.bincount(heard))
-            turn.learn(dict(zip(holder.tolist(), following.tolist(), strict=True)), heard.tolist())
-        newest = slice(max(begin, end - _FEW), end)
-        parties = rows.source[newest].tolist(), rows.destination[newest].tolist()
-        for kind, source, destination in zip(self.frames.function[newest].tolist(), *parties, strict=True):
-            turn.see(frame, kind, source, destination)
+        """Who spoke to whom, and whose turn it is. `frame`: the last."""
+        rows, some = self.rows, slice(begin, end)
+        kinds = rows.kinds[some]
+        parties = rows.source[some], rows.destination[some]
+        teach(turn, kinds == TOKEN, kinds == POLL_REPLY, *parties, self.frames.function[some], frame)
 
     # Rows as the values they stand for
 

@@ -56,6 +56,11 @@ class Questions:
         self._unanswered: OrderedDict[tuple[int, int], Asked] = OrderedDict()  # by server and client
         self._postponed: deque[tuple[int, int, int]] = deque(maxlen=_POSTPONED_MAX)  # server, client, end of request
 
+    @property
+    def postponed(self) -> set[tuple[int, int]]:
+        """Server and client of each answer that was postponed."""
+        return {(server, client) for server, client, _ in self._postponed}
+
     def forget(self) -> None:
         """Octets were missed: nobody is measured against what was asked before."""
         self.asked = None

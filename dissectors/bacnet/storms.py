@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Iterable
 
 from dissectors.bacnet.limits import MS
 
@@ -21,3 +22,12 @@ class Storms:
         newest = self._newest
         newest.append(time)
         return len(newest) == STORM_BROADCASTS and 0 <= time - newest[0] <= STORM_WITHIN
+
+    def see_many(self, times: Iterable[int]) -> None:
+        """Take broadcasts of which it is known that they are no storm."""
+        self._newest.extend(times)
+
+    @property
+    def newest(self) -> Iterable[int]:
+        """When the newest were sent."""
+        return self._newest

@@ -20,22 +20,22 @@ class BareEnds:
     def __init__(self, timing: Timing, seen: Evidence) -> None:
         self._seen = seen
         self._touching = timing.char + timing.latency
-        self._newest: tuple[str, int, int] | None = None  # sender, time, frame that ended with CR alone
+        self.newest: tuple[str, int, int] | None = None  # sender, time, frame that ended with CR alone
 
     def see(self, no: int, frame: Frame, header: Header, placement: Placement) -> None:
         """Take the next frame: nothing stands between it and the one before."""
         self._count()
         if frame.protocol == ASCII_NAME and header.ok and frame.octets[-1] & 0x7F == _CR:
-            self._newest = sender_of(placement), frame.end, no
+            self.newest = sender_of(placement), frame.end, no
 
     def hear_noise(self, noise: Event) -> None:
         """Take octets that are no frame: directly behind a CR they are an LF that was spoilt, not one left out."""
-        if self._newest is not None and isinstance(noise, Noise) and noise.start - self._newest[1] <= self._touching:
-            self._newest = None
+        if self.newest is not None and isinstance(noise, Noise) and noise.start - self.newest[1] <= self._touching:
+            self.newest = None
         self._count()
 
     def _count(self) -> None:
-        newest, self._newest = self._newest, None
+        newest, self.newest = self.newest, None
         if newest is not None:
             sender, time, no = newest
             self._seen.gap_tally(self._seen.bare_ends, sender).add(time, no)

@@ -6,41 +6,43 @@ station: it is slow when even the shortest reading is too long, too quick when e
 
 from __future__ import annotations
 
-from collections import deque
+from typing import TYPE_CHECKING
 
 from dissectors.checksums import crc16_modbus
 from dissectors.findings import ExceptionWords, Finding, Tally
 from dissectors.frame import Damage, Event, Flaw, Frame, Header, Noise, Role
-from dissectors.line import Timing
 from dissectors.modbus.asked import Asked
-from dissectors.modbus.bare_ends import BareEnds
 from dissectors.modbus.envelope import RTU_NAME, readable_adu, rtu_check
-from dissectors.modbus.evidence import Evidence
 from dissectors.modbus.exchange import is_begin_of
 from dissectors.modbus.functions import BROADCAST, FUNCTIONS, answer_length
-from dissectors.modbus.gaps import Gaps
 from dissectors.modbus.judgement import judge
-from dissectors.modbus.learnt import READ, Learnt
+from dissectors.modbus.learnt import READ
+from dissectors.modbus.remembered import (
+    BEGIN,
+    FINAL_KEPT,
+    HASTY_KEPT,
+    LAST_STANDARD_UNIT,
+    LOST_KEPT,
+    MS,
+    OPEN_KEPT,
+    SLOW_UNLEARNT,
+    Remembered,
+    slow_limit,
+)
 from dissectors.modbus.response_groups import Answered
 from dissectors.modbus.station_record import Lost, Station
-from dissectors.modbus.torn import TornFrames
 from dissectors.tracker import Placement, Transaction, Verdict
 
-MS = 1_000_000
+if TYPE_CHECKING:
+    from dissectors.row_columns import RowColumns
+
 TURNAROUND = 90 * MS
 """Nobody speaks so soon after a broadcast: the master waits 100 … 200 ms (Modbus over Serial Line V1.02, 2.4.1)."""
 
-SLOW_UNLEARNT = 500 * MS
-_OPEN_KEPT = 4096
-_HASTY_KEPT = 256
-_LAST_STANDARD_UNIT = 247
 AT_ONCE = 50 * MS
 """No master repeats a request so soon."""
 
-_BEGIN = 5  # octets of a request that no noise makes by chance: unit, function, address, half a quantity
 _NO_WAIT = 10 * MS  # no master gives up so soon: it does not wait for one answer before it asks for the next
-_LOST_KEPT = 64
-_FINAL_KEPT = 64
 _STRAY_KEPT = 600  # octets, more than the longest frame; of more nothing is said
 _EXCESS_KEPT = 256
 _WORDS_KEPT = 16
@@ -49,102 +51,74 @@ _MAY_BE_TORN = (Verdict.DAMAGED_ANSWER, Verdict.DAMAGED_REQUEST, Verdict.NO_RESP
 _SETTLED_ELSEWHERE = (Verdict.ECHO, Verdict.DATA, Verdict.OPEN, Verdict.BROADCAST)
 
 
-class ModbusFindings:
+class ModbusFindings(Remembered):
     """Fed row by row and transaction by transaction; gives findings at any time."""
-
-    def __init__(self, timing: Timing) -> None:
-        self._timing = timing
-        self._learnt = Learnt(timing)
-        self._seen = Evidence(timing)
-        self._gaps = Gaps(timing, self._seen, self._learnt)
-        self._ends = BareEnds(timing, self._seen)
-        self._asked: dict[int, Asked] = {}  # by transaction
-        self._open: Asked | None = None  # the newest request, while nothing has come after it
-        self._broadcast: Asked | None = None  # likewise
-        self._codes: dict[int, int] = {}  # exception codes by transaction
-        self._answers: dict[int, bytes] = {}  # good answers by transaction
-        self._elsewhere: dict[int, int] = {}  # requests (by frame) that another unit answered, and which
-        self._repeats: deque[int] = deque(maxlen=64)  # the last transactions that repeated another
-        self._copied: deque[int | None] = deque(maxlen=64)  # the last transactions whose request came twice at once
-        self._no_requests: deque[int] = deque(maxlen=64)  # frames that the tracker takes for requests, but are none
-        self._damaged: deque[int] = deque(maxlen=64)  # transactions of the last damaged answers
-        self._flaws: dict[int, Flaw] = {}  # of damaged frames, by transaction
-        self._newest: int | None = None  # the transaction of the newest request
-        self._stray: dict[int, bytes] = {}  # octets that are no good frame, by the transaction they came in
-        self._lost: dict[int, Lost] = {}  # requests without answer, by transaction
-        self._begins: set[bytes] = set()  # the first octets of good requests
-        self._late_read = 0  # the newest frame that was read later than the adapter explains
-        self._torn = TornFrames()
-        self._bad_ends: dict[int, tuple[int, int, Frame]] = {}  # damaged answers (station, row), by transaction
-        self._marked: deque[int] = deque(maxlen=64)  # transactions with line errors in what came in answer
-        self._waits: dict[int, int] = {}  # by request that nothing followed: until the next one, ns
-        self._final: dict[int, bytes] = {}  # the last answers, by transaction
 
     # ---- the contract
 
     def see(self, no: int, event: Event, header: Header | None, placement: Placement | None) -> None:
         """See `dissectors.findings.Judge`."""
-        seen = self._seen
+        seen = self.seen
         seen.first = event.start if seen.first is None else seen.first
         seen.now = max(seen.now, event.end)
         if self._is_cut_echo(event):
             seen.cut_echoes.add(event.start, no)
             return
-        tx = self._newest if placement is None or header is None else placement.tx
-        self._torn.see(no, event, tx, is_good_frame=header is not None and header.ok)
+        tx = self.newest if placement is None or header is None else placement.tx
+        self.torn.see(no, event, tx, is_good_frame=header is not None and header.ok)
         if isinstance(event, Noise) or header is None or placement is None:
             self._gather(event)
             self._see_broken(no, event, event.octets)
             self._see_noise(no, event)
-            self._open = None
-            self._gaps.hear_noise()
-            self._ends.hear_noise(event)
+            self.open = None
+            self.gaps.hear_noise()
+            self.ends.hear_noise(event)
             return
-        if event.slack > self._timing.latency + MS:
-            self._late_read = no
+        if event.slack > self.timing.latency + MS:
+            self.late_read = no
         octets = readable_adu(event)
         if not header.ok:
             self._see_broken(no, event, octets)
-        self._gaps.see(no, event, header, placement)
-        self._ends.see(no, event, header, placement)
+        self.gaps.see(no, event, header, placement)
+        self.ends.see(no, event, header, placement)
         if placement.role is Role.RESPONSE:
             self._see_answer(no, event, header, placement, octets)
         elif placement.role is Role.EITHER:
-            self._open = self._broadcast = None
+            self.open = self.broadcast = None
         else:
-            self._newest = placement.tx
+            self.newest = placement.tx
             self._see_request(Asked(no, event, header, octets), placement)
-        if header.ok and octets and octets[0] > _LAST_STANDARD_UNIT:
-            self._station(octets[0]).reserved.add(event.start, no)
+        if header.ok and octets and octets[0] > LAST_STANDARD_UNIT:
+            self.station(octets[0]).reserved.add(event.start, no)
 
     def settle(self, transaction: Transaction) -> None:
         """See `dissectors.findings.Judge`."""
-        asked = self._asked.pop(transaction.id, None)
-        code = self._codes.pop(transaction.id, 0)
-        answer = self._answers.pop(transaction.id, b"")
-        stray, flaw = self._stray.pop(transaction.id, b""), self._flaws.pop(transaction.id, None)
-        ended = self._bad_ends.pop(transaction.id, None)
+        asked = self.asked.pop(transaction.id, None)
+        code = self.codes.pop(transaction.id, 0)
+        answer = self.answers.pop(transaction.id, b"")
+        stray, flaw = self.stray.pop(transaction.id, b""), self.flaws.pop(transaction.id, None)
+        ended = self.bad_ends.pop(transaction.id, None)
         verdict = transaction.verdict
         if verdict in _SETTLED_ELSEWHERE:
             if verdict is Verdict.ECHO:
-                self._seen.echoes += 1
-                self._copied.append(transaction.of)
+                self.seen.echoes += 1
+                self.copied.append(transaction.of)
                 if transaction.station is not None:
-                    self._station(transaction.station).echoed += 1
+                    self.station(transaction.station).echoed += 1
             if verdict is Verdict.BROADCAST and asked is not None:
-                self._seen.cycles.add(asked.octets, asked.key, transaction.start)
+                self.seen.cycles.add(asked.octets, asked.key, transaction.start)
             return
         damaged = verdict in (Verdict.DAMAGED_ANSWER, Verdict.DAMAGED_REQUEST)
-        if damaged and self._late_read >= (transaction.request or transaction.response or 0):
+        if damaged and self.late_read >= (transaction.request or transaction.response or 0):
             return  # a frame was torn by a late read, not spoilt
         if self._is_torn(transaction, asked):
             return
         if ended is not None:
             self._see_end(*ended)
         if verdict is Verdict.DAMAGED_REQUEST:
-            self._seen.damaged_requests.add(transaction.start, transaction.request)
+            self.seen.damaged_requests.add(transaction.start, transaction.request)
             if flaw is not None:
-                tallies = self._seen.requests_damaged_by
+                tallies = self.seen.requests_damaged_by
                 tallies.setdefault(flaw, Tally()).add(transaction.start, transaction.request)
             return
         if asked is not None and asked.is_for_nobody:
@@ -155,137 +129,143 @@ class ModbusFindings:
             return
         if transaction.station is None:
             return
-        station = self._station(transaction.station)
+        station = self.station(transaction.station)
         if verdict is Verdict.UNDECIDED:
             station.undecided.add(transaction.start, transaction.request, transaction.response)
             return
         if transaction.attempt > 1:
-            self._repeats.append(transaction.id)
-        if verdict is Verdict.ANSWERED_TWICE and transaction.of in self._copied:
-            self._seen.asked_twice.add(transaction.start, transaction.response)  # what seemed an echo had its answer
-        elif verdict is Verdict.ANSWERED_TWICE and transaction.of not in self._repeats:
+            self.repeats.append(transaction.id)
+        if verdict is Verdict.ANSWERED_TWICE and transaction.of in self.copied:
+            self.seen.asked_twice.add(transaction.start, transaction.response)  # what seemed an echo had its answer
+        elif verdict is Verdict.ANSWERED_TWICE and transaction.of not in self.repeats:
             station.twice.add(transaction.start, transaction.response)
-            first = self._final.get(transaction.of or 0)
+            first = self.final.get(transaction.of or 0)
             station.same_twice += not answer or first is None or first == answer
         elif verdict in (Verdict.LATE, Verdict.ANSWERED_TWICE):  # each try has its answer, the first one came late
             self._settle_late(station, transaction)
         elif asked is not None:
             if answer:
-                self._final[transaction.id] = answer
-                if len(self._final) > _FINAL_KEPT:
-                    del self._final[next(iter(self._final))]
-            self._settle_request(station, transaction, asked, code, answer)
-            if verdict is Verdict.DAMAGED_ANSWER and asked.no not in self._no_requests:
+                self.final[transaction.id] = answer
+                if len(self.final) > FINAL_KEPT:
+                    del self.final[next(iter(self.final))]
+            self.settle_request(station, transaction, asked, code, answer)
+            if verdict is Verdict.DAMAGED_ANSWER and asked.no not in self.no_requests:
                 self._settle_damaged(station, transaction, asked, stray, flaw)
+
+    def take(self, rows: RowColumns) -> None:
+        """See `dissectors.row_columns.JudgesColumns`."""
+        from dissectors.modbus.judging_columns import take  # numpy is not needed for a bus that is heard live
+
+        take(self, rows)
 
     def word_exceptions(self, words: ExceptionWords) -> None:
         """See `dissectors.findings.WordsExceptions`."""
-        self._seen.maker_words = words
+        self.seen.maker_words = words
 
     def findings(self) -> tuple[Finding, ...]:
         """See `dissectors.findings.Judge`."""
-        self._gaps.judge_slow(left=0)
-        return judge(self._seen, self._learnt.timeout)
+        self.gaps.judge_slow(left=0)
+        return judge(self.seen, self.learnt.timeout)
 
     # ---- rows
 
     def _see_request(self, asked: Asked, placement: Placement) -> None:
-        if len(self._asked) < _OPEN_KEPT:
-            self._asked[placement.tx] = asked
+        if len(self.asked) < OPEN_KEPT:
+            self.asked[placement.tx] = asked
         if not asked.header.ok:
             self._note_flaw(placement.tx, asked.frame)
         if self._is_no_request(asked):
-            self._no_requests.append(asked.no)
-            self._open = self._broadcast = None
+            self.no_requests.append(asked.no)
+            self.open = self.broadcast = None
             return
-        self._seen.requests += 1
-        if asked.header.ok and len(asked.octets) > _BEGIN and len(self._begins) < _OPEN_KEPT:
-            self._begins.add(asked.octets[:_BEGIN])
-        if self._open is not None:
-            self._waited_in_vain(self._open, asked)
+        self.seen.requests += 1
+        if asked.header.ok and len(asked.octets) > BEGIN and len(self.begins) < OPEN_KEPT:
+            self.begins.add(asked.octets[:BEGIN])
+        if self.open is not None:
+            self.waited_in_vain(self.open, asked)
         is_broadcast = placement.role is Role.BROADCAST or (asked.unit == BROADCAST and not asked.is_for_nobody)
-        self._open = None if is_broadcast or not asked.header.ok else asked
-        self._broadcast = asked if is_broadcast and asked.header.ok else None
+        self.open = None if is_broadcast or not asked.header.ok else asked
+        self.broadcast = asked if is_broadcast and asked.header.ok else None
 
     def _is_no_request(self, asked: Asked) -> bool:
         """Whether it is an answer in the shape of a request: to a broadcast, or by another unit than the one asked."""
-        if self._broadcast is not None and self._is_answer_to_broadcast(asked):
-            self._seen.answers_to_broadcast.add(asked.frame.start, self._broadcast.no, asked.no)
-            self._seen.broadcast_answers[asked.unit] += 1
+        if self.broadcast is not None and self._is_answer_to_broadcast(asked):
+            self.seen.answers_to_broadcast.add(asked.frame.start, self.broadcast.no, asked.no)
+            self.seen.broadcast_answers[asked.unit] += 1
             return True
-        if self._open is not None and self._is_answer_of_another(self._open, asked):
-            self._seen.pair((self._open.unit, asked.unit)).add(asked.frame.start, self._open.no, asked.no)
-            self._elsewhere[self._open.no] = asked.unit
+        if self.open is not None and self._is_answer_of_another(self.open, asked):
+            self.seen.pair((self.open.unit, asked.unit)).add(asked.frame.start, self.open.no, asked.no)
+            self.elsewhere[self.open.no] = asked.unit
             return True
         return False
 
-    def _waited_in_vain(self, before: Asked, asked: Asked) -> None:
+    def waited_in_vain(self, before: Asked, asked: Asked) -> None:
         """A request after another that nothing has followed."""
-        self._station(before.unit).waited += max(0, asked.frame.start - before.frame.start)
+        self.station(before.unit).waited += max(0, asked.frame.start - before.frame.start)
         if not asked.header.ok or before.is_for_nobody:
             return
         gap = max(0, asked.frame.start - before.frame.end)
         if asked.octets == before.octets:
-            if gap > self._timing.t35 + self._timing.latency and before.header.role is Role.REQUEST:  # no echo
-                self._learnt.unanswered(gap, repeated=True)
+            if gap > self.timing.t35 + self.timing.latency and before.header.role is Role.REQUEST:  # no echo
+                self.learnt.unanswered(gap, repeated=True)
             return
         if before.header.role is not Role.REQUEST:  # a write has the shape of its answer, which may have come late
             return
-        self._learnt.unanswered(gap)
-        self._waits[before.no] = gap
-        if len(self._waits) > _LOST_KEPT:
-            del self._waits[next(iter(self._waits))]
-        if len(self._seen.hasty) < _HASTY_KEPT:
-            self._seen.hasty.append((gap + before.frame.slack, before.unit, asked.frame.start, before.no, asked.no))
+        self.learnt.unanswered(gap)
+        self.waits[before.no] = gap
+        if len(self.waits) > LOST_KEPT:
+            del self.waits[next(iter(self.waits))]
+        if len(self.seen.hasty) < HASTY_KEPT:
+            self.seen.hasty.append((gap + before.frame.slack, before.unit, asked.frame.start, before.no, asked.no))
 
     def _see_answer(self, no: int, frame: Frame, header: Header, placement: Placement, octets: bytes) -> None:
-        self._seen.answers += 1
-        if self._broadcast is not None and frame.start - self._broadcast.frame.end < TURNAROUND:
-            self._seen.answers_to_broadcast.add(frame.start, self._broadcast.no, no)
-        if self._broadcast is not None and placement.source is not None:
-            self._seen.broadcast_answers[placement.source] += 1
-        self._broadcast = self._open = None
+        self.seen.answers += 1
+        if self.broadcast is not None and frame.start - self.broadcast.frame.end < TURNAROUND:
+            self.seen.answers_to_broadcast.add(frame.start, self.broadcast.no, no)
+        if self.broadcast is not None and placement.source is not None:
+            self.seen.broadcast_answers[placement.source] += 1
+        self.broadcast = self.open = None
         if header.ok:
             if header.error is not None and len(octets) > 2 and octets[1] & 0x80:
-                self._codes[placement.tx] = octets[2]
-                if len(self._codes) > _OPEN_KEPT:
-                    self._codes.clear()
+                self.codes[placement.tx] = octets[2]
+                if len(self.codes) > OPEN_KEPT:
+                    self.codes.clear()
             else:
-                self._answers[placement.tx] = octets
-                if len(self._answers) > _OPEN_KEPT:
-                    self._answers.clear()
+                self.answers[placement.tx] = octets
+                if len(self.answers) > OPEN_KEPT:
+                    self.answers.clear()
         elif placement.source is not None:
-            self._damaged.append(placement.tx)
+            self.damaged.append(placement.tx)
             self._gather(frame)
             self._note_flaw(placement.tx, frame)
-            self._bad_ends[placement.tx] = placement.source, no, frame
-            if len(self._bad_ends) > _OPEN_KEPT:
-                self._bad_ends.clear()
+            self.bad_ends[placement.tx] = placement.source, no, frame
+            if len(self.bad_ends) > OPEN_KEPT:
+                self.bad_ends.clear()
 
     def _see_noise(self, no: int, event: Event) -> None:
-        if self._broadcast is not None and event.start - self._broadcast.frame.end < TURNAROUND:
+        if self.broadcast is not None and event.start - self.broadcast.frame.end < TURNAROUND:
             if len(event.octets) >= 3:
-                self._seen.noise_after_broadcast.add(event.start, self._broadcast.no, no)
+                self.seen.noise_after_broadcast.add(event.start, self.broadcast.no, no)
             return
-        self._broadcast = None
+        self.broadcast = None
 
     def _is_answer_to_broadcast(self, asked: Asked) -> bool:
         """Whether what looks like a request is a station's copy of the broadcast before it, as itself or as 0."""
-        broadcast = self._broadcast
-        if broadcast is None or asked.octets[1:] != broadcast.octets[1:] or (self._seen.echoes and not asked.unit):
+        broadcast = self.broadcast
+        if broadcast is None or asked.octets[1:] != broadcast.octets[1:] or (self.seen.echoes and not asked.unit):
             return False
         gap = asked.frame.start - broadcast.frame.end
-        return self._timing.char + self._timing.latency < gap < TURNAROUND
+        return self.timing.char + self.timing.latency < gap < TURNAROUND
 
     def _is_answer_of_another(self, before: Asked, asked: Asked) -> bool:
         """Whether what looks like a request is the copy of the one before it, by a unit that is known to answer so."""
-        return asked.octets[1:] == before.octets[1:] and (before.unit, asked.unit) in self._seen.pairs
+        return asked.octets[1:] == before.octets[1:] and (before.unit, asked.unit) in self.seen.pairs
 
     # ---- transactions
 
     def _is_torn(self, transaction: Transaction, asked: Asked | None) -> bool:
         """Whether a late read made of it what it seems; where a station's frames are so often, it is the station."""
-        verdict, torn = transaction.verdict, self._torn
+        verdict, torn = transaction.verdict, self.torn
         if verdict in (Verdict.UNSOLICITED, Verdict.LATE, Verdict.ANSWERED_TWICE):
             return torn.may_answer(transaction.response)
         is_either = asked is not None and asked.header.role is Role.EITHER
@@ -294,53 +274,54 @@ class ModbusFindings:
         if verdict not in _MAY_BE_TORN or not torn.is_torn(transaction.id):
             return False
         unit = transaction.station
-        return unit is None or torn.is_seldom(unit, self._station(unit).asked)
+        return unit is None or torn.is_seldom(unit, self.station(unit).asked)
 
     def _see_end(self, unit: int, no: int, frame: Frame) -> None:
         """How a damaged answer of a station, in that row, ended."""
-        station = self._station(unit)
+        station = self.station(unit)
         station.cut += frame.damage is Damage.SHORT
         if _ends_badly(frame):
             station.last_octet.add(frame.end, no)
 
     def _settle_unasked(self, transaction: Transaction) -> None:
         """An answer that fits no request: of another unit than the one asked, or of nobody's asking."""
-        other = self._asked.get(transaction.of) if transaction.of is not None else None
+        other = self.asked.get(transaction.of) if transaction.of is not None else None
         if other is not None and transaction.station is not None and transaction.station != other.unit:
-            self._elsewhere[other.no] = transaction.station
-            if len(self._elsewhere) > _OPEN_KEPT:
-                self._elsewhere.clear()
+            self.elsewhere[other.no] = transaction.station
+            if len(self.elsewhere) > OPEN_KEPT:
+                self.elsewhere.clear()
             pair = (other.unit, transaction.station)
-            self._seen.pair(pair).add(transaction.start, other.no, transaction.response)
+            self.seen.pair(pair).add(transaction.start, other.no, transaction.response)
             return
-        if transaction.response in self._no_requests:
+        if transaction.response in self.no_requests:
             return
-        if not self._seen.requests and self._seen.answers == 1:
+        if not self.seen.requests and self.seen.answers == 1:
             return  # the capture began between a request and its answer
-        if transaction.id in self._damaged:  # more likely a request, when nobody was asked
-            self._seen.damaged_requests.add(transaction.start, transaction.response)
+        if transaction.id in self.damaged:  # more likely a request, when nobody was asked
+            self.seen.damaged_requests.add(transaction.start, transaction.response)
             return
-        self._seen.unasked.add(transaction.start, transaction.response)
+        self.seen.unasked.add(transaction.start, transaction.response)
 
-    def _settle_request(
+    def settle_request(
         self, station: Station, transaction: Transaction, asked: Asked, code: int, answer: bytes
     ) -> None:
+        """A request that closed, with its answer, the code of its exception, or neither."""
         verdict = transaction.verdict
-        if asked.no in self._no_requests:
+        if asked.no in self.no_requests:
             return
-        if verdict is Verdict.NO_RESPONSE and asked.no in self._elsewhere:
-            del self._elsewhere[asked.no]  # the pair is reported instead
-            self._seen.repeated_elsewhere[asked.unit] += transaction.attempt > 1
+        if verdict is Verdict.NO_RESPONSE and asked.no in self.elsewhere:
+            del self.elsewhere[asked.no]  # the pair is reported instead
+            self.seen.repeated_elsewhere[asked.unit] += transaction.attempt > 1
             return
         if asked.fault is not None:
-            self._seen.malformed.add(transaction.start, transaction.request, transaction.response)
-            if len(self._seen.malformed_words) < _WORDS_KEPT:
-                self._seen.malformed_words[asked.fault] += 1
+            self.seen.malformed.add(transaction.start, transaction.request, transaction.response)
+            if len(self.seen.malformed_words) < _WORDS_KEPT:
+                self.seen.malformed_words[asked.fault] += 1
         request = station.request(asked.key)
         request.tries += 1
         if transaction.attempt == 1:
             request.turns += 1
-            self._seen.cycles.add(asked.octets, asked.key, transaction.start)
+            self.seen.cycles.add(asked.octets, asked.key, transaction.start)
         else:
             station.repeats.add(transaction.start, transaction.request)
             station.repeats_cost += max(0, transaction.start - station.last_start)
@@ -350,9 +331,9 @@ class ModbusFindings:
             request.missing.add(transaction.start, transaction.request)
             station.missing.add(transaction.start, transaction.request)
             station.silent.add(transaction.start, transaction.request)
-            self._lost[transaction.id] = Lost(asked.unit, asked.key, asked.no)
-            if len(self._lost) > _LOST_KEPT:
-                del self._lost[next(iter(self._lost))]
+            self.lost[transaction.id] = Lost(asked.unit, asked.key, asked.no)
+            if len(self.lost) > LOST_KEPT:
+                del self.lost[next(iter(self.lost))]
             return
         station.heard(transaction.end)
         if verdict is Verdict.DAMAGED_ANSWER:
@@ -361,10 +342,10 @@ class ModbusFindings:
             return
         station.answered += 1
         station.copies += answer == asked.octets
-        if transaction.latency is not None and not self._torn.is_torn(transaction.id):
+        if transaction.latency is not None and not self.torn.is_torn(transaction.id):
             station.times.add(transaction.latency)
             if asked.header.ok and transaction.attempt == 1:
-                self._learnt.answered(transaction.station or 0, READ, transaction.latency.nominal)
+                self.learnt.answered(transaction.station or 0, READ, transaction.latency.nominal)
             self._compare_with_timeout(station, transaction, transaction.latency.low)
             if verdict is Verdict.ANSWERED and transaction.error is None and transaction.response is not None:
                 came = Answered(transaction.response, transaction.end, transaction.latency, answer)
@@ -373,7 +354,7 @@ class ModbusFindings:
             if asked.fault is None:
                 station.exception(asked.key, code).add(transaction.end, transaction.request, transaction.response)
             else:
-                self._seen.malformed_codes[code] += 1
+                self.seen.malformed_codes[code] += 1
         elif (
             transaction.error is not None and asked.header.ok and not transaction.error.startswith("before the answer")
         ):
@@ -383,29 +364,25 @@ class ModbusFindings:
 
     def _compare_with_timeout(self, station: Station, transaction: Transaction, least: int) -> None:
         """Whether an answer took long; counted anew when the timeout gets known, since the limit is another then."""
-        timeout = self._learnt.timeout
-        limit = None if timeout is None else timeout * 7 // 10
-        if (limit is None) != (station.slow_limit is None):
-            station.slow, station.slow_of = Tally(), 0
-        station.slow_limit = limit
-        station.slow_of += 1
+        limit = slow_limit(self.learnt.timeout)
+        station.compare_with(limit, 1)
         if least > (SLOW_UNLEARNT if limit is None else limit):
-            self._gaps.took_long(station.slow, transaction)
+            self.gaps.took_long(station.slow, transaction)
 
     def _settle_late(self, station: Station, transaction: Transaction) -> None:
         """An answer after the next request: its own request is not lost; late only if the master has waited at all."""
         station.heard(transaction.end)
-        self._seen.late(transaction.response)
-        lost = self._lost.pop(transaction.of or 0, None)
+        self.seen.late(transaction.response)
+        lost = self.lost.pop(transaction.of or 0, None)
         if lost is not None:
             station.forgive(lost)
-            if self._waits.get(lost.no, AT_ONCE) < _NO_WAIT:
+            if self.waits.get(lost.no, AT_ONCE) < _NO_WAIT:
                 return
         station.late.add(transaction.start, transaction.response)
 
     def _settle_for_nobody(self, transaction: Transaction, asked: Asked) -> None:
         """A read of address 0, and who answered it."""
-        seen = self._seen
+        seen = self.seen
         seen.to_nobody.add(transaction.start, transaction.request, transaction.response)
         if transaction.verdict in (Verdict.ANSWERED, Verdict.RETRY, Verdict.EXCEPTION):
             seen.for_nobody[transaction.station or 0] += 1
@@ -424,7 +401,7 @@ class ModbusFindings:
             return
         begins = stray[:1] == b":" if asked.frame.protocol != RTU_NAME else stray[:1] == asked.octets[:1]
         frames = transaction.request, transaction.response
-        marked = transaction.id in self._marked
+        marked = transaction.id in self.marked
         station.garbage.add(stray, transaction.end, *frames, is_marked=marked, begins=begins)
         if asked.frame.protocol != RTU_NAME or stray[:2] != asked.octets[:2] or stray[1] not in FUNCTIONS:
             return
@@ -438,41 +415,38 @@ class ModbusFindings:
 
     def _gather(self, event: Event) -> None:
         """Keep octets that are no good frame, in the transaction of the newest request."""
-        tx = self._newest
+        tx = self.newest
         if tx is None:
             return
-        before = self._stray.get(tx, b"")
-        self._stray[tx] = (before + event.octets)[:_STRAY_KEPT]
+        before = self.stray.get(tx, b"")
+        self.stray[tx] = (before + event.octets)[:_STRAY_KEPT]
         if event.marks:
-            self._marked.append(tx)
-        if len(self._stray) > _OPEN_KEPT:
-            self._stray.clear()
+            self.marked.append(tx)
+        if len(self.stray) > OPEN_KEPT:
+            self.stray.clear()
 
     def _note_flaw(self, tx: int, frame: Frame) -> None:
         if frame.repair is not None:
-            self._flaws[tx] = frame.repair.flaw
-            if len(self._flaws) > _OPEN_KEPT:
-                self._flaws.clear()
+            self.flaws[tx] = frame.repair.flaw
+            if len(self.flaws) > OPEN_KEPT:
+                self.flaws.clear()
 
     def _see_broken(self, no: int, event: Event, octets: bytes) -> None:
         """A damaged frame that begins as a request to another station, while one is asked: somebody else spoke."""
-        asked, begin = self._open, octets[:_BEGIN]
-        if asked is None or begin not in self._begins or begin[0] == asked.unit:
+        asked, begin = self.open, octets[:BEGIN]
+        if asked is None or begin not in self.begins or begin[0] == asked.unit:
             return
         gap = max(0, event.start - asked.frame.end)
-        if len(self._seen.broken_in) < _HASTY_KEPT:
-            self._seen.broken_in.append((gap + asked.frame.slack, asked.unit, event.start, asked.no, no))
+        if len(self.seen.broken_in) < HASTY_KEPT:
+            self.seen.broken_in.append((gap + asked.frame.slack, asked.unit, event.start, asked.no, no))
 
     def _is_cut_echo(self, event: Event) -> bool:
         """Whether it is the begin of the request before it, given back at once and cut short."""
-        asked = self._open
+        asked = self.open
         if asked is None or not is_begin_of(event.octets, asked.frame.octets):
             return False
         gap = max(0, event.start - asked.frame.end)
-        return gap < (AT_ONCE if asked.header.role is Role.REQUEST else self._timing.t35)
-
-    def _station(self, unit: int) -> Station:
-        return self._seen.stations.setdefault(unit, Station())
+        return gap < (AT_ONCE if asked.header.role is Role.REQUEST else self.timing.t35)
 
 
 def _ends_badly(frame: Frame) -> bool:

@@ -7,6 +7,7 @@ the computer was busy, and had caught up when the next request came.
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from dissectors.findings import Tally
@@ -18,8 +19,11 @@ from dissectors.modbus.learnt import Learnt
 from dissectors.modbus.station_record import middle
 from dissectors.tracker import Placement, Transaction
 
-_SPACING_KEPT = 64
-_SPACING_LEAST = 8
+SPACING_KEPT = 64
+SPACING_LEAST = 8
+PAUSES_KEPT = 32
+"""The newest pauses, of which `Learnt` keeps no more."""
+
 _SLOW_KEPT = 2
 
 
@@ -35,26 +39,29 @@ class Gaps:
     """Fed frame by frame; writes what it finds into the evidence."""
 
     def __init__(self, timing: Timing, seen: Evidence, learnt: Learnt) -> None:
-        self._timing = timing
-        self._seen = seen
+        self.latency = timing.latency
+        self._char = timing.char
+        self.pause_limit = timing.t15
+        self.close = timing.t35 - timing.line.bits(1)  # a silence between frames that is below, by the longest reading
+        self.seen = seen
         self._learnt = learnt
-        self._before: Frame | None = None  # the row before, if it was a good frame
-        self._answered: Frame | None = None  # the row before, if it was a good answer
-        self._spacing: dict[str, deque[int]] = {}  # silence an octet of the last frames of each sender, ns
+        self.before: Frame | None = None  # the row before, if it was a good frame
+        self.answered: Frame | None = None  # the row before, if it was a good answer
+        self.spacing: dict[str, deque[int]] = {}  # silence an octet of the last frames of each sender, ns
         self._slow: deque[_Slow] = deque()  # answers that took long, until the pause after them is known
-        self._pauses: deque[int] = deque(maxlen=_SPACING_KEPT)  # the master's, between an answer and its next request
-        self._hurried: deque[int] = deque(maxlen=64)  # answers after which the master seemed to pause hardly
+        self.pauses: deque[int] = deque(maxlen=SPACING_KEPT)  # the master's, between an answer and its next request
+        self.hurried: deque[int] = deque(maxlen=64)  # answers after which the master seemed to pause hardly
 
     def see(self, no: int, frame: Frame, header: Header, placement: Placement) -> None:
         """Take the next frame."""
         self._see_gap(no, frame, header, placement)
         self._see_pause_before(no, frame, header, placement)
-        self._before = frame if header.ok else None
-        self._answered = frame if placement.role is Role.RESPONSE and header.ok else None
+        self.before = frame if header.ok else None
+        self.answered = frame if placement.role is Role.RESPONSE and header.ok else None
 
     def hear_noise(self) -> None:
         """Take octets that are no frame."""
-        self._before = self._answered = None
+        self.before = self.answered = None
 
     def took_long(self, tally: Tally, transaction: Transaction) -> None:
         """Count an answer that took long, once the pause after it is known."""
@@ -66,52 +73,85 @@ class Gaps:
         while len(self._slow) > left:
             self._judge_slow(self._slow.popleft())
 
+    def pass_by(self, last: Frame) -> None:
+        """Go on behind good frames, of which `last` is the last one, and an answer."""
+        self.before = self.answered = last
+
+    def begins_soon(self, start: int, octets: bytes) -> bool:
+        """Whether a good frame begins too soon after the row before; frames that touch came in one read, which says
+        nothing of the silence between them."""
+        before = self.before
+        if before is None or before.octets == octets or before.end >= start:
+            return False
+        return max(0, start - before.end) + before.slack < self.close
+
     def _see_gap(self, no: int, frame: Frame, header: Header, placement: Placement) -> None:
         """Silences that are provably too short between frames, or too long inside one."""
-        timing, before = self._timing, self._before
+        sender = sender_of(placement)
         if placement.role is not Role.EITHER:
-            self._seen.frames[sender_of(placement)] += 1
-            self._seen.octets[sender_of(placement)] += max(len(frame.octets), frame.expected or 0)
+            self.seen.frames[sender] += 1
+            self.seen.octets[sender] += max(len(frame.octets), frame.expected or 0)
         if frame.protocol != RTU_NAME:
             return
-        sender = sender_of(placement)
-        # frames that touch came in one read, which says nothing of the silence between them
-        if before is not None and header.ok and not frame.skipped and before.octets != frame.octets:
-            longest = max(0, frame.start - before.end) + before.slack
-            if before.end < frame.start and longest < timing.t35 - timing.line.bits(1):
-                self._seen.too_close(sender, frame.start, no - 1, no)
+        if header.ok and not frame.skipped and self.begins_soon(frame.start, frame.octets):
+            self.seen.too_close(sender, frame.start, no - 1, no)
         if header.ok and not frame.marks:  # in a damaged one octets may be missing, and leave the same silence
-            self._see_pause(no, frame, sender)
+            self._see_spacing(no, frame, sender)
 
-    def _see_pause(self, no: int, frame: Frame, sender: str) -> None:
+    def _see_spacing(self, no: int, frame: Frame, sender: str) -> None:
         """A silence inside a frame, beyond the spacing that this sender always leaves between its octets."""
-        gaps = len(frame.octets) - 1
-        if gaps < 1:
+        length = len(frame.octets)
+        if length < 2:
             return
-        silence = frame.end - frame.slack - frame.start - len(frame.octets) * self._timing.char
-        usual = self._spacing.setdefault(sender, deque(maxlen=_SPACING_KEPT))
-        limit = self._timing.t15
-        if silence > limit and len(usual) >= _SPACING_LEAST and silence - gaps * max(0, middle(usual)) > limit:
-            self._seen.gap_tally(self._seen.paused, sender).add(frame.start, no)
-        usual.append(silence // gaps)
+        silence = frame.end - frame.slack - frame.start - length * self._char
+        if silence > self.pause_limit:
+            self.see_pause(no, frame.start, length, silence, sender)
+        self.spacing_of(sender).append(silence // (length - 1))
+
+    def see_pause(self, no: int, start: int, length: int, silence: int, sender: str) -> None:
+        """Take a frame with more silence in it than the rule allows."""
+        usual = self.spacing_of(sender)
+        if len(usual) >= SPACING_LEAST and silence - (length - 1) * max(0, middle(usual)) > self.pause_limit:
+            self.seen.gap_tally(self.seen.paused, sender).add(start, no)
+
+    def spacing_of(self, sender: str) -> deque[int]:
+        """Silence an octet of the last frames of a sender, ns."""
+        usual = self.spacing.get(sender)
+        if usual is None:
+            usual = self.spacing[sender] = deque(maxlen=SPACING_KEPT)
+        return usual
 
     def _judge_slow(self, slow: _Slow) -> None:
         """Count an answer that took long, unless the computer was late for it and no later for what followed."""
         transaction = slow.transaction
-        if transaction.response not in self._hurried:
+        if transaction.response not in self.hurried:
             slow.tally.add(transaction.end, transaction.request, transaction.response)
 
     def _see_pause_before(self, no: int, frame: Frame, header: Header, placement: Placement) -> None:
         """A request after an answer: a pause far below the usual says that the answer was read too late."""
-        if self._answered is None or placement.role is not Role.REQUEST or not header.ok:
+        if self.answered is None or placement.role is not Role.REQUEST or not header.ok:
             return
-        pause = max(0, frame.start - self._answered.end)
-        if len(self._pauses) >= _SPACING_LEAST and 2 * pause < middle(self._pauses) - self._timing.latency:
-            self._hurried.append(no - 1)
-        self._pauses.append(pause)
-        self._learnt.paused(pause, 0)
+        pause = max(0, frame.start - self.answered.end)
+        if self.is_hurried(pause, self.pauses):
+            self.hurried.append(no - 1)
+        self.paused((pause,))
+
+    def is_hurried(self, pause: int, before: Sequence[int]) -> bool:
+        """Whether a pause is far below the usual of those before."""
+        return len(before) >= SPACING_LEAST and 2 * pause < middle(before) - self.latency
+
+    def paused(self, pauses: Sequence[int]) -> None:
+        """The master's next pauses between an answer and a request, ns."""
+        self.pauses.extend(pauses)
+        for pause in pauses[-PAUSES_KEPT:]:
+            self._learnt.paused(pause, 0)
 
 
 def sender_of(placement: Placement) -> str:
     """Who sent a frame, as findings name him."""
     return "master" if placement.role is not Role.RESPONSE else f"station {placement.source}"
+
+
+def sender_name(unit: int) -> str:
+    """The same by the station's address; 0: the master."""
+    return f"station {unit}" if unit else "master"

@@ -43,22 +43,37 @@ class ResponseTimes:
     quickest: int = 0  # by the shortest reading, ns
     blocks: list[Block] = field(default_factory=list)
     _size: int = 8
-    _latest: list[Interval] = field(default_factory=list)
+    _lows: list[int] = field(default_factory=list)  # of those since the last block, by their three readings
+    _nominals: list[int] = field(default_factory=list)
+    _highs: list[int] = field(default_factory=list)
 
     def add(self, latency: Interval) -> None:
         """Take the next one."""
-        self.count += 1
-        self.longest = max(self.longest, latency.low)
-        self.quickest = min(self.quickest, latency.low) if self.count > 1 else latency.low
-        self._latest.append(latency)
-        if len(self._latest) < self._size:
-            return
-        self.blocks.append(_block(self._latest))
-        self._latest.clear()
+        self.extend([latency.low], [latency.nominal], [latency.high])
+
+    def extend(self, lows: list[int], nominals: list[int], highs: list[int]) -> None:
+        """Take the next ones, at least one, by their three readings."""
+        self.longest = max(self.longest, max(lows))
+        self.quickest = min(self.quickest, min(lows)) if self.count else min(lows)
+        self.count += len(lows)
+        self._lows += lows
+        self._nominals += nominals
+        self._highs += highs
+        done = 0
+        while len(self._lows) - done >= self._size:
+            done = self._make_block(done)
+        if done:
+            del self._lows[:done], self._nominals[:done], self._highs[:done]
+
+    def _make_block(self, begin: int) -> int:
+        """Of those from `begin` on; gives where the next one begins."""
+        end = begin + self._size
+        self.blocks.append(_block(self._lows[begin:end], self._nominals[begin:end], self._highs[begin:end]))
         if len(self.blocks) == _BLOCKS:
             pairs = zip(self.blocks[::2], self.blocks[1::2], strict=True)
             self.blocks = [_mean(earlier, later) for earlier, later in pairs]
             self._size *= 2
+        return end
 
     def soonest(self) -> int:
         """How soon it answers at best, by the shortest reading, ns: the least of some in a row, in the middle of all.
@@ -71,7 +86,7 @@ class ResponseTimes:
         """Over all of them; None without any."""
         if self.blocks:
             return _of_blocks(self.blocks)
-        return _block(self._latest) if self._latest else None
+        return _block(self._lows, self._nominals, self._highs) if self._lows else None
 
     def quarters(self) -> tuple[Block, ...]:
         """Medians of the four quarters, in order; empty while there is too little to compare."""
@@ -86,13 +101,8 @@ def middle(values: Sequence[int]) -> int:
     return sorted(values)[len(values) // 2]
 
 
-def _block(latencies: Sequence[Interval]) -> Block:
-    return Block(
-        min(latency.low for latency in latencies),
-        middle([latency.low for latency in latencies]),
-        middle([latency.nominal for latency in latencies]),
-        middle([latency.high for latency in latencies]),
-    )
+def _block(lows: Sequence[int], nominals: Sequence[int], highs: Sequence[int]) -> Block:
+    return Block(min(lows), middle(lows), middle(nominals), middle(highs))
 
 
 def _of_blocks(blocks: Sequence[Block]) -> Block:
@@ -182,9 +192,12 @@ class Station:
 
     def request(self, key: Key) -> Requested:
         """The record of one kind of request; beyond KEYS_KEPT kinds, one for all others."""
-        if key not in self.requests and len(self.requests) >= KEYS_KEPT:
-            key = ("other requests", None)
-        return self.requests.setdefault(key, Requested())
+        request = self.requests.get(key)
+        if request is None:
+            if len(self.requests) >= KEYS_KEPT:
+                key = ("other requests", None)
+            request = self.requests.setdefault(key, Requested())
+        return request
 
     def exception(self, key: Key, code: int) -> Tally:
         """The record of one exception to one kind of request; beyond KEYS_KEPT, one for all others."""
@@ -194,8 +207,23 @@ class Station:
 
     def compare(self, key: Key, request: bytes, answer: Answered) -> None:
         """Keep an answer beside the others to exactly the same request; the first SAME_KEPT requests only."""
-        if (key, request) in self.same or len(self.same) < SAME_KEPT:
-            self.same.setdefault((key, request), SameRequest()).answers.append(answer)
+        same = self.same_request(key, request)
+        if same is not None:
+            same.answers.append(answer)
+
+    def same_request(self, key: Key, request: bytes) -> SameRequest | None:
+        """The answers to exactly the same request, those to come included; None beyond SAME_KEPT requests."""
+        same = self.same.get((key, request))
+        if same is None and len(self.same) < SAME_KEPT:
+            same = self.same[key, request] = SameRequest()
+        return same
+
+    def compare_with(self, limit: int | None, answers: int) -> None:
+        """Count answers that are compared with a limit; anew when there is one, or none any more."""
+        if (limit is None) != (self.slow_limit is None):
+            self.slow, self.slow_of = Tally(), 0
+        self.slow_limit = limit
+        self.slow_of += answers
 
     def flaw(self, flaw: Flaw) -> Tally:
         """The record of one way in which answers are damaged."""
@@ -213,7 +241,8 @@ class Station:
     def heard(self, time: int) -> None:
         """Something came from it."""
         self.last_heard = time
-        self.silent = Tally()
+        if self.silent.count:
+            self.silent = Tally()
 
 
 @dataclass(slots=True)
@@ -231,8 +260,12 @@ class Cycles:
             return
         self._last[octets] = start
         self._keys[octets] = key
-        if before is not None and start > before:
-            self._periods.setdefault(octets, deque(maxlen=256)).append(start - before)
+        if before is None or start <= before:
+            return
+        periods = self._periods.get(octets)
+        if periods is None:
+            periods = self._periods[octets] = deque(maxlen=256)
+        periods.append(start - before)
 
     def usual(self) -> tuple[int, Key, list[int]] | None:
         """Unit and kind of the request with the most periods, and those in ascending order; None where none repeats."""

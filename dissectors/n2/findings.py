@@ -9,6 +9,7 @@ no status bits, no change-of-state records.
 from __future__ import annotations
 
 from collections import OrderedDict
+from typing import TYPE_CHECKING
 
 from dissectors.findings import Finding, Tally
 from dissectors.frame import Damage, Event, Frame, Header, Noise
@@ -21,10 +22,20 @@ from dissectors.n2.torn import TornFrames
 from dissectors.n2.wording import SLOW, Heard, worded
 from dissectors.tracker import Placement, Transaction, Verdict
 
+if TYPE_CHECKING:
+    from dissectors.row_columns import RowColumns
+
 __all__ = ["SLOW", "N2Findings"]
 
-_ANSWERS = 8  # answers remembered, to tell a repeat from a second one
+ANSWERS_KEPT = 8
+"""Answers remembered, to tell a repeat from a second one."""
+
 _NOT_JUDGED = frozenset((Verdict.ECHO, Verdict.OPEN, Verdict.DAMAGED_REQUEST, Verdict.BROADCAST))
+
+
+def refusal_code(octets: bytes) -> str:
+    """The code of a refusal, as the rules know it."""
+    return octets[1:3].decode("latin-1").upper()
 
 
 class N2Findings:
@@ -32,27 +43,27 @@ class N2Findings:
 
     def __init__(self, timing: Timing) -> None:
         self._timing = timing
-        self._first: int | None = None
-        self._now = 0
-        self._stations: dict[int, Station] = {}
-        self._master = Damages()
+        self.first: int | None = None
+        self.now = 0
+        self.stations: dict[int, Station] = {}
+        self.master = Damages()
         self._asked: dict[int, Asked] = {}  # by transaction
-        self._masters = Masters()
-        self._torn = TornFrames(timing)
+        self.masters = Masters()
+        self.torn = TornFrames(timing)
         self._stray = Tally()
         self._codes: dict[int, str] = {}  # transaction → error code, of refusals that are still to close
         self._answers: OrderedDict[int, bytes] = OrderedDict()  # transaction → its good answer
         self._bad: int | None = None  # the newest damaged answer
-        self._turn: int | None = None  # whom the newest command was for
+        self.turn: int | None = None  # whom the newest command was for
 
     def see(self, no: int, event: Event, header: Header | None, placement: Placement | None) -> None:
         """Take the next row: event, its header and placement (None for noise)."""
-        self._first = event.start if self._first is None else self._first
-        self._now = max(self._now, event.end)
-        self._torn.see(no, event, placement.tx if placement else None, is_good_frame=header is not None and header.ok)
+        self.first = event.start if self.first is None else self.first
+        self.now = max(self.now, event.end)
+        self.torn.see(no, event, placement.tx if placement else None, is_good_frame=header is not None and header.ok)
         if isinstance(event, Noise) or header is None or placement is None:
             if not event.octets or event.octets.strip(b"\r\n"):
-                self._masters.see_other()  # may have been an answer
+                self.masters.see_other()  # may have been an answer
         elif meant(event)[:1] == b">":
             self._see_command(no, event, header, placement)
         else:
@@ -60,42 +71,52 @@ class N2Findings:
 
     def _see_command(self, no: int, event: Frame, header: Header, placement: Placement) -> None:
         asked = Asked(no, event, parse_command(meant(event)))
-        before = self._masters.last_station
-        self._masters.see_command(asked, self._stations.get(before) if before is not None else None)
+        before = self.masters.last_station
+        self.masters.see_command(asked, self.stations.get(before) if before is not None else None)
         self._asked[placement.tx] = asked
-        self._master.frames += 1
-        self._master.octets += len(event.octets)
+        self.master.frames += 1
+        self.master.octets += len(event.octets)
         if header.ok:
-            if placement.destination is not None and placement.destination != self._turn:
-                self._station(placement.destination).turns += 1
-            self._turn = placement.destination
+            if placement.destination is not None and placement.destination != self.turn:
+                self.station(placement.destination).turns += 1
+            self.turn = placement.destination
         elif event.damage is not Damage.RESTARTED or event.repair is not None:
-            self._add_bad(self._master, no, event)
+            self._add_bad(self.master, no, event)
 
     def _see_answer(self, no: int, event: Frame, header: Header, placement: Placement) -> None:
-        self._masters.see_other()
+        self.masters.see_other()
         octets = event.octets
         if header.ok:
             if octets[:1] == b"N":
-                self._codes[placement.tx] = octets[1:3].decode("latin-1").upper()
-            self._answers[placement.tx] = octets
-            if len(self._answers) > _ANSWERS:
-                self._answers.popitem(last=False)
+                self._codes[placement.tx] = refusal_code(octets)
+            self.keep_answer(placement.tx, octets)
         else:
             self._bad = no
         if placement.source is None:
             return
-        sent = self._station(placement.source).sent
+        sent = self.station(placement.source).sent
         sent.frames += 1
         sent.octets += len(octets)
         if not header.ok:
             self._add_bad(sent, no, event)
 
     def _add_bad(self, sender: Damages, no: int, event: Frame) -> None:
-        if self._torn.is_late(event) or self._torn.completes(no):
+        if self.torn.is_late(event) or self.torn.completes(no):
             return  # its begin was read before, or may have been
         sender.add_bad(event.end, no, event.repair.flaw if event.repair is not None else None)
-        self._torn.struck(sender)
+        self.torn.struck(sender)
+
+    def keep_answer(self, transaction: int, octets: bytes) -> None:
+        """Remember a good answer for a while."""
+        self._answers[transaction] = octets
+        if len(self._answers) > ANSWERS_KEPT:
+            self._answers.popitem(last=False)
+
+    def take(self, rows: RowColumns) -> None:
+        """See `dissectors.row_columns.JudgesColumns`."""
+        from dissectors.n2.judging_columns import take  # who feeds row by row needs no numpy
+
+        take(self, rows)
 
     def settle(self, transaction: Transaction) -> None:
         """Take a transaction that closed."""
@@ -103,24 +124,24 @@ class N2Findings:
         code = self._codes.pop(transaction.id, "")
         verdict = transaction.verdict
         if verdict is Verdict.UNSOLICITED:
-            if transaction.response != self._bad and not self._torn.may_answer(transaction.response):
+            if transaction.response != self._bad and not self.torn.may_answer(transaction.response):
                 self._stray.add(transaction.start, transaction.response)
             return
         if transaction.station is None or verdict in _NOT_JUDGED:
             return
-        station = self._station(transaction.station)
+        station = self.station(transaction.station)
         if verdict is Verdict.ANSWERED_TWICE:
             response = transaction.response
-            if self._torn.is_torn(transaction.of, response) or self._torn.may_answer(response):
+            if self.torn.is_torn(transaction.of, response) or self.torn.may_answer(response):
                 return  # to what was torn, perhaps
             same = self._answers.get(transaction.id) == self._answers.get(transaction.of or 0)
             (station.repeated if same else station.twice).add(transaction.start, transaction.response)
         elif verdict is Verdict.LATE:
-            if self._torn.may_answer(transaction.response):
+            if self.torn.may_answer(transaction.response):
                 return  # the command that it answers was torn
             station.late.add(transaction.start, transaction.response)
             station.missing.take_back(transaction.of)
-            self._masters.see_late(transaction, station)
+            self.masters.see_late(transaction, station)
         elif asked is not None:
             self._settle_asked(station, asked, code, transaction)
 
@@ -130,31 +151,32 @@ class N2Findings:
         verdict = transaction.verdict
         if transaction.response is None:
             if verdict is Verdict.NO_RESPONSE:
-                if self._torn.is_answered(transaction.request):
+                if self.torn.is_answered(transaction.request):
                     return
                 station.missing.add(transaction.id, transaction.end, transaction.request)
-            elif verdict is Verdict.DAMAGED_ANSWER and not self._torn.is_torn(transaction.id, transaction.request):
+            elif verdict is Verdict.DAMAGED_ANSWER and not self.torn.is_torn(transaction.id, transaction.request):
                 station.sent.add_bad(transaction.end, transaction.request)
             return
         station.answered += 1
         self._judge_latency(station, transaction)
         if verdict is Verdict.EXCEPTION:
-            self._refused(station, asked, code, transaction)
+            self.refused(station, asked, code, transaction)
         elif verdict in (Verdict.ANSWERED, Verdict.RETRY):
-            self._obeyed(station, asked, transaction)
+            self.obeyed(station, asked, transaction)
 
     def findings(self) -> tuple[Finding, ...]:
         """All findings so far: the bus first, then station by station."""
-        seconds = (self._now - (self._first or 0)) / 1e9
-        heard = Heard(self._now, seconds, self._master, self._stations, self._masters.seen, self._stray)
+        seconds = (self.now - (self.first or 0)) / 1e9
+        heard = Heard(self.now, seconds, self.master, self.stations, self.masters.seen, self._stray)
         return tuple(worded(heard))
 
     # --- judging ---
 
-    def _station(self, address: int) -> Station:
-        station = self._stations.get(address)
+    def station(self, address: int) -> Station:
+        """What is known of a station."""
+        station = self.stations.get(address)
         if station is None:
-            station = self._stations[address] = Station()
+            station = self.stations[address] = Station()
         return station
 
     def _judge_latency(self, station: Station, transaction: Transaction) -> None:
@@ -166,7 +188,8 @@ class N2Findings:
             station.slow.add(transaction.end, transaction.response)
             station.slowest = max(station.slowest, latency.low)
 
-    def _refused(self, station: Station, asked: Asked, code: str, transaction: Transaction) -> None:
+    def refused(self, station: Station, asked: Asked, code: str, transaction: Transaction) -> None:
+        """A command that was refused, with this code."""
         command, time = asked.command, transaction.end
         if code == "00":
             if not station.waits:
@@ -181,7 +204,8 @@ class N2Findings:
             refused = station.refused.setdefault((code, command.type.title), Tally())
             refused.add(time, transaction.request, transaction.response)
 
-    def _obeyed(self, station: Station, asked: Asked, transaction: Transaction) -> None:
+    def obeyed(self, station: Station, asked: Asked, transaction: Transaction) -> None:
+        """A command that was obeyed."""
         command = asked.command
         kind = command.type.kind
         if kind == "identify":

@@ -77,6 +77,11 @@ class Masters:
             self.seen.add(transaction.start, transaction.response)
 
     @property
+    def is_at_rest(self) -> bool:
+        """Whether something has come after the newest command."""
+        return self._last is None
+
+    @property
     def last_station(self) -> int | None:
         """Whom the newest command asked, while nothing has come after it."""
         return self._last.command.address if self._last is not None else None

@@ -11,12 +11,15 @@ What is directly behind a torn frame may be the answer to what was torn: nobody'
 from __future__ import annotations
 
 from collections import deque
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from dissectors.frame import Event, Frame
 from dissectors.line import MS, Timing
 from dissectors.n2.envelope import judge
 from dissectors.n2.record import Damages
+
+if TYPE_CHECKING:
+    from dissectors.columns import Times
 
 PIECES: Final = 8
 """Most rows that one torn frame is."""
@@ -83,6 +86,17 @@ class TornFrames:
                 self._open.append(tx)
             if len(self._pieces) > PIECES:
                 self._settle()
+
+    @property
+    def is_quiet(self) -> bool:
+        """Whether nothing is held that the next row may belong to."""
+        return not self._pieces and not self._struck and not self._open
+
+    def pass_by(self, first: int, slack: Times) -> None:
+        """Go on behind good frames, in rows from `first` on, while nothing is held."""
+        late = (slack > self._usual).nonzero()[0]
+        if len(late):
+            self._late_row = first + int(late[-1])
 
     def struck(self, sender: Damages) -> None:
         """Say who was counted for the row."""

@@ -4,21 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from dissectors import registry
 from dissectors.findings import Finding, Rule, WordsExceptions, with_consequences
 from dissectors.frame import Noise, Place, Reason
 from dissectors.manifest import Dissector
 from dissectors.profiles import Devices
+from dissectors.row_columns import JudgesColumns, in_turn
 from dissectors.token_ring import WatchesRing
 from dissectors.tracker import Transaction, Verdict
-from sniff.analysis.line_findings import LineFindings
+from sniff.analysis.bulk_line_findings import BulkLineFindings
 from sniff.analysis.line_rules import LINE_RULES
 from sniff.analysis.plain import plain
 from sniff.analysis.profile_findings import PROFILE_RULES, ProfileFindings
 from sniff.engine.engine import Output
 from sniff.engine.session import LineEvent, LineEventKind, Session, settings_change
+
+if TYPE_CHECKING:
+    from dissectors.columns import Masks, TransactionColumns
+    from sniff.engine.table import Table
 
 _DOUBTFUL = frozenset(
     (Verdict.NO_RESPONSE, Verdict.UNSOLICITED, Verdict.LATE, Verdict.DAMAGED_ANSWER, Verdict.DAMAGED_REQUEST)
@@ -30,7 +35,7 @@ class Judging:
 
     def __init__(self, session: Session, dissector: Dissector, devices: Devices | None = None) -> None:
         self.judge = dissector.judge(session.timing) if dissector.judge is not None else None
-        self.line = LineFindings(session)
+        self.line = BulkLineFindings(session)
         self._rules = rules_over(dissector)
         self.devices = ProfileFindings(session.timing, dissector, devices) if devices else None
         if devices and isinstance(self.judge, WordsExceptions):
@@ -67,6 +72,43 @@ class Judging:
             if devices is not None:
                 devices.settle(transaction)
 
+    def add_table(self, table: Table) -> None:
+        """Take many rows: the same as one after the other."""
+        if any(row.searched is not None for row in table.odd.values()) or not table.has_true_times:
+            for output in table.outputs():
+                self.add(output)
+            return
+        if self._hole is not None and self._first_after is None:
+            self._across_hole(table, self._hole)
+        else:
+            self._take(table)
+
+    def _across_hole(self, table: Table, hole: int) -> None:
+        """Take rows among which may be the first that ends after a hole."""
+        after = table.frames.end >= hole
+        place = int(after.argmax()) if after.any() else len(table)
+        if place or not len(table):
+            self._take(table.part(0, place))
+        if place < len(table):
+            for output in table.part(place, place + 1).outputs():
+                self.add(output)
+        if place + 1 < len(table):
+            self._take(table.part(place + 1, len(table)))
+
+    def _take(self, table: Table) -> None:
+        """Take rows none of which is the first after a hole."""
+        judge, devices = self.judge, self.devices
+        self.line.add_table(table)
+        if self._hole is not None:
+            torn = self._are_torn(table.transactions, self._hole)
+            table = table.without(torn) if torn.any() else table
+        if isinstance(judge, JudgesColumns):
+            judge.take(table)
+        elif judge is not None:
+            in_turn(judge, table)
+        if devices is not None:
+            devices.take(table)
+
     def add_line_event(self, event: LineEvent) -> None:
         """Take something that happened to the line."""
         change = settings_change(event)
@@ -90,6 +132,20 @@ class Judging:
             return True
         numbers = [no for no in (transaction.request, transaction.response) if no is not None]
         return self._first_after is None or min(numbers, default=0) <= self._first_after + 1
+
+    def _are_torn(self, closed: TransactionColumns, hole: int) -> Masks:
+        """The same for many."""
+        import numpy as np
+
+        from dissectors.columns import NONE, VERDICTS
+
+        doubtful: Masks = np.isin(closed.verdict, [VERDICTS.index(verdict) for verdict in _DOUBTFUL])
+        if self._first_after is None:
+            return doubtful
+        both = (closed.request != NONE) & (closed.response != NONE)
+        least = np.where(both, np.minimum(closed.request, closed.response), np.maximum(closed.request, closed.response))
+        torn: Masks = doubtful & ((closed.start <= hole) | (least <= self._first_after + 1))
+        return torn
 
     def findings(self) -> tuple[Finding, ...]:
         """All findings so far, the gravest first. Where hardly anything is a frame, the line speaks alone."""

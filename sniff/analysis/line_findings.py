@@ -31,6 +31,9 @@ MOST_RESTS = 16
 """Stretches that are no frame and are asked what they may be."""
 
 RUBBISH_TOLD = 40  # the same where it is known what they are
+COUNTED_OCTETS = 4096
+"""Of longer rows the octets are not counted by value."""
+
 READ_LATE = 1_000_000
 """ns of slack over the adapter's latency that prove a late read (`sniff.engine.late_reads`)."""
 
@@ -83,11 +86,18 @@ class LineFindings:
         self._rows += 1
         self._now = max(self._now, event.end)
         self._octets += len(event.octets)
-        if len(event.octets) <= 4096:
+        if len(event.octets) <= COUNTED_OCTETS:
             self._values.update(event.octets)
         if self._sampled < SAMPLE_OCTETS:
             self._sample.append(Chunk(event.end, event.octets[:SAMPLE_OCTETS], event.marks))
             self._sampled += len(event.octets)
+        sender = self._see_event(row)
+        self._patterns.see(row.no, event, sender)
+        self._use.see(row.no, event, row.placement.role if row.placement is not None else Role.UNKNOWN)
+
+    def _see_event(self, row: Row) -> str:
+        """Take what is not the same for every row; gives the sender."""
+        event = row.event
         self._senders.see_marks(event)
         if event.marks:
             self._see_marks(row.no, event)
@@ -95,12 +105,9 @@ class LineFindings:
             self._damaged += 1
             self._damaged_here += any(mark.error & LineError.OVERRUN for mark in event.marks)
         if isinstance(event, Frame):
-            sender = self._see_frame(row, event)
-        else:
-            sender = BUS
-            self._see_noise(row.no, event)
-        self._patterns.see(row.no, event, sender)
-        self._use.see(row.no, event, row.placement.role if row.placement is not None else Role.UNKNOWN)
+            return self._see_frame(row, event)
+        self._see_noise(row.no, event)
+        return BUS
 
     def pass_by(self, row: Row) -> None:
         """Take a row of a search for settings: the bus was not silent, and that is all it says."""
@@ -156,14 +163,18 @@ class LineFindings:
             self._good += 1
             self._in_frames += len(frame.octets)
         self._senders.see(sender, row.no, frame)
-        if frame.slack <= self._session.timing.latency + READ_LATE:
+        self._settle_strays(sender, frame.slack)
+        return sender
+
+    def _settle_strays(self, sender: str, slack: int) -> None:
+        """A frame has come, read at most `slack` ns late: what the octets before it were."""
+        if slack <= self._session.timing.latency + READ_LATE:
             for no, noise in self._pending:
                 self._senders.stray(sender, "LN201", no, noise)
             self._begins.forget()
         else:
             self._begins.take_back(self._senders)
         self._pending.clear()  # before a frame that was read late they are the rest of one that was torn
-        return sender
 
     def _see_noise(self, no: int, noise: Noise) -> None:
         if noise.reason in (Reason.BREAK, Reason.PAD) or any(m.error & LineError.BREAK for m in noise.marks):

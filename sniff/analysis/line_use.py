@@ -4,11 +4,16 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
-from dissectors.findings import Finding, Severity, Tally, found
+from dissectors.findings import EVIDENCE_MAX, Finding, Severity, Tally, found
 from dissectors.frame import Event, Frame, Role
 from dissectors.line import NS_PER_S, LineSettings
 from sniff.analysis.line_rules import LINE_RULES as RULES
+
+if TYPE_CHECKING:
+    from dissectors.columns import Times
+    from sniff.engine.table import Table
 
 SHORT, LONG = 10, 30
 """Seconds over which a load is looked at: the first for a note, the second for a warning."""
@@ -43,6 +48,40 @@ class LineUse:
         busy = len(event.octets) * self._char
         self._busy += busy
         second = event.end // NS_PER_S
+        self._load(second, min(busy, event.end - second * NS_PER_S), busy)
+        if role is Role.BROADCAST and isinstance(event, Frame) and event.ok:
+            self._broadcast.add(event.start, no)
+            self._broadcast_busy += busy
+
+    def take(self, table: Table, broadcast: Times) -> None:
+        """Take rows, one or more, behind the first of the bus. `broadcast`: places of the good broadcasts."""
+        import numpy as np
+
+        starts, ends = table.frames.start, table.frames.end
+        busy = table.frames.length.astype(np.int64) * self._char
+        self._last = max(self._last, int(ends.max()))
+        self._busy += int(busy.sum())
+        if (ends[1:] < ends[:-1]).any():  # times that run backwards
+            for end, of_row in zip(ends.tolist(), busy.tolist(), strict=True):
+                self._load(end // NS_PER_S, min(of_row, end % NS_PER_S), of_row)
+        else:
+            seconds = ends // NS_PER_S
+            late = np.minimum(busy, ends - seconds * NS_PER_S)
+            begins = np.flatnonzero(np.append(True, seconds[1:] != seconds[:-1]))
+            sums = (seconds[begins], np.add.reduceat(late, begins), np.add.reduceat(busy, begins))
+            for second, of_second, of_both in zip(*(one.tolist() for one in sums), strict=True):
+                self._load(second, of_second, of_both)
+        self._broadcast.add_many(starts[broadcast].tolist(), (table.first + broadcast[:EVIDENCE_MAX]).tolist())
+        self._broadcast_busy += int(busy[broadcast].sum())
+
+    def _load(self, second: int, late: int, busy: int) -> None:
+        """Octets that took `busy` ns, `late` of them in a second and the rest in the one before it."""
+        self._come_to(second)
+        self._seconds[-1] += late
+        if late < busy and len(self._seconds) > 1:
+            self._seconds[-2] += busy - late
+
+    def _come_to(self, second: int) -> None:
         if self._second is None:
             self._second = self._first_second = second
         while self._second < second:
@@ -52,13 +91,6 @@ class LineUse:
                 self._seconds.append(0)
                 break
             self._close_second()
-        late = min(busy, event.end - second * NS_PER_S)
-        self._seconds[-1] += late
-        if late < busy and len(self._seconds) > 1:
-            self._seconds[-2] += busy - late
-        if role is Role.BROADCAST and isinstance(event, Frame) and event.ok:
-            self._broadcast.add(event.start, no)
-            self._broadcast_busy += busy
 
     def _close_second(self) -> None:
         assert self._second is not None

@@ -5,11 +5,15 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 from dissectors.findings import Finding, Severity, Tally, counted
 from dissectors.line import NS_PER_S
-from dissectors.tracker import Transaction, Verdict
+from dissectors.tracker import PASSING, Transaction, Verdict
 from sniff.analysis.line_rules import LINE_RULES as RULES
+
+if TYPE_CHECKING:
+    from dissectors.columns import TransactionColumns
 
 LOST_IN_A_ROW = 3
 ANSWERED_BEFORE = 5
@@ -54,6 +58,33 @@ class LostTogether:
             station.answered += 1
             station.last_answer = transaction.end
 
+    def settle_many(self, closed: TransactionColumns) -> None:
+        """Take transactions that closed; those of stations that all answer as columns."""
+        import numpy as np
+
+        from dissectors.columns import NONE, VERDICTS
+
+        passing = [code for code, name in enumerate(closed.names) if name in PASSING]
+        asked = (closed.station != NONE) & (closed.request != NONE) & ~np.isin(closed.kind, passing)
+        missed = asked & (closed.verdict == VERDICTS.index(Verdict.NO_RESPONSE))
+        stations, firsts = np.unique(closed.station[asked], return_index=True)
+        one_by_one = set(closed.station[missed].tolist())
+        one_by_one |= {number for number, station in self._stations.items() if station.missed}
+        for number in stations[np.argsort(firsts)].tolist():  # in the order of first sight
+            if number not in self._stations and len(self._stations) < MOST_STATIONS:
+                self._stations[number] = _Station()
+        answered = asked & (closed.response != NONE)
+        places = np.flatnonzero(answered)
+        numbers, lasts, counts = np.unique(closed.station[places][::-1], return_index=True, return_counts=True)
+        for number, last, count in zip(numbers.tolist(), lasts.tolist(), counts.tolist(), strict=True):
+            station = self._stations.get(number)
+            if station is not None and number not in one_by_one:
+                station.answered += count
+                station.last_answer = int(closed.end[places[len(places) - 1 - last]])
+        doubtful = asked & np.isin(closed.station, sorted(one_by_one))
+        for place in np.flatnonzero(doubtful).tolist():
+            self.settle(closed.transaction(place))
+
     def _back(self, station: _Station, time: int) -> None:
         if station.missed >= LOST_IN_A_ROW and station.answered >= ANSWERED_BEFORE:
             station.losses.append((station.last_answer, station.first_missed, time))
@@ -70,7 +101,7 @@ class LostTogether:
         span = now - first
         while losses:
             moment = losses[0][1]  # the first miss: who answered after it was not lost then
-            together = [loss for loss in losses if loss[0] <= moment]
+            together = [loss for loss in losses if loss is losses[0] or loss[0] <= moment]
             names = sorted({loss[3] for loss in together})
             window = max(loss[1] for loss in together) - min(loss[0] for loss in together)
             losses = [loss for loss in losses if loss not in together]

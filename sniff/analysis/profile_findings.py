@@ -17,6 +17,7 @@ from dissectors.profiles import Devices, Entry, Profile
 from dissectors.profiles import Role as EntryRole
 from dissectors.profiles.decoding import Value, bit_words, decode, in_range, number, plain_name, state_words
 from dissectors.readings import How, Reading
+from dissectors.row_columns import RowColumns, in_turn
 from dissectors.subject import About, Subject, station
 from dissectors.tracker import Placement, Transaction
 from dissectors.words import milliseconds
@@ -141,6 +142,10 @@ class ProfileFindings:
             if sample.value.how is not How.WRITE:
                 self._judge_value(sample)
         self._judge_time(transaction)
+
+    def take(self, rows: RowColumns) -> None:
+        """Take rows and what they closed (`dissectors.row_columns.JudgesColumns`)."""
+        in_turn(self, rows)
 
     def findings(self) -> tuple[Finding, ...]:
         """All findings so far, in the order of first sight.

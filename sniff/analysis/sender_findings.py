@@ -104,6 +104,21 @@ class Senders:
         self.before, self._end = name, frame.end
         return sender
 
+    def count(self, name: str, frames: int, octets: int) -> None:
+        """Count good frames without line errors, at their sender where it is kept."""
+        self.frames += frames
+        sender = self.by_name.get(name)
+        if sender is not None:
+            sender.frames += frames
+            sender.octets += octets
+
+    def see_good(self, name: str, end: int) -> None:
+        """Take good frames without line errors that follow one another, which `count` has had: who sent the last of
+        them, and when it ended (ns)."""
+        self._runs.see([], 1, True)
+        self._close_packet()
+        self.before, self._end = name, end
+
     def see_break(self, no: int, time: int, inside: bool) -> None:
         """Take a break; those inside a frame were counted with it."""
         self.breaks.add(time, no)

@@ -12,18 +12,25 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 from dissectors.findings import Finding, Tally, counted, found
 from dissectors.frame import Chunk, Event, Frame, LineError
-from dissectors.histogram import Histogram
 from dissectors.line import MS, NS_PER_S
 from dissectors.tracker import Transaction
 from dissectors.words import milliseconds
 from sniff.analysis.line_rules import LINE_RULES as RULES
 from sniff.analysis.lost_together import LostTogether
 from sniff.analysis.other_settings import Fit, what_fits
+from sniff.analysis.rounds import Rounds
+from sniff.analysis.sender_findings import MASTER
+from sniff.analysis.silences import Silences
 from sniff.analysis.slower_bus import slower_by
 from sniff.engine.session import LineEvent, Session
+
+if TYPE_CHECKING:
+    from dissectors.columns import Masks, Times, TransactionColumns
+    from sniff.engine.table import Table
 
 MAINS = {20 * MS: "50 Hz", 10 * MS: "twice 50 Hz", 50 * MS // 3: "60 Hz", 25 * MS // 3: "twice 60 Hz"}
 """Periods, ns: once a wave, and twice (each half wave, as of a dimmer)."""
@@ -46,21 +53,12 @@ BURST_OCTETS = 64
 """Octets of a burst that are compared with others."""
 
 STRONG = 3
-MOST_ROUNDS = 300
 STEADY = 0.08
 
 UNREADABLE_OCTETS = 40
 UNREADABLE_ROWS = 6
 UNREADABLE_KEPT = 8
 STRETCH_OCTETS = 800
-
-SILENT_LEAST = 3 * NS_PER_S
-SILENT_WAITING = 10 * NS_PER_S
-"""The same behind a request: a master may wait so long for an answer."""
-
-SILENT_TIMES = 30
-SILENT_KEPT = 8
-ROWS_AROUND = 50
 
 _MARKS = LineError.PARITY | LineError.FRAMING | LineError.BREAK
 
@@ -86,15 +84,6 @@ class _Burst:
 
 
 @dataclass(slots=True)
-class _Round:
-    """One frame that comes again and again: when first and last, and how often after the first time."""
-
-    first: int
-    last: int
-    count: int = 0
-
-
-@dataclass(slots=True)
 class _Stretch:
     """Octets without a good frame among them."""
 
@@ -117,9 +106,7 @@ class TimePatterns:
         self._session = session
         self._char = session.line.char
         self._latency = session.adapter.latency
-        self._first: int | None = None
-        self._now = 0
-        self._rows = self._good = self._good_since = 0
+        self._good = self._good_since = 0
         # hum
         self._locks = {period: _Lock() for period in MAINS}
         self._trouble_at: int | None = None
@@ -129,30 +116,29 @@ class TimePatterns:
         self._apart: Counter[int] = Counter()  # ms from disturbance to disturbance
         # bursts
         self._bursts: list[_Burst] = []
-        self._rounds: dict[bytes, _Round] = {}
+        self._rounds = Rounds()
         # stretches that cannot be read
         self._stretch: _Stretch | None = None
         self._stretches: list[_Stretch] = []
-        # silence
-        self._gaps = Histogram()
-        self._silences: list[tuple[int, int, int]] = []  # begin, end, rows before
-        self._hole = False
-        self._asked = False  # the newest row is a request
+        self._silences = Silences()
         self._lost = LostTogether()
 
     # ---- taking in
 
     def see(self, no: int, event: Event, sender: str) -> None:
         """Take the next row."""
-        self._see_silence(event)
-        self._asked = sender == "master"
-        self._rows += 1
+        self._silences.see(event, sender == MASTER)
+        if isinstance(event, Frame) and event.ok and not is_struck(event):
+            self._rounds.see(event.octets, event.start)
+        self.see_trouble(no, event, sender)
+
+    def see_trouble(self, no: int, event: Event, sender: str) -> None:
+        """Take a row that `take` left out, at its place among those of `see_good`."""
         is_good = isinstance(event, Frame) and event.ok
         wrong = next((mark for mark in event.marks if mark.error & _MARKS), None)
         if is_good and wrong is None:
             self._good += 1
             self._good_since += 1
-            self._see_round(event)
             self._end_stretch()
             self._step(event.end, False)
             return
@@ -171,29 +157,34 @@ class TimePatterns:
         else:
             self._see_unreadable(no, event)
 
+    def take(self, table: Table, sound: Times, asks: Masks) -> None:
+        """Take rows, behind the first of the bus, for what is the same whatever is between them.
+
+        `sound`: places of the good frames without line errors. `asks`: of each row, whether a master without an
+        address sent it.
+        """
+        self._silences.take(table.frames.start, table.frames.end, asks)
+        self._rounds.take(table, sound)
+
+    def see_good(self, ends: Times) -> None:
+        """Take good frames without line errors that follow one another, which `take` has had. `ends`: ns."""
+        self._good += len(ends)
+        self._good_since += len(ends)
+        self._end_stretch()
+        self._step_over(ends)
+
     def settle(self, transaction: Transaction) -> None:
         """Take a transaction that closed."""
         self._lost.settle(transaction)
 
+    def settle_many(self, closed: TransactionColumns) -> None:
+        """Take transactions that closed."""
+        self._lost.settle_many(closed)
+
     def add_line_event(self, event: LineEvent) -> None:
         """Take something that happened to the line: over a hole nothing is known."""
         if event.kind.is_hole:
-            self._hole = True
-
-    def _see_silence(self, event: Event) -> None:
-        if self._first is None:
-            self._first = event.start
-        else:
-            gap = max(0, event.start - self._now)
-            self._gaps.add(gap)
-            if (
-                gap >= (SILENT_WAITING if self._asked else SILENT_LEAST)
-                and not self._hole
-                and len(self._silences) < 20 * SILENT_KEPT
-            ):
-                self._silences.append((self._now, event.start, self._rows))
-        self._hole = False
-        self._now = max(self._now, event.end)
+            self._silences.miss()
 
     def _step(self, moment: int, is_trouble: bool) -> bool:
         """Measure a moment against the trouble before it; whether it is one of its own."""
@@ -217,6 +208,19 @@ class TimePatterns:
             self._other_steps += 1
         return is_trouble
 
+    def _step_over(self, moments: Times) -> None:
+        """The same as `_step` for moments without trouble, one or more."""
+        import numpy as np
+
+        before = self._trouble_at
+        if before is None or int(moments[0]) - before > HUM_SPAN < int(moments[-1]) - before:
+            return
+        since = moments - before
+        since = since[(since > SAME) & (since <= HUM_SPAN)]
+        self._other_steps += len(since)
+        for period, lock in self._locks.items():
+            lock.others += complex(np.exp(2j * math.pi * ((since % period) / period)).sum())
+
     def _see_trouble(self, no: int, event: Event, sender: str) -> None:
         bursts = self._bursts
         marked = sum(bool(mark.error & _MARKS) for mark in event.marks)
@@ -232,25 +236,6 @@ class TimePatterns:
             octets = event.octets[:BURST_OCTETS]
             bursts.append(_Burst(event.start, event.end, {sender}, [no], self._good_since, struck, marked > 0, octets))
             self._good_since = 0
-
-    def _see_round(self, event: Event) -> None:
-        """Measure how often the same frame comes: the bus's own rhythm."""
-        rounds = self._rounds
-        known = rounds.get(event.octets)
-        if known is not None:
-            known.count += 1
-            known.last = event.start
-        elif len(rounds) < MOST_ROUNDS:
-            rounds[event.octets] = _Round(event.start, event.start)
-
-    def _is_own_rhythm(self, interval: int) -> bool:
-        """Whether something on this bus comes at that interval anyhow, or at a half or a third of it."""
-        for one in self._rounds.values():
-            if one.count >= 4:
-                every = (one.last - one.first) / one.count
-                if any(abs(interval - times * every) <= 0.1 * interval for times in (1, 2, 3)):
-                    return True
-        return False
 
     def _see_unreadable(self, no: int, event: Event) -> None:
         stretch = self._stretch
@@ -278,8 +263,8 @@ class TimePatterns:
         yield from self._in_step_with_mains()
         yield from self._in_bursts()
         yield from self._unreadable()
-        yield from self._silent()
-        yield from self._lost.findings(self._first or 0, self._now)
+        yield from self._silences.findings()
+        yield from self._lost.findings(self._silences.first or 0, self._silences.now)
 
     def _in_step_with_mains(self) -> Iterator[Finding]:
         if self._steps < HUM_LEAST:
@@ -336,7 +321,7 @@ class TimePatterns:
         between = sorted(burst.good_before for burst in bursts[1:])[len(intervals) // 2]
         if usual < NS_PER_S or steady < 0.75 * len(intervals) or between < 10:
             return None
-        if self._is_own_rhythm(usual):
+        if self._rounds.is_own(usual):
             return None
         if not struck and not self._is_noise(bursts):
             return None  # somebody who speaks at that interval
@@ -362,6 +347,7 @@ class TimePatterns:
 
     def _unreadable(self) -> Iterator[Finding]:
         told: list[tuple[_Stretch, str]] = []
+        begin = self._silences.first or 0
         last = [self._stretch] if self._stretch is not None and _is_unreadable(self._stretch) else []
         for stretch in [*self._stretches, *last]:
             words = self._words_of(stretch)
@@ -371,8 +357,7 @@ class TimePatterns:
             return
         first = told[0][0]
         spans = ", ".join(
-            f"{(one.first - (self._first or 0)) / NS_PER_S:.1f} … {(one.last - (self._first or 0)) / NS_PER_S:.1f} s"
-            for one, _ in told
+            f"{(one.first - begin) / NS_PER_S:.1f} … {(one.last - begin) / NS_PER_S:.1f} s" for one, _ in told
         )
         octets = sum(one.octets for one, _ in told)
         seen = f"{octets} octets and not one good frame at {spans}, good frames otherwise; {told[0][1]}"
@@ -398,32 +383,11 @@ class TimePatterns:
             return f"{stretch.marked / stretch.octets:.0%} of them have line errors: another baud rate or format"
         return ""
 
-    def _silent(self) -> Iterator[Finding]:
-        usual = self._gaps.quantile(0.98)
-        if usual is None or not self._silences:
-            return
-        limit = max(SILENT_LEAST, SILENT_TIMES * usual)
-        long = [one for one in self._silences if one[1] - one[0] >= limit]
-        whole = [one for one in long if one[2] >= ROWS_AROUND and self._rows - one[2] >= ROWS_AROUND // 2]
-        if not whole or len(long) > SILENT_KEPT or _is_regular([end - begin for begin, end, _ in long]):
-            return
-        tally = Tally()
-        for begin, _, row in whole:
-            tally.add(begin, row, row + 1)
-        longest = max(end - begin for begin, end, _ in whole)
-        at = ", ".join(f"{(begin - (self._first or 0)) / NS_PER_S:.1f} s" for begin, _, _ in whole)
-        seen = (
-            f"not one octet for {longest / NS_PER_S:.1f} s, {longest // max(usual, MS)} times as long as pauses are "
-            f"here; from {at} on, and everything went on as before"
-        )
-        yield tally.found(RULES["LN304"], "bus", seen)
-
 
 def _is_unreadable(stretch: _Stretch) -> bool:
     return stretch.octets >= UNREADABLE_OCTETS and stretch.count >= UNREADABLE_ROWS
 
 
-def _is_regular(spans: list[int]) -> bool:
-    """Whether pauses belong to the bus's own rhythm: three or more that are alike."""
-    middle = sorted(spans)[len(spans) // 2]
-    return len(spans) >= 3 and sum(abs(span - middle) <= 0.25 * middle for span in spans) >= 0.7 * len(spans)
+def is_struck(event: Event) -> bool:
+    """Whether a row has a line error that is not an overrun."""
+    return any(mark.error & _MARKS for mark in event.marks)

@@ -14,7 +14,6 @@ from sniff.analysis.points import PointReader, PointTable, Sample
 from sniff.analysis.summary import Summary
 from sniff.bus.telling_rows import telling_rows, telling_transactions
 from sniff.engine.engine import Output
-from sniff.engine.observer import TableObserver
 from sniff.engine.session import LineEvent, Session
 
 if TYPE_CHECKING:
@@ -68,15 +67,10 @@ class BusModel:
             self.points.add(self.samples)
 
     def add_table(self, table: Table) -> None:
-        """Take many rows at once; who only takes row by row gets them so."""
+        """Take many rows at once."""
         self.version += 1
         self.summary.add_table(table)
-        judging: object = self.judging
-        if isinstance(judging, TableObserver):
-            judging.add_table(table)
-        else:
-            for output in table.outputs():
-                self.judging.add(output)
+        self.judging.add_table(table)
         if self._with_points:
             self.samples = self.reader.add(telling_rows(table, telling_transactions(table)))
             self.points.add(self.samples)

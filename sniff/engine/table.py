@@ -103,6 +103,12 @@ class Table:
         return heard
 
     @property
+    def has_true_times(self) -> bool:
+        """Whether the columns hold all times: those of a damaged file may be out of their range."""
+        ends, most = (self.frames.start, self.frames.end), 1 << 62
+        return not len(self) or all(-most < int(one.min()) and int(one.max()) < most for one in ends)
+
+    @property
     def good(self) -> Masks:
         """bool[n]: frames of which nothing is damaged, with a good check where they have one (`Frame.ok`)."""
         frames = self.frames
@@ -146,6 +152,30 @@ class Table:
             yield Output((row,), tuple(map(self.transaction, range(begin, at))))
         if at < len(closed):
             yield Output((), tuple(map(self.transaction, range(at, len(closed)))))
+
+    def part(self, begin: int, end: int) -> Table:
+        """Rows [begin, end) with what they closed; those that no row closed go with the last row.
+
+        They share their octets with the whole.
+        """
+        closed_by = np.maximum.accumulate(np.where(self.closed_by < 0, len(self), self.closed_by))
+        of_rows = slice(*np.searchsorted(closed_by, (begin, end if end < len(self) else len(self) + 1)).tolist())
+        rows, closed_by = slice(begin, end), self.closed_by[of_rows]
+        return replace(
+            self,
+            first=self.first + begin,
+            frames=self.frames.take(rows),
+            slack=self.slack[rows],
+            is_frame=self.is_frame[rows],
+            placed=PlacementColumns(*(getattr(self.placed, one.name)[rows] for one in fields(PlacementColumns))),
+            transactions=self.transactions.take(of_rows),
+            closed_by=np.where(closed_by < 0, -1, closed_by - begin),
+            odd={place - begin: row for place, row in self.odd.items() if begin <= place < end},
+        )
+
+    def without(self, torn: Masks) -> Table:
+        """The same rows without some of the transactions."""
+        return replace(self, transactions=self.transactions.take(~torn), closed_by=self.closed_by[~torn])
 
     def _placement(self, place: int) -> Placement | None:
         placed = self.placed

@@ -15,8 +15,8 @@ from dissectors.line import LineSettings
 from dissectors.modbus.envelope import seal_rtu
 from dissectors.profiles import parse_text
 from dissectors.profiles.model import Kind
-from sniff.engine.session import Session
 from sniff.bus.capture_writer import create
+from sniff.engine.session import Session
 
 LINE = LineSettings.parse("9600,8E1")
 MS = 1_000_000

@@ -1,0 +1,72 @@
+"""What the rules keep in mind while a Modbus line is judged: what is open, and what is still to be settled. Bounded."""
+
+from __future__ import annotations
+
+from collections import deque
+
+from dissectors.frame import Flaw, Frame
+from dissectors.line import Timing
+from dissectors.modbus.asked import Asked
+from dissectors.modbus.bare_ends import BareEnds
+from dissectors.modbus.evidence import Evidence
+from dissectors.modbus.gaps import Gaps
+from dissectors.modbus.learnt import Learnt
+from dissectors.modbus.station_record import Lost, Station
+from dissectors.modbus.torn import TornFrames
+
+MS = 1_000_000
+SLOW_UNLEARNT = 500 * MS
+"""An answer that takes longer is slow while the master's timeout is not known."""
+
+LAST_STANDARD_UNIT = 247
+OPEN_KEPT = 4096
+HASTY_KEPT = 256
+LOST_KEPT = 64
+FINAL_KEPT = 64
+BEGIN = 5
+"""Octets of a request that no noise makes by chance: unit, function, address, half a quantity."""
+
+
+def slow_limit(timeout: int | None) -> int | None:
+    """From when on an answer is slow, ns, by the master's timeout; None while that is not known."""
+    return None if timeout is None else timeout * 7 // 10
+
+
+class Remembered:
+    """State of the rules between one row and the next; `findings.py` and `judging_columns.py` move it on."""
+
+    def __init__(self, timing: Timing) -> None:
+        self.timing = timing
+        self.learnt = Learnt(timing)
+        self.seen = Evidence(timing)
+        self.gaps = Gaps(timing, self.seen, self.learnt)
+        self.ends = BareEnds(timing, self.seen)
+        self.asked: dict[int, Asked] = {}  # by transaction
+        self.open: Asked | None = None  # the newest request, while nothing has come after it
+        self.broadcast: Asked | None = None  # likewise
+        self.codes: dict[int, int] = {}  # exception codes by transaction
+        self.answers: dict[int, bytes] = {}  # good answers by transaction
+        self.elsewhere: dict[int, int] = {}  # requests (by frame) that another unit answered, and which
+        self.repeats: deque[int] = deque(maxlen=64)  # the last transactions that repeated another
+        self.copied: deque[int | None] = deque(maxlen=64)  # the last transactions whose request came twice at once
+        self.no_requests: deque[int] = deque(maxlen=64)  # frames that the tracker takes for requests, but are none
+        self.damaged: deque[int] = deque(maxlen=64)  # transactions of the last damaged answers
+        self.flaws: dict[int, Flaw] = {}  # of damaged frames, by transaction
+        self.newest: int | None = None  # the transaction of the newest request
+        self.stray: dict[int, bytes] = {}  # octets that are no good frame, by the transaction they came in
+        self.lost: dict[int, Lost] = {}  # requests without answer, by transaction
+        self.begins: set[bytes] = set()  # the first octets of good requests
+        self.late_read = 0  # the newest frame that was read later than the adapter explains
+        self.torn = TornFrames()
+        self.bad_ends: dict[int, tuple[int, int, Frame]] = {}  # damaged answers (station, row), by transaction
+        self.marked: deque[int] = deque(maxlen=64)  # transactions with line errors in what came in answer
+        self.waits: dict[int, int] = {}  # by request that nothing followed: until the next one, ns
+        self.final: dict[int, bytes] = {}  # the last answers, by transaction
+
+    def station(self, unit: int) -> Station:
+        """What is known of a station."""
+        stations = self.seen.stations
+        station = stations.get(unit)
+        if station is None:
+            station = stations[unit] = Station()
+        return station

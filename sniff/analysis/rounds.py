@@ -1,0 +1,108 @@
+"""The bus's own rhythm: how often the same frame comes. Pure, bounded."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
+
+    from dissectors.columns import Octets, Times
+    from sniff.engine.table import Table
+
+MOST_ROUNDS = 300
+
+
+@dataclass(slots=True)
+class _Round:
+    """One frame that comes again and again: when first and last, and how often after the first time."""
+
+    first: int
+    last: int
+    count: int = 0
+
+
+class Rounds:
+    """Fed the good frames of a bus; the first MOST_ROUNDS different ones are followed."""
+
+    def __init__(self) -> None:
+        self._rounds: dict[bytes, _Round] = {}
+        self._by_mark: dict[int, _Round] = {}  # the same, as far as columns have asked
+
+    def see(self, octets: bytes, start: int) -> None:
+        """Take a frame. `start`: ns."""
+        known = self._rounds.get(octets)
+        if known is not None:
+            known.count += 1
+            known.last = start
+        elif len(self._rounds) < MOST_ROUNDS:
+            self._rounds[octets] = _Round(start, start)
+
+    def take(self, table: Table, places: Times) -> None:
+        """Take the frames at some places of a table, ascending."""
+        import numpy as np
+
+        from dissectors.fingerprints import LONGEST
+
+        frames = table.frames.take(places)
+        if not len(frames):
+            return
+        if int(frames.length.max()) > LONGEST or int(frames.length.min()) < 1:
+            for begin, length, start in zip(
+                frames.offset.tolist(), frames.length.tolist(), frames.start.tolist(), strict=True
+            ):
+                self.see(table.octets[begin : begin + length].tobytes(), start)
+            return
+        marks = _marks(table.octets, frames.offset, frames.length.astype(np.int64))
+        order = np.argsort(marks, kind="stable")
+        held = marks[order]
+        begins = np.flatnonzero(np.append(True, held[1:] != held[:-1]))
+        ends = np.append(begins[1:], len(held))
+        firsts, lasts = order[begins], order[ends - 1]
+        if len(self._rounds) < MOST_ROUNDS:
+            chosen = np.argsort(firsts)  # in the order of first sight
+        else:
+            self._mark()
+            known = np.array(sorted(self._by_mark), np.uint64)
+            at = np.minimum(np.searchsorted(known, held[begins]), len(known) - 1)
+            chosen = np.flatnonzero(known[at] == held[begins])
+        for group in chosen.tolist():
+            first, times = int(firsts[group]), int(ends[group] - begins[group])
+            begin = int(frames.offset[first])
+            octets = table.octets[begin : begin + int(frames.length[first])].tobytes()
+            self.see(octets, int(frames.start[first]))
+            one = self._rounds.get(octets)
+            if times > 1 and one is not None:
+                one.count += times - 1
+                one.last = int(frames.start[lasts[group]])
+
+    def _mark(self) -> None:
+        """Say what columns know each of the frames by."""
+        import numpy as np
+
+        from dissectors.fingerprints import LONGEST
+
+        if len(self._by_mark) == len(self._rounds):
+            return
+        for octets, one in self._rounds.items():
+            held = np.frombuffer(octets, np.uint8)
+            if 0 < len(held) <= LONGEST:
+                mark = _marks(held, np.zeros(1, np.int64), np.array([len(held)], np.int64))
+                self._by_mark[int(mark[0])] = one
+
+    def is_own(self, interval: int) -> bool:
+        """Whether something on this bus comes at that interval (ns) anyhow, or at a half or a third of it."""
+        for one in self._rounds.values():
+            if one.count >= 4:
+                every = (one.last - one.first) / one.count
+                if any(abs(interval - times * every) <= 0.1 * interval for times in (1, 2, 3)):
+                    return True
+        return False
+
+
+def _marks(octets: Octets, begins: Times, lengths: Times) -> npt.NDArray[np.uint64]:
+    from dissectors.fingerprints import fingerprints, gathered
+
+    return fingerprints(*gathered(octets, begins, lengths), lengths)

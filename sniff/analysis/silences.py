@@ -1,0 +1,102 @@
+"""Silences of a bus that is never silent, with everything as before behind them. Pure, bounded."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from dissectors.findings import Finding, Tally
+from dissectors.frame import Event
+from dissectors.histogram import Histogram
+from dissectors.line import MS, NS_PER_S
+from sniff.analysis.line_rules import LINE_RULES as RULES
+
+if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
+
+SILENT_LEAST = 3 * NS_PER_S
+SILENT_WAITING = 10 * NS_PER_S
+"""The same behind a request: a master may wait so long for an answer."""
+
+SILENT_TIMES = 30
+SILENT_KEPT = 8
+ROWS_AROUND = 50
+
+
+class Silences:
+    """Fed every row of one bus. `first`, `now`: ns, begin of the first row and the latest end; `first` None before."""
+
+    def __init__(self) -> None:
+        self.first: int | None = None
+        self.now = 0
+        self._rows = 0
+        self._gaps = Histogram()
+        self._silences: list[tuple[int, int, int]] = []  # begin, end, rows before
+        self._hole = False
+        self._asked = False  # the newest row is a request
+
+    def see(self, event: Event, asks: bool) -> None:
+        """Take the next row. `asks`: whether a master without an address sent it."""
+        if self.first is None:
+            self.first = event.start
+        else:
+            gap = max(0, event.start - self.now)
+            self._gaps.add(gap)
+            self._see_gap(gap, self._asked, (self.now, event.start, self._rows))
+        self._hole = False
+        self.now = max(self.now, event.end)
+        self._asked = asks
+        self._rows += 1
+
+    def take(self, starts: npt.NDArray[np.int64], ends: npt.NDArray[np.int64], asks: npt.NDArray[np.bool_]) -> None:
+        """Take rows, one or more, behind the first."""
+        import numpy as np
+
+        before = np.maximum(np.maximum.accumulate(np.append(self.now, ends[:-1])), self.now)
+        gaps = np.maximum(starts - before, 0)
+        self._gaps.add_many(gaps)
+        for place in np.flatnonzero(gaps >= SILENT_LEAST).tolist():
+            asked = bool(asks[place - 1]) if place else self._asked
+            self._hole = self._hole and not place
+            self._see_gap(int(gaps[place]), asked, (int(before[place]), int(starts[place]), self._rows + place))
+        self._hole = False
+        self.now = max(self.now, int(ends.max()))
+        self._asked = bool(asks[-1])
+        self._rows += len(starts)
+
+    def miss(self) -> None:
+        """Octets may be lost: over a hole nothing is known."""
+        self._hole = True
+
+    def _see_gap(self, gap: int, asked: bool, silence: tuple[int, int, int]) -> None:
+        long = gap >= (SILENT_WAITING if asked else SILENT_LEAST)
+        if long and not self._hole and len(self._silences) < 20 * SILENT_KEPT:
+            self._silences.append(silence)
+
+    def findings(self) -> Iterator[Finding]:
+        """What there is to say so far."""
+        usual = self._gaps.quantile(0.98)
+        if usual is None or not self._silences:
+            return
+        limit = max(SILENT_LEAST, SILENT_TIMES * usual)
+        long = [one for one in self._silences if one[1] - one[0] >= limit]
+        whole = [one for one in long if one[2] >= ROWS_AROUND and self._rows - one[2] >= ROWS_AROUND // 2]
+        if not whole or len(long) > SILENT_KEPT or _is_regular([end - begin for begin, end, _ in long]):
+            return
+        tally = Tally()
+        for begin, _, row in whole:
+            tally.add(begin, row, row + 1)
+        longest = max(end - begin for begin, end, _ in whole)
+        at = ", ".join(f"{(begin - (self.first or 0)) / NS_PER_S:.1f} s" for begin, _, _ in whole)
+        seen = (
+            f"not one octet for {longest / NS_PER_S:.1f} s, {longest // max(usual, MS)} times as long as pauses are "
+            f"here; from {at} on, and everything went on as before"
+        )
+        yield tally.found(RULES["LN304"], "bus", seen)
+
+
+def _is_regular(spans: list[int]) -> bool:
+    """Whether pauses belong to the bus's own rhythm: three or more that are alike."""
+    middle = sorted(spans)[len(spans) // 2]
+    return len(spans) >= 3 and sum(abs(span - middle) <= 0.25 * middle for span in spans) >= 0.7 * len(spans)

@@ -1,0 +1,193 @@
+"""A bus is judged from tables as it is row by row, wherever the tables are cut."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from itertools import chain
+from pathlib import Path
+
+import pytest
+
+from dissectors.bacnet import bulk_ring_observer
+from dissectors.columns import Reads
+from dissectors.line import Timing
+from dissectors.profiles import Devices
+from dissectors.token_ring import WatchesColumns
+from sniff.analysis.judging import Judging
+from sniff.bus.offline import outputs
+from sniff.devices import noted_devices
+from sniff.engine.blocks import Block, blocks_of
+from sniff.engine.bulk import tables
+from sniff.engine.capture import CaptureError
+from sniff.engine.engine import Output, Row
+from sniff.engine.follow_settings import dissector_for
+from sniff.engine.session import Adapter, LineEvent, LineEventKind, Session
+from sniff.engine.table import Table
+from sniff.formats import read
+from tests.bench import bulk_mstp, bulk_rtu
+from tests.property import mstp_buses
+
+Bus = Callable[[float], tuple[Session, Reads]]
+
+CAPTURES = Path(__file__).parents[2] / "captures"
+SHARED = Path(__file__).parents[3] / "shared"
+FOLDERS = (CAPTURES, SHARED / "captures", SHARED / "cases")
+NAMES = sorted(
+    path
+    for path in chain.from_iterable(folder.rglob("*") for folder in FOLDERS if folder.exists())
+    if path.suffix in {".txt", ".pcap", ".pcapng", ".mcap"} and not path.name.endswith(".expect.txt")
+)
+
+
+def cut(table: Table, dice: random.Random, most: int) -> Iterator[Table]:
+    """A table in parts, of any size up to `most` rows."""
+    begin = 0
+    while begin < len(table):
+        end = min(len(table), begin + dice.choice((1, 2, 3, dice.randint(1, most), most)))
+        yield table.part(begin, end)
+        begin = end
+    if not len(table):
+        yield table
+
+
+def judged(session: Session, devices: Devices | None = None) -> Judging:
+    return Judging(session, dissector_for(session), devices)
+
+
+def by_rows(items: list[Table | LineEvent], judging: Judging) -> Judging:
+    for item in items:
+        if isinstance(item, LineEvent):
+            judging.add_line_event(item)
+            continue
+        for output in item.outputs():
+            judging.add(output)
+    return judging
+
+
+def by_tables(items: list[Table | LineEvent], judging: Judging, dice: random.Random, most: int) -> Judging:
+    for item in items:
+        if isinstance(item, LineEvent):
+            judging.add_line_event(item)
+            continue
+        for part in cut(item, dice, most):
+            judging.add_table(part)
+    return judging
+
+
+def same(one: Judging, other: Judging) -> None:
+    for found, expected in zip(one.findings(), other.findings(), strict=True):
+        assert found == expected
+    assert one.ring() == other.ring()
+
+
+@pytest.fixture(autouse=True)
+def short_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Even the shortest stretch is taken by columns: else only long captures would try them."""
+    monkeypatch.setattr(bulk_ring_observer, "RUN_LEAST", 1)
+
+
+@pytest.mark.parametrize("path", NAMES, ids=lambda path: path.name)
+def test_a_capture_is_judged_from_tables_as_row_by_row(path: Path) -> None:
+    try:
+        session = read(path).session
+        reference = judged(session, noted_devices(session))
+        for item in outputs(read(path).items(), session):
+            if isinstance(item, Output):
+                reference.add(item)
+            else:
+                reference.add_line_event(item)
+        items = list(tables(blocks_of(read(path).items()), session))
+    except CaptureError as error:
+        pytest.skip(str(error))
+    dice = random.Random(path.name)
+    for most in (1 << 30, 200, 20):
+        from_tables = judged(session, noted_devices(session))
+        same(by_tables(items, from_tables, dice, most), reference)
+
+
+def _mstp(damaged: float, answered: float = 1.0) -> tuple[Session, Reads]:
+    return Session("x", bulk_mstp.LINE, "mstp"), bulk_mstp.reads(12_000, damaged=damaged, answered=answered)
+
+
+def _held_back(damaged: float) -> tuple[Session, Reads]:
+    """An adapter that holds octets back for up to 16 ms: times say little."""
+    session, reads = _mstp(damaged)
+    times = -(-reads.times // 16_000_000) * 16_000_000
+    return replace(session, adapter=Adapter(latency=16_000_000)), replace(reads, times=times)
+
+
+def _unanswered(damaged: float) -> tuple[Session, Reads]:
+    return _mstp(damaged, answered=0.9)
+
+
+def _rtu(damaged: float, timing: Timing = bulk_rtu.TIMING) -> tuple[Session, Reads]:
+    table, length = bulk_rtu.frames(12_000)
+    spoilt = bulk_rtu.damaged(table, length, damaged) if damaged else table
+    session = Session("x", timing.line, "modbus-rtu", adapter=Adapter(latency=timing.latency))
+    return session, bulk_rtu.bus(spoilt, length, timing)
+
+
+@pytest.mark.parametrize("damaged", [0.0, 0.002, 0.03])
+@pytest.mark.parametrize("bus", [_mstp, _held_back, _unanswered, _rtu])
+def test_a_long_bus_is_judged_from_tables_as_row_by_row(bus: Bus, damaged: float) -> None:
+    session, reads = bus(damaged)
+    items = list(tables([Block(reads)], session))
+    expected = by_rows(items, judged(session))
+    dice = random.Random(7)
+    for most in (1 << 30, 3000, 40):
+        same(by_tables(items, judged(session), dice, most), expected)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_stations_that_do_anything_are_judged_from_tables_as_row_by_row(seed: int) -> None:
+    session = Session("x", mstp_buses.LINE, "mstp")
+    items = list(tables(blocks_of(iter(mstp_buses.conversation(random.Random(seed), 300))), session))
+    expected = by_rows(items, judged(session))
+    dice = random.Random(seed)
+    for most in (1 << 30, 100, 10):
+        same(by_tables(items, judged(session), dice, most), expected)
+
+
+def test_octets_lost_on_the_way_tear_the_same_transactions() -> None:
+    """The same hole between the same rows, wherever tables are cut: it is pending over several of them."""
+    session, reads = _mstp(0.01)
+    (table, *_) = (one for one in tables([Block(reads)], session) if isinstance(one, Table) and len(one))
+    head, tail = table.part(0, 5000), table.part(5000, len(table))
+    late = int(tail.frames.end[700])  # octets that were on their way are lost too
+    items = [head, LineEvent(late, LineEventKind.DROPPED, count=40), tail]
+    expected = by_rows(items, judged(session))
+    assert any(finding.code == "LN005" for finding in expected.findings())
+    dice = random.Random(3)
+    for most in (1 << 30, 300, 9):
+        same(by_tables(items, judged(session), dice, most), expected)
+
+
+@pytest.mark.parametrize("damaged", [0.0, 0.02])
+def test_a_ring_is_the_same_from_tables_and_row_by_row(damaged: float) -> None:
+    session, reads = _mstp(damaged)
+    one, other = (dissector_for(session).ring.observer(session.timing) for _ in range(2))  # type: ignore[union-attr]
+    assert isinstance(one, WatchesColumns)
+    for table in tables([Block(reads)], session):
+        assert isinstance(table, Table)
+        one.take(table)
+        for row in table.rows():
+            other.see(row.no, row.event, row.header)
+    assert one.ring() == other.ring()
+
+
+def test_most_rows_of_a_clean_ring_never_become_objects(monkeypatch: pytest.MonkeyPatch) -> None:
+    made = 0
+    row_of = Table.row
+
+    def counted(table: Table, place: int) -> Row:
+        nonlocal made
+        made += 1
+        return row_of(table, place)
+
+    session, reads = _mstp(0.0)
+    parts = [one for one in tables([Block(reads)], session) if isinstance(one, Table)]
+    monkeypatch.setattr(Table, "row", counted)
+    by_tables(parts, judged(session), random.Random(1), 1 << 30)
+    assert made < 0.1 * len(reads)

@@ -1,0 +1,61 @@
+"""The rules of a Modbus line remember the same from columns as from rows, whatever happens on it."""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+
+from dissectors import stretches
+from dissectors.modbus.findings import ModbusFindings
+from dissectors.row_columns import in_turn
+from sniff.engine.blocks import Block
+from sniff.engine.bulk import tables
+from sniff.engine.table import Table
+from tests.property.judge_memory import memory
+from tests.property.modbus_buses import TROUBLES, bus
+from tests.property.test_judging_tables import cut
+
+
+@pytest.mark.parametrize("is_ascii", [False, True], ids=["rtu", "ascii"])
+@pytest.mark.parametrize("seed", range(12))
+def test_what_is_remembered_is_the_same_wherever_tables_are_cut(seed: int, is_ascii: bool) -> None:
+    session, reads = bus(seed, is_ascii, exchanges=500)
+    made = [one for one in tables([Block(reads)], session) if isinstance(one, Table)]
+    by_rows = ModbusFindings(session.timing)
+    for table in made:
+        in_turn(by_rows, table)
+    dice, expected = random.Random(seed), memory(by_rows)
+    found = by_rows.findings()
+    for most in (1 << 30, 200, stretches.LEAST + 8):
+        by_columns = ModbusFindings(session.timing)
+        for table in made:
+            for part in cut(table, dice, most):
+                by_columns.take(part)
+        assert memory(by_columns) == expected
+        assert by_columns.findings() == found
+
+
+@pytest.mark.parametrize("trouble", TROUBLES)
+def test_each_trouble_alone_leaves_the_same(trouble: str) -> None:
+    session, reads = bus(99, trouble == "bare", exchanges=300, troubles=(trouble,))
+    made = [one for one in tables([Block(reads)], session) if isinstance(one, Table)]
+    by_rows, by_columns = ModbusFindings(session.timing), ModbusFindings(session.timing)
+    for table in made:
+        in_turn(by_rows, table)
+        by_columns.take(table)
+    assert memory(by_columns) == memory(by_rows)
+    assert by_columns.findings() == by_rows.findings()
+
+
+def test_of_a_quiet_bus_no_row_becomes_an_object_but_the_last(monkeypatch: pytest.MonkeyPatch) -> None:
+    session, reads = bus(3, exchanges=400, troubles=())
+    looked_at: list[int] = []
+    view = Table.row
+    made = [one for one in tables([Block(reads)], session) if isinstance(one, Table)]
+    monkeypatch.setattr(Table, "row", lambda table, place: looked_at.append(place) or view(table, place))
+    judge = ModbusFindings(session.timing)
+    for table in made:
+        judge.take(table)
+    assert len(looked_at) < 10
+    assert judge.seen.answers > 390
