@@ -89,12 +89,16 @@ class SnifferApp(Analyzer):
         if not self.screen_stack:  # the app is ending
             return
         changed = self.feed.poll()
-        was_searching, self.status = self.status.searching, self.feed.status()
+        was_searching, was_reading, self.status = self.status.searching, self.status.reading, self.feed.status()
         if was_searching and not self.status.searching:
             self._take_what_was_found()
         self._tell()
+        if self._worker is not None and (self.status.reading or self.status.judged < 1):
+            self._worker.resume()
         if changed:
             self.draw_screen()
+        if was_reading and not self.status.reading:  # there is nothing to follow any more
+            self.viewing.follow = False
         self._draw_header()
 
     def _tell(self) -> None:
@@ -141,7 +145,8 @@ class SnifferApp(Analyzer):
 
     def _work(self) -> None:
         screen = self.shown
-        busy = screen is not None and _is_whole(screen) and screen.work_left() and screen.work()
+        busy = self.feed.work()
+        busy |= screen is not None and _is_whole(screen) and screen.work_left() and screen.work()
         if not busy and self._worker is not None:
             self._worker.pause()
 

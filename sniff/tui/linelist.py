@@ -18,6 +18,7 @@ from textual.message import Message
 from textual.scroll_view import ScrollView
 from textual.strip import Strip
 
+from sniff.tui.analyzer import analyzer
 from sniff.tui.columns import Cell, Column, pieces
 from sniff.tui.index import Index
 from sniff.tui.viewing import Viewing
@@ -234,9 +235,12 @@ class LineList(ScrollView, can_focus=True, inherit_bindings=False):
             self.go_to(self.index[0])
 
     def action_last(self) -> None:
-        """Go to the last line."""
+        """Go to the last line, and follow where more come."""
         if len(self.index):
             self.go_to(self.index[len(self.index) - 1])
+            status = analyzer(self).status
+            growing = status.reading or (status.live and not status.ended)
+            self.viewing.follow = self.viewing.follow or (growing and not self.viewing.frozen)
 
     def action_choose(self) -> None:
         """Tell that the line under the cursor was chosen."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import ClassVar
 
 from textual.app import ComposeResult
@@ -19,6 +20,7 @@ from sniff.tui.field_tree import FieldTree
 from sniff.tui.filter_line import FilterLine
 from sniff.tui.frame_list import FrameList
 from sniff.tui.hex_pane import HexPane
+from sniff.tui.index import Known
 from sniff.tui.linelist import LineList
 from sniff.tui.prompt import Prompt
 from sniff.tui.screens.listing import ListingScreen
@@ -69,6 +71,11 @@ class FramesScreen(ListingScreen):
         """The filter on a row."""
         return self.viewing.accepts_row(number)
 
+    def known(self) -> Known | None:
+        """What columns say of rows."""
+        masks = self.viewing.masks
+        return None if masks is None else masks.rows
+
     def bounds(self) -> tuple[int, int]:
         """Rows in memory, up to the freeze."""
         return self.store.first_no, self.viewing.last_row
@@ -77,12 +84,10 @@ class FramesScreen(ListingScreen):
         """The row itself."""
         return self.viewing.row or None
 
-    def touched(self, closed: int) -> tuple[int, ...]:
-        """Request and response."""
-        transaction = self.store.closed_by_no(closed)
-        if transaction is None:
-            return ()
-        return tuple(no for no in (transaction.request, transaction.response) if no is not None)
+    def touched(self, first: int, last: int) -> Sequence[int]:
+        """Requests and responses."""
+        numbers: list[int] = self.store.kept.rows_of_closings(first, last).tolist()
+        return numbers
 
     def draw(self) -> None:
         """List first; details when the cursor rests."""

@@ -108,7 +108,8 @@ class PointsScreen(ViewScreen):
         if self._drawn == state or (self.viewing.frozen and self._drawn and self._drawn[1] == view):
             return
         self._drawn = state
-        now = self.store.rows[-1].event.end if self.store.rows else 0
+        newest = self.store.by_no(self.store.last_no)
+        now = newest.event.end if newest is not None else 0
         points = self._chosen()
         self.query_one(StationTable).fill((_key(point), _cells(point, now, self._pinned)) for point in points[:SHOWN])
         self._hidden = max(0, len(points) - SHOWN)
