@@ -86,6 +86,7 @@ class KeptTables:
         self._rows: dict[int, Row] = {}
         self._closings: dict[int, Transaction] = {}
         self._numbers: dict[int, int] = {}  # of closings, by id
+        self._names: dict[tuple[str, ...], tuple[str, ...]] = {}
         self._spans: tuple[Values, Values] | None = None
 
     # -- taking and letting go ---------------------------------------------------------------------------------
@@ -100,6 +101,9 @@ class KeptTables:
             table = _placed_at(table, first)
             if len(table) >= PACKED:
                 table = PackedTable(table)
+        if isinstance(table, PackedTable):  # most tables have the same texts
+            table.names = self._names.setdefault(table.names, table.names)
+            table.closed_names = self._names.setdefault(table.closed_names, table.closed_names)
         part = Part(table, first, self.last_closed + 1)
         self.parts.append(part)
         self.last_no += part.rows
