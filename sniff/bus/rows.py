@@ -60,7 +60,7 @@ class Store:
     `kept`: the rows and transactions. `errors`: numbers of rows that are damaged frames or noise, or that have a bad
     verdict; `error_total`: with those that were dropped; `failed`: how many of them began in each second. `marks`:
     octets by the line errors reported on them. `gaps`: silence between one row and the next, ns. `version` changes
-    whenever anything changed.
+    whenever anything changed, `heard` whenever more was heard.
     """
 
     def __init__(
@@ -86,6 +86,7 @@ class Store:
         self.gaps = Histogram()
         self.dropped_rows = 0
         self.version = 0
+        self.heard = 0
         self._last_end: int | None = None  # of the newest row that was heard with the right settings; else None
         self._later = _Later() if judge_later else None
         self._summary = Summary(session.line) if judge_later else None
@@ -97,6 +98,7 @@ class Store:
         if self._feeds_model:
             self.model.settle(session, dissector)
         self.version += 1
+        self.heard += 1
 
     def add(self, output: Output) -> None:
         """Take what the engine gave."""
@@ -139,11 +141,13 @@ class Store:
         if self._summary is not None:
             self._summary.add_line_event(event)
         self.version += 1
+        self.heard += 1
         self.line_events.append(event)
 
     def _take(self, table: Table, prepared: Prepared | None = None) -> None:
         prepared = prepare(table) if prepared is None else prepared
         self.version += 1
+        self.heard += 1
         if self._summary is not None:
             self._summary.add_table(table)
         self.kept.append(prepared.packed or table)

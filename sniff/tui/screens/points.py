@@ -17,6 +17,7 @@ from sniff.tui.analyzer import analyzer
 from sniff.tui.charts import BARS
 from sniff.tui.plain import plain
 from sniff.tui.screens.base import ViewScreen
+from sniff.tui.still_judging import still_judging
 from sniff.tui.tables import StationTable
 
 SHOWN = 500
@@ -125,7 +126,8 @@ class PointsScreen(ViewScreen):
         return pinned + others
 
     def _draw_detail(self) -> None:
-        self.query_one("#detail", Static).update(self._detail())
+        open_end = still_judging(analyzer(self).status, self.store)
+        self.query_one("#detail", Static).update("\n".join(part for part in (open_end, self._detail()) if part))
 
     def _detail(self) -> str:
         point = self._here()

@@ -99,7 +99,7 @@ class TimelineScreen(ViewScreen):
     def draw(self) -> None:
         """Bring the charts up to date, unless frozen."""
         width = max(10, self.size.width - LABEL - 2)
-        state = (self.store.version, width, self.size.height, self._zoom, self._cursor, self._anchor)
+        state = (self.store.heard, width, self.size.height, self._zoom, self._cursor, self._anchor)
         frozen = self.viewing.frozen and self._drawn and self._drawn[1:] == state[1:]
         if state == self._drawn or frozen:
             return
