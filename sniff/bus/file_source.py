@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import queue
+import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -35,6 +36,8 @@ SLICE = 0.012
 WAITING = 8
 """Pieces that the thread may be ahead by."""
 LEAST_JUDGED = 32
+SWITCHED, SWITCHING = sys.getswitchinterval(), 0.001
+"""Seconds after which the thread gives way; while a file is read, a key waits for that several times."""
 PACKED_ROWS = 1024
 """Rows from which on a piece is packed at once."""
 
@@ -102,6 +105,7 @@ class FileFeed:
             self._store.add_line_event(piece)
         else:
             self._reading = False
+            sys.setswitchinterval(SWITCHED)
             self._store.version += 1
             if isinstance(piece, CaptureError):  # what was read before it stays
                 self._ended = str(piece)
@@ -120,6 +124,7 @@ class FileFeed:
                 if time.perf_counter() >= until or not self._reading:
                     break
         if self._reading:
+            sys.setswitchinterval(SWITCHING)
             self._thread = threading.Thread(target=self._go_on, name="reading", daemon=True)
             self._thread.start()
 
@@ -163,6 +168,7 @@ class FileFeed:
     def close(self) -> None:
         """Have the thread end."""
         self._stopped.set()
+        sys.setswitchinterval(SWITCHED)
         if self._thread is not None:
             self._thread.join(2.0)
 

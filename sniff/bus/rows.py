@@ -221,8 +221,8 @@ class Store:
         return not self.all_judged
 
     def findings(self) -> tuple[Finding, ...]:
-        """What was found so far."""
-        return self.model.findings()
+        """What was found so far; nothing as long as there was nothing to judge."""
+        return () if self._later is not None and not (self._later.row or self.all_judged) else self.model.findings()
 
     # -- reading -----------------------------------------------------------------------------------------------
 

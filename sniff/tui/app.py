@@ -7,6 +7,7 @@ from functools import partial
 from typing import ClassVar
 
 from textual.binding import Binding, BindingType
+from textual.events import Event, InputEvent
 from textual.screen import Screen
 from textual.timer import Timer
 
@@ -26,6 +27,8 @@ from sniff.tui.viewing import Viewing
 POLL_SECONDS = 0.1
 WORK_SECONDS = 0.02
 """Pause between two pieces of pending work, so that keys are answered in between."""
+CALM_SECONDS = 0.2
+"""How long what is not on the screen waits after a key: who holds one down must not feel it."""
 SURE_SECONDS = 4.0
 """How long a first `q` during a recording waits for the second."""
 THEMES = ("textual-dark", "textual-light")
@@ -70,11 +73,18 @@ class SnifferApp(Analyzer):
         self._told_dropped = False
         self._told_trouble = ""
         self._asked_to_quit = 0.0
+        self._pressed = 0.0  # when the last key was
 
     @property
     def store(self) -> Store:
         """The rows."""
         return self.feed.store
+
+    async def on_event(self, event: Event) -> None:
+        """Note when somebody is at work here."""
+        if isinstance(event, InputEvent):
+            self._pressed = time.monotonic()
+        await super().on_event(event)
 
     # -- keeping up --------------------------------------------------------------------------------------------
 
@@ -145,7 +155,7 @@ class SnifferApp(Analyzer):
 
     def _work(self) -> None:
         screen = self.shown
-        busy = self.feed.work()
+        busy = time.monotonic() - self._pressed < CALM_SECONDS or self.feed.work()
         busy |= screen is not None and _is_whole(screen) and screen.work_left() and screen.work()
         if not busy and self._worker is not None:
             self._worker.pause()

@@ -193,6 +193,7 @@ def test_judged_later_is_judged_the_same(name: str, cuts: list[int], slices: lis
             store.add_line_event(event)
             model.add_line_event(event)
     assert store.judged == 0
+    assert store.findings() == ()  # not that nothing was heard
     assert store.load == model.summary.load
     turn = 0
     while store.judge(slices[turn % len(slices)]):
