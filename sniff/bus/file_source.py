@@ -18,8 +18,9 @@ from typing import Any
 
 from dissectors.profiles import Devices
 from sniff.bus.feed import FeedStatus
+from sniff.bus.prepared import Prepared, prepare
 from sniff.bus.row_source import rows_that_fit
-from sniff.bus.rows import Prepared, Store, prepare
+from sniff.bus.rows import Store
 from sniff.engine.blocks import in_pieces
 from sniff.engine.bulk import tables
 from sniff.engine.capture import Capture, CaptureError

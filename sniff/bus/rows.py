@@ -6,11 +6,8 @@ second). Nothing here touches the capture: pausing a view never does.
 
 from __future__ import annotations
 
-from bisect import bisect_left
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from itertools import islice
 from typing import overload
 
 import numpy as np
@@ -31,10 +28,11 @@ from sniff.analysis.wording import describe
 from sniff.bus.ascending import Ascending
 from sniff.bus.kept_tables import KeptTables
 from sniff.bus.model import BusModel
+from sniff.bus.prepared import Prepared, prepare
+from sniff.bus.unjudged import Unjudged
 from sniff.engine.engine import Output, Row
-from sniff.engine.packed_table import PackedTable
 from sniff.engine.session import LineEvent, Session
-from sniff.engine.table import Table, cut
+from sniff.engine.table import Table
 
 KEPT_ROWS = 1_000_000
 """Rows of a live bus kept for viewing; older ones are dropped from the view (never from a recording), with a count."""
@@ -88,7 +86,7 @@ class Store:
         self.version = 0
         self.heard = 0
         self._last_end: int | None = None  # of the newest row that was heard with the right settings; else None
-        self._later = _Later() if judge_later else None
+        self._later = Unjudged() if judge_later else None
         self._summary = Summary(session.line) if judge_later else None
 
     # -- writing -----------------------------------------------------------------------------------------------
@@ -365,62 +363,3 @@ class _Rows(Sequence[Row]):
         if row is None:
             raise IndexError(at)
         return row
-
-
-@dataclass(frozen=True, slots=True)
-class Prepared:
-    """A table with what the store wants to know of it, which another thread may have found out.
-
-    `packed`: None where the table is too small for it. `bad`: places of rows that are trouble by themselves;
-    `bad_begins`: ns. `gaps`: between its rows. `begin`: of the first row, `end`: of the last; None where it was only
-    heard while settings were searched for.
-    """
-
-    table: Table
-    packed: PackedTable | None
-    marks: Counter[LineError]
-    gaps: Histogram
-    bad: Times
-    bad_begins: Times
-    begin: int | None
-    end: int | None
-
-
-def prepare(table: Table, pack: bool = False) -> Prepared:
-    """Look at a table. `pack`: it follows right behind the table before it, and will not be joined with another."""
-    heard, frames = table.heard, table.frames
-    marks = Counter(mark.error for row in table.odd.values() if row.searched is None for mark in row.event.marks)
-    gaps = Histogram()
-    between = heard[1:] & heard[:-1]
-    if len(between):
-        gaps.add_many((frames.start[1:] - frames.end[:-1])[between])
-    bad = np.flatnonzero(heard & ~table.good)
-    begin = int(frames.start[0]) if len(table) and heard[0] else None
-    end = int(frames.end[-1]) if len(table) and heard[-1] else None
-    return Prepared(table, PackedTable(table) if pack else None, marks, gaps, bad, frames.start[bad], begin, end)
-
-
-class _Later:
-    """What the model has still to take. `row`, `closed`: the last that it took; `events`: behind which they came."""
-
-    def __init__(self) -> None:
-        self.row = 0
-        self.closed = 0
-        self.events: deque[tuple[int, int, LineEvent]] = deque()
-
-    def next(self, kept: KeptTables, rows: int) -> Table | None:
-        """The next rows, at most so many, up to the next event."""
-        at = bisect_left(kept.parts, self.row, key=lambda part: part.last)
-        for part in islice(kept.parts, at, None):
-            if part.last > self.row or part.closed_first + part.closed - 1 > self.closed:
-                break
-        else:
-            return None
-        begin = max(0, self.row + 1 - part.first)
-        end = min(part.rows, begin + rows)
-        if self.events:
-            end = max(begin, min(end, self.events[0][0] + 1 - part.first))
-        table = cut(kept.table(part), begin, end)
-        self.row = max(self.row, part.first + end - 1)
-        self.closed = part.closed_first + part.closed - 1 if end == part.rows else self.closed + len(table.transactions)
-        return table

@@ -6,6 +6,7 @@ number stands on a line, and the subclass for the cells of that number.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterable
 from typing import ClassVar
 
@@ -117,10 +118,12 @@ class LineList(ScrollView, can_focus=True, inherit_bindings=False):
         self._settle(None)
         self.show_cursor(centre=True)
 
-    def search(self, count: int) -> None:
-        """Let the index test `count` numbers up and down."""
+    def search(self, count: int, until: float) -> None:
+        """Let the index test `count` numbers up and down, and again until then (`time.perf_counter`)."""
         top = self._top()
         self.index.step(count)
+        while self.index.pending and time.perf_counter() < until:
+            self.index.step(count)
         self._settle(top)
 
     def retest(self, numbers: Iterable[int]) -> None:

@@ -19,7 +19,7 @@ from sniff.tui.screens.base import ViewScreen
 SLICE_SECONDS = 0.012
 """How long one piece of searching may take: short enough that a key never waits for it."""
 SLICE_ROWS = 128
-AT_ONCE_SECONDS = 0.04
+AT_ONCE_SECONDS = 0.05
 """How long a new filter may search before anything of it is shown."""
 MOST_RETESTED = 5000
 DATA_ONLY = "!(role in {token, poll})"
@@ -114,9 +114,7 @@ class ListingScreen(ViewScreen):
         index = self.lines.index
         end = time.perf_counter() + SLICE_SECONDS
         found = len(index)
-        self.lines.search(SLICE_ROWS)
-        while index.pending and time.perf_counter() < end:
-            self.lines.search(SLICE_ROWS)
+        self.lines.search(SLICE_ROWS, end)
         self.query_one(FilterLine).show(self.viewing, index, self.THINGS)
         if len(index) != found:
             self.draw()

@@ -20,8 +20,9 @@ from sniff.bus import kept_tables
 from sniff.bus.ascending import Ascending
 from sniff.bus.model import BusModel
 from sniff.bus.offline import outputs
+from sniff.bus.prepared import prepare
 from sniff.bus.row_masks import ACCEPTED, DOUBTFUL, RowMasks
-from sniff.bus.rows import BAD_VERDICTS, Store, prepare
+from sniff.bus.rows import BAD_VERDICTS, Store
 from sniff.engine.blocks import Block, in_pieces
 from sniff.engine.bulk import tables
 from sniff.engine.engine import Output, Row
