@@ -123,7 +123,7 @@ MASKED: dict[str, Callable[[Table], tuple[Column, ...]]] = {
 
 CLOSED: dict[str, Callable[[Closings], Column]] = {
     "verdict": lambda closed: Texts(closed.verdict + 1, _VERDICT_WORDS),
-    "latency_ms": lambda closed: Numbers(closed.latency / 1e6, (closed.verdict >= 0) & (closed.latency != NONE)),
+    "latency_ms": lambda closed: Numbers(closed.latency / 1e6, closed.latency != NONE),
     "attempt": lambda closed: Numbers(closed.attempt, closed.verdict >= 0),
 }
 """Columns of a filter that the transactions of its rows hold."""

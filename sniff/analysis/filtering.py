@@ -293,7 +293,7 @@ class _Parser:
             wanted_text = str(self._value())
             accepts = _containing(wanted_text) if how == "contains" else _matching(wanted_text, column)
             return self._accepting(token.text, get, accepts)
-        return self._accepting(token.text, get, lambda found: found not in (0, ""))
+        return self._accepting(token.text, get, _Something())
 
     def _accepting(self, name: str, get: Getter, accepts: Accepts) -> Filter:
         """Rows of which any value of that name is accepted."""
@@ -416,6 +416,18 @@ class _Compared:
             return np.full(len(values), self.compare is operator.ne)
         chosen = self.compare(values, self.wanted)
         return np.asarray(chosen, bool)
+
+
+class _Something:
+    """Values that are neither 0 nor empty."""
+
+    def __call__(self, found: Value) -> bool:
+        return found not in (0, "")
+
+    def many(self, values: npt.NDArray[np.number[Any]]) -> Masks:
+        """The same for numbers."""
+        chosen: Masks = values != 0
+        return chosen
 
 
 @dataclass(frozen=True, slots=True)

@@ -68,6 +68,10 @@ class Part:
         values: Values = getattr(held, one)
         return values
 
+    def closed_column(self, name: str) -> Values:
+        """Of its transactions."""
+        return self.column(f"closed.{name}")
+
     def view(self) -> Table | TableView:
         """For filters."""
         return TableView(self.whole) if isinstance(self.whole, PackedTable) else self.whole

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from sniff.analysis.filtering import Filter
 from sniff.bus.kept_tables import KeptTables, Part
-from sniff.engine.closings import Closings, ClosingsOf
+from sniff.engine.closings import Closings
 from sniff.engine.packed_table import PackedTable
 
 if TYPE_CHECKING:
@@ -96,7 +96,4 @@ class RowMasks:
         least, most = (int(placed.min()), int(placed.max())) if len(placed) else (1, 1)
         if most - least > WIDEST:
             return None
-        made = ClosingsOf(least, most)
-        for around in self._kept.closing_parts(least, most):
-            made.add(*(around.column(f"closed.{name}") for name in ("id", "verdict", "latency", "attempt")))
-        return made.of(tx)
+        return Closings(tx, least, most, [part.closed_column for part in self._kept.closing_parts(least, most)])
