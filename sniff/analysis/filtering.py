@@ -26,7 +26,12 @@ from sniff.analysis.wording import describe
 from sniff.engine.engine import Row
 
 if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
+
     from dissectors.columns import Masks
+    from sniff.analysis.filter_masks import Remembered
+    from sniff.engine.closings import Closings
     from sniff.engine.table import Table
 
 Value = int | float | str
@@ -35,19 +40,21 @@ Accepts = Callable[[Value], bool]
 Getter = Callable[[Row, Transaction | None], tuple[Value, ...]]
 
 
-MaskOf = Callable[["Table"], "Masks"]
+MaskOf = Callable[["Table", "Closings | None"], "Masks"]
 """Which plain rows of a table may be accepted."""
 
 
 @dataclass(frozen=True, slots=True)
 class Filter:
     """A test of a row with its transaction. `columns`: the same for many rows at once, as far as a table holds what
-    is asked, None where it holds none of it; `exact`: whether that is all that is asked.
+    is asked, None where it holds none of it; `exact`: whether that is all that is asked. `of_closing`: whether what
+    became of the row is asked for, which may become known later than the row.
     """
 
     test: Predicate
     columns: MaskOf | None = None
     exact: bool = False
+    of_closing: bool = False
 
     def __call__(self, row: Row, transaction: Transaction | None) -> bool:
         """Whether the row is accepted."""
@@ -59,7 +66,7 @@ class Filter:
             return None
         import numpy as np
 
-        chosen = self.columns(table)
+        chosen = self.columns(table, None)
         chosen[list(table.odd)] = True
         places: list[int] = np.flatnonzero(chosen).tolist()
         return places
@@ -140,7 +147,9 @@ COLUMNS: dict[str, Getter] = {
     "attempt": lambda _, tx: (tx.attempt,) if tx is not None else (),
     "hex": lambda row, _: (row.event.octets.hex(),),
 }
-IN_TABLES = frozenset(COLUMNS) - {"verdict", "latency_ms", "attempt", "hex"}
+OF_CLOSING = frozenset(("verdict", "latency_ms", "attempt"))
+"""What became of a row."""
+IN_TABLES = frozenset(COLUMNS) - OF_CLOSING - {"hex"}
 """Those that a table holds as columns (`filter_masks.py`)."""
 
 ALIASES = {"frame.number": "no", "frame.len": "len", "tx.verdict": "verdict", "tx.latency_ms": "latency_ms"}
@@ -178,15 +187,18 @@ class _Token:
     column: int
 
 
-def compile_filter(text: str, dissector: Dissector) -> Filter:
-    """Turn a filter into a test of a row with its transaction. An empty filter is always true. Raises FilterError."""
+def compile_filter(text: str, dissector: Dissector, with_closings: bool = False) -> Filter:
+    """Turn a filter into a test of a row with its transaction. An empty filter is always true. Raises FilterError.
+
+    `with_closings`: whoever calls `columns` gives what became of the rows too.
+    """
     tokens = _lex(text)
     if len(tokens) == 1:
         return Filter(lambda row, tx: True, _every, exact=True)
-    return _Parser(tokens, dissector).parse()
+    return _Parser(tokens, dissector, with_closings).parse()
 
 
-def _every(table: Table) -> Masks:
+def _every(table: Table, closings: Closings | None = None) -> Masks:
     import numpy as np
 
     every: Masks = np.ones(len(table), bool)
@@ -213,9 +225,10 @@ def _lex(text: str) -> list[_Token]:
 
 
 class _Parser:
-    def __init__(self, tokens: list[_Token], dissector: Dissector) -> None:
+    def __init__(self, tokens: list[_Token], dissector: Dissector, with_closings: bool) -> None:
         self.tokens = tokens
         self.dissector = dissector
+        self.in_columns = IN_TABLES | OF_CLOSING if with_closings else IN_TABLES
         self.at = 0
         self.depth = 0
 
@@ -277,7 +290,7 @@ class _Parser:
             compare = _COMPARE[self._now.text]
             self.at += 1
             wanted = self._value_of(token.text)
-            return self._accepting(token.text, get, lambda found: _compare(compare, found, wanted))
+            return self._accepting(token.text, get, _Compared(compare, wanted))
         if (self._now.kind == "word" and self._now.text in {"contains", "matches", "in"}) or self._now.text == "~":
             how = self._now.text
             self.at += 1
@@ -287,7 +300,7 @@ class _Parser:
             wanted_text = str(self._value())
             accepts = _containing(wanted_text) if how == "contains" else _matching(wanted_text, column)
             return self._accepting(token.text, get, accepts)
-        return self._accepting(token.text, get, lambda found: found not in (0, ""))
+        return self._accepting(token.text, get, _Something())
 
     def _accepting(self, name: str, get: Getter, accepts: Accepts) -> Filter:
         """Rows of which any value of that name is accepted."""
@@ -296,15 +309,17 @@ class _Parser:
         def test(row: Row, tx: Transaction | None) -> bool:
             return any(accepts(found) for found in get(row, tx))
 
-        if name not in IN_TABLES:
-            return Filter(test)
+        of_closing = name in OF_CLOSING
+        if name not in self.in_columns:
+            return Filter(test, of_closing=of_closing)
+        remembered: Remembered = {}
 
-        def columns(table: Table) -> Masks:
+        def columns(table: Table, closings: Closings | None) -> Masks:
             from sniff.analysis.filter_masks import accepted
 
-            return accepted(table, name, accepts)
+            return accepted(table, name, accepts, remembered, closings)
 
-        return Filter(test, columns, exact=True)
+        return Filter(test, columns, exact=True, of_closing=of_closing)
 
     def _among(self, name: str, get: Getter) -> Filter:
         if not self._take("{"):
@@ -313,7 +328,7 @@ class _Parser:
         while not self._take("}"):
             self._take(",")
             values.append(self._value_of(name))
-        return self._accepting(name, get, lambda found: any(_compare(operator.eq, found, wanted) for wanted in values))
+        return self._accepting(name, get, _Among(values))
 
     def _value_of(self, name: str) -> Value:
         """The next value to compare a name with; a verdict may stand as people read it, "no answer"."""
@@ -390,20 +405,72 @@ def _compare(compare: Callable[[Any, Any], bool], found: Value, wanted: Value) -
     return compare(found, wanted)
 
 
+@dataclass(frozen=True, slots=True)
+class _Compared:
+    """Values that compare so with `wanted`."""
+
+    compare: Callable[[Any, Any], bool]
+    wanted: Value
+
+    def __call__(self, found: Value) -> bool:
+        return _compare(self.compare, found, self.wanted)
+
+    def many(self, values: npt.NDArray[np.number[Any]]) -> Masks:
+        """The same for numbers."""
+        import numpy as np
+
+        if isinstance(self.wanted, str):
+            return np.full(len(values), self.compare is operator.ne)
+        chosen = self.compare(values, self.wanted)
+        return np.asarray(chosen, bool)
+
+
+class _Something:
+    """Values that are neither 0 nor empty."""
+
+    def __call__(self, found: Value) -> bool:
+        return found not in (0, "")
+
+    def many(self, values: npt.NDArray[np.number[Any]]) -> Masks:
+        """The same for numbers."""
+        chosen: Masks = values != 0
+        return chosen
+
+
+@dataclass(frozen=True, slots=True)
+class _Among:
+    """Values that equal one of `wanted`."""
+
+    wanted: Sequence[Value]
+
+    def __call__(self, found: Value) -> bool:
+        return any(_compare(operator.eq, found, wanted) for wanted in self.wanted)
+
+    def many(self, values: npt.NDArray[np.number[Any]]) -> Masks:
+        """The same for numbers."""
+        import numpy as np
+
+        chosen = np.zeros(len(values), bool)
+        for wanted in self.wanted:
+            chosen |= _Compared(operator.eq, wanted).many(values)
+        return chosen
+
+
 def _any_of(parts: Sequence[Filter]) -> Filter:
     masks = [part.columns for part in parts if part.columns is not None]
 
     def test(row: Row, tx: Transaction | None) -> bool:
         return any(part(row, tx) for part in parts)
 
-    def columns(table: Table) -> Masks:
-        chosen = masks[0](table)
+    def columns(table: Table, closings: Closings | None) -> Masks:
+        chosen = masks[0](table, closings)
         for mask in masks[1:]:
-            chosen |= mask(table)
+            chosen |= mask(table, closings)
         return chosen
 
     whole = len(masks) == len(parts)
-    return Filter(test, columns if whole else None, whole and all(part.exact for part in parts))
+    exact = whole and all(part.exact for part in parts)
+    return Filter(test, columns if whole else None, exact, any(part.of_closing for part in parts))
 
 
 def _all_of(parts: Sequence[Filter]) -> Filter:
@@ -412,14 +479,14 @@ def _all_of(parts: Sequence[Filter]) -> Filter:
     def test(row: Row, tx: Transaction | None) -> bool:
         return all(part(row, tx) for part in parts)
 
-    def columns(table: Table) -> Masks:
-        chosen = masks[0](table)
+    def columns(table: Table, closings: Closings | None) -> Masks:
+        chosen = masks[0](table, closings)
         for mask in masks[1:]:
-            chosen &= mask(table)
+            chosen &= mask(table, closings)
         return chosen
 
     exact = len(masks) == len(parts) and all(part.exact for part in parts)
-    return Filter(test, columns if masks else None, exact)
+    return Filter(test, columns if masks else None, exact, any(part.of_closing for part in parts))
 
 
 def _none_of(inner: Filter) -> Filter:
@@ -428,13 +495,13 @@ def _none_of(inner: Filter) -> Filter:
     def test(row: Row, tx: Transaction | None) -> bool:
         return not inner(row, tx)
 
-    def columns(table: Table) -> Masks:
+    def columns(table: Table, closings: Closings | None) -> Masks:
         assert mask is not None
-        chosen: Masks = ~mask(table)
+        chosen: Masks = ~mask(table, closings)
         return chosen
 
     exact = mask is not None and inner.exact
-    return Filter(test, columns if exact else None, exact)
+    return Filter(test, columns if exact else None, exact, inner.of_closing)
 
 
 def _containing(wanted: str) -> Accepts:

@@ -45,7 +45,7 @@ class Second:
 
 @dataclass(slots=True)
 class Load:
-    """Totals, and the last seconds one by one (at most `kept` of them)."""
+    """Totals, and the last seconds one by one: the newest `kept` of them, and up to a sixteenth more."""
 
     line: LineSettings
     total: Second = field(default_factory=Second)
@@ -133,8 +133,10 @@ class Load:
         second = self.seconds.get(number)
         if second is None:
             second = self.seconds[number] = Second()
-            if len(self.seconds) > self.kept:
-                del self.seconds[min(self.seconds)]
+            if len(self.seconds) > self.kept + self.kept // 16:  # many at once: each time costs a look at all
+                for old in sorted(self.seconds)[: len(self.seconds) - self.kept]:
+                    del self.seconds[old]
+                second = self.seconds.setdefault(number, second)
         return second
 
     def share(self, over: int = 10) -> float:

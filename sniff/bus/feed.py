@@ -19,7 +19,8 @@ class FeedStatus:
     `priority`: what the system allowed the capture process, in words ("real-time", "normal"), empty when unknown.
     `trouble`: why nothing is written any more although the capture goes on ("no space left on the disk …").
     `behind`: seconds by which the disk is late with the recording, 0 while it keeps up.
-    `reading`: whether the file is still being read.
+    `reading`: whether the file is still being read, `read`: how much of it has been, 0 … 1. `judged`: how many of its
+    rows the rules have seen, 0 … 1.
     `searching`: with which settings a search listens at the moment, empty when there is none.
     """
 
@@ -36,6 +37,8 @@ class FeedStatus:
     trouble: str = ""
     behind: float = 0.0
     reading: bool = False
+    read: float = 1.0
+    judged: float = 1.0
 
     @property
     def in_file(self) -> bool:
@@ -44,7 +47,8 @@ class FeedStatus:
 
 
 class Feed(Protocol):
-    """Fills a store. The app calls `poll` ten times a second, from its own thread; it must return quickly."""
+    """Fills a store. The app calls `poll` ten times a second, and `work` while there is some, from its own thread;
+    both must return quickly."""
 
     @property
     def store(self) -> Store:
@@ -53,6 +57,10 @@ class Feed(Protocol):
 
     def poll(self) -> bool:
         """Move what has come into the store; whether anything changed."""
+        ...
+
+    def work(self) -> bool:
+        """Do a small piece of what can wait (some ms); whether more is left."""
         ...
 
     def status(self) -> FeedStatus:
@@ -83,6 +91,10 @@ class StoreFeed:
         changed = self._store.version != self._version
         self._version = self._store.version
         return changed
+
+    def work(self) -> bool:
+        """There is none."""
+        return False
 
     def status(self) -> FeedStatus:
         """What `current` was set to."""

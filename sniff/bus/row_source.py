@@ -1,29 +1,21 @@
-"""What fills the terminal UI: a live bus, or a capture file read in slices, so that the first screen comes at once."""
+"""What fills the terminal UI from a live bus."""
 
 from __future__ import annotations
 
 import contextlib
 import os
-import time
-from collections.abc import Callable, Iterator
-from pathlib import Path
+from collections.abc import Callable
 
-from dissectors.profiles import Devices
 from sniff.bus.feed import FeedStatus
 from sniff.bus.live import LiveBus
-from sniff.bus.offline import outputs
 from sniff.bus.rows import KEPT_ROWS, Store
 from sniff.capture.wire import Status
-from sniff.engine.capture import Capture, CaptureError
 from sniff.engine.engine import Output
-from sniff.engine.follow_settings import dissector_for
-from sniff.engine.session import LineEvent, Session
-
-SLICE = 0.05
-"""Seconds that one poll may spend on reading a file."""
+from sniff.engine.session import LineEvent
+from sniff.engine.table import Table
 
 LEAST_ROWS = 100_000
-ROW_OCTETS = 1000
+ROW_OCTETS = 120
 """What a row and its share of a transaction take in memory, about."""
 
 
@@ -53,16 +45,28 @@ class LiveFeed:
     def poll(self) -> bool:
         """Take what has come."""
         before = self._store.version
-        items = self.live.poll()
+        items = self.live.poll_tables()
+        outputs: list[Output] = []
         if self.live.session is not self._session:  # a search has ended
             self._session = self.live.session
             self._store.settle(self.live.session, self.live.dissector)
         for item in items:
             if isinstance(item, Output):
-                self._store.add(item)
+                outputs.append(item)
+                continue
+            if isinstance(item, Table | LineEvent):
+                self._store.add_outputs(outputs)
+                outputs = []
+            if isinstance(item, Table):
+                self._store.add_table(item)
             elif isinstance(item, LineEvent):
                 self._store.add_line_event(item)
+        self._store.add_outputs(outputs)
         return self._store.version != before
+
+    def work(self) -> bool:
+        """There is none: the bus brings what it has to whoever polls."""
+        return False
 
     def status(self) -> FeedStatus:
         """How the capture is doing."""
@@ -97,59 +101,3 @@ class LiveFeed:
         while self.live.ended is None:
             with contextlib.suppress(KeyboardInterrupt):  # then it is told to stop once more
                 self.live.stop(tell)
-
-
-class FileFeed:
-    """A capture file, read on in every poll until its end."""
-
-    def __init__(self, path: str, capture: Capture, session: Session, devices: Devices | None = None) -> None:
-        self.path = path
-        self.capture = capture
-        self._store = Store(session, dissector_for(session), rows_that_fit(), devices)
-        self._outputs: Iterator[Output | LineEvent] | None = outputs(capture.items(), session)
-        self._ended = ""
-        try:
-            self._size = Path(path).stat().st_size
-        except OSError:
-            self._size = 0
-
-    @property
-    def store(self) -> Store:
-        """The rows so far."""
-        return self._store
-
-    def poll(self) -> bool:
-        """Read on for a while."""
-        if self._outputs is None:
-            return False
-        until = time.monotonic() + SLICE
-        try:
-            for output in self._outputs:
-                if isinstance(output, Output):
-                    self._store.add(output)
-                else:
-                    self._store.add_line_event(output)
-                if time.monotonic() > until:
-                    return True
-            complete = self.capture.completeness()
-            self._ended = "" if complete.whole else complete.text
-        except CaptureError as error:  # what was read before it stays
-            self._ended = str(error)
-        self._outputs = None
-        return True
-
-    def status(self) -> FeedStatus:
-        """Where the file ends, once it has been read."""
-        session = self._store.session
-        return FeedStatus(
-            self.path,
-            session.line_words,
-            session.protocol_words,
-            file_size=self._size,
-            ended=self._ended,
-            reading=self._outputs is not None,
-        )
-
-    def close(self) -> None:
-        """Nothing to stop."""
-        self._outputs = None

@@ -1,4 +1,4 @@
-"""The rows and transactions of one bus that a face shows, held in memory, bounded; what they add up to is its model's.
+"""The rows and transactions of one bus that a face shows, held in memory as tables, bounded; what they add up to.
 
 Written by one thread; readers call the methods from the same thread (the terminal UI pulls a snapshot ten times a
 second). Nothing here touches the capture: pausing a view never does.
@@ -6,31 +6,60 @@ second). Nothing here touches the capture: pausing a view never does.
 
 from __future__ import annotations
 
-from bisect import bisect_left, bisect_right
 from collections import Counter
+from collections.abc import Iterable, Sequence
+from typing import overload
 
+import numpy as np
+
+from dissectors.columns import NONE, VERDICTS, Times
+from dissectors.findings import Finding
 from dissectors.frame import Frame, LineError
 from dissectors.histogram import Histogram
+from dissectors.line import NS_PER_S
 from dissectors.manifest import Dissector
 from dissectors.profiles import Devices
 from dissectors.tracker import Transaction, Verdict
 from sniff.analysis.load import Load
 from sniff.analysis.nodes import NodeTable
 from sniff.analysis.points import PointTable, words
-from sniff.analysis.wording import describe, is_error
+from sniff.analysis.summary import Summary
+from sniff.analysis.wording import describe
+from sniff.bus.ascending import Ascending
+from sniff.bus.kept_tables import KeptTables
 from sniff.bus.model import BusModel
+from sniff.bus.prepared import Prepared, prepare
+from sniff.bus.unjudged import Unjudged
 from sniff.engine.engine import Output, Row
 from sniff.engine.session import LineEvent, Session
+from sniff.engine.table import Table
 
 KEPT_ROWS = 1_000_000
-"""Rows kept for viewing; older ones are dropped from the view (never from a recording), with a count."""
+"""Rows of a live bus kept for viewing; older ones are dropped from the view (never from a recording), with a count."""
 
-CLOSING_DISORDER = 256
-"""How far a transaction may close out of the order of opening and still be found by its id."""
+BAD_VERDICTS = frozenset(
+    {
+        Verdict.EXCEPTION,
+        Verdict.NO_RESPONSE,
+        Verdict.LATE,
+        Verdict.ECHO,
+        Verdict.UNSOLICITED,
+        Verdict.ANSWERED_TWICE,
+        Verdict.DAMAGED_ANSWER,
+        Verdict.DAMAGED_REQUEST,
+    }
+)
+_BAD = np.array([verdict in BAD_VERDICTS for verdict in VERDICTS], bool)
 
 
 class Store:
-    """Rows in order of the wire; `rows[i].no == first_no + i` always holds."""
+    """Rows in order of the wire, numbered without holes.
+
+    `kept`: the rows and transactions. `errors`: numbers of rows that are damaged frames or noise, or that have a bad
+    verdict; `error_total`: with those that were dropped; `failed`: how many of them began in each second. `marks`:
+    octets by the line errors reported on them. `gaps`: silence between one row and the next, ns. `version` changes
+    whenever anything changed, `heard` whenever more was heard.
+    """
 
     def __init__(
         self,
@@ -39,22 +68,26 @@ class Store:
         keep: int = KEPT_ROWS,
         devices: Devices | None = None,
         model: BusModel | None = None,
+        judge_later: bool = False,
     ) -> None:
-        """`model`: of this bus, which somebody else feeds; without one it has its own."""
+        """`model`: of this bus, which somebody else feeds; without one it has its own. `judge_later`: which takes
+        rows only when `judge` is called; counts and load are up to date all the same."""
         self.keep = keep
         self._feeds_model = model is None
         self.model = BusModel(session, dissector, devices) if model is None else model
-        self.rows: list[Row] = []
-        self.transactions: dict[int, Transaction] = {}
-        self.closed: list[int] = []  # transaction ids in the order of closing
-        self.errors: list[int] = []  # numbers of rows that are damaged frames or noise, or that have a bad verdict
+        self.kept = KeptTables()
+        self.errors = Ascending()
+        self.failed: Counter[int] = Counter()
         self.line_events: list[LineEvent] = []
-        self.error_total = 0  # like `errors`, with those that were dropped
-        self.marks: Counter[LineError] = Counter()  # octets by the line errors reported on them
-        self.gaps = Histogram()  # silence between one row and the next, ns
+        self.error_total = 0
+        self.marks: Counter[LineError] = Counter()
+        self.gaps = Histogram()
         self.dropped_rows = 0
-        self.dropped_transactions = 0
-        self.version = 0  # changes whenever anything changed
+        self.version = 0
+        self.heard = 0
+        self._last_end: int | None = None  # of the newest row that was heard with the right settings; else None
+        self._later = Unjudged() if judge_later else None
+        self._summary = Summary(session.line) if judge_later else None
 
     # -- writing -----------------------------------------------------------------------------------------------
 
@@ -63,62 +96,131 @@ class Store:
         if self._feeds_model:
             self.model.settle(session, dissector)
         self.version += 1
+        self.heard += 1
 
     def add(self, output: Output) -> None:
         """Take what the engine gave."""
-        if not output:
+        self.add_outputs((output,))
+
+    def add_outputs(self, outputs: Iterable[Output]) -> None:
+        """Take what the engine gave, in order."""
+        rows: list[Row] = []
+        closed: list[Transaction] = []
+        closed_by: list[int] = []
+        for output in outputs:
+            if self._feeds_model and self._later is None and output:
+                self.model.add(output)
+            rows += output.rows
+            closed += output.transactions
+            closed_by += [len(rows) - 1] * len(output.transactions)
+        if rows or closed:
+            self._take(Table.of(self.dissector.name, self.last_no + 1, rows, closed, closed_by))
+
+    def add_table(self, table: Table) -> None:
+        """Take rows and transactions that follow."""
+        if not table:
             return
-        if self._feeds_model:
-            self.model.add(output)
-        self.version += 1
-        for row in output.rows:
-            if row.searched is not None:
-                self.rows.append(row)
-                continue
-            if self.rows and self.rows[-1].searched is None:
-                self.gaps.add(row.event.start - self.rows[-1].event.end)
-            self.rows.append(row)
-            for mark in row.event.marks:
-                self.marks[mark.error] += 1
-            if is_error(row):
-                self.errors.append(row.no)
-                self.error_total += 1
-        for transaction in output.transactions:
-            self._close(transaction)
-        if len(self.rows) > self.keep * 1.1:
-            self._drop(len(self.rows) - self.keep)
+        if self._feeds_model and self._later is None:
+            self.model.add_table(table)
+        self._take(table)
+
+    def add_prepared(self, prepared: Prepared) -> None:
+        """Take a table that was looked at elsewhere."""
+        if self._feeds_model and self._later is None:
+            self.model.add_table(prepared.table)
+        self._take(prepared.table, prepared)
 
     def add_line_event(self, event: LineEvent) -> None:
         """Take something that happened to the line."""
-        if self._feeds_model:
+        if self._later is not None:
+            self._later.events.append((self.last_no, self.last_closed, event))
+        elif self._feeds_model:
             self.model.add_line_event(event)
+        if self._summary is not None:
+            self._summary.add_line_event(event)
         self.version += 1
+        self.heard += 1
         self.line_events.append(event)
 
-    def _close(self, transaction: Transaction) -> None:
-        self.transactions[transaction.id] = transaction
-        self.closed.append(transaction.id)
-        if transaction.verdict in BAD_VERDICTS:
-            no = transaction.request if transaction.request is not None else transaction.response
-            position = bisect_left(self.errors, no or 0)
-            if no is not None and self.errors[position : position + 1] != [no]:
-                self.errors.insert(position, no)
-                self.error_total += 1
+    def _take(self, table: Table, prepared: Prepared | None = None) -> None:
+        prepared = prepare(table) if prepared is None else prepared
+        self.version += 1
+        self.heard += 1
+        if self._summary is not None:
+            self._summary.add_table(table)
+        self.kept.append(prepared.packed or table)
+        self.marks += prepared.marks
+        if prepared.begin is not None and self._last_end is not None:
+            self.gaps.add(prepared.begin - self._last_end)
+        if prepared.gaps.count:
+            self.gaps = self.gaps.merge(prepared.gaps)
+        if len(table):
+            self._last_end = prepared.end
+        first = self.last_no - len(table) + 1
+        self._fail(first + prepared.bad, prepared.bad_begins)
+        closed = table.transactions
+        bad = _BAD[closed.verdict]
+        if bad.any():
+            numbers = np.where(closed.request[bad] != NONE, closed.request[bad], closed.response[bad])
+            self._fail(numbers[numbers != NONE], closed.start[bad][numbers != NONE])
+        if len(self) > self.keep * 1.1:
+            self._drop(len(self) - self.keep)
+
+    def _fail(self, numbers: Times, begins: Times) -> None:
+        """Rows of these numbers, which began then, are trouble."""
+        if not len(numbers):
+            return
+        if int(numbers.min()) < self.first_no:  # of rows that are gone: nobody knows whether they were trouble before
+            kept = numbers >= self.first_no
+            self.error_total += int(np.count_nonzero(~kept))
+            numbers, begins = numbers[kept], begins[kept]
+        new = self.errors.add(numbers)
+        self.error_total += len(new)
+        seconds, counts = np.unique(begins[new] // NS_PER_S, return_counts=True)
+        for second, count in zip(seconds.tolist(), counts.tolist(), strict=True):
+            self.failed[second] += count
 
     def _drop(self, count: int) -> None:
-        del self.rows[:count]
-        self.dropped_rows += count
-        first = self.first_no
-        del self.errors[: bisect_left(self.errors, first)]
-        gone = 0
-        for key in self.closed:
-            transaction = self.transactions.get(key)
-            if transaction is not None and max(transaction.request or 0, transaction.response or 0) >= first:
-                break
-            self.transactions.pop(key, None)
-            gone += 1
-        del self.closed[:gone]
-        self.dropped_transactions += gone
+        before = self.first_no
+        self.kept.drop(count)
+        self.dropped_rows += self.first_no - before
+        self.errors.drop_below(self.first_no)
+        row = self.by_no(self.first_no)
+        if row is not None:
+            for second in [second for second in self.failed if second < row.event.start // NS_PER_S]:
+                del self.failed[second]
+
+    # -- judging later -----------------------------------------------------------------------------------------
+
+    @property
+    def judged(self) -> int:
+        """Number of the last row that the model has taken."""
+        return self.last_no if self._later is None else self._later.row
+
+    @property
+    def all_judged(self) -> bool:
+        """Whether the model has taken everything that was read."""
+        later = self._later
+        return later is None or (later.row >= self.last_no and later.closed >= self.last_closed and not later.events)
+
+    def judge(self, rows: int) -> bool:
+        """Let the model take up to so many rows; whether more are left."""
+        later = self._later
+        if later is None or self.all_judged:
+            return False
+        self.version += 1
+        table = None
+        if not later.events or (later.row, later.closed) < later.events[0][:2]:
+            table = later.next(self.kept, rows)
+        if table:
+            self.model.add_table(table)
+        elif later.events:
+            self.model.add_line_event(later.events.popleft()[2])
+        return not self.all_judged
+
+    def findings(self) -> tuple[Finding, ...]:
+        """What was found so far; nothing as long as there was nothing to judge."""
+        return () if self._later is not None and not (self._later.row or self.all_judged) else self.model.findings()
 
     # -- reading -----------------------------------------------------------------------------------------------
 
@@ -138,14 +240,19 @@ class Store:
         return self.model.devices
 
     @property
+    def summary(self) -> Summary:
+        """What all that came adds up to, judged or not."""
+        return self.model.summary if self._summary is None else self._summary
+
+    @property
     def load(self) -> Load:
         """How busy it is."""
-        return self.model.summary.load
+        return self.summary.load
 
     @property
     def nodes(self) -> NodeTable:
         """Who is on it."""
-        return self.model.summary.nodes
+        return self.summary.nodes
 
     @property
     def points(self) -> PointTable:
@@ -153,47 +260,55 @@ class Store:
         return self.model.points
 
     def __len__(self) -> int:
-        return len(self.rows)
+        return self.kept.last_no - self.kept.first_no + 1
+
+    @property
+    def rows(self) -> Sequence[Row]:
+        """All rows; each is made when it is asked for."""
+        return _Rows(self.kept)
 
     @property
     def first_no(self) -> int:
         """Number of the oldest row kept (1 when there is none)."""
-        return self.rows[0].no if self.rows else 1
+        return self.kept.first_no
 
     @property
     def last_no(self) -> int:
         """Number of the newest row (0 when there never was one)."""
-        return self.rows[-1].no if self.rows else 0
+        return self.kept.last_no
+
+    def row_at(self, time: int) -> int:
+        """Number of the first row that begins at `time` (ns) or after; one after the last where there is none."""
+        return self.kept.row_at(time)
 
     def closed_by_no(self, no: int) -> Transaction | None:
         """The transaction that closed as number `no` (from 1, without holes), None when dropped or not yet."""
-        index = no - 1 - self.dropped_transactions
-        return self.transactions.get(self.closed[index]) if 0 <= index < len(self.closed) else None
+        return self.kept.closing(no)
 
     def closed_number(self, transaction: int) -> int | None:
-        """The number under which a transaction closed, by its id; None when dropped or open.
-
-        Transactions close nearly in the order of opening, so it is looked for near the place where that would put it.
-        """
-        near = bisect_left(self.closed, transaction)
-        for index in range(max(0, near - CLOSING_DISORDER), min(len(self.closed), near + CLOSING_DISORDER)):
-            if self.closed[index] == transaction:
-                return index + 1 + self.dropped_transactions
-        return None
+        """The number under which a transaction closed, by its id; None when dropped or open."""
+        return self.kept.closing_of(transaction)
 
     @property
     def last_closed(self) -> int:
         """How many transactions have closed, with those dropped."""
-        return self.dropped_transactions + len(self.closed)
+        return self.kept.last_closed
+
+    @property
+    def dropped_transactions(self) -> int:
+        """How many of them are no longer in memory."""
+        return self.kept.first_closed - 1
 
     def by_no(self, no: int) -> Row | None:
         """The row of that number, None when it was dropped or never was."""
-        index = no - self.first_no
-        return self.rows[index] if 0 <= index < len(self.rows) else None
+        return self.kept.row(no)
 
     def transaction(self, row: Row) -> Transaction | None:
         """The closed transaction that a row belongs to; None while open, and for noise."""
-        return None if row.placement is None else self.transactions.get(row.placement.tx)
+        if row.placement is None:
+            return None
+        no = self.kept.closing_of(row.placement.tx)
+        return None if no is None else self.kept.closing(no)
 
     def partner(self, row: Row) -> int | None:
         """Number of the response to a request, of the request to a response; None when there is none."""
@@ -220,24 +335,31 @@ class Store:
 
     def next_error(self, no: int) -> int | None:
         """Number of the first error row after `no`, None when there is none."""
-        position = bisect_right(self.errors, no)
-        return self.errors[position] if position < len(self.errors) else None
+        return self.errors.after(no)
 
     def previous_error(self, no: int) -> int | None:
         """Number of the last error row before `no`, None when there is none."""
-        position = bisect_left(self.errors, no)
-        return self.errors[position - 1] if position else None
+        return self.errors.before(no)
 
 
-BAD_VERDICTS = frozenset(
-    {
-        Verdict.EXCEPTION,
-        Verdict.NO_RESPONSE,
-        Verdict.LATE,
-        Verdict.ECHO,
-        Verdict.UNSOLICITED,
-        Verdict.ANSWERED_TWICE,
-        Verdict.DAMAGED_ANSWER,
-        Verdict.DAMAGED_REQUEST,
-    }
-)
+class _Rows(Sequence[Row]):
+    """Rows that are made when they are asked for."""
+
+    def __init__(self, kept: KeptTables) -> None:
+        self._kept = kept
+
+    def __len__(self) -> int:
+        return self._kept.last_no - self._kept.first_no + 1
+
+    @overload
+    def __getitem__(self, at: int) -> Row: ...
+    @overload
+    def __getitem__(self, at: slice) -> list[Row]: ...
+
+    def __getitem__(self, at: int | slice) -> Row | list[Row]:
+        if isinstance(at, slice):
+            return [self[index] for index in range(*at.indices(len(self)))]
+        row = self._kept.row(self._kept.first_no + (at if at >= 0 else at + len(self)))
+        if row is None:
+            raise IndexError(at)
+        return row

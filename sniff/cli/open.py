@@ -20,7 +20,7 @@ def run(args: argparse.Namespace) -> int:
     captures = arguments.open_captures(args.files)
     if not arguments.on_terminal():
         raise Failure("open needs a terminal; use `sniff485 show` for text", USAGE)
-    from sniff.bus.row_source import FileFeed
+    from sniff.bus.file_source import FileFeed
     from sniff.tui import run as run_tui
 
     for path, capture in captures:

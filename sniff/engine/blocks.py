@@ -62,6 +62,28 @@ class Block:
             yield Chunk(time, octets[at : at + length], self.marks.get(index, ()))
             at += length
 
+    def cut(self, first: int, end: int) -> Block:
+        """Reads [first, end), at least one."""
+        reads = self.reads
+        at = int(reads.lengths[:first].sum())
+        lengths = reads.lengths[first:end]
+        octets = reads.octets[at : at + int(lengths.sum())]
+        some = Reads(octets, reads.times[first:end], lengths, reads.marked[first:end], reads.before)
+        return Block(some, {read - first: marks for read, marks in self.marks.items() if first <= read < end})
+
+
+def in_pieces(items: Iterable[Block | LineEvent], least: int, most: int) -> Iterator[Block | LineEvent]:
+    """The same in blocks of at most `least` reads first, so that something is there at once, later of at most `most`.
+    Raises what `items` raises."""
+    for item in items:
+        if isinstance(item, LineEvent):
+            yield item
+            continue
+        first = 0
+        while first < len(item):
+            yield item.cut(first, min(len(item), first + least))
+            first, least = first + least, min(2 * least, most)
+
 
 def reads_of(chunks: Sequence[Chunk]) -> Reads:
     """Chunks that hold octets, at least one, as columns."""

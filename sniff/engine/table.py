@@ -20,6 +20,7 @@ from dissectors.columns import (
     NONE,
     ROLES,
     VERDICTS,
+    Codes,
     FrameColumns,
     Masks,
     Octets,
@@ -111,9 +112,7 @@ class Table:
     @property
     def good(self) -> Masks:
         """bool[n]: frames of which nothing is damaged, with a good check where they have one (`Frame.ok`)."""
-        frames = self.frames
-        good: Masks = self.is_frame & (frames.damage == 0) & (frames.check != _CHECKS[Check.BAD])
-        return good
+        return good_rows(self.is_frame, self.frames.damage, self.frames.check)
 
     @property
     def repaired(self) -> Masks:
@@ -122,6 +121,12 @@ class Table:
         for place, row in self.odd.items():
             repaired[place] = isinstance(row.event, Frame) and row.event.repair is not None
         return repaired
+
+    def shown(self, name: str) -> npt.NDArray[Any]:
+        """What a row says of itself: "source", "destination" or "role", by the tracker where it has a place, else by
+        its header."""
+        values: npt.NDArray[Any] = np.where(self.placed.tx > 0, getattr(self.placed, name), getattr(self.frames, name))
+        return values
 
     def __len__(self) -> int:
         return len(self.frames)
@@ -260,6 +265,12 @@ def rows_at(table: Table, places: Sequence[int]) -> list[Row]:
     return rows
 
 
+def good_rows(is_frame: Masks, damage: Codes, check: Codes) -> Masks:
+    """Frames of which nothing is damaged, with a good check where they have one."""
+    good: Masks = is_frame & (damage == 0) & (check != _CHECKS[Check.BAD])
+    return good
+
+
 def joined(protocol: str, first: int, parts: Sequence[Table]) -> Table:
     """Tables whose rows follow one another as one; an empty one whose rows would begin with `first` for none."""
     if not parts:
@@ -286,6 +297,30 @@ def joined(protocol: str, first: int, parts: Sequence[Table]) -> Table:
         joined_columns(TransactionColumns, [part.transactions for part in parts]),
         np.concatenate([part.closed_by + np.where(part.closed_by < 0, 0, part.first - first) for part in parts]),
         odd,
+    )
+
+
+def cut(table: Table, begin: int, end: int) -> Table:
+    """Rows [begin, end) with what they closed; with the last row also what closed without one."""
+    if (begin, end) == (0, len(table)):
+        return table
+    at, rows = table.closed_by, slice(begin, end)
+    closed = (at >= begin) & (at < end)
+    if end == len(table):
+        closed |= at < 0
+    frames, placed = table.frames.take(rows), table.placed
+    first, last = (int(frames.offset[0]), int(frames.offset[-1] + frames.length[-1])) if len(frames) else (0, 0)
+    return Table(
+        table.protocol,
+        table.first + begin,
+        table.octets[first:last],
+        replace(frames, offset=frames.offset - first),
+        table.slack[rows],
+        table.is_frame[rows],
+        PlacementColumns(placed.tx[rows], placed.role[rows], placed.source[rows], placed.destination[rows]),
+        table.transactions.take(closed),
+        np.where(at[closed] < 0, at[closed], at[closed] - begin),
+        {place - begin: row for place, row in table.odd.items() if begin <= place < end},
     )
 
 

@@ -6,6 +6,8 @@ import contextlib
 import errno
 import os
 import stat
+from collections.abc import Callable, Iterator
+from contextvars import ContextVar
 from io import BufferedReader, FileIO
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
@@ -47,11 +49,28 @@ def open_capture(path: Path) -> BinaryIO:
         mode = os.stat(path).st_mode
         if not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):
             raise CaptureError(f"{path}: {_what(mode)}")
-        return BufferedReader(_AsOfNow(path))
+        stream = _AsOfNow(path)
+        watch = _WATCH.get()
+        if watch is not None:
+            watch(stream)
+        return BufferedReader(stream)
     except OSError as error:
         raise explain(path, error) from None
     except ValueError:  # a name with NUL in it
         raise CaptureError(f"{str(path)!r}: no file can have that name") from None
+
+
+_WATCH: ContextVar[Callable[[FileIO], None] | None] = ContextVar("watch", default=None)
+
+
+@contextlib.contextmanager
+def watched(watch: Callable[[FileIO], None]) -> Iterator[None]:
+    """Meanwhile each file that is opened here is shown, so that somebody can tell how far it has been read."""
+    token = _WATCH.set(watch)
+    try:
+        yield
+    finally:
+        _WATCH.reset(token)
 
 
 def _what(mode: int) -> str:

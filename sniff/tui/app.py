@@ -7,6 +7,7 @@ from functools import partial
 from typing import ClassVar
 
 from textual.binding import Binding, BindingType
+from textual.events import Event, InputEvent
 from textual.screen import Screen
 from textual.timer import Timer
 
@@ -26,6 +27,8 @@ from sniff.tui.viewing import Viewing
 POLL_SECONDS = 0.1
 WORK_SECONDS = 0.02
 """Pause between two pieces of pending work, so that keys are answered in between."""
+CALM_SECONDS = 0.2
+"""How long what is not on the screen waits after a key: who holds one down must not feel it."""
 SURE_SECONDS = 4.0
 """How long a first `q` during a recording waits for the second."""
 THEMES = ("textual-dark", "textual-light")
@@ -70,11 +73,18 @@ class SnifferApp(Analyzer):
         self._told_dropped = False
         self._told_trouble = ""
         self._asked_to_quit = 0.0
+        self._pressed = 0.0  # when the last key was
 
     @property
     def store(self) -> Store:
         """The rows."""
         return self.feed.store
+
+    async def on_event(self, event: Event) -> None:
+        """Note when somebody is at work here."""
+        if isinstance(event, InputEvent):
+            self._pressed = time.monotonic()
+        await super().on_event(event)
 
     # -- keeping up --------------------------------------------------------------------------------------------
 
@@ -89,12 +99,16 @@ class SnifferApp(Analyzer):
         if not self.screen_stack:  # the app is ending
             return
         changed = self.feed.poll()
-        was_searching, self.status = self.status.searching, self.feed.status()
+        was_searching, was_reading, self.status = self.status.searching, self.status.reading, self.feed.status()
         if was_searching and not self.status.searching:
             self._take_what_was_found()
         self._tell()
+        if self._worker is not None and (self.status.reading or self.status.judged < 1):
+            self._worker.resume()
         if changed:
             self.draw_screen()
+        if was_reading and not self.status.reading:  # there is nothing to follow any more
+            self.viewing.follow = False
         self._draw_header()
 
     def _tell(self) -> None:
@@ -141,7 +155,8 @@ class SnifferApp(Analyzer):
 
     def _work(self) -> None:
         screen = self.shown
-        busy = screen is not None and _is_whole(screen) and screen.work_left() and screen.work()
+        busy = time.monotonic() - self._pressed < CALM_SECONDS or self.feed.work()
+        busy |= screen is not None and _is_whole(screen) and screen.work_left() and screen.work()
         if not busy and self._worker is not None:
             self._worker.pause()
 

@@ -38,6 +38,13 @@ def record_state(status: FeedStatus) -> str:
     return "REC" if status.recording else "NOT REC"
 
 
+def progress_of(status: FeedStatus) -> str:
+    """How far a file has been read, then how far its rows have been judged; empty when all is done."""
+    if status.reading:
+        return f"{int(status.read * 100)} % read"
+    return f"{int(status.judged * 100)} % judged" if status.judged < 1 else ""
+
+
 def why_ended(status: FeedStatus, store: Store) -> tuple[str, str]:
     """Why nothing more comes, in two or three words and in full; empty while it does.
 
@@ -68,7 +75,8 @@ def status_line(status: FeedStatus, store: Store, viewing: Viewing, width: int) 
             shown_state,
             {"REC": "bad", "NOT REC": "doubt", "ENDED": "doubt"}.get(style, ""),
         ),
-        *([(size(status.file_size), "")] if status.recording or not status.live else []),
+        *([(progress, "")] if (progress := progress_of(status)) else []),
+        *([(size(status.file_size), "")] if status.recording or not (status.live or progress) else []),
     ]
     if status.dropped:
         pieces.append((f"LOST {status.dropped}", "bad"))

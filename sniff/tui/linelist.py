@@ -6,6 +6,7 @@ number stands on a line, and the subclass for the cells of that number.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterable
 from typing import ClassVar
 
@@ -18,6 +19,7 @@ from textual.message import Message
 from textual.scroll_view import ScrollView
 from textual.strip import Strip
 
+from sniff.tui.analyzer import analyzer
 from sniff.tui.columns import Cell, Column, pieces
 from sniff.tui.index import Index
 from sniff.tui.viewing import Viewing
@@ -116,10 +118,12 @@ class LineList(ScrollView, can_focus=True, inherit_bindings=False):
         self._settle(None)
         self.show_cursor(centre=True)
 
-    def search(self, count: int) -> None:
-        """Let the index test `count` numbers up and down."""
+    def search(self, count: int, until: float) -> None:
+        """Let the index test `count` numbers up and down, and again until then (`time.perf_counter`)."""
         top = self._top()
         self.index.step(count)
+        while self.index.pending and time.perf_counter() < until:
+            self.index.step(count)
         self._settle(top)
 
     def retest(self, numbers: Iterable[int]) -> None:
@@ -234,9 +238,12 @@ class LineList(ScrollView, can_focus=True, inherit_bindings=False):
             self.go_to(self.index[0])
 
     def action_last(self) -> None:
-        """Go to the last line."""
+        """Go to the last line, and follow where more come."""
         if len(self.index):
             self.go_to(self.index[len(self.index) - 1])
+            status = analyzer(self).status
+            growing = status.reading or (status.live and not status.ended)
+            self.viewing.follow = self.viewing.follow or (growing and not self.viewing.frozen)
 
     def action_choose(self) -> None:
         """Tell that the line under the cursor was chosen."""

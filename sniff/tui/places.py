@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from bisect import bisect_left
 from datetime import datetime, timedelta
 
 from dissectors.line import NS_PER_S
@@ -22,9 +21,7 @@ def find(store: Store, text: str, last: int) -> int | None:
     time = _time(store, text)
     if time is None:
         return None
-    count = last - store.first_no + 1
-    position = bisect_left(range(count), time, key=lambda index: store.rows[index].event.start)
-    return store.first_no + min(position, count - 1)
+    return min(store.row_at(time), last)
 
 
 def _time(store: Store, text: str) -> int | None:

@@ -6,7 +6,8 @@ from bisect import bisect_right, insort
 from dataclasses import dataclass, field
 
 from dissectors.findings import Finding
-from sniff.analysis.filtering import Predicate, compile_filter
+from sniff.analysis.filtering import Filter, compile_filter
+from sniff.bus.row_masks import RowMasks
 from sniff.bus.rows import Store
 from sniff.tui.times import TimeMode
 
@@ -21,7 +22,8 @@ class Viewing:
     row: int = 0  # number of the row under the cursor, 0 before there is one
     row_from: object = None  # the list whose cursor it is; other lists go there when they are shown
     filter: str = ""
-    accepts: Predicate | None = None
+    accepts: Filter | None = None
+    masks: RowMasks | None = None  # the same for many rows at once, where columns say something of it
     filter_version: int = 0  # changes with the filter, so that lists know when to begin anew
     marks: list[int] = field(default_factory=list)  # row numbers, ascending
     _frozen: tuple[int, int] | None = None  # last row and last closed transaction that are shown
@@ -35,11 +37,11 @@ class Viewing:
     def freeze(self, on: bool) -> None:
         """Stand still at what is there now, or go on."""
         self._frozen = (self.store.last_no, self.store.last_closed) if on else None
-        self._found = self.store.model.findings() if on else ()
+        self._found = self.store.findings() if on else ()
 
     def findings(self) -> tuple[Finding, ...]:
         """What was found in the rows to show."""
-        return self._found if self.frozen else self.store.model.findings()
+        return self._found if self.frozen else self.store.findings()
 
     @property
     def came_since(self) -> int:
@@ -59,7 +61,9 @@ class Viewing:
     def set_filter(self, text: str) -> None:
         """Show only what `text` accepts; an empty text shows everything. Raises FilterError."""
         text = text.strip()
-        self.accepts = compile_filter(text, self.store.dissector) if text else None
+        accepts = compile_filter(text, self.store.dissector, with_closings=True) if text else None
+        self.accepts = accepts
+        self.masks = RowMasks(self.store.kept, accepts) if accepts is not None and accepts.columns else None
         self.filter = text
         self.filter_version += 1
 

@@ -17,6 +17,7 @@ from sniff.analysis.judging import rules_over
 from sniff.tui.analyzer import analyzer
 from sniff.tui.plain import plain
 from sniff.tui.screens.base import ViewScreen
+from sniff.tui.still_judging import still_judging
 from sniff.tui.tables import StationTable
 from sniff.tui.times import clock
 
@@ -44,6 +45,7 @@ class FindingsScreen(ViewScreen):
         super().__init__()
         self._looked = -PERIOD
         self._first_look = True
+        self._open_end = False
         self._by_subject = False
         self._all = True
         self._found: dict[str, Finding] = {}
@@ -67,8 +69,10 @@ class FindingsScreen(ViewScreen):
     # -- keeping up --------------------------------------------------------------------------------------------
 
     def draw(self) -> None:
-        """Look again, at most once a second."""
-        if time.monotonic() - self._looked >= PERIOD:
+        """Look again, at most once a second, and when all has been judged."""
+        open_end = bool(still_judging(analyzer(self).status, self.store))
+        if open_end != self._open_end or time.monotonic() - self._looked >= PERIOD:
+            self._open_end = open_end
             self._look()
 
     def _look(self) -> None:
@@ -86,7 +90,7 @@ class FindingsScreen(ViewScreen):
         table.fill((key, self._cells(f, key in self._under)) for key, f in self._found.items())
         if self._first_look:  # the cursor stays on the gravest one until all was read once
             table.move_cursor(row=0, animate=False)
-            self._first_look = analyzer(self).status.reading
+            self._first_look = bool(still_judging(analyzer(self).status, self.store))
         self._describe()
 
     # -- showing -----------------------------------------------------------------------------------------------
@@ -101,10 +105,12 @@ class FindingsScreen(ViewScreen):
     def _describe(self) -> None:
         words = self.query_one("#words", Static)
         finding = self._here()
-        reading = analyzer(self).status.reading
-        text = Text("the file is still being read: more may be found\n" if reading else "", style="dim")
+        open_end = still_judging(analyzer(self).status, self.store)
+        text = Text()
+        if open_end:
+            text.append(f"{open_end}; more may be found, or found to be otherwise\n", style="yellow")
         if finding is None:
-            words.update(text if reading else "nothing was found")
+            words.update(text if open_end else "nothing was found")
             return
         text.append(f"{finding.severity.label} {finding.code} ", style=_STYLES[finding.severity])
         text.append(plain(f"{finding.subject}: {finding.seen}") + "\n")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import ClassVar
 
 from textual.app import ComposeResult
@@ -19,6 +20,7 @@ from sniff.tui.field_tree import FieldTree
 from sniff.tui.filter_line import FilterLine
 from sniff.tui.frame_list import FrameList
 from sniff.tui.hex_pane import HexPane
+from sniff.tui.index import Known
 from sniff.tui.linelist import LineList
 from sniff.tui.prompt import Prompt
 from sniff.tui.screens.listing import ListingScreen
@@ -26,6 +28,8 @@ from sniff.tui.times import date_and_clock
 
 DETAIL_SECONDS = 0.05
 """How long the cursor must rest before fields and octets are shown: holding a key down stays fluent."""
+FIRST_SECONDS = 0.01
+"""The same for the first row: the first time that fields are taken apart takes a fifth of a second."""
 FOLLOWING_SECONDS = 0.5
 """The same while the list follows a live bus: nobody reads ten frames a second."""
 
@@ -69,6 +73,11 @@ class FramesScreen(ListingScreen):
         """The filter on a row."""
         return self.viewing.accepts_row(number)
 
+    def known(self) -> Known | None:
+        """What columns say of rows."""
+        masks = self.viewing.masks
+        return None if masks is None else masks.rows
+
     def bounds(self) -> tuple[int, int]:
         """Rows in memory, up to the freeze."""
         return self.store.first_no, self.viewing.last_row
@@ -77,12 +86,10 @@ class FramesScreen(ListingScreen):
         """The row itself."""
         return self.viewing.row or None
 
-    def touched(self, closed: int) -> tuple[int, ...]:
-        """Request and response."""
-        transaction = self.store.closed_by_no(closed)
-        if transaction is None:
-            return ()
-        return tuple(no for no in (transaction.request, transaction.response) if no is not None)
+    def touched(self, first: int, last: int) -> Sequence[int]:
+        """Requests and responses."""
+        numbers: list[int] = self.store.kept.rows_of_closings(first, last).tolist()
+        return numbers
 
     def draw(self) -> None:
         """List first; details when the cursor rests."""
@@ -124,10 +131,9 @@ class FramesScreen(ListingScreen):
     def _plan_detail(self) -> None:
         if self._state() == self._detail or self._detail_timer is not None:
             return
-        if self._detail is None and self.query(HexPane):  # beside the first row there must not stand nothing
-            self._show_detail()
-            return
         delay = FOLLOWING_SECONDS if self.viewing.follow and not self.viewing.frozen else DETAIL_SECONDS
+        if self._detail is None:  # beside the first row there must not stand nothing for long, but the list comes first
+            delay = FIRST_SECONDS
         self._detail_timer = self.set_timer(delay, self._show_detail)
 
     def _show_detail(self) -> None:

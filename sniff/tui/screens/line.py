@@ -212,7 +212,7 @@ class LineScreen(ViewScreen):
         """Bring the page up to date, unless frozen."""
         page = self.query_one(Page)
         width = page.scrollable_content_region.width - LABEL - 4
-        state = (self.store.version, width)
+        state = (self.store.heard, width)
         if self._drawn == state or (self.viewing.frozen and self._drawn and self._drawn[1] == width) or width < 1:
             return
         self._drawn = state

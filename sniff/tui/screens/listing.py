@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from typing import ClassVar
 
 from textual.binding import Binding, BindingType
@@ -10,7 +11,7 @@ from textual.binding import Binding, BindingType
 from sniff.analysis.filtering import FIELDS, FilterError, compile_filter
 from sniff.tui.analyzer import analyzer
 from sniff.tui.filter_line import FilterLine
-from sniff.tui.index import Index
+from sniff.tui.index import Index, Known
 from sniff.tui.linelist import LineList
 from sniff.tui.prompt import Prompt
 from sniff.tui.screens.base import ViewScreen
@@ -18,6 +19,9 @@ from sniff.tui.screens.base import ViewScreen
 SLICE_SECONDS = 0.012
 """How long one piece of searching may take: short enough that a key never waits for it."""
 SLICE_ROWS = 128
+AT_ONCE_SECONDS = 0.05
+"""How long a new filter may search before anything of it is shown."""
+MOST_RETESTED = 5000
 DATA_ONLY = "!(role in {token, poll})"
 """On an idle token ring more than nine rows of ten are tokens."""
 
@@ -40,6 +44,7 @@ class ListingScreen(ViewScreen):
         super().__init__()
         self._filter_version = 0
         self._closed_seen = 0  # closed transactions that the index took into account
+        self._lines_seen = 0  # and the last line then
 
     @property
     def lines(self) -> LineList:
@@ -48,6 +53,10 @@ class ListingScreen(ViewScreen):
 
     def test(self, number: int) -> bool:
         """Whether the filter lets a line through."""
+        raise NotImplementedError
+
+    def known(self) -> Known | None:
+        """What the filter says of many lines at once; None where each has to be tested."""
         raise NotImplementedError
 
     def bounds(self) -> tuple[int, int]:
@@ -69,9 +78,13 @@ class ListingScreen(ViewScreen):
         if self._filter_version != viewing.filter_version:
             self._filter_version = viewing.filter_version
             anchor = min(max(place or lines.cursor or last, first), last + 1)
-            index = Index(self.test if viewing.filter else None, anchor)
+            index = Index(self.test if viewing.filter else None, anchor, self.known())
             index.bound(first, last)
             index.step(SLICE_ROWS)
+            if viewing.masks is not None:
+                end = time.perf_counter() + AT_ONCE_SECONDS
+                while index.pending and time.perf_counter() < end:
+                    index.step(SLICE_ROWS)
             lines.use_index(index)
         lines.bring_up(first, last)
         if place is not None:
@@ -81,14 +94,15 @@ class ListingScreen(ViewScreen):
 
     def _retest_closed(self) -> None:
         """Rows whose transaction closed since may pass the filter now, or no longer."""
-        last = self.viewing.last_closed
-        seen = max(self._closed_seen, last - 5000)
-        self._closed_seen = last
-        if self.lines.index.test is not None and seen < last:
-            self.lines.retest(number for no in range(seen + 1, last + 1) for number in self.touched(no))
+        last, before = self.viewing.last_closed, self._lines_seen
+        seen, self._closed_seen, self._lines_seen = self._closed_seen, last, self.lines.index.last
+        accepts = self.viewing.accepts
+        if accepts is not None and accepts.of_closing and seen < last:
+            numbers = [number for number in self.touched(seen + 1, last) if number <= before]
+            self.lines.retest(numbers[-MOST_RETESTED:])
 
-    def touched(self, closed: int) -> tuple[int, ...]:
-        """Lines about which a transaction that closed says something."""
+    def touched(self, first: int, last: int) -> Sequence[int]:
+        """Lines about which the transactions that closed as `first` … `last` say something."""
         return ()
 
     def work_left(self) -> bool:
@@ -100,9 +114,7 @@ class ListingScreen(ViewScreen):
         index = self.lines.index
         end = time.perf_counter() + SLICE_SECONDS
         found = len(index)
-        self.lines.search(SLICE_ROWS)
-        while index.pending and time.perf_counter() < end:
-            self.lines.search(SLICE_ROWS)
+        self.lines.search(SLICE_ROWS, end)
         self.query_one(FilterLine).show(self.viewing, index, self.THINGS)
         if len(index) != found:
             self.draw()

@@ -89,7 +89,7 @@ class NodesScreen(ViewScreen):
 
     def draw(self) -> None:
         """Bring the table up to date, unless frozen."""
-        state = (self.store.version, self._order)
+        state = (self.store.heard, self._order)
         if self._drawn == state or (self.viewing.frozen and self._drawn and self._drawn[1] == self._order):
             return
         self._drawn = state

@@ -17,6 +17,7 @@ from sniff.tui.analyzer import analyzer
 from sniff.tui.charts import BARS
 from sniff.tui.plain import plain
 from sniff.tui.screens.base import ViewScreen
+from sniff.tui.still_judging import still_judging
 from sniff.tui.tables import StationTable
 
 SHOWN = 500
@@ -108,7 +109,8 @@ class PointsScreen(ViewScreen):
         if self._drawn == state or (self.viewing.frozen and self._drawn and self._drawn[1] == view):
             return
         self._drawn = state
-        now = self.store.rows[-1].event.end if self.store.rows else 0
+        newest = self.store.by_no(self.store.last_no)
+        now = newest.event.end if newest is not None else 0
         points = self._chosen()
         self.query_one(StationTable).fill((_key(point), _cells(point, now, self._pinned)) for point in points[:SHOWN])
         self._hidden = max(0, len(points) - SHOWN)
@@ -124,7 +126,8 @@ class PointsScreen(ViewScreen):
         return pinned + others
 
     def _draw_detail(self) -> None:
-        self.query_one("#detail", Static).update(self._detail())
+        open_end = still_judging(analyzer(self).status, self.store)
+        self.query_one("#detail", Static).update("\n".join(part for part in (open_end, self._detail()) if part))
 
     def _detail(self) -> str:
         point = self._here()

@@ -12,6 +12,7 @@ from textual.widgets import DataTable, Static
 from dissectors.token_ring import Cell
 from sniff.tui.analyzer import analyzer
 from sniff.tui.screens.base import ViewScreen
+from sniff.tui.still_judging import still_judging
 from sniff.tui.tables import StationTable
 
 PERIOD = 1.0
@@ -55,7 +56,7 @@ class RingScreen(ViewScreen):
 
     def __init__(self) -> None:
         super().__init__()
-        self._drawn = (-1, 0.0)
+        self._drawn = (-1, 0.0, False)
 
     def compose_view(self) -> ComposeResult:
         """The table, and the sentences."""
@@ -71,12 +72,13 @@ class RingScreen(ViewScreen):
         table.cell_padding = 1
 
     def draw(self) -> None:
-        """Bring it up to date once a second, unless frozen."""
-        version, time = self._drawn
-        waits = self.viewing.frozen or monotonic() - time < PERIOD
+        """Bring it up to date once a second, and when all has been judged, unless frozen."""
+        version, time, was_open = self._drawn
+        open_end = still_judging(analyzer(self).status, self.store)
+        waits = self.viewing.frozen or (monotonic() - time < PERIOD and bool(open_end) == was_open)
         if self.store.version == version or (waits and version >= 0):
             return
-        self._drawn = (self.store.version, monotonic())
+        self._drawn = (self.store.version, monotonic(), bool(open_end))
         words = self.query_one("#words", Static)
         shown = self.store.dissector.ring
         if shown is None:
@@ -96,7 +98,7 @@ class RingScreen(ViewScreen):
             "token · use: from token to first frame · repl: answers · post: postponed · poll-: unanswered polls for "
             "masters · dam.: damaged frames"
         )
-        words.update("\n".join((*shown.sentences(ring), "", legend)))
+        words.update("\n".join((*([open_end] if open_end else []), *shown.sentences(ring), "", legend)))
 
     def on_data_table_row_selected(self, event: DataTable.RowSelected) -> None:
         """Enter or click on a master: its frames."""

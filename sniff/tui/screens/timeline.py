@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from bisect import bisect_left
 from typing import ClassVar, NamedTuple
 
 from rich.text import Text
@@ -56,13 +55,7 @@ def columns(store: Store, begin: int, width: int, zoom: int) -> list[Column]:
 
 def _failed(store: Store, begin: int, end: int) -> int:
     """Rows that are damaged, noise, or of a bad transaction in these seconds."""
-    first, last = (_row_at(store, second * NS_PER_S) for second in (begin, end))
-    return bisect_left(store.errors, last) - bisect_left(store.errors, first)
-
-
-def _row_at(store: Store, time: int) -> int:
-    """Number of the first row that begins at `time` (ns) or after."""
-    return store.first_no + bisect_left(store.rows, time, key=lambda row: row.event.start)
+    return sum(store.failed[second] for second in range(begin, end) if second in store.failed)
 
 
 class TimelineScreen(ViewScreen):
@@ -106,7 +99,7 @@ class TimelineScreen(ViewScreen):
     def draw(self) -> None:
         """Bring the charts up to date, unless frozen."""
         width = max(10, self.size.width - LABEL - 2)
-        state = (self.store.version, width, self.size.height, self._zoom, self._cursor, self._anchor)
+        state = (self.store.heard, width, self.size.height, self._zoom, self._cursor, self._anchor)
         frozen = self.viewing.frozen and self._drawn and self._drawn[1:] == state[1:]
         if state == self._drawn or frozen:
             return
@@ -241,7 +234,7 @@ class TimelineScreen(ViewScreen):
         zoom = ZOOMS[self._zoom]
         begin = self._begin + (here - self._begin) // zoom * zoom
         edge = begin + zoom if step > 0 else begin
-        row = _row_at(self.store, edge * NS_PER_S)
+        row = self.store.row_at(edge * NS_PER_S)
         no = self.store.next_error(row - 1) if step > 0 else self.store.previous_error(row)
         found = self.store.by_no(no) if no is not None else None
         if found is None:
@@ -274,7 +267,7 @@ class TimelineScreen(ViewScreen):
         chosen = self._chosen(here, zoom)
         begin = self._begin + (here - self._begin) // zoom * zoom
         low, high = chosen or (begin, begin + zoom)
-        first, after = (_row_at(self.store, second * NS_PER_S) for second in (low, high))
+        first, after = (self.store.row_at(second * NS_PER_S) for second in (low, high))
         if chosen is not None:
             analyzer(self).filter(f"no >= {first} && no < {after}")
             self._anchor = None

@@ -7,6 +7,7 @@ from textual.app import ComposeResult
 from sniff.bus.rows import BAD_VERDICTS
 from sniff.tui.analyzer import analyzer
 from sniff.tui.filter_line import FilterLine
+from sniff.tui.index import Known
 from sniff.tui.linelist import LineList
 from sniff.tui.screens.listing import ListingScreen
 from sniff.tui.transaction_list import TransactionList
@@ -29,6 +30,11 @@ class TransactionsScreen(ListingScreen):
     def test(self, number: int) -> bool:
         """The filter on the frames of a transaction."""
         return self.viewing.accepts_closed(number)
+
+    def known(self) -> Known | None:
+        """What columns say of its frames."""
+        masks = self.viewing.masks
+        return None if masks is None else masks.closings
 
     def bounds(self) -> tuple[int, int]:
         """Closed transactions in memory, up to the freeze."""

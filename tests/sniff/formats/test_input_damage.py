@@ -109,7 +109,7 @@ def test_frames_up_to_the_damage_are_shown(tmp_path: Path, sniff485: Callable[..
 
 
 def test_the_terminal_ui_gets_the_rows_before_the_damage(tmp_path: Path) -> None:
-    from sniff.bus.row_source import FileFeed
+    from sniff.bus.file_source import FileFeed
 
     path = tmp_path / "a.cap.txt"
     path.write_text("# line: 19200,8E1\n+0 01 03 00 00 00 02 C4 0B\n+8 01 03 04 00 D7 00 1A CB C0\n+90 0\n")

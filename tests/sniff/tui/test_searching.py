@@ -95,7 +95,12 @@ def test_findings_are_those_of_what_was_found() -> None:
     searched.store.model.findings()
     searched.find()
     whole = BusModel(searched.engine.session, searched.engine.dissector)
-    whole.add(Output(tuple(searched.store.rows), tuple(searched.store.transactions.values())))
+    whole.add(
+        Output(
+            tuple(searched.store.rows),
+            tuple(map(searched.store.closed_by_no, range(1, searched.store.last_closed + 1))),
+        )
+    )
     assert searched.store.model.findings() == whole.findings()
     assert not searched.store.errors
     assert searched.store.load.total.frames == searched.store.last_no - 1

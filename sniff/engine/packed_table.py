@@ -1,0 +1,248 @@
+"""Tables packed into a third of their memory: every column as narrow as its values allow. Nothing is lost. Pure.
+
+A column is a constant, or what each value is above the least, or above the value before it, in 1, 2, 4 or 8 octets.
+What follows from another column is kept as the difference from it, which often is a constant: where a frame lies among
+the octets from the lengths before it, when it began from its end and its length, what the tracker says of its ends
+from what its header says.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from dissectors.columns import NONE, FrameColumns, Masks, Octets, PlacementColumns, TransactionColumns
+from sniff.engine.engine import Row
+from sniff.engine.table import Table, good_rows
+
+Values = npt.NDArray[Any]
+
+_FRAMES = tuple(one.name for one in fields(FrameColumns) if one.name != "names")
+_PLACED = tuple(one.name for one in fields(PlacementColumns))
+_CLOSED = tuple(one.name for one in fields(TransactionColumns) if one.name != "names")
+_FAR = 1 << 62
+
+
+@dataclass(frozen=True, slots=True)
+class PackedColumn:
+    """`count` values of one type. `narrow`: None where all are `base`. `missing`: what stands for `none`."""
+
+    form: np.dtype[Any]
+    count: int
+    base: int
+    narrow: Values | None = None
+    step: int | None = None  # of values above those before them: the least difference
+    none: int = NONE
+    missing: int | None = None
+
+    @property
+    def octets(self) -> int:
+        """Of memory, without what every column costs."""
+        return 0 if self.narrow is None else self.narrow.nbytes
+
+    def values(self) -> Values:
+        """The column as it was."""
+        narrow = self.narrow
+        if narrow is None:
+            return np.full(self.count, self.base, self.form)
+        if self.step is not None:
+            whole = np.empty(self.count, np.int64)
+            whole[0] = self.base
+            np.add(narrow, self.step, out=whole[1:], dtype=np.int64)
+            np.cumsum(whole, out=whole)
+        elif self.missing is None:
+            made: Values = (
+                narrow.astype(self.form, copy=False)
+                if not self.base
+                else np.add(narrow, self.base, dtype=self.form, casting="unsafe")
+            )
+            return made
+        else:
+            whole = np.add(narrow, self.base, dtype=np.int64)
+        if self.missing is not None:
+            whole[whole == self.missing] = self.none
+        return whole.astype(self.form, copy=False)
+
+
+def packed(values: Values, none: int | None = None) -> PackedColumn:
+    """A column of integers or truth values, narrow. `none`: a value that stands apart from the others."""
+    form, count = values.dtype, len(values)
+    if not count:
+        return PackedColumn(form, 0, 0)
+    if form == np.bool_:
+        values = values.view(np.uint8)
+    missing: int | None = None
+    least, most = int(values.min()), int(values.max())
+    if none is not None and least != most and least <= none:
+        there = values != none
+        least = int(np.min(values, where=there, initial=most))
+        if least - 1 > none:
+            missing = least - 1
+            values = np.where(there, values, missing)
+        least = int(values.min())
+    if least == most:
+        return PackedColumn(form, count, least)
+    if most - least >= _FAR:
+        return PackedColumn(form, count, 0, values.copy())
+    width, apart = _width(most - least), NONE if none is None else none
+    if width > 1:
+        steps = np.diff(values) if values.dtype.itemsize == 8 else np.diff(values.astype(np.int64))
+        low, high = int(steps.min()), int(steps.max())
+        if _width(high - low) < width:
+            narrow = (steps - low).astype(_FORMS[_width(high - low)])
+            return PackedColumn(form, count, int(values[0]), narrow, low, apart, missing)
+    narrow = np.subtract(values, least, dtype=np.int64).astype(_FORMS[width])
+    return PackedColumn(form, count, least, narrow, None, apart, missing)
+
+
+_FORMS = {1: np.uint8, 2: np.uint16, 4: np.uint32, 8: np.uint64}
+
+
+def _width(span: int) -> int:
+    return 1 if span < 1 << 8 else 2 if span < 1 << 16 else 4 if span < 1 << 32 else 8
+
+
+class PackedTable:
+    """A table that is only looked at. `first`, `odd`, `protocol`, and what a row is: as of a table.
+
+    `closed`: how many transactions. `ids`: the least and the greatest of theirs. `rows_closed`: the last row that they
+    name. `begin`: of the first row, ns.
+    """
+
+    def __init__(self, table: Table) -> None:
+        frames, placed, closed = table.frames, table.placed, table.transactions
+        self.protocol, self.first, self.odd = table.protocol, table.first, table.odd
+        self.octets: Octets = table.octets if table.octets.base is None else table.octets.copy()
+        self.names, self.closed_names = frames.names, closed.names
+        self.closed = len(closed)
+        self._count = len(table)
+        held = {f"frames.{name}": packed(getattr(frames, name)) for name in _FRAMES if name not in ("offset", "start")}
+        if not np.array_equal(frames.offset, _begins(frames.length)):
+            held["frames.offset"] = packed(frames.offset)
+        self._char = int((frames.end[0] - frames.start[0]) // max(1, int(frames.length[0]))) if len(table) else 0
+        held["frames.start"] = packed(frames.end - frames.start - np.int64(self._char) * frames.length)
+        held["slack"], held["is_frame"] = packed(table.slack), packed(table.is_frame)
+        held["placed.tx"] = packed(placed.tx, none=0)
+        for name in ("role", "source", "destination"):
+            values = getattr(placed, name)
+            if not np.array_equal(values, _as_headers_say(getattr(frames, name), placed.tx)):
+                held[f"placed.{name}"] = packed(values)
+        for name in _CLOSED:
+            values = getattr(closed, name)
+            if name == "start":
+                values = closed.end - values
+            elif name in ("least", "most"):
+                values = values - closed.latency
+            held[f"closed.{name}"] = packed(values, none=NONE if values.dtype == np.int64 else None)
+        held["closed_by"] = packed(table.closed_by)
+        self._held = held
+        ids, numbers = closed.id, np.concatenate((closed.request, closed.response))
+        self.ids = (int(ids.min()), int(ids.max())) if len(ids) else (0, -1)
+        self.rows_closed = int(numbers.max(initial=0))
+        self.begin = int(frames.start[0]) if len(table) else 0
+
+    def __len__(self) -> int:
+        return self._count
+
+    @property
+    def memory(self) -> int:
+        """Octets of memory that columns and the octets of the wire take."""
+        return self.octets.nbytes + sum(one.octets for one in self._held.values())
+
+    def column(self, name: str) -> Values:
+        """A column as a table has it: "frames.end", "placed.tx", "closed.verdict", "slack", "is_frame", "closed_by"."""
+        held = self._held.get(name)
+        if name == "frames.start":
+            made: Values = self.column("frames.end") - (
+                self._held[name].values() + np.int64(self._char) * self.column("frames.length")
+            )
+            return made
+        if name == "closed.start":
+            return self.column("closed.end") - self._held[name].values()
+        if name in ("closed.least", "closed.most"):
+            return self.column("closed.latency") + self._held[name].values()
+        if held is not None:
+            return held.values()
+        if name == "frames.offset":
+            return _begins(self.column("frames.length"))
+        return _as_headers_say(self.column(name.replace("placed.", "frames.")), self.column("placed.tx"))
+
+    def as_headers_say(self, name: str) -> bool:
+        """Whether the tracker says of all rows that have a place what their headers say: "source", "role" …."""
+        return f"placed.{name}" not in self._held
+
+    def table(self) -> Table:
+        """The table as it was."""
+        return Table(
+            self.protocol,
+            self.first,
+            self.octets,
+            FrameColumns(**{name: self.column(f"frames.{name}") for name in _FRAMES}, names=self.names),
+            self.column("slack"),
+            self.column("is_frame"),
+            PlacementColumns(*(self.column(f"placed.{name}") for name in _PLACED)),
+            TransactionColumns(**{name: self.column(f"closed.{name}") for name in _CLOSED}, names=self.closed_names),
+            self.column("closed_by"),
+            self.odd,
+        )
+
+
+def _begins(lengths: Values) -> Values:
+    begins: Values = np.cumsum(lengths, dtype=np.int64)
+    begins -= lengths
+    return begins
+
+
+def _as_headers_say(values: Values, tx: Values) -> Values:
+    """What a placement without any news would say; of a row without a place nothing."""
+    return np.where(tx > 0, values, values.dtype.type(0 if values.dtype == np.uint8 else NONE))
+
+
+class _Columns:
+    """Columns of one kind; each is unpacked when somebody asks for it."""
+
+    def __init__(self, whole: PackedTable, kind: str, names: tuple[str, ...] = ("",)) -> None:
+        self._whole, self._kind = whole, kind
+        self.names = names
+
+    def __getattr__(self, name: str) -> Values:
+        values = self._whole.column(f"{self._kind}.{name}")
+        setattr(self, name, values)
+        return values
+
+
+class TableView:
+    """What a filter asks of a table, unpacked as far as it is asked for."""
+
+    def __init__(self, whole: PackedTable) -> None:
+        self._whole = whole
+        self.protocol, self.first = whole.protocol, whole.first
+        self.odd: Mapping[int, Row] = whole.odd
+        self.frames = _Columns(whole, "frames", whole.names)
+        self.placed = _Columns(whole, "placed")
+
+    def __len__(self) -> int:
+        return len(self._whole)
+
+    def shown(self, name: str) -> Values:
+        """As of a table."""
+        if self._whole.as_headers_say(name):
+            made: Values = getattr(self.frames, name)
+            return made
+        values: Values = np.where(self.placed.tx > 0, getattr(self.placed, name), getattr(self.frames, name))
+        return values
+
+    @cached_property
+    def is_frame(self) -> Masks:
+        """As of a table."""
+        return self._whole.column("is_frame")
+
+    @property
+    def good(self) -> Masks:
+        """As of a table."""
+        return good_rows(self.is_frame, self.frames.damage, self.frames.check)

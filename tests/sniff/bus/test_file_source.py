@@ -1,0 +1,136 @@
+"""A capture file as the terminal UI gets it: its first rows at once, the rest from a thread, judged last."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from dissectors.tracker import Transaction
+from sniff.bus import file_source
+from sniff.bus.file_source import FileFeed
+from sniff.bus.model import BusModel
+from sniff.bus.offline import outputs, survey
+from sniff.engine.blocks import Block
+from sniff.engine.engine import Output, Row
+from sniff.engine.follow_settings import dissector_for
+from sniff.engine.session import LineEvent, Session
+from sniff.formats import read
+from tests.bench import bulk_files, bulk_mstp
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    """Some thousand frames, damaged ones among them, in a recording."""
+    path = tmp_path / "night.mcap"
+    session = Session("/dev/ttyUSB0", bulk_mstp.LINE, "mstp", bulk_mstp.BASE)
+    bulk_files.write_mcap(path, bulk_mstp.reads(4000, damaged=0.01), session)
+    return path
+
+
+@pytest.fixture
+def by_thread(monkeypatch: pytest.MonkeyPatch) -> None:
+    """All but the first rows are read by the thread, in many pieces."""
+    monkeypatch.setattr(file_source, "AT_FIRST", 0.0)
+    monkeypatch.setattr(file_source, "FIRST_READS", 100)
+    monkeypatch.setattr(file_source, "READS", 200)
+
+
+def feed_of(path: Path) -> FileFeed:
+    capture = read(path)
+    return FileFeed(str(path), capture, capture.session)
+
+
+def reference_of(path: Path) -> tuple[list[Row], list[Transaction]]:
+    capture = read(path)
+    made = [one for one in outputs(capture.items(), capture.session) if isinstance(one, Output)]
+    return [row for one in made for row in one.rows], [tx for one in made for tx in one.transactions]
+
+
+@pytest.mark.usefixtures("by_thread")
+def test_the_thread_gives_the_rows_of_the_reference(path: Path) -> None:
+    feed = feed_of(path)
+    assert feed.poll()
+    begun = feed.status()
+    assert 0 < len(feed.store) < 200
+    assert begun.reading
+    assert 0 <= begun.read < 1
+    assert begun.judged < 1
+    shares = [begun.read]
+    while feed.status().reading:
+        feed.poll()
+        shares.append(feed.status().read)
+    assert shares == sorted(shares)
+    assert shares[-1] == 1
+    rows, closed = reference_of(path)
+    assert list(feed.store.rows) == rows
+    assert [feed.store.closed_by_no(no) for no in range(1, feed.store.last_closed + 1)] == closed
+    feed.close()
+
+
+@pytest.mark.usefixtures("by_thread")
+def test_findings_are_final_when_all_is_judged(path: Path) -> None:
+    feed = feed_of(path)
+    feed.poll()
+    while feed.work():
+        pass
+    assert feed.status().judged == 1
+    capture = read(path)
+    model = BusModel(capture.session, dissector_for(capture.session))
+    survey(capture, capture.session, model)
+    assert feed.store.findings() == model.findings()
+    feed.poll()
+    assert not feed.poll()  # nothing changes any more
+    feed.close()
+
+
+def test_a_small_file_is_read_in_the_first_poll(tmp_path: Path) -> None:
+    path = tmp_path / "a.cap.txt"
+    path.write_text("# line: 19200,8E1\n+0 01 03 00 00 00 02 C4 0B\n+8 01 03 04 00 D7 00 1A CB C0\n")
+    feed = feed_of(path)
+    assert feed.poll()
+    assert len(feed.store) == 2
+    assert not feed.status().reading
+    feed.close()
+
+
+@pytest.mark.usefixtures("by_thread")
+def test_closing_ends_the_thread(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(file_source, "WAITING", 1)
+    feed = feed_of(path)
+    feed.poll()
+    feed.close()
+    assert feed._thread is not None
+    assert not feed._thread.is_alive()
+
+
+@pytest.mark.usefixtures("by_thread")
+def test_what_goes_wrong_in_the_thread_is_raised_where_one_polls(path: Path) -> None:
+    class Broken:
+        session = read(path).session
+
+        def blocks(self) -> Iterator[Block | LineEvent]:
+            yield from read(path).blocks()
+            raise ZeroDivisionError
+
+    feed = FileFeed(str(path), Broken(), Broken.session)  # type: ignore[arg-type]
+
+    def all_of_it() -> None:
+        while True:
+            feed.poll()
+
+    with pytest.raises(ZeroDivisionError):
+        all_of_it()
+    assert len(feed.store) > 3000
+    feed.close()
+
+
+def test_a_cut_file_says_so(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[:-2000])
+    feed = feed_of(path)
+    while feed.poll() or feed.status().reading:
+        pass
+    assert feed.status().ended
+    assert len(feed.store) > 100
+    feed.close()
