@@ -256,10 +256,12 @@ class Devices:
     default: Profile | None = None
 
     def at(self, address: int | None) -> Profile | None:
-        """The profile of a station; None stands for all of them, which have one where it is the same for each."""
+        """The profile of a station; None stands for all of them: what the rest have, else what each has."""
         if address is not None:
             return self.by_address.get(address, self.default)
-        return self.profiles[0] if len(self.profiles) == 1 else None
+        if self.default is not None or len(self.profiles) != 1:
+            return self.default
+        return self.profiles[0]
 
     def exception(self, address: int, family: str, code: int) -> str:
         """The maker's words for an exception code of a station; empty when there are none."""

@@ -22,7 +22,7 @@ from sniff.engine.table import Table, transaction_columns
 
 MARGIN = 520
 """Octets before the end of a block from which on nothing is taken from a kernel: what follows may decide them. Two of
-the longest RTU frames; the frames of MS/TP end where they say."""
+the longest frames of a protocol that is framed by silences; most frames end where they say."""
 
 LEAST = 1536
 """Octets that a block must hold for a kernel to be worth its while; the reference is as fast with fewer."""

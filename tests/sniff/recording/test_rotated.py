@@ -66,7 +66,7 @@ def as_one(paths: list[Path]) -> Capture:
 
 
 def ring(capture: Capture) -> Ring:
-    return ring_of(capture.items(), capture.session, MSTP.ring)
+    return ring_of(capture, capture.session, MSTP.ring)
 
 
 def test_parts_give_the_items_of_the_whole(files: tuple[Path, list[Path]]) -> None:
