@@ -7,10 +7,11 @@ from dataclasses import dataclass
 
 from dissectors.findings import Finding, Severity
 from sniff.analysis.judging import Judging, rules_over
-from sniff.bus.offline import outputs
 from sniff.devices import noted_devices
-from sniff.engine.engine import Output
+from sniff.engine.blocks import blocks_of
+from sniff.engine.bulk import tables
 from sniff.engine.follow_settings import dissector_for
+from sniff.engine.observer import observe_tables
 from sniff.engine.session import Item, Session
 from sniff.formats import with_first_reads
 from tests.faults.case import Case, subject_of
@@ -59,13 +60,9 @@ class Outcome:
 
 
 def findings_of(session: Session, items: Iterable[Item]) -> tuple[Finding, ...]:
-    """What all rules together say of a capture."""
+    """What all rules together say of a capture: by the way that `check` takes."""
     judging = Judging(session, dissector_for(session), noted_devices(session))
-    for item in outputs(items, session):
-        if isinstance(item, Output):
-            judging.add(item)
-        else:
-            judging.add_line_event(item)
+    observe_tables(tables(blocks_of(iter(items)), session), judging)
     return judging.findings()
 
 
