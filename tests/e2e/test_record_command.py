@@ -21,6 +21,7 @@ from sniff.formats import read
 
 pytest.importorskip("termios")
 
+from tests.e2e.recording_bus import octets_of
 from tests.e2e.running import rest_of
 
 POLL = bytes.fromhex("010300000002c40b")
@@ -124,13 +125,10 @@ def next_line(process: subprocess.Popen[str]) -> str:
     return line
 
 
-def octets_of(path: Path) -> bytes:
-    return b"".join(item.octets for item in read(path).items() if isinstance(item, Chunk))
-
-
 def wait_for(path: Path) -> None:
-    until = time.monotonic() + 20
-    while not path.exists() or path.stat().st_size < 4000:
+    """Until something that was heard is in a file."""
+    until = time.monotonic() + 60
+    while not (path.exists() and octets_of(path)):
         assert time.monotonic() < until
         time.sleep(0.05)
 
