@@ -89,9 +89,11 @@ class DataCapture:
 
     def values(self) -> Any:
         """A row for every value that was read or written, as `points --parquet` has it; `time_ns` since the epoch."""
+        from sniff.analysis.table_points import samples_of
+
         make = _maker()
         reader = PointReader(dissector_for(self.session), self.devices)
-        rows = [sample_row(sample) for table in self._tables() for sample in reader.add_table(table).in_order()]
+        rows = [sample_row(sample) for table in self._tables() for sample in samples_of(reader, table).in_order()]
         held = list(zip(*rows, strict=True)) or [()] * len(COLUMNS)
         columns: dict[str, Column] = {}
         for (name, kind), cells in zip(COLUMNS.items(), held, strict=True):

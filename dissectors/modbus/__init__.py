@@ -8,7 +8,6 @@ from dissectors.manifest import Dissector, PacketFile, on_first_use
 from dissectors.modbus.ascii_framing import AsciiFramer
 from dissectors.modbus.envelope import ASCII_NAME, RTU_NAME, make_ascii, make_rtu
 from dissectors.modbus.fields import fields
-from dissectors.modbus.findings import ModbusFindings
 from dissectors.modbus.framing import RtuFramer
 from dissectors.modbus.header import peek_ascii, peek_rtu
 from dissectors.modbus.readings import readings, refusal
@@ -34,6 +33,7 @@ __all__ = [
 packet = on_first_use("dissectors.modbus.packets:dissect")
 kernel = on_first_use("dissectors.modbus.kernel:kernel")
 pairing = on_first_use("dissectors.modbus.block_pairing:rtu_pairing")
+judge = on_first_use("dissectors.modbus.judging_columns:BulkModbusFindings")
 ascii_kernel = on_first_use("dissectors.modbus.ascii_kernel:kernel")
 ascii_pairing = on_first_use("dissectors.modbus.block_pairing:ascii_pairing")
 reading_columns = on_first_use("dissectors.modbus.reading_columns:reading_columns")
@@ -72,7 +72,7 @@ RTU = Dissector(
     makers={RTU_NAME: make_rtu},
     scenarios=on_first_use("dissectors.modbus.scenario:rtu_scenarios"),
     family="modbus",
-    judge=ModbusFindings,
+    judge=judge,
     rules=RULES,
     readings=readings,
     reading_columns=reading_columns,
@@ -97,7 +97,7 @@ ASCII = Dissector(
     makers={ASCII_NAME: make_ascii},
     scenarios=on_first_use("dissectors.modbus.scenario:ascii_scenarios"),
     family="modbus",
-    judge=ModbusFindings,
+    judge=judge,
     rules=RULES,
     readings=readings,
     refusal=refusal,

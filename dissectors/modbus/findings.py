@@ -34,7 +34,7 @@ from dissectors.modbus.station_record import Lost, Station
 from dissectors.tracker import Placement, Transaction, Verdict
 
 if TYPE_CHECKING:
-    from dissectors.row_columns import RowColumns
+    pass
 
 TURNAROUND = 90 * MS
 """Nobody speaks so soon after a broadcast: the master waits 100 … 200 ms (Modbus over Serial Line V1.02, 2.4.1)."""
@@ -151,12 +151,6 @@ class ModbusFindings(Remembered):
             self.settle_request(station, transaction, asked, code, answer)
             if verdict is Verdict.DAMAGED_ANSWER and asked.no not in self.no_requests:
                 self._settle_damaged(station, transaction, asked, stray, flaw)
-
-    def take(self, rows: RowColumns) -> None:
-        """See `dissectors.row_columns.JudgesColumns`."""
-        from dissectors.modbus.judging_columns import take  # numpy is not needed for a bus that is heard live
-
-        take(self, rows)
 
     def word_exceptions(self, words: ExceptionWords) -> None:
         """See `dissectors.findings.WordsExceptions`."""

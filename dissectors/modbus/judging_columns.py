@@ -15,6 +15,7 @@ from dissectors import stretches
 from dissectors.columns import ROLES
 from dissectors.frame import Frame, Role
 from dissectors.modbus.envelope import RTU_NAME
+from dissectors.modbus.findings import ModbusFindings
 from dissectors.modbus.gap_columns import hurried, see_close, see_spacing, silences
 from dissectors.modbus.gaps import sender_name
 from dissectors.modbus.regular_exchanges import UNANSWERED, adus_of, regular
@@ -23,19 +24,21 @@ from dissectors.modbus.stretch_evidence import Exchanged, StretchEvidence
 from dissectors.row_columns import in_turn
 
 if TYPE_CHECKING:
-    from dissectors.modbus.findings import ModbusFindings
     from dissectors.row_columns import RowColumns
 
 _REQUEST = ROLES.index(Role.REQUEST)
 
 
-def take(judge: ModbusFindings, rows: RowColumns) -> None:
-    """What `dissectors.row_columns.JudgesColumns` asks for."""
-    if len(rows) < stretches.LEAST:
-        in_turn(judge, rows)
-        return
-    judging = _Judging(judge, rows)
-    stretches.take(judge, rows, judging.found.stretches, judging.is_at_rest, judging.pass_by)
+class BulkModbusFindings(ModbusFindings):
+    """The same from many rows at once (`dissectors.row_columns.JudgesColumns`)."""
+
+    def take(self, rows: RowColumns) -> None:
+        """Take many rows; few go one by one."""
+        if len(rows) < stretches.LEAST:
+            in_turn(self, rows)
+            return
+        judging = _Judging(self, rows)
+        stretches.take(self, rows, judging.found.stretches, judging.is_at_rest, judging.pass_by)
 
 
 class _Judging:

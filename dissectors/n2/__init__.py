@@ -32,6 +32,7 @@ __all__ = [
 
 
 packet = on_first_use("dissectors.n2.packets:packet")
+judge = on_first_use("dissectors.n2.judging_columns:BulkN2Findings")
 kernel = on_first_use("dissectors.n2.kernel:kernel")
 pairing = on_first_use("dissectors.n2.block_pairing:pairing")
 
@@ -54,7 +55,7 @@ N2 = Dissector(
     packet=packet,
     default_line="9600,8N1",
     bits=bits,
-    judge=N2Findings,
+    judge=judge,
     rules=RULES,
     readings=readings,
     refusal=refusal,

@@ -23,7 +23,7 @@ from dissectors.n2.wording import SLOW, Heard, worded
 from dissectors.tracker import Placement, Transaction, Verdict
 
 if TYPE_CHECKING:
-    from dissectors.row_columns import RowColumns
+    pass
 
 __all__ = ["SLOW", "N2Findings"]
 
@@ -111,12 +111,6 @@ class N2Findings:
         self._answers[transaction] = octets
         if len(self._answers) > ANSWERS_KEPT:
             self._answers.popitem(last=False)
-
-    def take(self, rows: RowColumns) -> None:
-        """See `dissectors.row_columns.JudgesColumns`."""
-        from dissectors.n2.judging_columns import take  # who feeds row by row needs no numpy
-
-        take(self, rows)
 
     def settle(self, transaction: Transaction) -> None:
         """Take a transaction that closed."""

@@ -19,7 +19,7 @@ from dissectors import stretches
 from dissectors.columns import NONE, ROLES, VERDICTS
 from dissectors.frame import Frame, Role
 from dissectors.n2.commands import parse_command
-from dissectors.n2.findings import ANSWERS_KEPT, refusal_code
+from dissectors.n2.findings import ANSWERS_KEPT, N2Findings, refusal_code
 from dissectors.n2.header import BROADCAST, meant
 from dissectors.n2.masters import HASTE, Asked
 from dissectors.n2.wording import SLOW
@@ -28,7 +28,6 @@ from dissectors.tracker import Verdict
 
 if TYPE_CHECKING:
     from dissectors.columns import Masks, Times
-    from dissectors.n2.findings import N2Findings
     from dissectors.n2.record import Station
     from dissectors.row_columns import RowColumns
 
@@ -58,13 +57,16 @@ class _Regular:
     kind: Times
 
 
-def take(judge: N2Findings, rows: RowColumns) -> None:
-    """What `dissectors.row_columns.JudgesColumns` asks for."""
-    if len(rows) < stretches.LEAST:
-        in_turn(judge, rows)
-        return
-    judging = _Judging(judge, rows)
-    stretches.take(judge, rows, judging.found.stretches, judging.is_at_rest, judging.pass_by)
+class BulkN2Findings(N2Findings):
+    """The same from many rows at once (`dissectors.row_columns.JudgesColumns`)."""
+
+    def take(self, rows: RowColumns) -> None:
+        """Take many rows; few go one by one."""
+        if len(rows) < stretches.LEAST:
+            in_turn(self, rows)
+            return
+        judging = _Judging(self, rows)
+        stretches.take(self, rows, judging.found.stretches, judging.is_at_rest, judging.pass_by)
 
 
 def _regular(rows: RowColumns) -> _Regular:

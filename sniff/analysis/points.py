@@ -10,7 +10,6 @@ import math
 from collections import OrderedDict, deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 from dissectors.frame import Frame, Role
 from dissectors.manifest import Dissector
@@ -19,10 +18,6 @@ from dissectors.profiles.decoding import Quality, Value, decode, say
 from dissectors.readings import How
 from dissectors.tracker import Transaction, Verdict
 from sniff.engine.engine import Output, Row
-
-if TYPE_CHECKING:
-    from sniff.analysis.point_columns import TableSamples
-    from sniff.engine.table import Table
 
 MOST_OPEN = 20_000
 """Frames remembered while their transaction is open."""
@@ -104,12 +99,6 @@ class PointReader:
     def add(self, output: Output) -> list[Sample]:
         """Take rows and closed transactions; give the samples that these complete, in the order of closing."""
         return [sample for exchange in self._exchanges(output) for sample in self.samples(exchange)]
-
-    def add_table(self, table: Table) -> TableSamples:
-        """Take many rows and closed transactions; the same samples."""
-        from sniff.analysis.table_points import samples_of
-
-        return samples_of(self, table)
 
     def remember(self, output: Output) -> None:
         """Take rows and closed transactions for `words` alone: no value is worked out."""

@@ -117,7 +117,9 @@ class SeriesReader:
 
     def add_table(self, table: Table) -> None:
         """Take many at once."""
-        self.series.add(self.reader.add_table(table).in_order())
+        from sniff.analysis.table_points import samples_of
+
+        self.series.add(samples_of(self.reader, table).in_order())
 
     def add_line_event(self, event: LineEvent) -> None:
         """It says nothing of a register."""

@@ -83,6 +83,7 @@ def _print(args: argparse.Namespace) -> int:
 def _samples(args: argparse.Namespace, capture: Capture, session: Session) -> Iterator[TableSamples]:
     """The samples that the user wants, many at a time."""
     from sniff.analysis.point_columns import TableSamples, no_samples
+    from sniff.analysis.table_points import samples_of
     from sniff.engine.bulk import tables as tables_of
 
     reader = PointReader(dissector_for(session), arguments.noted_devices(args, session))
@@ -94,7 +95,7 @@ def _samples(args: argparse.Namespace, capture: Capture, session: Session) -> It
         return
     for table in tables_of(watched.blocks(), session):
         if not isinstance(table, LineEvent):
-            yield _wanted(args, reader.add_table(table))
+            yield _wanted(args, samples_of(reader, table))
 
 
 def _wanted(args: argparse.Namespace, samples: TableSamples) -> TableSamples:

@@ -231,7 +231,9 @@ class _Values:
         self._put(self._points.add(output))
 
     def add_table(self, table: Table) -> None:
-        self._put(self._points.add_table(table).in_order())
+        from sniff.analysis.table_points import samples_of
+
+        self._put(samples_of(self._points, table).in_order())
 
     def close(self) -> None:
         """Nothing is held."""

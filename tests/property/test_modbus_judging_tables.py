@@ -7,7 +7,7 @@ import random
 import pytest
 
 from dissectors import stretches
-from dissectors.modbus.findings import ModbusFindings
+from dissectors.modbus.judging_columns import BulkModbusFindings
 from dissectors.row_columns import in_turn
 from sniff.engine.blocks import Block
 from sniff.engine.bulk import tables
@@ -22,13 +22,13 @@ from tests.property.test_judging_tables import cut
 def test_what_is_remembered_is_the_same_wherever_tables_are_cut(seed: int, is_ascii: bool) -> None:
     session, reads = bus(seed, is_ascii, exchanges=500)
     made = [one for one in tables([Block(reads)], session) if isinstance(one, Table)]
-    by_rows = ModbusFindings(session.timing)
+    by_rows = BulkModbusFindings(session.timing)
     for table in made:
         in_turn(by_rows, table)
     dice, expected = random.Random(seed), memory(by_rows)
     found = by_rows.findings()
     for most in (1 << 30, 200, stretches.LEAST + 8):
-        by_columns = ModbusFindings(session.timing)
+        by_columns = BulkModbusFindings(session.timing)
         for table in made:
             for part in cut(table, dice, most):
                 by_columns.take(part)
@@ -40,7 +40,7 @@ def test_what_is_remembered_is_the_same_wherever_tables_are_cut(seed: int, is_as
 def test_each_trouble_alone_leaves_the_same(trouble: str) -> None:
     session, reads = bus(99, trouble == "bare", exchanges=300, troubles=(trouble,))
     made = [one for one in tables([Block(reads)], session) if isinstance(one, Table)]
-    by_rows, by_columns = ModbusFindings(session.timing), ModbusFindings(session.timing)
+    by_rows, by_columns = BulkModbusFindings(session.timing), BulkModbusFindings(session.timing)
     for table in made:
         in_turn(by_rows, table)
         by_columns.take(table)
@@ -54,7 +54,7 @@ def test_of_a_quiet_bus_no_row_becomes_an_object_but_the_last(monkeypatch: pytes
     view = Table.row
     made = [one for one in tables([Block(reads)], session) if isinstance(one, Table)]
     monkeypatch.setattr(Table, "row", lambda table, place: looked_at.append(place) or view(table, place))
-    judge = ModbusFindings(session.timing)
+    judge = BulkModbusFindings(session.timing)
     for table in made:
         judge.take(table)
     assert len(looked_at) < 10

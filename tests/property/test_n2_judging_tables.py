@@ -7,7 +7,7 @@ import random
 import pytest
 
 from dissectors import stretches
-from dissectors.n2.findings import N2Findings
+from dissectors.n2.judging_columns import BulkN2Findings
 from dissectors.row_columns import in_turn
 from sniff.engine.blocks import Block
 from sniff.engine.bulk import tables
@@ -21,12 +21,12 @@ from tests.property.test_judging_tables import cut
 def test_what_is_remembered_is_the_same_wherever_tables_are_cut(seed: int) -> None:
     session, reads = bus(seed, exchanges=500)
     made = [one for one in tables([Block(reads)], session) if isinstance(one, Table)]
-    by_rows = N2Findings(session.timing)
+    by_rows = BulkN2Findings(session.timing)
     for table in made:
         in_turn(by_rows, table)
     dice, expected = random.Random(seed), memory(by_rows)
     for most in (1 << 30, 200, stretches.LEAST + 8):
-        by_columns = N2Findings(session.timing)
+        by_columns = BulkN2Findings(session.timing)
         for table in made:
             for part in cut(table, dice, most):
                 by_columns.take(part)
@@ -38,7 +38,7 @@ def test_what_is_remembered_is_the_same_wherever_tables_are_cut(seed: int) -> No
 def test_each_trouble_alone_leaves_the_same(trouble: str) -> None:
     session, reads = bus(99, exchanges=300, troubles=(trouble,))
     made = [one for one in tables([Block(reads)], session) if isinstance(one, Table)]
-    by_rows, by_columns = N2Findings(session.timing), N2Findings(session.timing)
+    by_rows, by_columns = BulkN2Findings(session.timing), BulkN2Findings(session.timing)
     for table in made:
         in_turn(by_rows, table)
         by_columns.take(table)
@@ -58,7 +58,7 @@ def test_of_a_quiet_bus_few_rows_become_objects(monkeypatch: pytest.MonkeyPatch)
         for kind in table.frames.kind.tolist()
     )
     monkeypatch.setattr(Table, "row", lambda table, place: looked_at.append(place) or view(table, place))
-    judge = N2Findings(session.timing)
+    judge = BulkN2Findings(session.timing)
     for table in made:
         judge.take(table)
     assert len(looked_at) < changing + 10

@@ -16,6 +16,7 @@ from dissectors.modbus.readings import readings
 from dissectors.reading_columns import HOWS
 from sniff.analysis.point_columns import TableSamples, add_to
 from sniff.analysis.points import PointReader, PointTable, Sample
+from sniff.analysis.table_points import samples_of
 from sniff.bus.offline import outputs
 from sniff.engine.blocks import blocks_of
 from sniff.engine.bulk import tables
@@ -36,7 +37,7 @@ def of_tables(path: Path, size: int) -> Iterator[TableSamples]:
     reader = PointReader(dissector_for(capture.session))
     for table in tables(blocks, capture.session):
         if not isinstance(table, LineEvent):
-            yield reader.add_table(table)
+            yield samples_of(reader, table)
 
 
 @pytest.mark.parametrize("path", CAPTURES, ids=lambda path: path.name)
