@@ -91,6 +91,23 @@ PROFILE_RULES: dict[str, Rule] = {
             "a response delay that is set in the device, a device busy with other work, or a gateway in between",
             "allow for it in the master's timeout; look at the device's response delay setting",
         ),
+        Rule(
+            "PR008",
+            Severity.WARNING,
+            "write to reserved bits",
+            "A master writes 1 into bits of a command that the maker keeps for itself. The TECO manuals ask for 0 "
+            "there (1.0.2).",
+            "the master's bits do not fit this device",
+            "compare the master's command word with the device's table",
+        ),
+        Rule(
+            "PR009",
+            Severity.NOTE,
+            "function that the device does not have",
+            "A master asks with a function code that the device's manual does not list.",
+            "the wrong profile, or a master that tries what the device refuses",
+            "have the master use a function of the device",
+        ),
     )
 }
 
@@ -130,6 +147,8 @@ class ProfileFindings:
         if not isinstance(event, Frame) or not event.ok or placement is None:
             return
         self._judge_length(no, event, placement)
+        if placement.role is Role.REQUEST and header is not None and header.function is not None:
+            self._judge_function(no, event, placement.destination, header.function)
         if placement.role is not Role.RESPONSE and self._readings is not None:
             station = None if placement.role is Role.BROADCAST else placement.destination
             readings = tuple(reading for reading in self._readings(event, None) if reading.how is How.WRITE)
@@ -183,6 +202,14 @@ class ProfileFindings:
             seen = f"frames of {len(frame.octets)} octets {way} it, {longest} allowed"
             self._add("PR006", _subject(profile, station), way, seen, frame.end, no)
 
+    def _judge_function(self, no: int, frame: Frame, station: int | None, code: int) -> None:
+        profile = self._devices.at(station)
+        known = profile.limits_on(self._family).functions if profile is not None else None
+        if profile is not None and known is not None and code not in known:
+            listed = " ".join(f"{one:02X}" for one in sorted(known))
+            seen = f"asked with function {code:02X} (hex); its manual lists {listed}"
+            self._add("PR009", _subject(profile, station), f"{code}", seen, frame.end, no)
+
     def _judge_writes(self, no: int, frame: Frame, station: int | None, readings: tuple[Reading, ...]) -> None:
         profile = self._devices.at(station)
         if profile is None:
@@ -196,6 +223,10 @@ class ProfileFindings:
             elif entry is not None and not entry.access.writable:
                 seen = f"{entry.title} ({entry.number}) written, it is read only"
                 self._add("PR003", who, entry.name, seen, frame.end, no)
+            elif entry is not None and reading.raw is not None and (bits := entry.reserved_in(reading.raw)):
+                words = " ".join(f"{bit:X}" for bit in bits)
+                seen = f"{entry.title} ({entry.number}) written with reserved bits {words} set"
+                self._add("PR008", who, f"{entry.name} {words}", seen, frame.end, no)
         for value in decode(profile, readings):
             self._judge_range(value, who, frame.end, no)
 

@@ -234,3 +234,17 @@ def test_health_counts_what_devices_tell() -> None:
     health = health_of(summary, judging.findings())
     assert health.stations[1].reasons[-1] == "finding PR004 (−30)"
     assert health.bus.score == (100 + health.stations[1].score) // 2
+
+
+def test_bits_that_must_be_zero_are_written_as_zero() -> None:
+    (found,) = judged(("010625013001", "010625013001"))
+    assert (found.code, found.subject) == ("PR008", "drive 1")
+    assert found.seen == "operation command (2501h) written with reserved bits C D set"
+    assert not judged(("010625010001", "010625010001"))
+
+
+def test_a_function_that_the_manual_does_not_list_is_noted() -> None:
+    (found,) = judged(("010425200001", "01840100"[:6]))
+    assert (found.code, found.severity) == ("PR009", Severity.NOTE)
+    assert found.seen == "asked with function 04 (hex); its manual lists 03 06 08 10"
+    assert not judged(("010325200001", "0103020000"))
