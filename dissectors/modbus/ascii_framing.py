@@ -319,6 +319,8 @@ class AsciiFramer:
         reason = Reason.FALSE_START if _START.match(window.octets) else Reason.NO_DELIMITER
         least, most = window.silence(0)
         before = Side.SILENCE if least >= self._t35 or most >= UNKNOWN_SILENCE else self._before
+        if after is Side.FRAME and window.silence(count)[0] >= self._t35:
+            after = Side.SILENCE  # a start that nothing came of, and the next frame long after it
         place = noise_place(before, after, window.gap(0), window.gap(count) if after is Side.FRAME else 0)
         octets, start, end, _, marks = window.take(count)
         if not octets.strip(b"\0") and any(mark.error & LineError.BREAK for mark in marks):
