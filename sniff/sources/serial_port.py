@@ -178,7 +178,8 @@ class SerialSource:
     def _unplugged(self, error: OSError | None) -> list[Item]:
         self._finish_escape()
         items, self._pending = self._pending, []
-        reason = _reason(error) if error is not None else "hung up"
+        # a read of a port that hung up ends, or fails with EIO: which of both is a matter of moments
+        reason = "hung up" if error is None or error.errno == errno.EIO else _reason(error)
         self._release()
         now = self._again.lost()
         # The number of a pseudo-terminal is soon given to somebody else's terminal: only a link made anew is followed.

@@ -21,7 +21,7 @@ from sniff.formats import read
 
 pytest.importorskip("termios")
 
-from tests.e2e.recording_bus import octets_of
+from tests.e2e.recording_bus import octets_of, wait_until
 from tests.e2e.running import rest_of
 
 POLL = bytes.fromhex("010300000002c40b")
@@ -219,11 +219,11 @@ def test_a_gateway_that_closes_is_waited_for(begin, tmp_path) -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = f"socket://127.0.0.1:{server.getsockname()[1]}"
         process = begin("record", port, *LINE, "-w", "x.mcap")
-        for _ in range(2):
+        for number in (1, 2):
             client, _address = server.accept()
             with client:
                 client.sendall(POLL)
-                time.sleep(0.2)
+                wait_until(lambda due=number * POLL: octets_of(tmp_path / "x.mcap") == due, "not recorded")
         assert next_line(process) == f"sniff485: {port} is gone (closed by the gateway)\n"
         assert next_line(process) == f"sniff485: {port} is back\n"
         process.send_signal(signal.SIGTERM)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import signal
 import socket
-import time
 from pathlib import Path
 
 from dissectors.frame import Chunk
@@ -15,6 +14,7 @@ from sniff.capture.link import CaptureLink
 from sniff.capture.wire import Received
 from sniff.engine.session import LineEvent, LineEventKind, SettingsChange
 from sniff.formats import read
+from tests.e2e.recording_bus import octets_of, wait_until
 
 FIRST, SECOND = LineSettings.parse("9600,8N1"), LineSettings.parse("19200,8E1")
 UNKNOWN = ("line", "protocol")
@@ -86,7 +86,8 @@ def test_every_part_of_a_rotation_says_the_settings_it_begins_with(pty, collect,
         for number in range(6):
             pty.feed(b"%d" % number)
             heard += seen(collect(link, lambda got: octets(got)))
-            time.sleep(0.8)  # so that it is flushed: a batch is never torn
+            recorded = b"".join(b"%d" % one for one in range(number + 1))  # a batch is never torn: wait for its end
+            wait_until(lambda due=recorded: b"".join(map(octets_of, sorted(tmp_path.iterdir()))) == due, "not recorded")
             if number == 1:
                 link.reconfigure(0, SECOND)
             elif number == 3:
@@ -131,7 +132,7 @@ def test_with_the_line_known_it_goes_on_recording(pty, collect, octets, tmp_path
     link = CaptureLink.start([SourceSpec(pty.path, FIRST, unknown=("protocol",))], RecordSpec(str(path)))
     link._connection.close()
     pty.feed(b"heard")
-    time.sleep(1.5)
+    wait_until(lambda: octets_of(path) == b"heard", "not recorded")
     assert link._process.poll() is None
     link._process.terminate()
     assert link._process.wait(10) == 0
