@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from dissectors.profiles import Devices
 from sniff.analysis.points import PointReader
@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from sniff.engine.blocks import Block
     from sniff.engine.column_join import SettledRows
     from sniff.engine.table import Table
+
+Given = TypeVar("Given", covariant=True)
 
 
 def outputs(items: Iterable[Item], session: Session) -> Iterator[Output | LineEvent]:
@@ -87,18 +89,22 @@ def settled_in_bulk(
 ) -> Iterator[Settled]:
     """The same as `settled`, by way of tables: rows that a filter leaves out never become objects, unless something
     is to be said of devices."""
-    from sniff.engine.bulk import tables
     from sniff.engine.table_join import TableJoin
 
-    joining = _Spoken(PointReader(dissector_for(session), devices), wanted) if devices else TableJoin(wanted)
-    try:
-        for item in tables(capture.blocks(), session):
-            if not isinstance(item, LineEvent):
-                yield from joining.add(item)
-    except CaptureError:
-        yield from joining.flush()
-        raise
-    yield from joining.flush()
+    reader = PointReader(dissector_for(session), devices)
+    return _joined(capture, session, _Spoken(reader, wanted) if devices else TableJoin(wanted))
+
+
+class _Joining(Protocol[Given]):
+    """Takes tables in order and gives their rows with what became of them."""
+
+    def add(self, table: Table) -> Iterator[Given]:
+        """Take the table that follows; give what is settled by it."""
+        ...
+
+    def flush(self) -> Iterator[Given]:
+        """Give all that is left."""
+        ...
 
 
 class _Spoken:
@@ -121,10 +127,15 @@ class _Spoken:
 
 def settled_columns(capture: Source, session: Session) -> Iterator[SettledRows]:
     """All rows of `settled`, as columns. Raises CaptureError as `settled` does."""
-    from sniff.engine.bulk import tables
     from sniff.engine.column_join import ColumnJoin
 
-    joining = ColumnJoin()
+    return _joined(capture, session, ColumnJoin())
+
+
+def _joined(capture: Source, session: Session, joining: _Joining[Given]) -> Iterator[Given]:
+    """What a join gives of all tables of a capture; raises what the capture does, when all before it was given."""
+    from sniff.engine.bulk import tables
+
     try:
         for item in tables(capture.blocks(), session):
             if not isinstance(item, LineEvent):

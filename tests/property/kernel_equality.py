@@ -23,6 +23,18 @@ def reads_of(chunks: Sequence[Chunk]) -> Reads:
     )
 
 
+def cut_anyhow(octets: bytes, timing: Timing, cuts: Sequence[int], pauses: Sequence[int]) -> list[Chunk]:
+    """Octets in reads of the lengths `cuts`, each `pauses` ns after the one before ended, over and over."""
+    now, at = 10**9, 0
+    chunks: list[Chunk] = []
+    while at < len(octets):
+        part = octets[at : at + cuts[len(chunks) % len(cuts)]]
+        now += len(part) * timing.char + pauses[len(chunks) % len(pauses)]
+        chunks.append(Chunk(now, part))
+        at += len(part)
+    return chunks
+
+
 def events_of(dissector: Dissector, chunks: Sequence[Chunk], timing: Timing) -> list[tuple[int, Event]]:
     """(place of the first octet, event) as the reference gives them."""
     framer = dissector.framer(timing)

@@ -19,7 +19,7 @@ from dissectors.modbus.ascii_kernel import kernel
 from dissectors.modbus.envelope import seal_ascii
 from sniff import formats
 from tests.bus_delivery import FTDI_LATENCY, MS, exact, ftdi, laid_out, with_noise
-from tests.property.kernel_equality import assert_equal, reads_of
+from tests.property.kernel_equality import assert_equal, cut_anyhow, reads_of
 from tests.property.modbus_adus import ascii_frames
 from tests.property.test_rtu_kernel import _exchange
 
@@ -101,13 +101,7 @@ pieces = st.one_of(
     st.lists(st.sampled_from([0, 1_000, MS, 3 * MS, 120 * MS, 2_000 * MS, -5 * MS]), min_size=1, max_size=8),
 )
 def test_of_any_octets(timing: Timing, pieces: list[bytes], cuts: list[int], pauses: list[int]) -> None:
-    octets, now, at = b"".join(pieces), 10**9, 0
-    chunks: list[Chunk] = []
-    while at < len(octets):
-        part = octets[at : at + cuts[len(chunks) % len(cuts)]]
-        now += len(part) * timing.char + pauses[len(chunks) % len(pauses)]
-        chunks.append(Chunk(now, part))
-        at += len(part)
+    chunks = cut_anyhow(b"".join(pieces), timing, cuts, pauses)
     if chunks and min(pauses) >= 0:
         assert_equal(ASCII, chunks, timing)
     elif chunks:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from typing import Any
 
 from dissectors import registry
 from dissectors.frame import Chunk, LineError, Mark
@@ -11,46 +10,18 @@ from dissectors.line import LineSettings
 from dissectors.profiles import Devices
 from sniff.bus.live import LiveBus
 from sniff.bus.recorded_values import RecordedValues
-from sniff.capture.wire import Batch, Ended, Heard, Received, Tick
+from sniff.capture.wire import Ended, Heard, Received, Tick
 from sniff.engine.blocks import Block, reads_of
 from sniff.engine.bulk import tables
 from sniff.engine.engine import Output
 from sniff.engine.session import LineEvent, LineEventKind, Session
 from sniff.engine.table import Table
 from tests.property.modbus_adus import rtu
+from tests.sniff.bus.given_link import GivenLink
 
 MS = 1_000_000
-SESSION = Session("port", LineSettings.parse("115200,8N1"), "modbus-rtu", bus="bus")
-
-
-class Link:
-    """Hands out what it was given; keeps what is to be recorded."""
-
-    def __init__(self, paths: list[str]) -> None:
-        self.paths, self.priority, self.closing = paths, "", False
-        self.dropped: dict[int, int] = {}
-        self.messages: list[Batch] = []
-        self.told: list[tuple[Any, ...]] = []
-
-    def session(self, bus: int) -> Session:
-        return SESSION
-
-    def receive_batches(self, timeout: float = 0.0) -> list[Batch]:
-        given, self.messages = self.messages, []
-        return given
-
-    def look(self, timeout: float = 0.0) -> bool:
-        return True
-
-    def insist(self) -> Ended | None:
-        return None
-
-    def let_go(self) -> None:
-        pass
-
-    def derived(self, *told: Any) -> bool:
-        self.told.append(told)
-        return True
+LINE = "115200,8N1"
+SESSION = Session("port0", LineSettings.parse(LINE), "modbus-rtu", bus="bus0")
 
 
 def polls(begin: int, count: int) -> list[Chunk]:
@@ -68,8 +39,8 @@ def heard(chunks: list[Chunk]) -> Heard:
     return Heard(0, Block(reads_of(chunks)))
 
 
-def live(paths: tuple[str, ...] = (), watched: bool = True) -> tuple[LiveBus, Link]:
-    link = Link(list(paths))
+def live(paths: tuple[str, ...] = (), watched: bool = True) -> tuple[LiveBus, GivenLink]:
+    link = GivenLink(paths=paths, line=LINE)
     return LiveBus(link, watched=watched), link  # type: ignore[arg-type]
 
 
@@ -116,7 +87,7 @@ def test_what_was_heard_in_a_second_is_counted_in_it() -> None:
     bus, link = live(paths=("x.mcap",), watched=False)
     link.messages = [Tick(0, 1000 * MS), heard(polls(1010, 200)), Tick(0, 1900 * MS), Tick(0, 2000 * MS)]
     bus.poll_tables()
-    (told,) = [told for told in link.told if told[1] == "/bus/bus"]
+    (told,) = [told for told in link.told if told[1] == "/bus/bus0"]
     assert json.loads(told[5])["frames"] == 400
 
 
@@ -131,7 +102,7 @@ def test_a_read_with_line_errors_keeps_its_place() -> None:
 
 def test_values_that_have_no_turn_are_not_worked_out_and_the_others_are_the_same() -> None:
     table = next(one for one in tables([Block(reads_of(polls(1000, 800)))], SESSION) if isinstance(one, Table))
-    by_rows, by_table = (RecordedValues("bus", registry.get("modbus-rtu"), Devices()) for _ in range(2))
+    by_rows, by_table = (RecordedValues("bus0", registry.get("modbus-rtu"), Devices()) for _ in range(2))
     for values in (by_rows, by_table):
         values._budget._left = values._budget._burst / 2 + 20  # soon each point gets its turn only
     expected = [one for output in table.outputs() for one in by_rows.of_rows(output)]

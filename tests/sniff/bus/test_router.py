@@ -6,44 +6,16 @@ from types import SimpleNamespace
 from typing import Any
 
 from dissectors.frame import Chunk
-from dissectors.line import LineSettings
 from sniff.bus import router as router_module
 from sniff.bus.live import LiveBus
 from sniff.bus.router import Router
 from sniff.capture.wire import Ended, Message, Received, Status, Tick
 from sniff.engine.engine import Output
-from sniff.engine.session import Session
 from tests.property.modbus_adus import rtu
+from tests.sniff.bus.given_link import GivenLink
 
 MS = 1_000_000
 REQUEST, ANSWER = rtu(bytes.fromhex("010300000001")), rtu(bytes.fromhex("0103020007"))
-
-
-class Link:
-    """Hands out what it was given, once."""
-
-    def __init__(self, *messages: Message) -> None:
-        self.messages = list(messages)
-        self.paths: list[str] = []
-        self.priority = ""
-        self.dropped: dict[int, int] = {}
-        self.closing = False
-
-    def session(self, bus: int) -> Session:
-        return Session(f"port{bus}", LineSettings.parse("19200,8E1"), "modbus-rtu", bus=f"bus{bus}")
-
-    def receive_batches(self, timeout: float = 0.0) -> list[Message]:
-        given, self.messages = self.messages, []
-        return given
-
-    def look(self, timeout: float = 0.0) -> bool:
-        return True
-
-    def insist(self) -> Ended | None:
-        return None
-
-    def let_go(self) -> None:
-        pass
 
 
 def said(bus: int, at: int) -> list[Message]:
@@ -59,7 +31,7 @@ def rows(live: LiveBus) -> int:
 
 
 def test_two_models_on_one_link_each_get_their_rows() -> None:
-    link: Any = Link(*said(0, 100), *said(1, 100), *said(0, 300), Ended("stopped"))
+    link: Any = GivenLink([*said(0, 100), *said(1, 100), *said(0, 300), Ended("stopped")])
     router = Router(link)
     lives = [LiveBus(link, bus, router=router) for bus in (0, 1)]
     assert [rows(live) for live in lives] == [4, 2]
@@ -69,7 +41,7 @@ def test_two_models_on_one_link_each_get_their_rows() -> None:
 
 def test_a_bus_that_nobody_asks_for_costs_no_more_than_its_share(monkeypatch: Any) -> None:
     monkeypatch.setattr(router_module, "HELD", 100)
-    link: Any = Link(*(message for at in range(0, 3000, 300) for message in said(1, at)), *said(0, 5000))
+    link: Any = GivenLink([*(message for at in range(0, 3000, 300) for message in said(1, at)), *said(0, 5000)])
     router = Router(link)
     alone, late = LiveBus(link, 0, router=router), LiveBus(link, 1, router=router)
     assert rows(alone) == 2
@@ -78,7 +50,7 @@ def test_a_bus_that_nobody_asks_for_costs_no_more_than_its_share(monkeypatch: An
 
 
 def test_buses_that_are_shown_by_nobody_are_left_alone() -> None:
-    link: Any = Link(*said(0, 100), *said(7, 100), Status(7))
+    link: Any = GivenLink([*said(0, 100), *said(7, 100), Status(7)])
     assert rows(LiveBus(link, 0)) == 2
 
 
