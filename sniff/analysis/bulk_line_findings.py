@@ -84,6 +84,7 @@ class BulkLineFindings(LineFindings):
         self._senders.see_good(last, int(table.frames.end[end - 1]))
         role = columns.role_before(begin, end)
         self._awaiting = self._awaiting if role is None else role is Role.REQUEST
+        self._asker = last if columns.role_before(end - 1, end) is Role.REQUEST else None
         self._before_ok = True
         self._patterns.see_good(table.frames.end[begin:end])
 

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import cache
+from typing import NamedTuple
 
 from dissectors.findings import Finding, Severity, Tally, counted, found, times
 from dissectors.frame import Chunk, Damage, Event, Frame, LineError, Noise, Place, Reason, Role
@@ -43,6 +44,25 @@ PROVED_FRAMES = 20
 _WHO_SPEAKS_IT = "which device still speaks the other protocol: its protocol setting; it does not belong on this line"
 
 
+class _Stray(NamedTuple):
+    """Stray octets beside a frame; `asker`: who had asked before them, where an answer was due."""
+
+    no: int
+    noise: Noise
+    asker: str | None
+
+    def told(self, sender: str) -> tuple[str, str]:
+        """Whose they are and by which rule, once `sender` has sent a frame.
+
+        Who asks again had no answer, or none that can be told: they may be what there was of it, and are nobody's.
+        """
+        if self.asker is not None and sender in (self.asker, BUS):
+            return BUS, "LN203"
+        if self.noise.place is Place.AFTER and self.asker is not None:
+            return self.asker, "LN202"
+        return sender, "LN201"
+
+
 class LineFindings:
     """Counts of one bus; `findings` may be asked at any time."""
 
@@ -66,7 +86,8 @@ class LineFindings:
         self._values: Counter[int] = Counter()
         self._before_ok = True  # the newest frame
         self._awaiting = False  # a request was the newest frame of a known kind
-        self._pending: list[tuple[int, Noise]] = []  # noise directly before the frame to come
+        self._asker: str | None = None  # who sent the newest frame, if that was a request
+        self._pending: list[_Stray] = []  # noise beside frames, of which the frame to come tells
         self._begins = UnsureStrays()  # noise that may be the begin of the frame to come
         self._sample: list[Chunk] = []  # what came first, to ask what else it may be
         self._sampled = 0
@@ -164,13 +185,14 @@ class LineFindings:
             self._in_frames += len(frame.octets)
         self._senders.see(sender, row.no, frame)
         self._settle_strays(sender, frame.slack)
+        self._asker = sender if role is Role.REQUEST else None
         return sender
 
     def _settle_strays(self, sender: str, slack: int) -> None:
         """A frame has come, read at most `slack` ns late: what the octets before it were."""
         if slack <= self._session.timing.latency + READ_LATE:
-            for no, noise in self._pending:
-                self._senders.stray(sender, "LN201", no, noise)
+            for stray in self._pending:
+                self._senders.stray(*stray.told(sender), stray.no, stray.noise)
             self._begins.forget()
         else:
             self._begins.take_back(self._senders)
@@ -190,8 +212,8 @@ class LineFindings:
             if self._rests_sampled < SAMPLE_OCTETS:
                 self._rest_sample.append(Chunk(noise.end, noise.octets[:SAMPLE_OCTETS], noise.marks))
                 self._rests_sampled += len(noise.octets)
-        elif noise.place is Place.BEFORE:
-            self._pending.append((no, noise))
+        elif noise.place is Place.BEFORE or (noise.place is Place.AFTER and self._asker is not None):
+            self._pending.append(_Stray(no, noise, self._asker))
             del self._pending[:-8]
         elif noise.place is Place.AFTER and self._senders.before is not None:
             self._begins.add(self._senders, self._senders.before, "LN202", no, noise)

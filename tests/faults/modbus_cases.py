@@ -359,6 +359,18 @@ MODBUS_CASES: tuple[Case, ...] = (
         (("MB005", "station 3"),),
     ),
     Case(
+        "ASCII answers cut short, FTDI",
+        partial(_ascii, (CutShort(0.1, ("unit 3",)),)),
+        (("MB005", "station 3"),),
+        FTDI,
+    ),
+    Case(
+        "RTU answers cut short, FTDI",
+        partial(modbus, (CutShort(0.1, ("unit 3",)),)),
+        (("MB005", "station 3"),),
+        FTDI,
+    ),
+    Case(
         "RTU noise before a station, FTDI",
         partial(modbus, (Of("unit 2", NoiseInGaps(0.2, places=(Place.BEFORE,))),)),
         (Said(_second, ("LN201",), r"stray|noise|before"),),
