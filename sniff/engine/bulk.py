@@ -152,9 +152,8 @@ def _is_sane(block: Block) -> bool:
 
 
 def _of_outputs(engine: SessionEngine, outputs: list[Output]) -> Table:
-    rows = [row for output in outputs for row in output.rows]
-    closed = [one for output in outputs for one in output.transactions]
-    return Table.of(engine.dissector.name, rows[0].no if rows else 0, rows, closed)
+    first = next((output.rows[0].no for output in outputs if output.rows), 0)
+    return Table.of_outputs(engine.dissector.name, first, outputs)
 
 
 class _Leg:
@@ -178,7 +177,8 @@ class _Leg:
             return None
         leg = cls(engine.dissector, engine.timing, engine.next, engine.last_tx)
         leg._before_tx = engine.before_tx
-        leg._framing = BulkFraming(engine.dissector, engine.timing, engine.framer, times[-1] if times else None)
+        before = times[-1] if times else None
+        leg._framing = BulkFraming(engine.dissector, engine.timing, engine.framer, before, engine.held)
         leg._late = LateColumns.after(engine.late, engine.timing)
         leg._tracker = engine.tracker
         return leg

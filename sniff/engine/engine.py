@@ -63,11 +63,13 @@ class Engine:
         self.before_tx = before_tx
         self.late = LateReads(timing)
         self.framer = dissector.framer(timing)
+        self.held = 0
         self.tracker: Tracker = dissector.tracker(timing) if pairing else Unpaired()
 
     def feed(self, chunk: Chunk) -> Output:
         """Take one read."""
         self.late.see(chunk)
+        self.held += len(chunk.octets)
         return self._track(self.framer.feed(chunk))
 
     def advance(self, now: int) -> Output:
@@ -94,6 +96,7 @@ class Engine:
         closed: list[Transaction] = []
         peek, track, late = self.dissector.peek, self.tracker.track, self.late
         for event in events:
+            self.held -= len(event.octets)
             if isinstance(event, Frame):
                 event = late.with_slack(event)
             no = self.next

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dissectors.columns import NONE, FrameColumns, Octets, PlacementColumns, Reads, Remembering, Times
-from dissectors.frame import Chunk, Event, Frame
+from dissectors.columns import NONE, ROLES, FrameColumns, Octets, PlacementColumns, Reads, Remembering, Times
+from dissectors.frame import Chunk, Event, Frame, Role
 from dissectors.framer import Framer
 from dissectors.line import Timing
 from dissectors.manifest import Dissector
@@ -57,18 +57,27 @@ Stretch = Clean | list[Event]
 """Rows that follow one another: by columns, or events of the reference framer."""
 
 
+_REQUEST = ROLES.index(Role.REQUEST)
+
+
 class BulkFraming:
     """Blocks in, stretches of rows out; the same rows as the reference framer alone gives."""
 
     def __init__(
-        self, dissector: Dissector, timing: Timing, framer: Framer | None = None, before: int | None = None
+        self,
+        dissector: Dissector,
+        timing: Timing,
+        framer: Framer | None = None,
+        before: int | None = None,
+        held: int = 0,
     ) -> None:
-        """`framer`: to go on with, which has taken octets; the nominal end of the newest of them was `before`, ns."""
+        """`framer`: to go on with, which has taken octets and still holds so many; the nominal end of the newest of
+        them was `before`, ns."""
         self._dissector = dissector
         self._timing = timing
         self._framer: Framer = framer if framer is not None else dissector.framer(timing)
         self._known = 0  # octets handed to the framer whose events were given already
-        self._given = 0  # octets of the stream that are in rows
+        self._given = -held  # octets of the stream that are in rows; it begins with the first block
         self._base = 0  # octets of the stream before the block at work
         self._before = before  # nominal end of the newest octet
 
@@ -158,14 +167,15 @@ class _Work:
             except _AnotherReadingError:
                 at = self._give_back()
                 continue
-            jump = self._take_events(fresh)
+            jump = self._take_events(fresh, at)
             if jump is not None:
                 at = jump
         self._end_events()
         return self._stretches
 
-    def _take_events(self, events: list[Event]) -> int | None:
-        """Keep events; where a chain is taken up, the place in the block where it ends."""
+    def _take_events(self, events: list[Event], fed: int) -> int | None:
+        """Keep events of a framer that has been fed up to a place of the block; where a chain is taken up, the place in
+        the block where it ends."""
         framing = self._framing
         for event in events:
             begin = framing._given - framing._base
@@ -174,20 +184,22 @@ class _Work:
             if begin >= self._doubted and isinstance(event, Frame) and event.ok and self._columns is not None:
                 row = int(np.searchsorted(self._columns.offset, begin))
                 if row < len(self._columns) and self._columns.offset[row] == begin:
-                    end = self._take_up(row, event)
+                    end = self._take_up(row, event, fed)
                     if end is not None:
                         return end
         return None
 
-    def _take_up(self, row: int, event: Frame) -> int | None:
+    def _take_up(self, row: int, event: Frame, fed: int) -> int | None:
         columns, last = self._columns, self._last
         assert columns is not None
         assert last is not None
         end = int(last[row]) + 1
         if end - row - 1 < SHORTEST or columns.length[row] != len(event.octets):
             return None
+        if int(columns.offset[end - 1]) + int(columns.length[end - 1]) <= fed:  # the framer has read it all already
+            return None
         for primed in (*PRIMED, end - row):
-            first = max(row, end - primed)
+            first = self._with_request(row, max(row, end - primed))
             if self._prime(slice(row + 1, max(row + 1, first)), slice(first, end)):
                 self._end_events()
                 self._taken = row, end, len(self._stretches)
@@ -196,6 +208,16 @@ class _Work:
                 self._framing._given = self._framing._base + stop
                 return stop
         return None
+
+    def _with_request(self, row: int, first: int) -> int:
+        """From which row on a framer that remembers is to be handed rows: the last request up to `first`, else `row`,
+        so that it knows what an answer answers."""
+        columns = self._columns
+        assert columns is not None
+        if not isinstance(self._framing._framer, Remembering):
+            return first
+        asked = np.flatnonzero(columns.role[row : first + 1] == _REQUEST)
+        return row + int(asked[-1]) if len(asked) else row
 
     def _clean(self, first: int, end: int) -> Clean:
         assert self._columns is not None
