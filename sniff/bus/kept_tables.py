@@ -156,7 +156,7 @@ class KeptTables:
             gone += 1
         del self.parts[:gone]
         self._spans = None
-        for held in (self._rows, self._closings, self._numbers):
+        for held in (self._rows, self._closings, self._numbers, self._unpacked):
             held.clear()
 
     # -- rows --------------------------------------------------------------------------------------------------

@@ -104,17 +104,12 @@ class Store:
 
     def add_outputs(self, outputs: Iterable[Output]) -> None:
         """Take what the engine gave, in order."""
-        rows: list[Row] = []
-        closed: list[Transaction] = []
-        closed_by: list[int] = []
-        for output in outputs:
-            if self._feeds_model and self._later is None and output:
+        given = [output for output in outputs if output]
+        if self._feeds_model and self._later is None:
+            for output in given:
                 self.model.add(output)
-            rows += output.rows
-            closed += output.transactions
-            closed_by += [len(rows) - 1] * len(output.transactions)
-        if rows or closed:
-            self._take(Table.of(self.dissector.name, self.last_no + 1, rows, closed, closed_by))
+        if given:
+            self._take(Table.of_outputs(self.dissector.name, self.last_no + 1, given))
 
     def add_table(self, table: Table) -> None:
         """Take rows and transactions that follow."""
@@ -163,6 +158,8 @@ class Store:
         if bad.any():
             numbers = np.where(closed.request[bad] != NONE, closed.request[bad], closed.response[bad])
             self._fail(numbers[numbers != NONE], closed.start[bad][numbers != NONE])
+        if self._later is not None and len(self) > self.keep:  # what is soon let go is judged first
+            self.judge(2 * len(table))
         if len(self) > self.keep * 1.1:
             self._drop(len(self) - self.keep)
 
@@ -182,6 +179,8 @@ class Store:
 
     def _drop(self, count: int) -> None:
         before = self.first_no
+        while self._later is not None and self._later.row < before + count - 1 and self.judge(count):
+            pass
         self.kept.drop(count)
         self.dropped_rows += self.first_no - before
         self.errors.drop_below(self.first_no)

@@ -8,7 +8,7 @@ from itertools import islice
 
 from sniff.bus.kept_tables import KeptTables
 from sniff.engine.session import LineEvent
-from sniff.engine.table import Table, cut
+from sniff.engine.table import Table
 
 
 class Unjudged:
@@ -31,7 +31,7 @@ class Unjudged:
         end = min(part.rows, begin + rows)
         if self.events:
             end = max(begin, min(end, self.events[0][0] + 1 - part.first))
-        table = cut(kept.table(part), begin, end)
+        table = kept.table(part).part(begin, end)
         self.row = max(self.row, part.first + end - 1)
         self.closed = part.closed_first + part.closed - 1 if end == part.rows else self.closed + len(table.transactions)
         return table

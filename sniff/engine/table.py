@@ -6,7 +6,7 @@ not say all (noise, damage, line errors, pads, messages in several frames) are k
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any, TypeVar
 
@@ -94,6 +94,20 @@ class Table:
             np.array(closed_by if closed_by is not None else [len(rows) - 1] * len(closed), np.int64),
             {place: row for place, row in enumerate(rows) if not _is_plain(row)},
         )
+
+    @classmethod
+    def of_outputs(cls, protocol: str, first: int, outputs: Iterable[Output]) -> Table:
+        """What an engine gave, output by output: transactions close with the last row of theirs."""
+        rows: list[Row] = []
+        closed: list[Transaction] = []
+        closed_by: list[int] = []
+        for output in outputs:
+            rows += output.rows
+            closed += output.transactions
+            closed_by += [len(rows) - 1] * len(output.transactions)
+        if rows:  # what closed before any row came goes with the first
+            closed_by = [max(place, 0) for place in closed_by]
+        return cls.of(protocol, first, rows, closed, closed_by)
 
     @property
     def heard(self) -> Masks:
@@ -297,30 +311,6 @@ def joined(protocol: str, first: int, parts: Sequence[Table]) -> Table:
         joined_columns(TransactionColumns, [part.transactions for part in parts]),
         np.concatenate([part.closed_by + np.where(part.closed_by < 0, 0, part.first - first) for part in parts]),
         odd,
-    )
-
-
-def cut(table: Table, begin: int, end: int) -> Table:
-    """Rows [begin, end) with what they closed; with the last row also what closed without one."""
-    if (begin, end) == (0, len(table)):
-        return table
-    at, rows = table.closed_by, slice(begin, end)
-    closed = (at >= begin) & (at < end)
-    if end == len(table):
-        closed |= at < 0
-    frames, placed = table.frames.take(rows), table.placed
-    first, last = (int(frames.offset[0]), int(frames.offset[-1] + frames.length[-1])) if len(frames) else (0, 0)
-    return Table(
-        table.protocol,
-        table.first + begin,
-        table.octets[first:last],
-        replace(frames, offset=frames.offset - first),
-        table.slack[rows],
-        table.is_frame[rows],
-        PlacementColumns(placed.tx[rows], placed.role[rows], placed.source[rows], placed.destination[rows]),
-        table.transactions.take(closed),
-        np.where(at[closed] < 0, at[closed], at[closed] - begin),
-        {place - begin: row for place, row in table.odd.items() if begin <= place < end},
     )
 
 

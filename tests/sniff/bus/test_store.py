@@ -29,7 +29,7 @@ from sniff.engine.engine import Output, Row
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.packed_table import PackedTable, packed
 from sniff.engine.session import LineEvent, LineEventKind, Session
-from sniff.engine.table import Table, cut, joined
+from sniff.engine.table import Table, joined
 from tests.bench import bulk_mstp, bulk_rtu
 
 NAMES = ("mstp", "modbus-rtu")
@@ -82,7 +82,7 @@ def table_of(name: str) -> Table:
 def pieces(table: Table, cuts: Sequence[int]) -> list[Table]:
     """The table, cut before these rows."""
     edges = sorted({0, len(table), *(at % (len(table) + 1) for at in cuts)})
-    return [cut(table, begin, end) for begin, end in pairwise(edges)]
+    return [table.part(begin, end) for begin, end in pairwise(edges)]
 
 
 def filled(name: str, cuts: Sequence[int], pack: int, keep: int = 10**6, later: bool = False) -> Store:
