@@ -123,19 +123,25 @@ class MstpTracker:
     # What time alone ends
 
     def _expire(self, now: int) -> list[Transaction]:
+        """What is over by `now`, in the order in which its time was up: whoever asks in between gets the same order."""
         closed: list[Transaction] = []
         waiting = self._waiting
-        if waiting is not None and now - waiting.last >= T_NO_TOKEN:
-            self._let_go(waiting, closed)
-        if not self._postponed:
-            return closed
         over = [
-            key
+            (exchange.last + (SEGMENTS_FOR if exchange.segmented else POSTPONED_FOR), key)
             for key, exchange in self._postponed.items()
             if now - exchange.last >= (SEGMENTS_FOR if exchange.segmented else POSTPONED_FOR)
         ]
-        for key in over:
-            closed.append(self._stop(self._postponed.pop(key)))
+        until = None if waiting is None or now - waiting.last < T_NO_TOKEN else waiting.last + T_NO_TOKEN
+        if len(over) > 1:
+            over.sort(key=lambda one: one[0])
+        for due, key in over:
+            if until is not None and waiting is not None and until <= due:
+                self._let_go(waiting, closed)
+                until = None
+            if key in self._postponed:
+                closed.append(self._stop(self._postponed.pop(key)))
+        if until is not None and waiting is not None:
+            self._let_go(waiting, closed)
         return closed
 
     def _let_go(self, waiting: Exchange, closed: list[Transaction]) -> None:

@@ -32,8 +32,8 @@ reads at most one fewer; else the computer was busy."""
 MOST = 250_000_000
 """ns; no computer that is worth listening with is away for longer."""
 
-KEPT = 64
-"""Reads that may still hold the end of a frame to come."""
+KEPT = 2048
+"""Reads that may still hold the end of a frame to come: more than the octets of the longest frame there is."""
 
 
 class _Read:
@@ -90,6 +90,8 @@ class LateReads:
         """The frame; with more slack where it ended in a read that was late, or where many are."""
         slack = frame.slack
         for read in reversed(self.kept):
+            if read.time < frame.end:
+                break
             if read.start < frame.end <= read.time:
                 if read.latency > self._allowed:
                     slack = max(slack, read.latency)
