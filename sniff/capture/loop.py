@@ -186,7 +186,7 @@ class CaptureLoop:
             for bus in self._buses:
                 if bus.due <= now:
                     self._take(bus)
-        if now >= self._beat_at or self.outlet.size > FLUSH_AT:
+        if now >= self._beat_at or self.outlet.gathered > FLUSH_AT:
             self._beat(now)
 
     def _take(self, bus: _Bus) -> bool:

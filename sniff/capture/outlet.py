@@ -24,13 +24,14 @@ TOGETHER = 64 * 1024
 
 class Outlet:
     """Sends messages over a connection; reads of a bus that follow one another go together. `dropped[bus]`: octets of
-    the line that were not sent."""
+    the line that were not sent; `gathered`: octets of messages since the last `flush`."""
 
     def __init__(self, connection: socket.socket, buses: int, backlog: int = BACKLOG) -> None:
         self._connection: socket.socket | None = connection.dup()  # closed here; others may still wait on theirs
         self._backlog = backlog
         self._parts: deque[bytes] = deque()
         self._size = 0
+        self.gathered = 0
         self._reads: list[list[Chunk]] = [[] for _ in range(buses)]  # that are no message yet
         self._unsealed = [0] * buses  # octets that they will take
         self._gap = [0] * buses  # octets dropped since the last that were sent
@@ -65,6 +66,7 @@ class Outlet:
             self._reads[bus].append(item)
             self._unsealed[bus] += taken
             self._size += taken
+            self.gathered += taken
             if self._unsealed[bus] > TOGETHER:
                 self._seal(bus)
             return
@@ -84,6 +86,7 @@ class Outlet:
         if self._connection is not None:
             self._parts.append(message)
             self._size += len(message)
+            self.gathered += len(message)
 
     def _seal_all(self) -> None:
         for bus, reads in enumerate(self._reads):
@@ -100,23 +103,28 @@ class Outlet:
     def flush(self) -> None:
         """Give the connection what it takes now."""
         self._seal_all()
+        self.gathered = 0
         while self._parts and self._connection is not None:
-            data = b"".join(self._parts) if len(self._parts) > 1 else self._parts[0]
-            data, rest = data[:AT_ONCE], data[AT_ONCE:]
+            data = self._next_parts()
             try:
                 taken = self._connection.send(data)
             except BlockingIOError:
                 taken = 0
             except OSError:
                 return self.close()
-            self._parts.clear()
-            left = data[taken:] + rest
-            if left:
-                self._parts.append(left)
-            self._size = len(left)
+            self._size -= taken
             if taken < len(data):
+                self._parts.appendleft(data[taken:])
                 return None
         return None
+
+    def _next_parts(self) -> bytes:
+        """Take the oldest messages, about AT_ONCE octets of them: of a long backlog nothing else is copied."""
+        taken, size = [], 0
+        while self._parts and size < AT_ONCE:
+            taken.append(self._parts.popleft())
+            size += len(taken[-1])
+        return taken[0] if len(taken) == 1 else b"".join(taken)
 
     def finish(self, message: bytes, patience: float) -> None:
         """Send a last message and close; a reader that does not read is waited for `patience` seconds."""
