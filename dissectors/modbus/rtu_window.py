@@ -22,7 +22,7 @@ from dissectors.modbus.damaged import (
     predicted,
     zeros_at_start,
 )
-from dissectors.modbus.functions import EXCEPTION_BIT, is_open_length
+from dissectors.modbus.functions import BROADCAST, EXCEPTION_BIT, is_open_length
 from dissectors.modbus.open_request import Expected, expectation
 from dissectors.modbus.past import Past
 from dissectors.modbus.repair import repaired
@@ -153,7 +153,8 @@ class RtuWindow:
         self._taken(count, Side.FRAME)
         self.good_before = True
         self.expected = expectation(self.expected, octets, request, response)
-        self.past.note(octets, self.expected is not None or not response)
+        to_all = octets[0] == BROADCAST and not octets[1] & EXCEPTION_BIT  # nobody answers for all
+        self.past.note(octets, self.expected is not None or not response or to_all)
         self._last_good = octets
         self.units.add(octets[0])
 

@@ -13,12 +13,18 @@ What is no frame is noise. A line feed after CR is filler.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from dissectors.frame import Check, Chunk, Damage, Event, Found, Frame, LineError, Noise, Place, Reason
 from dissectors.framer import OctetWindow, Taken
 from dissectors.line import Timing
 from dissectors.n2.commands import Command, expected_length, parse_command
 from dissectors.n2.envelope import COMMAND, CR, NOT_TEXT, is_good, judge
 from dissectors.n2.stretch import SHORTEST, Before, Piece, Stretch, good_whole
+
+if TYPE_CHECKING:
+    from dissectors.columns import FrameColumns, Octets
+    from dissectors.framer import Framer
 
 __all__ = ["MAX_LENGTH", "SILENCE", "N2Framer", "judge"]
 
@@ -85,6 +91,13 @@ class N2Framer:
         if not len(self._window):
             return None
         return self._window.proves_silence(self._limit if self._holds_frame() else self._near)
+
+    def remember(self, earlier: Framer, frames: FrameColumns, octets: Octets) -> None:
+        """See `dissectors.columns.Remembering`: a bus that has proved to speak N2 still does."""
+        from dissectors.columns import CHECKS  # who feeds row by row needs no numpy
+
+        assert isinstance(earlier, N2Framer)
+        self._proved = earlier._proved or bool((frames.check == CHECKS.index(Check.GOOD)).any())
 
     @property
     def _last_place(self) -> Place:
