@@ -270,6 +270,12 @@ class TransactionColumns:
         )
 
 
+def holds_any(begins: Times, ends: Times, places: Times) -> Masks:
+    """bool[n]: whether one of the ascending `places` lies in each [begin, end)."""
+    holds: Masks = np.searchsorted(places, ends, "left") > np.searchsorted(places, begins, "left")
+    return holds
+
+
 def counted(*keys: npt.NDArray[np.integer[Any]]) -> Iterator[tuple[tuple[int, ...], int]]:
     """How often each combination of numbers, 0 or more, stands in columns of one length; in ascending order."""
     if not len(keys[0]):

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from dissectors.columns import CHECKS, FOUNDS, NONE, FrameColumns, OctetTimes
+from dissectors.columns import CHECKS, FOUNDS, NONE, FrameColumns, OctetTimes, holds_any
 from dissectors.frame import Check, Found
 from dissectors.modbus.ascii_framing import LONGEST_SILENCE, MAX_CHARACTERS
 from dissectors.modbus.candidates import SHORT_FRAME
@@ -59,16 +59,10 @@ def _stretches(octets: Octets, reads: Reads, times: OctetTimes, timing: Timing) 
     strange = np.concatenate(([0], np.cumsum(_DIGITS.take(octets) == _NO_DIGIT, dtype=np.int64)))
     formed &= strange[ends] - strange[begins] == 3
     reads_begin = reads.begins[:-1]
-    formed &= ~_holds(begins + 1, ends, reads_begin[times.gaps() - timing.latency >= LONGEST_SILENCE])
+    formed &= ~holds_any(begins + 1, ends, reads_begin[times.gaps() - timing.latency >= LONGEST_SILENCE])
     if reads.marked.any():
-        formed &= ~_holds(begins, ends, np.flatnonzero(np.repeat(reads.marked, reads.lengths)))
+        formed &= ~holds_any(begins, ends, np.flatnonzero(np.repeat(reads.marked, reads.lengths)))
     return begins[formed], ends[formed]
-
-
-def _holds(begins: Times, ends: Times, places: Times) -> Masks:
-    """Whether one of the ascending `places` lies in [begin, end)."""
-    holds: Masks = np.searchsorted(places, ends, "left") > np.searchsorted(places, begins, "left")
-    return holds
 
 
 def _decoded(octets: Octets, begins: Times, ends: Times) -> tuple[Octets, Times, Times]:

@@ -6,11 +6,10 @@ station: it is slow when even the shortest reading is too long, too quick when e
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from dissectors.checksums import crc16_modbus
 from dissectors.findings import ExceptionWords, Finding, Tally
 from dissectors.frame import Damage, Event, Flaw, Frame, Header, Noise, Role
+from dissectors.line import MS
 from dissectors.modbus.asked import Asked
 from dissectors.modbus.envelope import RTU_NAME, readable_adu, rtu_check
 from dissectors.modbus.exchange import is_begin_of
@@ -23,7 +22,6 @@ from dissectors.modbus.remembered import (
     HASTY_KEPT,
     LAST_STANDARD_UNIT,
     LOST_KEPT,
-    MS,
     OPEN_KEPT,
     SLOW_UNLEARNT,
     Remembered,
@@ -32,9 +30,6 @@ from dissectors.modbus.remembered import (
 from dissectors.modbus.response_groups import Answered
 from dissectors.modbus.station_record import Lost, Station
 from dissectors.tracker import Placement, Transaction, Verdict
-
-if TYPE_CHECKING:
-    pass
 
 TURNAROUND = 90 * MS
 """Nobody speaks so soon after a broadcast: the master waits 100 … 200 ms (Modbus over Serial Line V1.02, 2.4.1)."""

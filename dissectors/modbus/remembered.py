@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 
 from dissectors.frame import Flaw, Frame
-from dissectors.line import Timing
+from dissectors.line import MS, Timing
 from dissectors.modbus.asked import Asked
 from dissectors.modbus.bare_ends import BareEnds
 from dissectors.modbus.evidence import Evidence
@@ -14,7 +14,6 @@ from dissectors.modbus.learnt import Learnt
 from dissectors.modbus.station_record import Lost, Station
 from dissectors.modbus.torn import TornFrames
 
-MS = 1_000_000
 SLOW_UNLEARNT = 500 * MS
 """An answer that takes longer is slow while the master's timeout is not known."""
 

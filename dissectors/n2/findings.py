@@ -9,7 +9,6 @@ no status bits, no change-of-state records.
 from __future__ import annotations
 
 from collections import OrderedDict
-from typing import TYPE_CHECKING
 
 from dissectors.findings import Finding, Tally
 from dissectors.frame import Damage, Event, Frame, Header, Noise
@@ -21,9 +20,6 @@ from dissectors.n2.record import Damages, Override, Station
 from dissectors.n2.torn import TornFrames
 from dissectors.n2.wording import SLOW, Heard, worded
 from dissectors.tracker import Placement, Transaction, Verdict
-
-if TYPE_CHECKING:
-    pass
 
 __all__ = ["SLOW", "N2Findings"]
 

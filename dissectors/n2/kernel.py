@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dissectors.columns import CHECKS, FOUNDS, NONE, ROLES, FrameColumns, OctetTimes
+from dissectors.columns import CHECKS, FOUNDS, NONE, ROLES, FrameColumns, OctetTimes, holds_any
 from dissectors.frame import Check, Found, Frame
 from dissectors.n2.commands import expected_length
 from dissectors.n2.envelope import ANSWER, COMMAND, CR, REFUSAL
@@ -49,9 +49,9 @@ def kernel(reads: Reads, timing: Timing) -> FrameColumns:
     times = OctetTimes.of(reads, timing.char)
     reads_begin = reads.begins
     pauses = reads_begin[:-1][times.gaps() - timing.latency >= 2 * timing.char]
-    good &= ~_holds(begins + 1, ends, pauses)
+    good &= ~holds_any(begins + 1, ends, pauses)
     if reads.marked.any():
-        good &= ~_holds(begins, ends, np.flatnonzero(np.repeat(reads.marked, reads.lengths)))
+        good &= ~holds_any(begins, ends, np.flatnonzero(np.repeat(reads.marked, reads.lengths)))
     offset = begins[good]
     return _columns(octets, times, offset, ends[good] - offset, checked[good])
 
@@ -70,12 +70,6 @@ def _good(octets: Octets, begins: Times, ends: Times) -> tuple[Masks, Masks]:
     checked = right & ((first == COMMAND) & (length >= _LEAST_COMMAND) | (first == ANSWER) & (length >= _LEAST_CHECKED))
     short = (first == ANSWER) & (length == 2) | (first == REFUSAL) & (length == _REFUSAL_LENGTH) & digits
     return plain & (checked | short), checked
-
-
-def _holds(begins: Times, ends: Times, places: Times) -> Masks:
-    """Whether one of the ascending `places` lies in [begin, end)."""
-    holds: Masks = np.searchsorted(places, ends, "left") > np.searchsorted(places, begins, "left")
-    return holds
 
 
 def _columns(octets: Octets, times: OctetTimes, offset: Times, length: Times, checked: Masks) -> FrameColumns:
