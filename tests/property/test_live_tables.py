@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 from collections.abc import Iterator
 from functools import partial
+from itertools import islice
 from pathlib import Path
 
 import pytest
@@ -16,11 +17,11 @@ from sniff.engine.blocks import Block, Gathering
 from sniff.engine.bulk import BulkEngine
 from sniff.engine.capture import CaptureError
 from sniff.engine.engine import Output, Row
-from sniff.engine.session import Item, LineEvent, Session
+from sniff.engine.session import Item, LineEvent, LineEventKind, Session, SettingsChange
 from sniff.engine.table import Table
 from sniff.formats import read
 from tests.bench import bulk_rtu
-from tests.property.test_tables import NAMES, Bus, _hidden, _mstp, _rtu
+from tests.property.test_tables import NAMES, Bus, _hidden, _mstp, _n2, _rtu
 
 HUGE = 1 << 20
 """Octets of a file that takes too long in small batches."""
@@ -99,3 +100,23 @@ def test_long_buses_give_the_same_live(bus: Bus, damaged: float) -> None:
     expected = by_reference(iter(items), session)
     for seed, most in ((1, 300), (2, 1000)):
         _assert_same(live(items, session, random.Random(seed), most), expected)
+
+
+@pytest.mark.parametrize("bus", [_mstp, _rtu, _hidden, _n2])
+def test_what_a_search_still_held_is_in_the_rows_after_it(bus: Bus) -> None:
+    """Settings are found in the middle of a frame: what goes on by columns has octets that came before."""
+    session, reads = bus(0.0)
+    given = [Chunk(chunk.time, chunk.octets) for chunk in islice(Block(reads).chunks(), 600)]
+    begin = LineEvent(given[0].time, LineEventKind.SETTINGS, str(SettingsChange(line=session.line, searching=True)))
+    found = str(SettingsChange(line=session.line, protocol=session.protocol, found=True))
+    for at in (3, 10, 40):
+        whole = given[at]
+        torn = Chunk(whole.time, whole.octets[:3]), Chunk(whole.time, whole.octets[3:])
+        over = LineEvent(whole.time, LineEventKind.SETTINGS, found)
+        items: list[Item] = [begin, *given[:at], torn[0], over, *filter(_holds, torn[1:]), *given[at + 1 :]]
+        expected = by_reference(iter(items), session)
+        _assert_same(live(items, session, random.Random(at), 300), expected)
+
+
+def _holds(chunk: Chunk) -> bool:
+    return bool(chunk.octets)

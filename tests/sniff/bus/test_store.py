@@ -207,6 +207,30 @@ def test_judged_later_is_judged_the_same(name: str, cuts: list[int], slices: lis
 
 
 @pytest.mark.parametrize("name", NAMES)
+@settings(deadline=None, max_examples=6)
+@given(CUTS, st.integers(20, 300))
+def test_what_is_dropped_was_judged_before(name: str, cuts: list[int], keep: int) -> None:
+    session = bus_of(name)[0]
+    model = BusModel(session, dissector_for(session))
+    model.add_table(table_of(name))
+    store = filled(name, cuts, 100, keep, later=True)
+    while store.judge(50):
+        pass
+    assert store.findings() == model.findings()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_table_of_outputs_says_which_row_closed_what(name: str) -> None:
+    made = reference_of(name)[2]
+    last, expected = 0, []
+    for output in made:
+        last = output.rows[-1].no if output.rows else last
+        expected += [(last, one) for one in output.transactions]
+    said = [(one.rows[0].no, tx) for one in Table.of_outputs(name, 1, made).outputs() for tx in one.transactions]
+    assert said == expected
+
+
+@pytest.mark.parametrize("name", NAMES)
 @BUSES
 @given(st.integers(1, 50), st.integers(1, 300))
 def test_blocks_in_pieces_give_the_same_rows(name: str, least: int, most: int) -> None:

@@ -5,7 +5,7 @@ import socket
 import pytest
 
 from dissectors.frame import Chunk
-from sniff.capture.outlet import Outlet
+from sniff.capture.outlet import AT_ONCE, Outlet
 from sniff.capture.wire import MessageSplitter, Received, decode_message, encode_tick, one_by_one
 from sniff.engine.session import LineEvent, LineEventKind
 
@@ -75,3 +75,18 @@ def test_a_reader_that_is_gone_costs_nothing(pair) -> None:
     assert outlet.size == 0
     assert outlet.dropped == [0]
     outlet.finish(b"", 1)
+
+
+def test_of_a_long_backlog_only_what_is_sent_at_once_is_joined(pair, monkeypatch: pytest.MonkeyPatch) -> None:
+    here, _ = pair
+    outlet = Outlet(here, 1, backlog=10**9)
+    joined: list[int] = []
+    whole = Outlet._next_parts
+    monkeypatch.setattr(Outlet, "_next_parts", lambda self: joined.append(len(parts := whole(self))) or parts)
+    for number in range(6000):
+        outlet.item(0, Chunk(number, bytes(1000)))
+        if number % 100 == 0:
+            outlet.flush()
+            assert outlet.gathered == 0
+    assert outlet.size > 10 * max(joined)
+    assert max(joined) <= 2 * AT_ONCE

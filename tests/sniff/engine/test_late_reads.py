@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from dissectors import registry
+from dissectors.bacnet.envelope import frame as mstp_frame
 from dissectors.frame import Chunk, Frame
 from dissectors.line import LineSettings, Timing
 from dissectors.modbus.envelope import seal_rtu
@@ -73,3 +74,21 @@ def test_a_computer_that_is_busy_now_and_then_does_not() -> None:
     busy = sorted([*times, (50_001.0, ASK), (100_001.0, ASK), (150_001.0, ASK)])
     frames, _ = read(busy)
     assert frames[-1].slack == 0
+
+
+def test_a_frame_that_is_given_many_reads_later_knows_its_late_read() -> None:
+    """The header of a long frame that was cut: what follows it is looked at again when all of its length has come."""
+    token = mstp_frame(0, 1, 2)
+    cut = mstp_frame(6, 255, 1, bytes(400))[:8]
+    line = LineSettings.parse("38400,8N1")
+    engine, rows = Engine(registry.get("mstp"), Timing(line)), []
+    now = 10 * MS
+    came = [(now, token), (now + 300 * MS, cut + token)]
+    for at, octet in enumerate(token * 60, 1):
+        came.append((now + 300 * MS + at * line.char, bytes([octet])))
+    for time, octets in came:
+        rows += engine.feed(Chunk(time, octets)).rows
+    rows += engine.close().rows
+    frames = [row.event for row in rows if isinstance(row.event, Frame) and row.event.octets == token]
+    assert len(frames) == 62
+    assert [frame.slack > 100 * MS for frame in frames] == [False, True] + [False] * 60
