@@ -46,23 +46,34 @@ _TABLE: Final = tuple(_step(value) for value in range(256))
 
 
 class _Begin:
-    """A place where such a frame may begin, and how far its CRC was followed."""
+    """A place where such a frame may begin, and how far its CRC was followed.
 
-    __slots__ = ("crc", "ends", "to")
+    Behind a good CRC and the same station and function again, nothing longer that begins here is a frame: both would
+    have to be chance.
+    """
+
+    __slots__ = ("begin", "crc", "ends", "is_over", "to")
 
     def __init__(self, at: int) -> None:
+        self.begin = at
         self.crc = _INITIAL
         self.to = at
         self.ends: list[int] = []  # where the CRC is good
+        self.is_over = False
 
     def follow(self, known: bytes, base: int, least: int, most: int) -> list[int]:
         """Positions up to `most` with a good CRC; none before `least`."""
         crc, at, table = self.crc, self.to, _TABLE
+        if self.is_over:
+            return self.ends
         for octet in known[at - base : most - base]:
             crc = crc >> 8 ^ table[(crc ^ octet) & 0xFF]
             at += 1
             if not crc and at >= least:
                 self.ends.append(at)
+                self.is_over = _same(known, self.begin - base, at - base)
+                if self.is_over:
+                    break
         self.crc, self.to = crc, at
         return self.ends
 
