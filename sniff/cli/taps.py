@@ -1,0 +1,72 @@
+"""Two captures of one line, taken at the same time at two places (both sides of a repeater, a gateway, a stretch of
+cable): every frame matched, how long it took, what is damaged or missing on one side only, and on which side the fault
+is. Exit code 1 when there is one.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+
+from sniff.analysis.plain import plain
+from sniff.bus.offline import survey
+from sniff.cli import arguments, json_output, tables
+from sniff.cli.progress import Watched
+from sniff.engine.session import Session
+from sniff.taps.frames import TapEar
+from sniff.taps.matching import matched
+from sniff.taps.verdict import Fault, faults, traffic
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Options of `taps`."""
+    parser.add_argument("first", metavar="A", help="capture at the first tap")
+    parser.add_argument("second", metavar="B", help="capture at the second tap, on the same clock")
+    arguments.add_line(parser)
+    arguments.add_reference(parser)
+    style = parser.add_mutually_exclusive_group()
+    style.add_argument("--json", action="store_const", const="json", dest="style", help="one JSON object a sender")
+    style.add_argument("--csv", action="store_const", const="csv", dest="style", help="comma-separated values")
+    parser.set_defaults(style="text")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Compare two taps."""
+    from sniff.taps import words
+
+    heard, doubts = [], []
+    for path in (args.first, args.second):
+        capture = arguments.open_capture(path)
+        session = arguments.settings_of(args, capture.session, path)
+        ear = TapEar()
+        survey(Watched(capture), session, ear, reference=args.reference)
+        heard.append(ear.frames())
+        doubts.append(_doubt(session))
+    doubt = sum(doubts)
+    first, second = heard
+    senders = traffic(first, second, matched(first, second, doubt))
+    found = faults(senders, doubt)
+    tables.write(words.HEADINGS if args.style == "text" else words.KEYS, words.rows(senders), args.style)
+    if args.style == "json":
+        for fault in found:
+            print(json_output.dumps(words.as_value(fault)))
+    if args.style == "text":
+        _say(found, bool(senders), doubt, args.first, args.second)
+    return 1 if found else 0
+
+
+def _say(found: Sequence[Fault], heard: bool, doubt: int, first: str, second: str) -> None:
+    from sniff.taps import words
+
+    print(f"A: {plain(first)}, B: {plain(second)}; {words.certainty(doubt)}")
+    if not heard:
+        print("no frame was heard while both taps listened")
+    elif not found:
+        print("nothing is wrong between the taps")
+    for fault in found:
+        print(words.sentence(fault))
+
+
+def _doubt(session: Session) -> int:
+    """ns by which a frame's time may be off: what the adapter holds back, and a character."""
+    return session.timing.latency + session.timing.char

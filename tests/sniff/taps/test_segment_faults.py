@@ -1,0 +1,161 @@
+"""Faults of a stretch between two taps: the right side is named, and nothing on a clean one; exact times and 16 ms."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+from dissectors.frame import Chunk
+from dissectors.line import LineSettings, Timing
+from sniff.bus.offline import survey
+from sniff.engine.blocks import blocks_of
+from sniff.engine.session import Adapter, Session
+from sniff.taps.frames import TapEar, TapFrames
+from sniff.taps.matching import matched
+from sniff.taps.verdict import Fault, Kind, Place, Side, Traffic, faults, traffic
+from sniff.taps.words import sentence
+from tests.bus_delivery import FTDI_LATENCY, MS, Wire, exact, ftdi
+from tests.sniff.taps.segment import (
+    Segment,
+    bit_errors,
+    dead,
+    lost,
+    rewritten,
+    ring,
+    without_begin,
+    without_end,
+)
+
+LINE = LineSettings.parse("19200,8E1")
+ADAPTERS = {"exact": 0, "16 ms": FTDI_LATENCY}
+BEHIND_A, BEHIND_B = {-1, 1, 2, 3, 4}, {5, 6, 7, 8}
+
+FAULTS: dict[str, tuple[Callable[[], Segment], set[tuple[Place, int, Kind]]]] = {
+    "bit errors onward": (lambda: Segment(onward=bit_errors(0.05)), {(Place.BETWEEN, 1, Kind.BITS)}),
+    "few bit errors onward": (lambda: Segment(onward=bit_errors(0.015)), {(Place.BETWEEN, 1, Kind.BITS)}),
+    "bit errors back": (lambda: Segment(back=bit_errors(0.05)), {(Place.BETWEEN, 0, Kind.BITS)}),
+    "bit errors both ways": (
+        lambda: Segment(onward=bit_errors(0.05), back=bit_errors(0.08)),
+        {(Place.BETWEEN, 1, Kind.BITS), (Place.BETWEEN, 0, Kind.BITS)},
+    ),
+    "back is dead": (lambda: Segment(back=dead), {(Place.BETWEEN, 0, Kind.DEAD)}),
+    "first octet onward": (lambda: Segment(onward=without_begin(0.1)), {(Place.BETWEEN, 1, Kind.BEGIN)}),
+    "first octets back": (lambda: Segment(back=without_begin(0.2, 3)), {(Place.BETWEEN, 0, Kind.BEGIN)}),
+    "last octets onward": (lambda: Segment(onward=without_end(0.1)), {(Place.BETWEEN, 1, Kind.END)}),
+    "last octet back": (lambda: Segment(back=without_end(0.1, 1)), {(Place.BETWEEN, 0, Kind.END)}),
+    "frames lost onward": (lambda: Segment(onward=lost(0.05)), {(Place.BETWEEN, 1, Kind.LOST)}),
+    "frames lost back": (lambda: Segment(back=lost(0.05)), {(Place.BETWEEN, 0, Kind.LOST)}),
+    "a gateway rewrites": (lambda: Segment(back=rewritten(0.1), delay=40 * MS), {(Place.BETWEEN, 0, Kind.CHANGED)}),
+    "a gateway loses onward": (
+        lambda: Segment(onward=lost(0.05), delay=30 * MS, jitter=10 * MS),
+        {(Place.BETWEEN, 1, Kind.LOST)},
+    ),
+    "bit errors behind a gateway": (
+        lambda: Segment(back=bit_errors(0.05), delay=25 * MS, jitter=5 * MS),
+        {(Place.BETWEEN, 0, Kind.BITS)},
+    ),
+    "the tap at B reads badly": (lambda: Segment(at_b=bit_errors(0.05)), {(Place.EITHER, 1, Kind.BITS)}),
+    "the tap at A reads badly": (lambda: Segment(at_a=bit_errors(0.05)), {(Place.EITHER, 0, Kind.BITS)}),
+    "the tap at B reads badly behind a gateway": (
+        lambda: Segment(at_b=bit_errors(0.05), delay=40 * MS),
+        {(Place.TAP, 1, Kind.BITS)},
+    ),
+    "the tap at B hears nothing for a while": (lambda: Segment(at_b=lost(0.1)), {(Place.EITHER, 1, Kind.LOST)}),
+}
+CLEAN = {
+    "cable": Segment,
+    "repeater": lambda: Segment(delay=600_000),
+    "gateway": lambda: Segment(delay=40 * MS, jitter=20 * MS),
+    "slow gateway": lambda: Segment(delay=300 * MS, jitter=100 * MS),
+}
+
+
+def tap(wire: Wire, latency: int, line: LineSettings = LINE, protocol: str = "modbus-rtu") -> TapFrames:
+    session = Session("tap", line, protocol, adapter=Adapter(latency=latency))
+    chunks: list[Chunk] = ftdi(wire) if latency else exact(wire)
+    ear = TapEar()
+    survey(_Capture(chunks), session, ear)
+    return ear.frames()
+
+
+class _Capture:
+    def __init__(self, chunks: list[Chunk]) -> None:
+        self._chunks = chunks
+
+    def items(self):
+        return iter(self._chunks)
+
+    def blocks(self):
+        return blocks_of(iter(self._chunks))
+
+
+def judged(segment: Segment, latency: int) -> tuple[dict[int, Traffic], list[Fault]]:
+    return compared([tap(wire, latency) for wire in segment.run(Timing(LINE))], 2 * (latency + LINE.char))
+
+
+def compared(taps: list[TapFrames], doubt: int) -> tuple[dict[int, Traffic], list[Fault]]:
+    first, second = taps
+    senders = traffic(first, second, matched(first, second, doubt))
+    return senders, faults(senders, doubt)
+
+
+@pytest.mark.parametrize("adapter", ADAPTERS)
+@pytest.mark.parametrize("name", FAULTS)
+def test_the_right_side_is_named(name: str, adapter: str) -> None:
+    make, expected = FAULTS[name]
+    _, found = judged(make(), ADAPTERS[adapter])
+    assert {(fault.place, fault.tap, fault.kind) for fault in found} == expected
+    for fault in found:
+        if fault.place is Place.BETWEEN:
+            hit, spared = (BEHIND_A, BEHIND_B) if fault.tap == 1 else (BEHIND_B, BEHIND_A)
+            assert set(fault.senders) <= hit
+            assert set(fault.spared) & spared
+            assert name.startswith("few") or set(fault.spared) <= spared
+        assert sentence(fault)
+
+
+@pytest.mark.parametrize("adapter", ADAPTERS)
+@pytest.mark.parametrize("name", CLEAN)
+def test_of_a_clean_stretch_nothing_is_said(name: str, adapter: str) -> None:
+    senders, found = judged(CLEAN[name](), ADAPTERS[adapter])
+    assert found == []
+    assert sum(one.both for one in senders.values()) == sum(one.heard for one in senders.values()) == 2400
+
+
+@pytest.mark.parametrize("delay", [0, 3 * MS, 40 * MS])
+def test_delays_are_those_of_the_stretch(delay: int) -> None:
+    segment = Segment(delay=delay)
+    senders, _ = judged(segment, 0)
+    for name, one in senders.items():
+        usual = sorted(one.delays)[len(one.delays) // 2]
+        assert usual == (delay if name in BEHIND_A else -delay)
+        side = Side.UNKNOWN if not delay else Side.FIRST if name in BEHIND_A else Side.SECOND
+        assert one.side(2 * LINE.char) is side
+
+
+@pytest.mark.parametrize("adapter", ADAPTERS)
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("clean", set()),
+        ("onward", {(Place.BETWEEN, 1, Kind.BITS)}),
+        ("back", {(Place.BETWEEN, 0, Kind.LOST)}),
+        ("tap", {(Place.EITHER, 0, Kind.BITS)}),
+    ],
+)
+def test_on_a_token_ring_whose_frames_are_all_alike(
+    name: str, adapter: str, expected: set[tuple[Place, int, Kind]]
+) -> None:
+    segment = {
+        "clean": Segment(delay=100_000),
+        "onward": Segment(onward=bit_errors(0.06)),
+        "back": Segment(back=lost(0.06)),
+        "tap": Segment(at_a=bit_errors(0.06)),
+    }[name]
+    line, latency = LineSettings.parse("38400,8N1"), ADAPTERS[adapter]
+    taps = [tap(wire, latency, line, "mstp") for wire in ring(segment, Timing(line))]
+    senders, found = compared(taps, 2 * (latency + line.char))
+    assert {(fault.place, fault.tap, fault.kind) for fault in found} == expected
+    if name == "clean":
+        assert sum(one.both for one in senders.values()) == 2400
