@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
-from pathlib import Path
 from typing import Any
 
 from dissectors import registry
@@ -31,25 +29,11 @@ class SourceSpec:
 
 @dataclass(frozen=True, slots=True)
 class RecordSpec:
-    """Where to record. `rotation`, `keep`: as the recorder takes them ("size:64MB", "time:1h"; parts to keep).
-
-    With several buses each has a file of its own: night.mcap becomes night.boiler-room.mcap.
-    """
+    """Where to record. `rotation`, `keep`: as the recorder takes them ("size:64MB", "time:1h"; parts to keep)."""
 
     path: str
     rotation: str | None = None
     keep: int | None = None
-
-    def path_of(self, source: SourceSpec, sources: Sequence[SourceSpec]) -> Path:
-        """The file of one of the buses."""
-        path = Path(self.path)
-        if len(sources) == 1:
-            return path
-        names = [other.bus for other in sources]
-        name = source.bus if names.count(source.bus) == 1 else f"{source.bus}-{sources.index(source) + 1}"
-        stem, dot, suffix = path.name.rpartition(".")
-        safe = re.sub(r"[^\w.-]+", "-", name)
-        return path.with_name(f"{stem}.{safe}.{suffix}" if dot else f"{path.name}.{safe}")
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,7 +24,7 @@ from sniff.capture.wire import Kind, MessageSplitter, WireError, decode_json, en
 from sniff.engine.capture import CaptureError
 from sniff.engine.session import Session
 from sniff.recording.rotation import Rotation
-from sniff.recording.writer import Recorder
+from sniff.recording.writer import Recorder, SharedFile
 from sniff.sources import PortError, Source, open_source
 from sniff.sources.capture_file import CaptureFileSource
 from sniff.sources.clock import Clock
@@ -78,20 +78,12 @@ def session_of(spec: SourceSpec, source: Source, clock: Clock) -> Session:
 
 
 def open_recorders(config: CaptureConfig, sessions: list[Session]) -> list[Recorder]:
-    """One a bus; none without a recording. Raises CaptureError or ValueError."""
+    """One a bus, into one file; none without a recording. Raises CaptureError or ValueError."""
     record = config.record
     if record is None:
         return []
     rotation = None if record.rotation is None else Rotation.parse(record.rotation)
-    opened: list[Recorder] = []
-    try:
-        for spec, session in zip(config.sources, sessions, strict=True):
-            opened.append(Recorder(record.path_of(spec, config.sources), session, rotation, record.keep))
-    except BaseException:
-        for recorder in opened:
-            recorder.close()
-        raise
-    return opened
+    return SharedFile(record.path, sessions, rotation, record.keep).recorders()
 
 
 def _capture(
@@ -132,6 +124,8 @@ def _capture(
     try:
         reason = loop.run()
     except BaseException:
+        for recorder in recorders:
+            recorder.finish()
         for recorder in recorders:
             recorder.close(CRASH_PATIENCE)
         raise

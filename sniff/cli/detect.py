@@ -37,7 +37,7 @@ def run(args: argparse.Namespace) -> int:
     args.line, args.protocol = args.line or AUTO, args.protocol or AUTO
     target = listening.target_of(args)
     assert target.search is not None
-    with listening.start_link(target.source, None) as link:
+    with listening.start_link([target.source], None) as link:
         outcome = search(link, target.search, args.timeout)
     if args.json:
         print(json_output.dumps(to_json(args.port, outcome)))

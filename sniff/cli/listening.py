@@ -8,8 +8,9 @@ import os
 import re
 import sys
 import time
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from dissectors import registry
@@ -19,6 +20,7 @@ from dissectors.words import milliseconds
 from sniff.analysis.plain import plain
 from sniff.analysis.summary import Summary
 from sniff.bus.live import LiveBus, LiveItem, LiveTables
+from sniff.bus.router import Router
 from sniff.capture.config import RecordSpec, SourceSpec
 from sniff.capture.link import CaptureLink
 from sniff.capture.wire import Ended, Status
@@ -47,16 +49,53 @@ class Target:
 
 def target_of(args: argparse.Namespace) -> Target:
     """What PORT, -s and -p mean, with the configuration behind them; flags win. Ends with exit code 2."""
+    config = _configured()
+    return _target(args, config, args.port or _only_port(config))
+
+
+def targets_of(args: argparse.Namespace) -> list[Target]:
+    """The same for any number of `args.ports`, or with `args.all` every bus of the configuration; no two buses have one
+    name. Ends with exit code 2."""
+    config = _configured()
+    wanted = list(args.ports)
+    if args.all:
+        if wanted:
+            raise Failure("--all: every configured bus; name no port beside it", USAGE)
+        wanted = [name for name, bus in config.buses.items() if bus.port]
+        if not wanted:
+            raise Failure(f"--all: no bus with a port is configured; name some in {FILE}", USAGE)
+    targets = [_target(args, config, port) for port in wanted or [_only_port(config)]]
+    twice = next((port for port, count in Counter(one.source.spec for one in targets).items() if count > 1), None)
+    if twice is not None:
+        raise Failure(f"{plain(twice)}: named twice; a port is listened to once", USAGE)
+    return _with_names_of_their_own(targets)
+
+
+def _with_names_of_their_own(targets: list[Target]) -> list[Target]:
+    taken: set[str] = set()
+    named = []
+    for target in targets:
+        name, number = target.source.bus, 2
+        while name in taken:
+            name, number = f"{target.source.bus}-{number}", number + 1
+        taken.add(name)
+        named.append(replace(target, source=replace(target.source, bus=name)))
+    return named
+
+
+def _configured() -> Config:
     try:
-        config = load()
+        return load()
     except ConfigError as error:
         raise Failure(str(error), USAGE) from None
-    wanted = args.port or _only_port(config)
+
+
+def _target(args: argparse.Namespace, config: Config, wanted: str) -> Target:
     bus = config.buses.get(wanted)
     if bus is None:
         _refuse_unknown(wanted, config)
     port = (bus.port or wanted) if bus is not None else wanted
-    if not args.port:
+    if not (args.port if "port" in args else args.ports or args.all):
         print(f"sniff485: no port named: listening to {plain(port)}, the only one there is", file=sys.stderr)
     configured = args.protocol or (bus.protocol if bus is not None else None)
     said: LineSettings | str | None = args.line or (bus.line if bus is not None else None)
@@ -130,18 +169,34 @@ def start(
     Recording and `duration` begin at once, also with something to `search` for; `LiveBus.searching` says how far it is.
     `duration` (seconds) and `count` (frames) are limits of the capture process, whatever becomes of this one.
     """
-    link = start_link(source, record, duration, count, watched)
+    return start_all([Target(source, None, devices or Devices(), search)], record, duration, count, watched)[0]
+
+
+def start_all(
+    targets: Sequence[Target],
+    record: RecordSpec | None,
+    duration: float | None = None,
+    count: int | None = None,
+    watched: bool = True,
+) -> list[LiveBus]:
+    """The same for several buses: one capture process, one clock, one file. `count`: frames of all together."""
+    link = start_link([target.source for target in targets], record, duration, count, watched)
     try:
-        adapter = link.session(0).adapter
-        detecting = search.detecting(adapter.latency, adapter.reports) if search is not None else None
-        return LiveBus(link, devices=devices, detecting=detecting, watched=watched)
+        router = Router(link)
+        return [_live(link, router, bus, target, watched) for bus, target in enumerate(targets)]
     except BaseException:
         link.stop()  # a capture outlives its starter unless it is told to end
         raise
 
 
+def _live(link: CaptureLink, router: Router, bus: int, target: Target, watched: bool) -> LiveBus:
+    adapter, search = link.session(bus).adapter, target.search
+    detecting = search.detecting(adapter.latency, adapter.reports) if search is not None else None
+    return LiveBus(link, bus, target.devices, detecting, router, watched)
+
+
 def start_link(
-    source: SourceSpec,
+    sources: Sequence[SourceSpec],
     record: RecordSpec | None,
     duration: float | None = None,
     count: int | None = None,
@@ -149,7 +204,7 @@ def start_link(
 ) -> CaptureLink:
     """Start the capture process without an engine. Ends with exit code 4 for the port, 3 for the file."""
     try:
-        return CaptureLink.start([source], record, duration, count, watched)
+        return CaptureLink.start(sources, record, duration, count, watched)
     except PortError as error:
         raise Failure(str(error), PORT_TROUBLE) from None
     except CaptureError as error:
@@ -176,13 +231,15 @@ def new_recording(bus: str) -> str:
 
 
 class Printer:
-    """Frames as lines (or JSON), each with its verdict, as they come; counts them all."""
+    """Frames as lines (or JSON), each with its verdict, as they come; counts them all. `before_saying`: called before
+    anything is said on standard error."""
 
     def __init__(self, live: LiveBus, as_json: bool = False, quiet: bool = False, colour: bool = False) -> None:
         self.live = live
         self.as_json = as_json
         self.quiet = quiet
         self.colour = colour
+        self.before_saying: Callable[[], None] = lambda: None
         self._session = live.session
         self._trouble = ""
         self._waited = False
@@ -223,6 +280,7 @@ class Printer:
 
     def _say_event(self, event: LineEvent) -> None:
         if event.kind in (LineEventKind.UNPLUGGED, LineEventKind.REPLUGGED):
+            self.before_saying()
             print(f"sniff485: {plain(event.text)}", file=sys.stderr)  # names the port
         elif event.kind in (LineEventKind.NOTE, LineEventKind.REFUSED):
             self._say(event.text)
@@ -253,6 +311,7 @@ class Printer:
             print(rows.text_line(settled, self.live.dissector, self.live.session, self.colour))
 
     def _say(self, text: str) -> None:
+        self.before_saying()
         print(f"sniff485: {self.live.session.port}: {plain(text)}", file=sys.stderr)
 
 
@@ -264,32 +323,50 @@ def waiting_words(status: Status) -> str:
     )
 
 
-def run(printer: Printer, progress: bool = True) -> int:
-    """Listen until something ends it: a signal, the capture's limits, the port. Gives the exit code.
+def run(printers: Sequence[Printer], progress: bool = True) -> int:
+    """Listen to the buses of a capture until something ends it: a signal, its limits, the ports. Gives the exit code.
 
-    A signal more ends the waiting for a slow disk, too. `progress`: say on standard error how a search for settings
-    goes, and how it ended.
+    A signal more ends the waiting for a slow disk, too. `progress`: say on standard error how searches for settings
+    go, and how they ended.
     """
-    live = printer.live
-    meter = _Meter(printer) if progress and printer.quiet and sys.stderr.isatty() else None
-    search_meter = searching.Meter() if progress and live.searching is not None else None
+    lives = [printer.live for printer in printers]
+    meter = _Meter(printers) if progress and printers[0].quiet and sys.stderr.isatty() else None
+    if meter is not None:
+        for printer in printers:
+            printer.before_saying = meter.clear
+    search_meters = {live.bus: searching.Meter() for live in lives if progress and live.searching is not None}
     heeded = 0
-    with until_interrupted() as caught, _stopped_by_its_reader(live):
-        while live.ended is None:
-            items = printer.poll(0.1)
-            if search_meter is not None:
-                search_meter.follow(live)
-                search_meter = None if live.searching is None else search_meter
-            elif meter is not None:
+    with until_interrupted() as caught, _stopped_by_its_reader(lives[0]):
+        while any(live.ended is None for live in lives):
+            for number, printer in enumerate(printers):
+                _turn(printer, 0.0 if number else 0.1, search_meters)
+            if meter is not None and not search_meters:
                 meter.show()
-            printer.take(items)
             if len(caught) > heeded:
                 heeded = len(caught)
-                live.end()
-        printer.finish()
-    for shown in (meter, search_meter):
+                lives[0].end()
+        for printer in printers:
+            printer.finish()
+    for shown in (meter, *search_meters.values()):
         if shown is not None:
             shown.clear()
+    return max(_code(live, bool(caught)) for live in lives)
+
+
+def _turn(printer: Printer, timeout: float, search_meters: dict[int, searching.Meter]) -> None:
+    """Take what has come of a bus; waits up to `timeout` seconds for something of any."""
+    live = printer.live
+    items = printer.poll(timeout)
+    search_meter = search_meters.get(live.bus)
+    if search_meter is not None:
+        search_meter.follow(live)
+        if live.searching is None:
+            del search_meters[live.bus]
+    printer.take(items)
+
+
+def _code(live: LiveBus, interrupted: bool) -> int:
+    """The exit code as far as one bus is concerned; says what went wrong with it."""
     if lost_something(live):
         return UNREADABLE  # what was asked for is not all in the file
     if live.ended is not None and not live.ended.clean:
@@ -298,8 +375,8 @@ def run(printer: Printer, progress: bool = True) -> int:
         print(f"sniff485: {plain(live.session.port)}: gone for good; nothing more can be heard", file=sys.stderr)
         return PORT_TROUBLE
     if live.engine.searching:
-        say_not_found(live, "interrupted" if caught else "ended")
-        return INTERRUPTED if caught else PORT_TROUBLE
+        say_not_found(live, "interrupted" if interrupted else "ended")
+        return INTERRUPTED if interrupted else PORT_TROUBLE
     return 0
 
 
@@ -339,14 +416,22 @@ def say_not_found(live: LiveBus, how: str) -> None:
         print("sniff485: the recording has every octet; read it with -s and -p once they are known", file=sys.stderr)
 
 
-def say_end(printer: Printer) -> None:
+def say_end(printers: Sequence[Printer]) -> None:
     """The closing lines on standard error: what was heard, what was lost, where it is."""
+    alone = len(printers) == 1
+    for number, printer in enumerate(printers, 1):
+        bus = "" if alone else f"{plain(printer.live.session.bus)}: "
+        _say_counts(printer, bus)
+        say_recorded(printer.live, number == len(printers), bus)
+
+
+def _say_counts(printer: Printer, bus: str) -> None:
     summary = printer.summary
     noise = f", {summary.noise} octets of noise" if summary.noise else ""
     searched = f", {summary.searched} octets heard while searching" if summary.searched else ""
     print(
-        f"sniff485: {summary.frames} frames ({summary.damaged} damaged), {summary.octets} octets{noise}{searched}, "
-        f"bus load {summary.load.overall():.1%}",
+        f"sniff485: {bus}{summary.frames} frames ({summary.damaged} damaged), {summary.octets} octets{noise}"
+        f"{searched}, bus load {summary.load.overall():.1%}",
         file=sys.stderr,
     )
     if summary.latency.count:
@@ -355,28 +440,28 @@ def say_end(printer: Printer) -> None:
         assert most is not None
         bound = milliseconds(printer.live.session.adapter.latency)
         print(
-            f"sniff485: response time p50 {milliseconds(middle)}, max {milliseconds(most)} (each ±{bound})",
+            f"sniff485: {bus}response time p50 {milliseconds(middle)}, max {milliseconds(most)} (each ±{bound})",
             file=sys.stderr,
         )
-    say_recorded(printer.live)
 
 
-def say_recorded(live: LiveBus, where: bool = True) -> None:
-    """The last lines on standard error: what was not looked at, what was lost, where the recording is (unless said)."""
+def say_recorded(live: LiveBus, where: bool = True, bus: str = "") -> None:
+    """The last lines on standard error: what was not looked at, what was lost, where the recording is (unless said).
+    `bus`: what the lines about octets begin with."""
     status, ended = live.status, live.ended
     if live.unseen:
         kept = "; the recording has them" if live.link.paths else ""
-        print(f"sniff485: {live.unseen} octets not looked at: this host did not keep up{kept}", file=sys.stderr)
+        print(f"sniff485: {bus}{live.unseen} octets not looked at: this host did not keep up{kept}", file=sys.stderr)
     if ended is not None and ended.unheard:
         what = "the last octets were not looked at, nobody knows how many: this host was too slow for them"
         print(f"sniff485: {what}{'; the recording has them' if live.link.paths else ''}", file=sys.stderr)
     lost = status.lost
     if ended is not None and not ended.clean and status.unwritten:
         lost += status.unwritten
-        print(f"sniff485: about {lost} octets NOT RECORDED: the capture process was ended", file=sys.stderr)
+        print(f"sniff485: {bus}about {lost} octets NOT RECORDED: the capture process was ended", file=sys.stderr)
     elif lost:
         why = "" if status.error else ": the disk did not keep up"
-        print(f"sniff485: {lost} octets NOT RECORDED{why}", file=sys.stderr)
+        print(f"sniff485: {bus}{lost} octets NOT RECORDED{why}", file=sys.stderr)
     if live.file_is_gone:
         print(f"sniff485: {plain(status.path or live.link.paths[0])} is not there any more", file=sys.stderr)
     elif status.path and where:
@@ -385,22 +470,36 @@ def say_recorded(live: LiveBus, where: bool = True) -> None:
 
 
 class _Meter:
-    """One line on the terminal, twice a second."""
+    """A line a bus on the terminal, twice a second."""
 
-    def __init__(self, printer: Printer) -> None:
-        self.printer = printer
+    def __init__(self, printers: Sequence[Printer]) -> None:
+        self.printers = printers
         self.began = time.monotonic()
         self.next = self.began
+        self._shown = 0
 
     def show(self) -> None:
         now = time.monotonic()
         if now < self.next:
             return
         self.next = now + 0.5
-        summary, status = self.printer.summary, self.printer.live.status
-        text = f"{now - self.began:.0f} s  {summary.frames} frames  {summary.damaged} damaged  {status.size} octets"
-        text += f"  disk slow: {status.behind:.0f} s behind" if status.behind else ""
-        print(f"\r\x1b[K{text}", end="", file=sys.stderr, flush=True)
+        lines = [self._line(printer, now) for printer in self.printers]
+        print(self._up() + "\n".join(f"\r\x1b[K{line}" for line in lines), end="", file=sys.stderr, flush=True)
+        self._shown = len(lines)
+
+    def _line(self, printer: Printer, now: float) -> str:
+        summary, status = printer.summary, printer.live.status
+        bus = "" if len(self.printers) == 1 else f"{plain(printer.live.session.bus)}  "
+        text = (
+            f"{bus}{now - self.began:.0f} s  {summary.frames} frames  {summary.damaged} damaged  {status.size} octets"
+        )
+        return text + (f"  disk slow: {status.behind:.0f} s behind" if status.behind else "")
+
+    def _up(self) -> str:
+        return f"\x1b[{self._shown - 1}A" if self._shown > 1 else ""
 
     def clear(self) -> None:
-        print("\r\x1b[K", end="", file=sys.stderr)
+        """Take it off the screen."""
+        if self._shown:
+            print(f"{self._up()}\r\x1b[J", end="", file=sys.stderr, flush=True)
+        self._shown = 0

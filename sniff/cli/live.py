@@ -62,6 +62,6 @@ def show(live: LiveBus, as_json: bool, as_lines: bool) -> int:
         listening.say_recorded(live, where=False)
         return UNREADABLE if listening.lost_something(live) else 0
     printer = listening.Printer(live, as_json=as_json, colour=arguments.colour())
-    code = listening.run(printer)
-    listening.say_end(printer)
+    code = listening.run([printer])
+    listening.say_end([printer])
     return code

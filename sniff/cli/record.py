@@ -1,5 +1,6 @@
 """PORT: a serial port, socket://HOST:PORT, rfc2217://HOST:PORT, or a bus named in sniff485.toml. Ends on Ctrl-C,
-SIGTERM, --duration or --count. A file cut off by a crash opens, and says where it ends.
+SIGTERM, --duration or --count. Several ports are recorded by one process, on one clock, into one file; every command
+reads such a file, one bus of it with --bus NAME. A file cut off by a crash opens, and says where it ends.
 """
 
 from __future__ import annotations
@@ -9,10 +10,16 @@ import argparse
 from sniff.capture.config import RecordSpec
 from sniff.cli import USAGE, Failure, arguments, listening
 
+NAMED = 3
+"""Buses that the name of a new file names."""
+
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Options of `record`."""
-    parser.add_argument("port", metavar="PORT", help="port, gateway, or a configured bus")
+    parser.add_argument(
+        "ports", nargs="*", metavar="PORT", help="port, gateway, or a configured bus; several go into one file"
+    )
+    parser.add_argument("--all", action="store_true", help="every bus of the configuration that has a port")
     arguments.add_line(parser, auto=True)
     arguments.add_devices(parser)
     parser.add_argument("-w", "--write", metavar="FILE", help="recording (.mcap); default: a new name in this folder")
@@ -32,21 +39,20 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Record until the end."""
-    target = listening.target_of(args)
-    path = args.write or target.record or listening.new_recording(target.source.bus)
+    targets = listening.targets_of(args)
+    path = args.write or (targets[0].record if len(targets) == 1 else None)
+    path = path or listening.new_recording("-".join(target.source.bus for target in targets[:NAMED]))
     listening.refuse_recording(path)
     if args.keep and not args.rotate:
         raise Failure("--keep: of which rotation? say when a new file begins with --rotate size:64MB or time:1h", USAGE)
     record = RecordSpec(path, args.rotate, args.keep)
-    live = listening.start(
-        target.source, record, args.duration, target.devices, target.search, args.count, watched=False
-    )
+    lives = listening.start_all(targets, record, args.duration, args.count, watched=False)
     try:
-        printer = listening.Printer(live, quiet=True)
-        code = listening.run(printer, not args.quiet)
+        printers = [listening.Printer(live, quiet=True) for live in lives]
+        code = listening.run(printers, not args.quiet)
     except KeyboardInterrupt:  # before anybody listened to signals: the capture must not go on
-        live.stop()
+        lives[0].stop()
         raise
     if not args.quiet:
-        listening.say_end(printer)
+        listening.say_end(printers)
     return code

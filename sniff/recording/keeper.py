@@ -11,8 +11,8 @@ import contextlib
 import os
 import time
 from collections import deque
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from queue import SimpleQueue
@@ -42,13 +42,14 @@ MOST_DERIVED = MOST_WAITING // 4
 
 @dataclass(frozen=True, slots=True)
 class Parcel:
-    """Messages that stay together, with how many octets and reads of the bus they hold."""
+    """Messages of a bus that stay together, with how many octets and reads of it they hold."""
 
     messages: list[Message]
     octets: int
     next: int
     schema: str = ""
     metadata: Mapping[str, str] | None = None
+    bus: int = 0
 
     @property
     def weight(self) -> int:
@@ -64,11 +65,58 @@ class Order:
 
 
 class Flush(Order):
-    """Write everything out; flushes are numbered from 1."""
+    """Write everything out; the flushes that a bus asks for are numbered from 1."""
 
-    def __init__(self, number: int) -> None:
+    def __init__(self, number: int, bus: int = 0) -> None:
         super().__init__("flush")
         self.number = number
+        self.bus = bus
+
+
+@dataclass(frozen=True, slots=True)
+class Changed:
+    """What a bus is from here on, for the parts to come."""
+
+    bus: int
+    session: Session
+
+
+@dataclass(slots=True)
+class Share:
+    """What the keeper did for one bus.
+
+    `taken`: weight of its parcels that came through `orders`. `flushed`: number of the newest of its flushes after
+    which nothing waited. `confirmed`, `lost_octets`: octets of the bus that are in a file, and that never will be.
+    `notices`: what became of files, in words, for whoever takes them from there. `next`: number of the next entry of
+    its reads; `first`: the same at the begin of the part. `octets`, `part_octets`: of the bus, in all parts and in
+    this one; `unwritten`: those that were taken since everything was in the file.
+    """
+
+    taken: int = 0
+    flushed: int = 0
+    confirmed: int = 0
+    lost_octets: int = 0
+    notices: deque[str] = field(default_factory=deque)
+    next: int = 0
+    first: int = 0
+    octets: int = 0
+    part_octets: int = 0
+    unwritten: int = 0
+
+    def written(self) -> None:
+        """All that was taken is in the file."""
+        self.confirmed += self.unwritten
+        self.unwritten = 0
+
+    def lose(self) -> None:
+        """What was taken and not written never will be."""
+        self.lost_octets += self.unwritten
+        self.unwritten = 0
+
+    def forget(self, octets: int) -> None:
+        """Octets that a part had of it are in no file any more."""
+        self.confirmed -= octets - self.unwritten
+        self.lost_octets += octets - self.unwritten
 
 
 SYNC, CHECK, CLOSE = Order("sync"), Order("check"), Order("close")
@@ -77,35 +125,25 @@ SYNC, CHECK, CLOSE = Order("sync"), Order("check"), Order("close")
 class Keeper:
     """Opens the first file at once (raises CaptureError); `run` is the thread, until it is told to CLOSE.
 
-    `taken`: weight of the parcels that came through `orders`. `flushed`: number of the newest flush after which nothing
-    waited. `confirmed`, `lost_octets`: octets of the bus that are in a file, and that never will be. `notices`: what
-    became of files, in words, for whoever takes them from there. `gone`: whether the last file is not where it was
-    begun, and nothing followed it.
+    `sessions`: of the buses that share the files. `shares`: what was done for each. `gone`: whether the last file is
+    not where it was begun, and nothing followed it.
     """
 
-    def __init__(self, path: Path, session: Session, rotation: Rotation | None, keep: int | None) -> None:
-        self.orders: SimpleQueue[Parcel | Order | Session] = SimpleQueue()
+    def __init__(self, path: Path, sessions: Sequence[Session], rotation: Rotation | None, keep: int | None) -> None:
+        self.orders: SimpleQueue[Parcel | Order | Changed] = SimpleQueue()
         self.paths: list[Path] = []
-        self.notices: deque[str] = deque()
-        self.taken = 0
-        self.flushed = 0
-        self.confirmed = 0
-        self.lost_octets = 0
+        self.shares = [Share() for _ in sessions]
         self.gone = False
         self._troubles: dict[str, str] = {}
         self._trouble: str | None = None
         self._path = path
         self._start = _current_folder()  # it may be removed, and made again by somebody
-        self._session = session
+        self._sessions = list(sessions)
+        self._to_close = len(sessions)
         self._rotation = rotation
         self._newest = NewestParts(keep)
-        self._next = 0  # number of the next entry of /raw
-        self._octets = 0  # of the bus, in all parts
         self._finished_size = 0
-        self._unwritten = 0  # octets of the bus that were taken since everything was in the file
         self._count = self._number = 0  # of parts begun; of the newest, as its name has it
-        self._first = 0  # of the part
-        self._part_octets = 0  # of the bus, in the part
         self._began: int | None = None  # time of the part's first batch
         self._released = time.monotonic()
         self._syncer = Syncer()
@@ -140,46 +178,48 @@ class Keeper:
         return self._syncer.wait(seconds)
 
     def run(self) -> None:
-        """Do what comes through `orders`. Never raises."""
+        """Do what comes through `orders`, until every bus has told it to close. Never raises."""
         steps = {SYNC: self._sync, CHECK: self._check, CLOSE: self._finish}
-        order: Parcel | Order | Session | None = None
-        while order is not CLOSE:
+        while self._to_close:
             order = self.orders.get()
             if isinstance(order, Parcel):
-                self._try("take", partial(self._take, order), order.octets)
-            elif isinstance(order, Session):
-                self._session = order  # of the parts to come
+                self._try("take", partial(self._take, order), order.octets, order.bus)
+            elif isinstance(order, Changed):
+                self._sessions[order.bus] = order.session
             elif isinstance(order, Flush):
-                self._try("flush", partial(self._flush, order.number))
+                self._try("flush", partial(self._flush, order))
             else:
-                self._try(order.name, steps[order])
+                self._to_close -= order is CLOSE
+                if order is not CLOSE or not self._to_close:
+                    self._try(order.name, steps[order])
         self._syncer.end()
 
-    def _try(self, name: str, step: Callable[[], None], octets: int = 0) -> None:
+    def _try(self, name: str, step: Callable[[], None], octets: int = 0, bus: int = 0) -> None:
         """Do one thing; when it fails say so, until it succeeds again. `octets`: of the bus that are lost then."""
         try:
             step()
         except OSError as error:
             self._troubles[name] = str(explain(error.filename or self.paths[-1], error))
-            self.lost_octets += octets
+            self.shares[bus].lost_octets += octets
         except Exception as error:  # the recording goes on whatever is wrong in here
             self._troubles[name] = f"{self.paths[-1]}: {type(error).__name__}: {error}"
-            self.lost_octets += octets
+            self.shares[bus].lost_octets += octets
         else:
             self._troubles.pop(name, None)
         self._trouble = next(iter(self._troubles.values()), None)
 
     def _take(self, batch: Parcel) -> None:
-        self.taken += batch.weight
+        share = self.shares[batch.bus]
+        share.taken += batch.weight
         if batch.messages[-1].topic == RAW and self._part_is_full(batch):
             self._try("rotate", self._rotate)  # the old part goes on when it fails; the next batch tries again
         add = self._part.add if batch.messages[-1].topic in (RAW, LINE) else self._part.hold
         for message in batch.messages:
-            add(message, batch.schema, batch.metadata)
-        self._octets += batch.octets
-        self._part_octets += batch.octets
-        self._unwritten += batch.octets
-        self._next = batch.next
+            add(message, batch.schema, batch.metadata, batch.bus)
+        share.octets += batch.octets
+        share.part_octets += batch.octets
+        share.unwritten += batch.octets
+        share.next = batch.next
         if self._began is None and batch.messages[-1].topic == RAW:
             self._began = batch.messages[-1].publish_time
 
@@ -187,21 +227,21 @@ class Keeper:
         if self._rotation is None or self._began is None:
             return False
         age = batch.messages[-1].publish_time - self._began
-        return self._rotation.due(self._part.size, age, self._next - self._first)
+        reads = sum(share.next - share.first for share in self.shares)
+        return self._rotation.due(self._part.size, age, reads)
 
-    def _flush(self, number: int) -> None:
+    def _flush(self, flush: Flush) -> None:
         now = time.monotonic()
         if self._part.holds_enough or now - self._released >= RELEASE_AFTER:
             self._released = now
             self._part.release()
         self._part.flush()
         self._written()
-        self.flushed = number
+        self.shares[flush.bus].flushed = flush.number
 
     def _written(self) -> None:
-        """All that was taken is in the file."""
-        self.confirmed += self._unwritten
-        self._unwritten = 0
+        for share in self.shares:
+            share.written()
 
     def _sync(self) -> None:
         self._syncer.sync(self.paths[-1], self._part.stream)
@@ -219,8 +259,8 @@ class Keeper:
 
     def _leave(self, old: PartFile, path: Path) -> None:
         """Let go of a part that something has followed."""
-        self.lost_octets += self._unwritten
-        self._unwritten = 0
+        for share in self.shares:
+            share.lose()
         self._syncer.sync(path, old.stream, last=True)
         self._newest.remove_old()
 
@@ -229,7 +269,7 @@ class Keeper:
         fate = self._fate()
         if fate is None:
             return
-        old, path, octets = self._part, self.paths[-1], self._part_octets
+        old, path, octets = self._part, self.paths[-1], [share.part_octets for share in self.shares]
         with contextlib.suppress(OSError):
             (self._start / path.parent).mkdir(parents=True, exist_ok=True)
         try:
@@ -240,13 +280,14 @@ class Keeper:
             with contextlib.suppress(OSError):
                 old.finish()
                 self._written()
-            said = ""
         else:
-            self._forget(octets)
-            said = f", with {octets} octets of the bus in it"
+            for share, held in zip(self.shares, octets, strict=True):
+                share.forget(held)
         self.paths.remove(path)
         self._leave(old, path)
-        self.notices.append(f"{path} was {fate} while it was recorded{said}; goes on in {self.paths[-1]}")
+        for share, held in zip(self.shares, octets, strict=True):
+            said = f", with {held} octets of the bus in it" if fate != MOVED else ""
+            share.notices.append(f"{path} was {fate} while it was recorded{said}; goes on in {self.paths[-1]}")
 
     def _fate(self) -> str | None:
         """What somebody did to the file that is being written; None where it is as it should be, or nobody knows."""
@@ -260,11 +301,6 @@ class Keeper:
             return None
         return MOVED if ours.st_nlink else REMOVED
 
-    def _forget(self, octets: int) -> None:
-        """Octets of the part that are in no file any more."""
-        self.confirmed -= octets - self._unwritten
-        self.lost_octets += octets - self._unwritten
-
     def _finish(self) -> None:
         self._try("check", self._check)
         try:
@@ -273,9 +309,10 @@ class Keeper:
         finally:
             self.gone = self._fate() is not None
             if self._fate() == REMOVED:
-                self._forget(self._part_octets)
-            self.lost_octets += self._unwritten  # at most: some of them may be in the file
-            self._unwritten = 0
+                for share in self.shares:
+                    share.forget(share.part_octets)
+            for share in self.shares:
+                share.lose()  # at most: some of them may be in the file
             self._syncer.sync(self._path, self._part.stream, last=True)
 
     def _open(self) -> None:
@@ -286,8 +323,8 @@ class Keeper:
             path = part_name(path, number)
         stream: BinaryIO = open(self._start / path, "xb", buffering=0)  # noqa: SIM115
         try:
-            before = {"first_chunk": self._next, "octets_before": self._octets}
-            part = PartFile(stream, self._session, self._count + 1, before)
+            before = [{"first_chunk": share.next, "octets_before": share.octets} for share in self.shares]
+            part = PartFile(stream, self._sessions, self._count + 1, before)
             part.flush()
             self._newest.add(self._start / path, stream)
         except OSError:
@@ -297,8 +334,8 @@ class Keeper:
         self._syncer.sync_folder(self._start / path.parent)
         self._part = part
         self._number, self._count = number, self._count + 1
-        self._first = self._next
-        self._part_octets = 0
+        for share in self.shares:
+            share.first, share.part_octets = share.next, 0
         self._began = None
         self.paths.append(path)
 

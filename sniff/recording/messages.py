@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import BinaryIO
 
 from sniff.recording import scan
 from sniff.recording.batch import Batch
-from sniff.recording.topics import FIXED_CHANNELS, SchemaText
+from sniff.recording.topics import LINE, RAW, SchemaText
 
 MOST_CHANNELS = 65536
 Head = tuple[int, int, int, int]
@@ -33,12 +33,19 @@ class MessagePass:
     """`since`: chunks that end before that time (ns) are not read. `start`: offset of the chunk to begin with, None
     for the beginning of the file.
 
+    `known`: the topics of the first channels.
+
     `last`: time of the last chunk read from the bus that was found. `jumped`: set when a chunk of the file was not
     read because of `since`.
     """
 
     def __init__(
-        self, stream: BinaryIO, report: scan.Report, since: int | None = None, start: int | None = None
+        self,
+        stream: BinaryIO,
+        report: scan.Report,
+        since: int | None = None,
+        start: int | None = None,
+        known: Sequence[str] = (RAW, LINE),
     ) -> None:
         self.report = report
         self.last: int | None = None
@@ -46,7 +53,7 @@ class MessagePass:
         self._records = scan.records(stream, report, since, start)
         self._schemas: dict[int, tuple[str, bytes]] = {}
         # known before the file says so: the chunk that says so may be damaged
-        self.channels = {number: Channel(topic) for number, (topic, _) in enumerate(FIXED_CHANNELS, 1)}
+        self.channels = {number: Channel(topic) for number, topic in enumerate(known, 1)}
 
     def messages(self) -> Iterator[tuple[str, Head, bytes]]:
         """Topic, head and data of all messages that can be read."""

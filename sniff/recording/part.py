@@ -9,7 +9,7 @@ without a seam when there is room again.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import BinaryIO
 
@@ -18,6 +18,7 @@ from sniff.recording import frames
 from sniff.recording.batch import Message
 from sniff.recording.chunk_indices import ChunkIndices
 from sniff.recording.topics import (
+    BUS,
     FIXED_CHANNELS,
     PART_RECORD,
     PROFILE,
@@ -26,6 +27,7 @@ from sniff.recording.topics import (
     SCHEMAS,
     SESSION_RECORD,
     VERSION,
+    topics_of,
 )
 from sniff.version import __version__
 
@@ -58,17 +60,20 @@ class _Pending:
 
 @dataclass(frozen=True, slots=True)
 class _Held:
-    """A message with what its channel needs when it is new."""
+    """A message of a bus with what its channel needs when it is new."""
 
     message: Message
     schema: str
     metadata: Mapping[str, str] | None
+    bus: int
 
 
 class PartFile:
-    """A part. `before`: what the parts before it held, as words → numbers, for its metadata."""
+    """A part, of one bus or of several. `before`: what the parts before it held of each, as words → numbers."""
 
-    def __init__(self, stream: BinaryIO, session: Session, number: int = 1, before: Mapping[str, int] | None = None):
+    def __init__(
+        self, stream: BinaryIO, sessions: Sequence[Session], number: int = 1, before: Sequence[Mapping[str, int]] = ()
+    ) -> None:
         from mcap.writer import Writer
 
         self.stream = stream
@@ -80,16 +85,23 @@ class PartFile:
         self._channels: dict[str, int] = {}
         self._schemas: dict[str, int] = {}
         self._writer.start(PROFILE, f"sniff485 {__version__}")
-        self._writer.add_metadata(SESSION_RECORD, session.to_metadata())
-        counters = {"first_chunk": 0, "octets_before": 0, **(before or {})}
-        record = {"version": VERSION, "part": number, **counters}
-        self._writer.add_metadata(PART_RECORD, {key: str(value) for key, value in record.items()})
-        for name, document in session.profiles.items():
-            self._writer.add_attachment(
-                session.started, session.started, name + PROFILE_SUFFIX, PROFILE_MEDIA_TYPE, document.encode()
-            )
-        for topic, schema in FIXED_CHANNELS:
-            self._register(topic, schema.name, {})
+        for session in sessions:
+            self._writer.add_metadata(SESSION_RECORD, session.to_metadata())
+        for bus, held in enumerate(before or [{}] * len(sessions)):
+            counters = {"first_chunk": 0, "octets_before": 0, **held}
+            record = {"version": VERSION, "part": number, **counters, **({BUS: bus} if len(sessions) > 1 else {})}
+            self._writer.add_metadata(PART_RECORD, {key: str(value) for key, value in record.items()})
+        self._attach_profiles(sessions)
+        self._topics = topics_of([session.bus for session in sessions])
+        for own in self._topics:
+            for (_, schema), topic in zip(FIXED_CHANNELS, own.values(), strict=True):
+                self._register(topic, schema.name, {})
+
+    def _attach_profiles(self, sessions: Sequence[Session]) -> None:
+        documents = {name: document for session in sessions for name, document in session.profiles.items()}
+        started = sessions[0].started
+        for name, document in documents.items():
+            self._writer.add_attachment(started, started, name + PROFILE_SUFFIX, PROFILE_MEDIA_TYPE, document.encode())
 
     @property
     def size(self) -> int:
@@ -101,13 +113,13 @@ class PartFile:
         """Octets that the file did not take yet."""
         return len(self._pending.octets)
 
-    def add(self, message: Message, schema: str = "", metadata: Mapping[str, str] | None = None) -> None:
+    def add(self, message: Message, schema: str = "", metadata: Mapping[str, str] | None = None, bus: int = 0) -> None:
         """Add a message; `schema` and `metadata` are for a topic that is new. Writes nothing out."""
-        self._add(_Held(message, schema, metadata))
+        self._add(_Held(message, schema, metadata, bus))
 
-    def hold(self, message: Message, schema: str = "", metadata: Mapping[str, str] | None = None) -> None:
+    def hold(self, message: Message, schema: str = "", metadata: Mapping[str, str] | None = None, bus: int = 0) -> None:
         """Add a message that may be kept back; arguments as for `add`."""
-        self._held.append(_Held(message, schema, metadata))
+        self._held.append(_Held(message, schema, metadata, bus))
         self._held_size += len(message.data)
 
     @property
@@ -126,9 +138,10 @@ class PartFile:
 
     def _add(self, one: _Held) -> None:
         message = one.message
-        channel = self._channels.get(message.topic)
+        topic = self._topics[one.bus].get(message.topic, message.topic)
+        channel = self._channels.get(topic)
         if channel is None:
-            channel = self._register(message.topic, one.schema, dict(one.metadata or {}))
+            channel = self._register(topic, one.schema, dict(one.metadata or {}))
         self._writer.add_message(
             channel, message.log_time, message.data, message.publish_time, sequence=message.sequence
         )

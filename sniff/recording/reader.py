@@ -29,8 +29,8 @@ from sniff.recording.clean_batches import CleanBatches
 from sniff.recording.frames import METADATA, SCHEMA, FrameBatch
 from sniff.recording.messages import Head, MessagePass
 from sniff.recording.topics import (
+    BUS,
     FRAMES,
-    LINE,
     PART_RECORD,
     PROFILE,
     PROFILE_MEDIA_TYPE,
@@ -38,6 +38,7 @@ from sniff.recording.topics import (
     RAW,
     SESSION_RECORD,
     VERSION,
+    topics_of,
 )
 
 MOST_PROFILE = 1 << 20
@@ -53,11 +54,14 @@ def read(path: str | Path) -> McapCapture:
 class McapCapture:
     """A recording opened for reading; each pass reads the file again, a live one up to where it is then.
 
-    `part`, `first_chunk`, `octets_before`: what the file says about the parts before it.
+    `bus`: which of the buses in it, from 0; `sessions`: of all of them. `part`, `first_chunk`, `octets_before`: what
+    the file says about the parts before it.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, bus: int = 0) -> None:
         self.path = path
+        self.bus = bus
+        self.sessions: list[Session] = []
         self.session = Session.from_metadata({})
         self.part = 1
         self.first_chunk = 0
@@ -68,6 +72,9 @@ class McapCapture:
         self._index = scan.ChunkIndex()
         try:
             self._read_start()
+            own = topics_of([session.bus for session in self.sessions] or [""])
+            self._known = [topic for each in own for topic in each.values()]
+            self._raw_topic, self._line_topic = own[min(bus, len(own) - 1)].values()
             self._began = self.session
             if self.session.unknown:
                 self._look_for_what_was_found()
@@ -164,7 +171,7 @@ class McapCapture:
         """The batches of /raw as they are, for work on columns; those that end before `since` (ns) left out."""
         with self._pass(since) as one:
             for topic, head, data in one.messages():
-                if topic == RAW and (since is None or head[2] >= since):
+                if topic == self._raw_topic and (since is None or head[2] >= since):
                     batch = one.batch(head, data)
                     if batch is not None:
                         yield batch
@@ -193,13 +200,12 @@ class McapCapture:
 
     # inside
 
-    @staticmethod
-    def _raw(one: MessagePass, joiner: Joiner) -> Iterator[tuple[Head, Batch]]:
+    def _raw(self, one: MessagePass, joiner: Joiner) -> Iterator[tuple[Head, Batch]]:
         """Batches of a pass; what is on /line goes to the joiner."""
         for topic, head, data in one.messages():
-            if topic == LINE:
+            if topic == self._line_topic:
                 joiner.line(head[2], data)
-            elif topic == RAW and (batch := one.batch(head, data)) is not None:
+            elif topic == self._raw_topic and (batch := one.batch(head, data)) is not None:
                 yield head, batch
 
     @contextmanager
@@ -208,7 +214,7 @@ class McapCapture:
         with open_capture(self.path) as stream:
             try:
                 start = None if since is None else self._index.find(since)
-                yield MessagePass(stream, scan.Report(os.fstat(stream.fileno()).st_size), since, start)
+                yield MessagePass(stream, scan.Report(os.fstat(stream.fileno()).st_size), since, start, self._known)
             except OSError as error:
                 raise explain(self.path, error) from None
 
@@ -240,7 +246,7 @@ class McapCapture:
 
     def _look_for_what_was_found(self) -> None:
         """The session with what a search found, if it did: said on /line, since it was not known at the start."""
-        for _, _, data in self.messages(LINE):
+        for _, _, data in self.messages(self._line_topic):
             event = line_event(data, 0)
             change = None if event is None else settings_change(event)
             if change is not None and change.found:
@@ -256,7 +262,7 @@ class McapCapture:
             if record.body is None:
                 continue
             if record.opcode == scan.CHUNK:
-                return ours or RAW in _topics(record.body)
+                return ours or any(topic.startswith(RAW) for topic in _topics(record.body))
             if record.opcode == scan.HEADER:
                 header = scan.parse(Header, record.body)
                 ours = ours or (header is not None and header.profile == PROFILE)
@@ -283,13 +289,18 @@ class McapCapture:
         if found is None or found.name not in (SESSION_RECORD, PART_RECORD):
             return False
         if found.name == SESSION_RECORD:
-            self.session = Session.from_metadata(found.metadata)
+            session = Session.from_metadata(found.metadata)
+            self.sessions.append(session)
+            if len(self.sessions) == self.bus + 1:
+                self.session = replace(session, profiles=self.session.profiles)
             return True
         version = _number(found.metadata.get("version"), VERSION)
         if version > VERSION:
             raise CaptureError(
                 f"{self.path}: written by a newer sniff485 (layout {version}, known is {VERSION}); use that one"
             )
+        if _number(found.metadata.get(BUS), self.bus) != self.bus:
+            return True
         self.part = _number(found.metadata.get("part"), 1)
         self._known_first = "first_chunk" in found.metadata
         self.first_chunk = _number(found.metadata.get("first_chunk"), 0)

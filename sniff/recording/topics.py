@@ -7,6 +7,8 @@ Binary layouts are written down in words in the schema record, so that a file ex
 from __future__ import annotations
 
 import json
+import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 RAW = "/raw"
@@ -191,4 +193,24 @@ SCHEMAS: dict[str, SchemaText] = {
 """Schema name → schema record; `Recorder.derived` takes these names."""
 
 FIXED_CHANNELS = ((RAW, RAW_SCHEMA), (LINE, LINE_SCHEMA))
-"""Channels 1, 2 … of every part, so that a file whose first chunk is damaged can still be read."""
+"""Channels 1, 2 … of every part, so that a file whose first chunk is damaged can still be read; with several buses
+those of each in turn."""
+
+BUS = "bus"
+"""In the part record of a file with several buses: which of the sessions, in their order, it is about."""
+
+
+def topics_of(buses: Sequence[str]) -> list[dict[str, str]]:
+    """What RAW and LINE are called for each bus of a file: as they are where it is alone, else with its name."""
+    if len(buses) == 1:
+        return [{topic: topic for topic, _ in FIXED_CHANNELS}]
+    names: list[str] = []
+    for number, bus in enumerate(buses, 1):
+        name = topic_part(bus) or "bus"
+        names.append(f"{name}-{number}" if name in names else name)
+    return [{topic: f"{topic}/{name}" for topic, _ in FIXED_CHANNELS} for name in names]
+
+
+def topic_part(text: str) -> str:
+    """A name as part of a topic: what no viewer takes for a separator or a wildcard."""
+    return re.sub(r"[^A-Za-z0-9_.-]+", "-", text).strip("-")

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -30,7 +30,7 @@ from sniff.formats.files import NewFile, explain
 from sniff.recording import keeper
 from sniff.recording.batch import Batcher, Message, loss_message, stamp
 from sniff.recording.block_batches import add_block
-from sniff.recording.keeper import CHECK, CLOSE, SYNC, Flush, Keeper, Parcel
+from sniff.recording.keeper import CHECK, CLOSE, SYNC, Changed, Flush, Keeper, Parcel
 from sniff.recording.part import PartFile
 from sniff.recording.rotation import Rotation
 from sniff.recording.topics import LINE, RAW
@@ -68,7 +68,7 @@ class McapWriter:
     def __init__(self, file: NewFile, session: Session) -> None:
         self._file = file
         self._batcher = Batcher()
-        self._part = PartFile(file.stream, session)
+        self._part = PartFile(file.stream, [session])
         self._sequences: dict[str, int] = {}
 
     def derived(
@@ -133,6 +133,35 @@ class McapWriter:
 # -- recording -------------------------------------------------------------------------------------------------
 
 
+class SharedFile:
+    """The file of some buses, and the thread that writes it until all their recorders are finished.
+
+    Created at once; arguments as `Recorder` takes them. Raises CaptureError.
+    """
+
+    def __init__(
+        self, path: str | Path, sessions: Sequence[Session], rotation: Rotation | None = None, keep: int | None = None
+    ) -> None:
+        self.keeper = Keeper(Path(path), sessions, rotation, keep)
+        self._sessions = sessions
+        self._thread = threading.Thread(target=self.keeper.run, name="recorder", daemon=True)
+        self._thread.start()
+
+    def recorders(self) -> list[Recorder]:
+        """One for each bus, in their order."""
+        path = self.keeper.paths[0]
+        return [Recorder(path, session, file=self, bus=bus) for bus, session in enumerate(self._sessions)]
+
+    @property
+    def finished(self) -> bool:
+        """Whether everything is written, or failed to be."""
+        return not self._thread.is_alive()
+
+    def join(self, patience: float) -> None:
+        """Wait so many seconds for that."""
+        self._thread.join(patience)
+
+
 class Recorder:
     """Records one bus. All methods are for one thread; none of them waits for the disk but `close`.
 
@@ -141,9 +170,18 @@ class Recorder:
     """
 
     def __init__(
-        self, path: str | Path, session: Session, rotation: Rotation | None = None, keep: int | None = None
+        self,
+        path: str | Path,
+        session: Session,
+        rotation: Rotation | None = None,
+        keep: int | None = None,
+        *,
+        file: SharedFile | None = None,
+        bus: int = 0,
     ) -> None:
-        """Create the first file. With a rotation it is NAME-0001.mcap, or the number after the highest that is there.
+        """Create the first file, or write into a `file` that several share, as the `bus` of this number.
+
+        With a rotation it is NAME-0001.mcap, or the number after the highest that is there.
 
         `keep`: how many parts of this very recording stay, from 1 on; parts of an earlier one are left alone. Raises
         CaptureError when the file cannot be created or exists already; nothing is ever overwritten.
@@ -169,9 +207,9 @@ class Recorder:
         self._closed = False
         self._given_up = False
         self._session = session
-        self._keeper = Keeper(Path(path), session, rotation, keep)
-        self._thread = threading.Thread(target=self._keeper.run, name="recorder", daemon=True)
-        self._thread.start()
+        self._file = file or SharedFile(path, [session], rotation, keep)
+        self._keeper, self._bus = self._file.keeper, bus
+        self._share = self._keeper.shares[bus]
 
     # what it is given
 
@@ -201,7 +239,7 @@ class Recorder:
         if change is not None:  # what was heard before stays in the part that says so
             self._close_batch()
             self._session = changed(self._session, change)
-            self._keeper.orders.put(self._session)
+            self._keeper.orders.put(Changed(self._bus, self._session))
         self._batcher.add_event(event)
         self._note(event.time)
         self._step(event.time)
@@ -222,7 +260,7 @@ class Recorder:
         sequence = self._sequences.get(topic, 0)
         self._sequences[topic] = (sequence + 1) % (1 << 32)
         message = Message(topic, stamp(log_time), stamp(publish_time), sequence, data)
-        self._send(Parcel([message], 0, self._batcher.first, schema_name, metadata))
+        self._send(Parcel([message], 0, self._batcher.first, schema_name, metadata, self._bus))
         self._note(log_time if self._now is None else self._now)
 
     def tick(self, now_ns: int) -> None:
@@ -239,13 +277,13 @@ class Recorder:
             self._close_batch()
             self._closed = True
             if self._gap_octets:  # nothing came after it
-                self._send(Parcel([self._gap(self._now or 0)], 0, self._following))
+                self._send(Parcel([self._gap(self._now or 0)], 0, self._following, bus=self._bus))
             self._keeper.orders.put(CLOSE)
 
     @property
     def finished(self) -> bool:
         """Whether everything is written, or failed to be."""
-        return not self._thread.is_alive()
+        return self._file.finished
 
     def give_up(self) -> None:
         """After `finish`: wait no longer; what is not in the file is lost, and counted."""
@@ -258,7 +296,7 @@ class Recorder:
     def close(self, patience: float = 60.0) -> None:
         """Finish the file; wait so many seconds for the disk. Never raises."""
         self.finish()
-        self._thread.join(patience)
+        self._file.join(patience)
         self.give_up()
         if self.finished:
             self.synced(SYNC_PATIENCE)
@@ -288,7 +326,7 @@ class Recorder:
     @property
     def notices(self) -> deque[str]:
         """What became of files, in words; whoever takes one removes it."""
-        return self._keeper.notices
+        return self._share.notices
 
     @property
     def trouble(self) -> str | None:
@@ -300,12 +338,12 @@ class Recorder:
     @property
     def lost_octets(self) -> int:
         """Octets of the bus that are not in a file and never will be."""
-        return self._dropped_octets + self._keeper.lost_octets + (self.unwritten if self._given_up else 0)
+        return self._dropped_octets + self._share.lost_octets + (self.unwritten if self._given_up else 0)
 
     @property
     def unwritten(self) -> int:
         """Octets of the bus that are not in a file yet."""
-        return max(0, self.octets - self._dropped_octets - self._keeper.lost_octets - self._keeper.confirmed)
+        return max(0, self.octets - self._dropped_octets - self._share.lost_octets - self._share.confirmed)
 
     @property
     def due(self) -> int | None:
@@ -314,7 +352,7 @@ class Recorder:
 
     def behind(self, now: int) -> int:
         """Age of the oldest thing that is not in the file yet (ns at `now`, the capture's clock), 0 for nothing."""
-        while self._flushes and self._flushes[0][0] <= self._keeper.flushed:
+        while self._flushes and self._flushes[0][0] <= self._share.flushed:
             self._flushes.popleft()
         if self.finished or not (self._flushes or self._oldest is not None):
             return 0
@@ -353,7 +391,7 @@ class Recorder:
         self._flush_number += 1
         if len(self._flushes) < MOST_FLUSHES:
             self._flushes.append((self._flush_number, self._oldest_came))
-        self._keeper.orders.put(Flush(self._flush_number))
+        self._keeper.orders.put(Flush(self._flush_number, self._bus))
         self._oldest = None
         if self._unsynced is None:
             self._unsynced = now
@@ -374,7 +412,7 @@ class Recorder:
         if self._gap_octets and messages[-1].topic == RAW:
             messages = [self._gap(messages[-1].publish_time), *messages]
         self._following = following
-        self._send(Parcel(messages, octets, following))
+        self._send(Parcel(messages, octets, following, bus=self._bus))
 
     def _gap(self, time: int) -> Message:
         """What says in the file how much is missing before a batch."""
@@ -385,7 +423,7 @@ class Recorder:
         return loss_message(event, self._following, reads)
 
     def _full(self, limit: int) -> bool:
-        return self._sent - self._keeper.taken + self._keeper.waiting > limit
+        return self._sent - self._share.taken + self._keeper.waiting > limit
 
     def _send(self, parcel: Parcel) -> None:
         self._sent += parcel.weight

@@ -38,7 +38,7 @@ def write_mcap(path: Path, reads: Reads, session: Session) -> None:
     """A recording: batches as the recorder cuts them, of at most 256 reads or 0.9 s. Times must not run backwards,
     and no read be over 65535 octets."""
     file = NewFile(path)
-    part = PartFile(file.stream, session)
+    part = PartFile(file.stream, [session])
     begins = reads.begins
     first = 0
     while first < len(reads):

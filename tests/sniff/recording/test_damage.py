@@ -43,7 +43,7 @@ def write_in_chunks(path: Path, items: list[Item], a_chunk: int) -> list[int]:
     """A recording flushed after every so many items; the file's size after each flush."""
     sizes = []
     with path.open("wb") as stream:
-        part, batcher = PartFile(stream, SESSION), Batcher()
+        part, batcher = PartFile(stream, [SESSION]), Batcher()
         for number, item in enumerate(items, 1):
             messages: list[Message] = []
             if isinstance(item, LineEvent):
