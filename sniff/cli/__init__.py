@@ -38,6 +38,7 @@ COMMANDS: dict[str, str] = {
     "cut": "a stretch of a capture: by time, by frames, around a finding",
     "merge": "captures of one bus into one, by time",
     "diff": "what differs between two captures: stations, answers, times, findings",
+    "fleet": "a whole archive: every bus, every day, health, findings, and what changed",
     "taps": "two captures of one line at two places: what is lost or damaged between them, and on which side",
     "anonymise": "a capture without names: other addresses, no texts, right checksums",
     "redissect": "computes frames and transactions anew, with other settings if need be",

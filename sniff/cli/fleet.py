@@ -1,0 +1,202 @@
+"""A whole archive judged: folders, files and patterns; every bus, every day, the worst first. The site is the first
+folder below the one that is named. What was read is kept in an index beside the archive, so that a second run reads
+only what is new. Work is spread over the cores of this machine, or over a Dask cluster, by the extra sniff485[fleet].
+Exit code 1 when something is wrong with a bus, 3 when a file could not be read.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from pathlib import Path
+
+from dissectors import registry
+from sniff.analysis.plain import plain
+from sniff.cli import UNREADABLE, USAGE, Failure, arguments, json_output, writing
+from sniff.engine.capture import CaptureError
+from sniff.fleet import running
+from sniff.fleet.answer import Answer, answer, marks
+from sniff.fleet.archive import Task, files_below, is_being_written, tasks_of
+from sniff.fleet.bus_day import Archive
+from sniff.fleet.index import NAME, Index
+from sniff.fleet.running import Done, Unreachable
+
+WATCHED_EVERY = 60.0
+"""Seconds between looks at an archive that is watched."""
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Options of `fleet`."""
+    parser.add_argument("folders", nargs="+", metavar="FOLDER", help="folders, captures, patterns (quoted)")
+    parser.add_argument("--since", type=_day, metavar="DAY", help="without what ended before, for instance 2026-01-01")
+    parser.add_argument("--workers", type=arguments.positive, metavar="N", help="processes (default: one a core)")
+    parser.add_argument("--scheduler", metavar="ADDRESS", help="a Dask scheduler that runs, tcp://HOST:8786")
+    parser.add_argument("--index", metavar="FILE", help=f"the index (default: {NAME} in the first folder)")
+    parser.add_argument("--no-index", action="store_true", help="read everything again, keep nothing")
+    parser.add_argument("--json", action="store_true", help="one JSON object a bus")
+    parser.add_argument("--all", action="store_true", help="all buses in the text, not only the worst")
+    parser.add_argument("--parquet", metavar="FILE", help="a row a bus, day and station as a Parquet file")
+    parser.add_argument("--html", metavar="FILE", help="one page that stands alone")
+    parser.add_argument("-f", "--force", action="store_true", help="overwrite files that are there")
+    parser.add_argument(
+        "--watch", action="store_true", help="go on: take up new captures as they are closed, once a minute"
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Judge an archive."""
+    if args.scheduler and args.workers:
+        raise Failure("--workers: those of the scheduler do the work; leave one of both out", USAGE)
+    for place in (args.parquet, args.html):
+        if place:
+            writing.refuse_to_overwrite(Path(place), (), args.force or args.watch)
+    index = _index(args)
+    code = _once(args, index)
+    while args.watch:
+        time.sleep(WATCHED_EVERY)
+        code = _once(args, index)
+    return code
+
+
+def _once(args: argparse.Namespace, index: Index | None) -> int:
+    try:
+        now = time.time_ns()
+        found = [one for one in files_below(args.folders) if not is_being_written(one[1], now)]
+        tasks, unreadable = tasks_of(found, args.since)
+    except CaptureError as error:
+        raise Failure(str(error), UNREADABLE) from None
+    archive = Archive(unreadable={one.file.path: one.why for one in unreadable})
+    missing = []
+    for task in tasks:
+        known = index.get(task) if index is not None else None
+        if known is None:
+            missing.append(task)
+        for day in known or ():
+            archive.add(day)
+    _read(args, index, archive, missing, len(tasks))
+    before = index.said_before() if index is not None else None
+    said = answer(archive, before, {name: registry.get(name).noun for name in registry.names()})
+    if index is not None:
+        index.say(marks(said))
+        if args.since is None:
+            index.forget_all_but(tasks)
+    _write(args, archive, said)
+    if archive.unreadable:
+        return UNREADABLE
+    return int(any(bus.troubles or bus.is_silent for bus in said.buses))
+
+
+def _read(args: argparse.Namespace, index: Index | None, archive: Archive, missing: list[Task], whole: int) -> None:
+    progress = _Progress(len(missing), whole)
+    for done in _run(args, missing):
+        if done.failed is not None:
+            for file in done.task.files:
+                archive.unreadable[file.path] = done.failed
+        else:
+            if index is not None:
+                index.put(done.task, list(done.days))
+            for day in done.days:
+                archive.add(day)
+        progress.tell(done)
+    progress.clear()
+
+
+def _run(args: argparse.Namespace, tasks: list[Task]) -> Iterator[Done]:
+    if args.scheduler:
+        if not running.available():
+            raise Failure("--scheduler needs Dask: pip install 'sniff485[fleet]'", USAGE)
+        try:
+            yield from running.by_cluster(tasks, args.scheduler)
+        except Unreachable as error:
+            raise Failure(str(error), UNREADABLE) from None
+    elif args.workers == 1 or len(tasks) < 2 or not running.available():
+        if len(tasks) > 1 and args.workers != 1:
+            print("sniff485: one core only; for all of them: pip install 'sniff485[fleet]'", file=sys.stderr)
+        yield from running.here(tasks)
+    else:
+        yield from running.by_processes(tasks, args.workers)
+
+
+def _index(args: argparse.Namespace) -> Index | None:
+    if args.no_index:
+        return None
+    first = Path(args.folders[0])
+    path = Path(args.index) if args.index else (first if first.is_dir() else Path()) / NAME
+    try:
+        return Index(path)
+    except CaptureError as error:
+        if args.index:
+            raise Failure(str(error), UNREADABLE) from None
+        print(f"sniff485: {plain(str(error))}; everything is read, nothing is kept (--index names another place)",
+              file=sys.stderr)  # fmt: skip
+        return None
+
+
+def _write(args: argparse.Namespace, archive: Archive, said: Answer) -> None:
+    from sniff.fleet import text, values
+
+    if args.parquet:
+        _write_parquet(args.parquet, archive)
+    if args.html:
+        from sniff.fleet import html
+
+        try:
+            Path(args.html).write_text(html.page(said), "utf-8", "backslashreplace")
+        except OSError as error:
+            raise Failure(f"{args.html}: {error.strerror}", UNREADABLE) from None
+    if args.json:
+        for value in values.as_values(said):
+            print(json_output.dumps(value))
+    else:
+        for line in text.page(said, len(said.buses) if args.all else text.SHOWN):
+            print(line)
+
+
+def _write_parquet(place: str, archive: Archive) -> None:
+    from sniff.fleet import values
+    from sniff.formats import parquet
+
+    if not parquet.available():
+        raise Failure("--parquet needs polars: pip install 'sniff485[parquet]'", USAGE)
+    try:
+        with parquet.ParquetWriter(Path(place), values.COLUMNS) as writer:
+            for row in values.rows(archive):
+                writer.add(row)
+    except CaptureError as error:
+        raise Failure(str(error), UNREADABLE) from None
+
+
+def _day(word: str) -> int:
+    """argparse type: the begin of a day of UTC, ns."""
+    try:
+        return int(datetime.fromisoformat(word).replace(tzinfo=UTC).timestamp()) * 1_000_000_000
+    except (ValueError, OverflowError):
+        raise argparse.ArgumentTypeError(f"{word!r}: a day like 2026-01-31") from None
+
+
+class _Progress:
+    """How far it is, on a terminal."""
+
+    def __init__(self, missing: int, whole: int) -> None:
+        self._missing, self._whole = missing, whole
+        self._done = self._failed = 0
+        self._began = time.monotonic()
+
+    def tell(self, done: Done) -> None:
+        self._done += 1
+        self._failed += done.failed is not None
+        if sys.stderr.isatty() and time.monotonic() - self._began > 0.5:
+            failed = f", {self._failed} failed" if self._failed else ""
+            known = self._whole - self._missing
+            print(
+                f"\r\x1b[Kread {self._done} of {self._missing}{failed}; {known} known from the index; "
+                f"{plain(done.task.name)[-60:]}",
+                end="", file=sys.stderr, flush=True,
+            )  # fmt: skip
+
+    def clear(self) -> None:
+        if sys.stderr.isatty():
+            print("\r\x1b[K", end="", file=sys.stderr, flush=True)

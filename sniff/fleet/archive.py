@@ -1,0 +1,147 @@
+"""What an archive holds: captures found below folders, and the parts of recordings grouped into tasks.
+
+A task is what one worker reads at a time: one capture, or the parts of one recording that began on one day. Only the
+beginning of each file is read here.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from glob import glob, has_magic
+from pathlib import Path
+
+from sniff.engine.capture import Capture, CaptureError
+from sniff.engine.session import Session
+from sniff.formats import READERS, read
+from sniff.recording import scan
+from sniff.recording.reader import McapCapture
+
+NS_PER_S = 1_000_000_000
+STILL_WRITTEN = 120 * NS_PER_S
+"""A recording that was not written to for so long, and has no end, was cut off."""
+
+
+@dataclass(frozen=True, slots=True)
+class FileState:
+    """A file as it was found. `size`: octets; `changed`: ns since the epoch."""
+
+    path: str
+    size: int
+    changed: int
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """What is read in one go: files that follow one another, of one site and one `bus` of several in them (None: the
+    only one). `protocol`: a registry name, "" where it is not known yet or cannot be."""
+
+    site: str
+    files: tuple[FileState, ...]
+    protocol: str = ""
+    bus: str | None = None
+
+    @property
+    def name(self) -> str:
+        """For people."""
+        more = f" and {len(self.files) - 1} more" if len(self.files) > 1 else ""
+        return f"{self.files[0].path}{more}"
+
+    @property
+    def size(self) -> int:
+        """Octets of all files."""
+        return sum(file.size for file in self.files)
+
+
+@dataclass(frozen=True, slots=True)
+class Unreadable:
+    """A file that is none of ours, or damaged at its very begin; `why` in words."""
+
+    file: FileState
+    site: str
+    why: str
+
+
+def files_below(words: Iterable[str]) -> list[tuple[str, FileState]]:
+    """Site and state of every capture: `words` are folders, files and patterns. The site is the first folder below the
+    named one, "" for files that lie in it. Raises CaptureError for a word that names nothing."""
+    found: dict[str, tuple[str, FileState]] = {}
+    for word in words:
+        paths = sorted(glob(word, recursive=True)) if has_magic(word) else [word]
+        if not any(os.path.exists(path) for path in paths):
+            raise CaptureError(f"{word}: no such file or folder")
+        for path in paths:
+            for site, each in _captures(Path(path)):
+                state = _state(each)
+                if state is not None:
+                    found.setdefault(os.path.realpath(each), (site, state))
+    return sorted(found.values(), key=lambda one: one[1].path)
+
+
+def _captures(path: Path) -> Iterable[tuple[str, Path]]:
+    if path.is_file():
+        yield path.parent.name, path
+        return
+    for folder, names, files in os.walk(path):
+        names.sort()
+        inside = Path(folder).relative_to(path).parts
+        for name in sorted(files):
+            if name.lower().endswith(tuple(READERS)) and not name.endswith(".expect.txt"):
+                yield (inside[0] if inside else ""), Path(folder, name)
+
+
+def _state(path: Path) -> FileState | None:
+    try:
+        status = path.stat()
+    except OSError:  # it went away meanwhile
+        return None
+    return FileState(str(path), status.st_size, status.st_mtime_ns)
+
+
+def is_being_written(file: FileState, now: int) -> bool:
+    """Whether a recording has no end yet and changed lately (`now`: ns since the epoch): its turn comes when it is
+    closed."""
+    if not file.path.lower().endswith(".mcap") or now - file.changed > STILL_WRITTEN:
+        return False
+    try:
+        with open(file.path, "rb") as stream:
+            stream.seek(max(0, file.size - len(scan.MAGIC)))
+            return stream.read() != scan.MAGIC
+    except OSError:
+        return False
+
+
+def tasks_of(found: Sequence[tuple[str, FileState]], since: int | None = None) -> tuple[list[Task], list[Unreadable]]:
+    """Group files into tasks, in the order of their names. `since`: ns; files that ended before are left out.
+
+    Reads the begin of each file; those that cannot be read are given beside.
+    """
+    groups: dict[tuple[str, ...], list[tuple[Session, int, FileState]]] = {}
+    unreadable = []
+    for site, file in found:
+        if since is not None and file.changed < since:
+            continue
+        try:
+            capture = read(file.path)
+        except CaptureError as error:
+            unreadable.append(Unreadable(file, site, str(error).removeprefix(f"{file.path}: ")))
+            continue
+        session, part = capture.session, capture.part if isinstance(capture, McapCapture) else 1
+        key = _group(site, session, part, capture, file)
+        groups.setdefault(key, []).append((session, part, file))
+    tasks = []
+    for (site, *_), members in groups.items():
+        members.sort(key=lambda one: (one[1], one[2].path))
+        tasks.append(Task(site, tuple(file for _, _, file in members), members[0][0].protocol))
+    return sorted(tasks, key=lambda task: task.files[0].path), unreadable
+
+
+def _group(site: str, session: Session, part: int, capture: Capture, file: FileState) -> tuple[str, ...]:
+    """What the parts of one recording that are read together have in common."""
+    is_part = isinstance(capture, McapCapture) and (part > 1 or Path(file.path).stem.endswith("-0001"))
+    if not session.started or not is_part:
+        return site, file.path
+    day = datetime.fromtimestamp(file.changed / NS_PER_S, UTC).date().isoformat()
+    return site, session.port, str(session.started), day

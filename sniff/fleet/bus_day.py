@@ -1,0 +1,99 @@
+"""What is known of one bus on one day: the unit of everything that a fleet's report says; mergeable."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+from dissectors.findings import Finding, merged
+from dissectors.line import LineSettings
+from sniff.analysis.health import HealthReport, health_of
+from sniff.analysis.summary import Summary
+
+Key = tuple[str, str, str, str]
+"""Site, bus, protocol, day."""
+
+
+@dataclass(frozen=True, slots=True)
+class BusDay:
+    """One bus on one day of UTC, from one capture or several.
+
+    `site`, `bus`, `port`, `protocol`: which; `day`: "2026-03-01". `summary`: counts, stations, response times; its load
+    is only a total. `busy`: ns with octets on the line, `listened`: ns between first and last octet, of all captures
+    together. `findings`: of the rules. `latency`: ns that the slowest adapter may have held octets back. `sources`: the
+    files. `notes`: what was wrong with them, in words.
+    """
+
+    site: str
+    bus: str
+    port: str
+    protocol: str
+    day: str
+    line: str
+    summary: Summary
+    busy: int = 0
+    listened: int = 0
+    first: int | None = None
+    last: int | None = None
+    findings: tuple[Finding, ...] = ()
+    latency: int = 0
+    sources: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @property
+    def key(self) -> Key:
+        """Of what two of them are merged: one bus speaks one protocol, and one name may be given at two sites."""
+        return self.site, self.bus, self.protocol, self.day
+
+    @property
+    def load(self) -> float:
+        """Bus load while somebody listened, 0 … 1."""
+        return min(1.0, self.busy / self.listened) if self.listened else 0.0
+
+    def health(self) -> HealthReport:
+        """How the bus and its stations fared."""
+        return health_of(self.summary, self.findings)
+
+    def merge(self, other: BusDay) -> BusDay:
+        """Both together; the order does not matter. Raises ValueError for two buses or two days."""
+        if self.key != other.key:
+            raise ValueError(f"{self.key} and {other.key} are two things")
+        low, high = sorted((self, other), key=lambda one: one.sources)
+        firsts = [one.first for one in (self, other) if one.first is not None]
+        lasts = [one.last for one in (self, other) if one.last is not None]
+        return replace(
+            low,
+            summary=low.summary.merge(high.summary),
+            busy=self.busy + other.busy,
+            listened=self.listened + other.listened,
+            first=min(firsts, default=None),
+            last=max(lasts, default=None),
+            findings=merged((low.findings, high.findings)),
+            latency=max(self.latency, other.latency),
+            sources=tuple(sorted({*self.sources, *other.sources})),
+            notes=tuple(sorted({*self.notes, *other.notes})),
+        )
+
+
+def empty_summary(line: str) -> Summary:
+    """A summary that keeps no seconds."""
+    return Summary(LineSettings.parse(line), kept_seconds=0)
+
+
+@dataclass(slots=True)
+class Archive:
+    """All bus-days of an archive, merged; and what could not be read, path → why."""
+
+    days: dict[Key, BusDay] = field(default_factory=dict)
+    unreadable: dict[str, str] = field(default_factory=dict)
+
+    def add(self, day: BusDay) -> None:
+        """Take what a task gave."""
+        known = self.days.get(day.key)
+        self.days[day.key] = day if known is None else known.merge(day)
+
+    def merge(self, other: Archive) -> Archive:
+        """Both together, as a new value."""
+        whole = Archive(dict(self.days), {**self.unreadable, **other.unreadable})
+        for day in other.days.values():
+            whole.add(day)
+        return whole

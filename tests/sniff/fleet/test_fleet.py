@@ -1,0 +1,256 @@
+"""An archive judged: who is ill since when, the same by any number of workers and in any order, an index that knows."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import shutil
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from sniff.cli import main
+from sniff.engine.capture import CaptureError
+from sniff.fleet import codec, running
+from sniff.fleet import index as index_module
+from sniff.fleet.answer import Answer, Change, Fresh, answer, marks
+from sniff.fleet.archive import files_below, tasks_of
+from sniff.fleet.bus_day import Archive, BusDay
+from sniff.fleet.html import page as html_page
+from sniff.fleet.index import Index
+from sniff.fleet.reading import read_task
+from sniff.fleet.text import page
+from sniff.fleet.values import as_values
+from tests.sniff.fleet.made_archive import FAULTS, Plan, plans, write
+
+SECONDS, DAYS, BUSES = 20.0, 3, 12
+Made = tuple[Path, list[Plan]]
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Made:
+    folder = tmp_path_factory.mktemp("archive")
+    planned = plans(BUSES, FAULTS, DAYS, SECONDS)
+    for plan in planned:
+        for day in range(DAYS):
+            write(folder, plan, day, SECONDS)
+    return folder, planned
+
+
+@pytest.fixture(scope="module")
+def days(made: Made) -> list[BusDay]:
+    tasks, unreadable = tasks_of(files_below([str(made[0])]))
+    assert not unreadable
+    return [day for task in tasks for day in read_task(task)]
+
+
+def whole(days: list[BusDay]) -> Archive:
+    archive = Archive()
+    for day in days:
+        archive.add(day)
+    return archive
+
+
+def values_of(found: Answer) -> str:
+    return json.dumps(list(as_values(found)), sort_keys=True)
+
+
+def test_exactly_the_ill_buses_are_named_from_their_first_day_on(made: Made, days: list[BusDay]) -> None:
+    found = answer(whole(days))
+    assert len(found.buses) == BUSES
+    ill = {bus.bus: bus for bus in found.buses if bus.troubles}
+    assert set(ill) == {plan.bus for plan in made[1] if plan.fault is not None}
+    for plan in made[1]:
+        if plan.fault is None:
+            continue
+        bus = ill[plan.bus]
+        assert bus.site == plan.site
+        for said in plan.fault.wanted:
+            fitting = [one for one in bus.troubles if said.fits(one.finding, None)]
+            assert fitting or not said.codes or said.codes[0].endswith("105"), (plan, said)
+            for one in fitting:
+                assert one.days[0] == f"2026-03-{plan.since + 1:02}"
+        assert {one.finding.subject.split(",")[0] for one in bus.troubles} <= plan.fault.about
+    worst = [bus.health.score for bus in found.buses]
+    assert worst == sorted(worst)
+    assert found.buses[0].bus in ill
+
+
+def test_the_answer_does_not_depend_on_order_or_on_how_parts_are_merged(days: list[BusDay]) -> None:
+    expected = values_of(answer(whole(days)))
+    for seed in range(4):
+        shuffled = random.Random(seed).sample(days, len(days))
+        assert values_of(answer(whole(shuffled))) == expected
+        cut = len(days) * seed // 4
+        assert values_of(answer(whole(shuffled[:cut]).merge(whole(shuffled[cut:])))) == expected
+
+
+def test_what_the_index_keeps_is_what_was_read(days: list[BusDay]) -> None:
+    again = codec.decode(codec.encode(days))
+    assert codec.encode(again) == codec.encode(days)
+    assert values_of(answer(whole(again))) == values_of(answer(whole(days)))
+    assert [day.findings for day in again] == [day.findings for day in days]
+
+
+@pytest.mark.skipif(not running.available(), reason="Dask is not installed")
+def test_processes_give_the_same(made: Made, days: list[BusDay]) -> None:
+    tasks, _ = tasks_of(files_below([str(made[0])]))
+    done = list(running.by_processes(tasks, 2))
+    assert [one.failed for one in done] == [None] * len(tasks)
+    assert values_of(answer(whole([day for one in done for day in one.days]))) == values_of(answer(whole(days)))
+
+
+def test_a_second_run_reads_only_what_is_new(
+    made: Made, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "archive"
+    shutil.copytree(made[0], folder)
+    for path in folder.rglob("day-*.mcap"):
+        if path.name != "day-1.mcap" or path.parent.name not in ("trunk-00", "trunk-01", "trunk-04", "trunk-05"):
+            path.unlink()
+    read: list[str] = []
+    whole_do = running.do
+    monkeypatch.setattr(running, "do", lambda task: read.append(task.files[0].path) or whole_do(task))
+    asked = ["fleet", "--workers", "1", "--json", str(folder)]
+    main(asked)
+    first = capsys.readouterr().out
+    assert len(read) == 4
+    read.clear()
+    main(asked)
+    assert read == []
+    assert _without_freshness(capsys.readouterr().out) == _without_freshness(first)
+    shutil.copy(made[0] / "north/trunk-00/day-3.mcap", folder / "north/trunk-00/day-3.mcap")
+    main(asked)
+    assert read == [str(folder / "north/trunk-00/day-3.mcap")]
+    said = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    fresh = {one["since_last_run"] for bus in said for one in bus.get("findings", ())}
+    assert fresh == {"new"}
+    read.clear()
+    other = {"modbus-rtu": "another"}
+    whole_code = index_module.code_of
+    monkeypatch.setattr(index_module, "code_of", lambda protocol: other.get(protocol) or whole_code(protocol))
+    main(asked)
+    assert {Path(path).parent.name for path in read} == {"trunk-00", "trunk-01"}  # only what that code reads
+
+
+def _without_freshness(text: str) -> list[dict[str, object]]:
+    said = [json.loads(line) for line in text.splitlines()]
+    for bus in said:
+        for one in bus.get("findings", ()):
+            one.pop("since_last_run")
+    return said
+
+
+def test_new_and_gone_since_the_run_before(days: list[BusDay]) -> None:
+    early = answer(whole([day for day in days if day.day == "2026-03-01"]))
+    later = answer(whole(days), marks(early))
+    assert {one.fresh for bus in later.buses for one in bus.troubles} == {Fresh.NEW}
+    again = answer(whole(days), marks(later))
+    assert {one.fresh for bus in again.buses for one in bus.troubles} == {Fresh.STAYS}
+    well = answer(whole([day for day in days if not day.findings]), marks(later))
+    assert set(well.gone) == marks(later)
+
+
+def test_a_file_that_cannot_be_read_is_told_with_its_reason(
+    made: Made, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shutil.copy(made[0] / "north/trunk-00/day-1.mcap", tmp_path / "a.mcap")
+    (tmp_path / "b.mcap").write_bytes(b"no recording")
+    cut = (made[0] / "south/trunk-01/day-1.mcap").read_bytes()
+    (tmp_path / "c.mcap").write_bytes(cut[: len(cut) // 2])
+    os.utime(tmp_path / "c.mcap", (0, 0))
+    (tmp_path / "growing.mcap").write_bytes(cut[: len(cut) // 2])
+    assert main(["fleet", "--no-index", "--workers", "1", str(tmp_path)]) == 3
+    out = capsys.readouterr().out
+    assert f"not read: {tmp_path}/b.mcap: not an MCAP file" in out
+    assert "c.mcap" not in out
+    assert "growing" not in out
+    assert "trunk-01" in out
+
+
+def test_no_such_folder_is_said(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["fleet", "/nowhere"]) == 3
+    assert "/nowhere: no such file or folder" in capsys.readouterr().err
+
+
+def test_workers_load_no_scapy(made: Made) -> None:
+    """Its licence and Dask's libraries stay in processes of their own."""
+    program = (
+        "import sys\n"
+        "from sniff.fleet.archive import files_below, tasks_of\n"
+        "from sniff.fleet.running import do\n"
+        f"tasks, _ = tasks_of(files_below([{str(made[0])!r}]))\n"
+        "assert all(do(task).failed is None for task in tasks[::5])\n"
+        "print(sorted(name for name in sys.modules if name.split('.')[0] in ('scapy', 'textual')))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_the_command_loads_no_scapy_beside_dask(made: Made) -> None:
+    program = (
+        "import sys\n"
+        "from sniff.cli import main\n"
+        f"main(['fleet', '--no-index', '--workers', '2', {str(made[0] / 'north/trunk-00')!r}])\n"
+        "print(sorted(name for name in sys.modules if name.split('.')[0] in ('scapy', 'textual')))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout.strip().endswith("[]")
+
+
+def test_the_pages_say_it(days: list[BusDay]) -> None:
+    found = answer(whole(days))
+    text = "\n".join(page(found))
+    assert "12 buses of 3 sites, 2026-03-01 … 2026-03-03: 6 with something wrong, 6 well" in text
+    assert "station 4: no answer to any of" in text
+    html = html_page(found)
+    assert "<script" not in html
+    assert "http" not in html
+    assert html.count("<tr>") == 13
+
+
+def test_hostile_names_are_inert(days: list[BusDay]) -> None:
+    evil = [replace(day, bus="\x1b]0;x\x07<img src=x>") for day in days[:1]]
+    found = answer(whole(evil))
+    assert "\x1b" not in "\n".join(page(found))
+    assert "<img" not in html_page(found)
+
+
+def test_stations_that_come_go_and_slow_down(days: list[BusDay]) -> None:
+    day = next(one for one in days if one.protocol == "modbus-rtu" and one.health().bus.score == 100)
+    without = codec.decode(codec.encode([day]))[0]
+    gone = max(without.summary.nodes.nodes)
+    del without.summary.nodes.nodes[gone]
+    slow = codec.decode(codec.encode([day]))[0]
+    for node in slow.summary.nodes:
+        latency = node.latency
+        node.latency = type(latency)()
+        for value in [40_000_000] * 200:
+            node.latency.add(value)
+    found = answer(whole([
+        replace(without, day="2026-03-01"), replace(day, day="2026-03-02"), replace(day, day="2026-03-04"),
+        replace(slow, day="2026-03-05"), replace(slow, day="2026-03-06"), replace(without, day="2026-03-07"),
+    ]))  # fmt: skip
+    (bus,) = found.buses
+    assert bus.missing == ("2026-03-03",)
+    changes = {(one.station, one.change, one.day) for one in bus.changes if one.station == gone}
+    assert (gone, Change.CAME, "2026-03-02") in changes
+    assert (gone, Change.WENT, "2026-03-06") in changes
+    assert any(one.change is Change.SLOWER for one in bus.changes)
+
+
+def test_an_index_of_somebody_else_is_refused_or_read_again(made: Made, tmp_path: Path) -> None:
+    (tmp_path / "x.sqlite").write_bytes(b"this is no data base at all, " * 100)
+    with pytest.raises(CaptureError, match="cannot be used"):
+        Index(tmp_path / "x.sqlite")
+    tasks, _ = tasks_of(files_below([str(made[0] / "north/trunk-00")]))
+    index = Index(tmp_path / "y.sqlite")
+    index.put(tasks[0], read_task(tasks[0]))
+    assert index.get(tasks[0]) is not None
+    with index._reach() as base:
+        base.execute("""UPDATE task SET days = '[{"site": 1}]'""")
+    assert index.get(tasks[0]) is None
