@@ -107,8 +107,9 @@ def is_being_written(file: FileState, now: int) -> bool:
         return False
     try:
         with open(file.path, "rb") as stream:
+            begins = stream.read(len(scan.MAGIC)) == scan.MAGIC
             stream.seek(max(0, file.size - len(scan.MAGIC)))
-            return stream.read() != scan.MAGIC
+            return begins and stream.read() != scan.MAGIC
     except OSError:
         return False
 
