@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 from dissectors.frame import Chunk
 from dissectors.line import MS, LineSettings
@@ -47,6 +48,7 @@ class Assembly:
         self._way = ""
         self._glued = False  # whether what is held follows what was given without a silence
         self._heading: Line | None = None
+        self._used = False  # whether octets came below it
         self._expected = 0  # offset of the next row
         self._squeezed = False
         self._row = b""
@@ -66,9 +68,16 @@ class Assembly:
             line.kind is Kind.TEXT and (line.stamp is not None or line.way)
         ):
             yield from self._flush()
-            self._heading = line
+            self._head(line)
         elif line.kind is Kind.EMPTY and not self._plan.octetwise:
             yield from self._flush()
+
+    def _head(self, line: Line) -> None:
+        """A line that says something of the octets below; two of them may stand above one another."""
+        before = self._heading
+        if before is not None and line.stamp is None and before.stamp is not None and not self._used:
+            line = replace(line, stamp=before.stamp)
+        self._heading, self._used = line, False
 
     def close(self) -> Iterator[Chunk]:
         """What is held at the end."""
@@ -84,7 +93,7 @@ class Assembly:
             self.was = Kind.SHAPE
             return
         if role is not Role.DATA:
-            self.was = Kind.STRANGE if role is None and len(line.octets) >= 3 else Kind.TEXT
+            self.was = Kind.STRANGE if role is None and line.spelling in self._plan.spellings else Kind.TEXT
             return
         if line.cut:
             self.was = Kind.STRANGE
@@ -119,6 +128,7 @@ class Assembly:
         self._way = way
         if line.stamp is None and heading is not None and line.bare:
             self._stamp, self._way = heading.stamp, way or heading.way
+            self._used = True
 
     # -- rows of a hexdump -----------------------------------------------------------------------------------------
 
@@ -143,7 +153,7 @@ class Assembly:
         if not self._held:
             stamp, glued = line.stamp, self._glued
             if stamp is None and self._heading is not None:
-                stamp = self._heading.stamp
+                stamp, self._used = self._heading.stamp, True
             self._stamp, self._glued, self._samples = stamp, glued, None
         self._held += line.octets
         self._row = line.octets
@@ -163,7 +173,7 @@ class Assembly:
             yield from self._flush()
             self._expected = 0
         if line.stamp is not None:
-            self._heading = line
+            self._head(line)
 
     # -- times -----------------------------------------------------------------------------------------------------
 

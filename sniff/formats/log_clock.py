@@ -10,7 +10,9 @@ from datetime import UTC, datetime
 from dissectors.line import MS, NS_PER_S
 from sniff.formats.octet_table import seconds
 
-_TIME = r"(?P<clock>\d{1,2}:\d{2}:\d{2}(?:[.,]\d{1,9}|:\d{3}(?![\d:]))?)(?!\d|:\d)(?: ?(?P<half>[AaPp][Mm])\b)?"
+_TIME = (
+    r"(?P<clock>\d{1,2}:\d{2}:\d{2}(?:[.,]\d{1,9}|:\d{3}(?![\d:]))?)(?!\d|:[0-9A-Za-z])(?: ?(?P<half>[AaPp][Mm])\b)?"
+)
 _MONTHS = ["jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec"]
 _MONTH = r"(?P<month>Jan|Feb|Mar|Apr|May|Jun|Jul|Aug|Sep|Oct|Nov|Dec)[a-z]*"
 _BEGIN = r"(?<![0-9A-Za-z:.])"

@@ -16,7 +16,11 @@ LONGEST = 1 << 16
 MOST_STAMPS = 3
 """Times in a line that are taken out of it; a program's log around another's has two."""
 
+MOST_WORDS = 4
+"""Between a direction and the octets; with more it is a word of a sentence."""
+
 _SPACES = re.compile(r"\s{4,}")
+_WORD = re.compile(r"[A-Za-z]{2,}")
 _DIGITS = re.compile(r"\d+")
 _WORDS = re.compile(r"[A-Za-z]{3,}")
 _HEXLIKE = re.compile(r"(?<![0-9A-Za-z])(?:0x)?[0-9A-Fa-f]{2}(?![0-9A-Za-z])")
@@ -119,7 +123,7 @@ def _general(text: str, stamp: Stamp | None, base: int) -> Line:
     lead = text[: run.begin]
     way = _way(lead)
     label = " ".join(_DIGITS.sub("#", WAYS.sub("~", lead)).replace(STAMP, "").split())
-    bare = not _WORDS.search(label) and "~" not in label and STAMP not in lead
+    bare = not _WORDS.search(label) and "~" not in label and "#" not in label and STAMP not in lead
     goes_on = text.rstrip().endswith((",", "\\"))
     return Line(
         Kind.OCTETS, stamp, way, run.octets, label if not bare else "", bare, None, "", run.spelling,
@@ -133,6 +137,8 @@ def _way(lead: str) -> str:
     if not found:
         return ""
     last = found[-1]
+    if len(_WORD.findall(lead[last.end() :])) > MOST_WORDS:
+        return ""
     if len(last[0].strip("<>=-→←")) == 0:  # a sign between two names
         names = re.split(r"[\s:|\]\0]+", lead.strip(" :|-\t"))
         return " ".join(names[-3:]).lower() if len(names) >= 3 and last[0] in names[-3:] else last[0]
@@ -141,7 +147,8 @@ def _way(lead: str) -> str:
 
 def _looks(text: str) -> bool:
     """Whether a line that tells no octets looks as if it did, or is no words either."""
-    return len(_HEXLIKE.findall(text)) >= 3 or not _WORDS.search(text)
+    found = len(_HEXLIKE.findall(text))
+    return found >= 3 or (found > 0 and not _WORDS.search(text) and STAMP not in text)
 
 
 def _without_stamps(text: str) -> tuple[Stamp | None, str]:

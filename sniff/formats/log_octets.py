@@ -92,6 +92,7 @@ def _by(pattern: str, base: int) -> Callable[[str], bytes]:
 def _escaped(text: str) -> bytes:
     """A string with escapes, as Python, C and strace write it; only characters of one octet."""
     inner = text[text.index(text[-1]) + 1 : -1] if text[-1] in "'\"" else text
+    inner = re.sub(r"\\(.)", lambda found: "\\x1b" if found[1] == "e" else found[0], inner)
     quote = '"' if "'" in inner else "'"
     if quote in inner.replace("\\" + quote, ""):
         raise ValueError("a quote within")
@@ -141,7 +142,7 @@ SPELLINGS: tuple[Spelling, ...] = (
     Spelling("names of controls", rf"[!-;=?-~]*{_CONTROL}", r"", _controls, 2, after="[!-;=?-~]*",
              before=r"(?:(?<=\s)|^)"),
     Spelling("binary", r"0b[01]{8}(?: ?\(0[xX][0-9A-Fa-f]{1,2}\))?", _SEPARATOR, _by(r"0b([01]{8})", 2), 1),
-    Spelling("0x and digits", r"0[xX][0-9A-Fa-f]{1,2}(?![0-9A-Za-z])", r"[ ]?[,;:/|]?[ \t]{0,2}",
+    Spelling("0x and digits", r"0[xX][0-9A-Fa-f]{1,2}(?![0-9A-Za-z])", r"['\"]?[ ]?[,;:/|]?[ \t]{0,2}['\"]?",
              _by(r"0[xX]([0-9A-Fa-f]{1,2})", 16), 2),
     Spelling("digits and h", rf"{_H2}[hH]", _SEPARATOR, _by(rf"({_H2})[hH]", 16), 2),
     Spelling("digits after a sign", rf"[$%&#]{_H2}", r"[ ,;]{0,2}", _HEX, 2, before=r"(?<![0-9A-Za-z_])"),
@@ -185,18 +186,25 @@ def numbers_in(line: str) -> tuple[str, ...]:
 
 
 def _digits(line: str, base: int) -> Run | None:
-    for match in _DIGITS.finditer(line):
+    at, best = 0, None
+    while (match := _DIGITS.search(line, at)) is not None:
         tokens = _TOKEN.findall(match[0])
-        if len(tokens) < 2:
-            continue
-        if base != PAIRS_ONLY:
-            try:
-                octets = bytes(int(token, base) for token in tokens)
-            except ValueError:
-                continue
-            return Run(match.start(), match.end(), octets, "numbers")
-        if all(len(token) == 2 for token in tokens):
-            return Run(match.start(), match.end(), bytes(int(token, 16) for token in tokens), "pairs")
+        at = match.start() + len(tokens[0]) if len(tokens) < 4 else match.end()  # a number may stand before the octets
+        run = _numbers(match, tokens, base) if len(tokens) > 1 else None
+        if run is not None and (best is None or len(run.octets) > len(best.octets)):
+            best = run
+    return best
+
+
+def _numbers(match: re.Match[str], tokens: list[str], base: int) -> Run | None:
+    if base != PAIRS_ONLY:
+        try:
+            octets = bytes(int(token, base) for token in tokens)
+        except ValueError:
+            return None
+        return Run(match.start(), match.end(), octets, "numbers")
+    if all(len(token) == 2 for token in tokens):
+        return Run(match.start(), match.end(), bytes(int(token, 16) for token in tokens), "pairs")
     return None
 
 

@@ -31,10 +31,11 @@ _WIDTHS = (8, 10, 12, 16, 20, 24, 32, 40, 48, 64)
 @dataclass(frozen=True, slots=True)
 class Plan:
     """How a log is read. `kind`: of what tool or sort it is; `base`: of numbers (`octets_in`); `offsets`: base of the
-    offsets of a hexdump, None where there is none. `roles`: what lines with a label mean. `directed`: whether lines with octets
-    say a direction, so that others need a reason to count. `width`: octets of the lines of a table without
+    offsets of a hexdump, None where there is none. `roles`: what lines with a label mean. `directed`: whether lines
+    with octets say a direction, so that others need a reason to count. `width`: octets of the lines of a table without
     offsets, whose ends say nothing; None where a line is a frame, or part of one that a tool got at once. `octetwise`:
     an octet a line. `bit_samples`: samples of a bit, of a logic analyser; 0 where there are none.
+    `spellings`: how octets are written.
     """
 
     kind: str
@@ -45,6 +46,7 @@ class Plan:
     width: int | None = None
     octetwise: bool = False
     bit_samples: float = 0.0
+    spellings: frozenset[str] = frozenset()
 
     def role(self, line: Line, recent: bytes) -> Role | None:
         """What a line with octets is; None: nobody knows. `recent`: the octets told last."""
@@ -107,6 +109,7 @@ def _of_labels(lines: Sequence[Line], base: int) -> Plan | None:
     return Plan(
         _name(data, lines), base, None, roles, main in directed, _width(data), octetwise,
         _bit_samples([line.samples for line in data if line.samples is not None]),
+        frozenset(line.spelling for line in data),
     )  # fmt: skip
 
 
