@@ -21,6 +21,9 @@ from sniff.formats.cut_capture import cut_short
 from sniff.formats.files import explain, open_capture
 from sniff.formats.records import FrameFile
 
+SAMPLE = 6000
+"""Octets at the begin of a capture that are kept with its session, to tell its protocol."""
+
 ITEMS, FRAMES = "items_writer", "frames_writer"
 """Kinds of writers in the table."""
 
@@ -86,10 +89,15 @@ def _with_reads(capture: Capture) -> Capture:
 def with_first_reads(session: Session, items: Iterable[Item]) -> Session:
     """The session with when its first reads came, and a latency that these allow; no reads after other settings."""
     reads: list[tuple[int, int]] = []  # time and octets; 0 octets for a hole
+    sample: list[Chunk] = []
+    left = SAMPLE
     try:
         for item in items:
             if isinstance(item, Chunk):
                 reads.append((item.time, len(item.octets)))
+                if left > 0:
+                    sample.append(item if len(item.octets) <= left else Chunk(item.time, item.octets[:left]))
+                    left -= len(item.octets)
             elif item.kind is LineEventKind.SETTINGS:
                 break
             elif item.kind.is_hole:
@@ -98,7 +106,7 @@ def with_first_reads(session: Session, items: Iterable[Item]) -> Session:
                 break
     except CaptureError:
         pass  # whoever reads on is told
-    return replace(session, reads=ReadTimes.of(reads)).with_latency_of_reads()
+    return replace(session, reads=ReadTimes.of(reads), sample=tuple(sample)).with_latency_of_reads()
 
 
 def keeps_frames(path: str | Path) -> bool:

@@ -56,7 +56,7 @@ class Assembly:
 
     def take(self, line: Line, text: str) -> Iterator[Chunk]:
         """Take a line; `text` as it is written."""
-        self.was = line.kind
+        self.was = line.kind if line.kind is not Kind.STRANGE or self._could_be(line, text) else Kind.TEXT
         if line.kind is Kind.ROW:
             self.was = Kind.OCTETS
             yield from self._take_row(line)
@@ -71,6 +71,10 @@ class Assembly:
             self._head(line)
         elif line.kind is Kind.EMPTY and not self._plan.octetwise:
             yield from self._flush()
+
+    def _could_be(self, line: Line, text: str) -> bool:
+        """Whether a line that cannot be read could be one of those that are: it is written as they are."""
+        return bool(line.tool) or self._plan.spellings != frozenset(("0x and digits",)) or text.count("0x") > 1
 
     def _head(self, line: Line) -> None:
         """A line that says something of the octets below; two of them may stand above one another."""

@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from decimal import Decimal
 
 from dissectors.line import MS, NS_PER_S
 from sniff.formats.octet_table import seconds
@@ -74,7 +75,7 @@ def _of_day(match: re.Match[str]) -> int:
 
 
 def _scaled(unit: int) -> Callable[[re.Match[str]], int]:
-    return lambda match: seconds(match["number"]) * unit // NS_PER_S
+    return lambda match: int(Decimal(match["number"]) * unit)
 
 
 def _clock(pattern: str) -> re.Pattern[str]:

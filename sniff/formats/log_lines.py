@@ -96,7 +96,7 @@ def line_of(text: str, base: int = PAIRS_ONLY, rows: bool = True) -> Line:
     if told is not None and run is None and _OCTET.fullmatch(told):
         run = Run(0, 1, bytes((int(told, 16),)), "one octet")
     if run is None:
-        return Line(Kind.STRANGE, stamp)
+        return Line(Kind.STRANGE, stamp, tool=shape.tool)
     begin, end = groups.get("begin"), groups.get("end")
     samples = (int(begin[:18]), int(end[:18])) if begin and end else None
     if not way and told is None:

@@ -116,6 +116,8 @@ def _of_labels(lines: Sequence[Line], base: int) -> Plan | None:
 def _roles(lines: Sequence[Line], main: str, directed: set[str]) -> dict[str, Role | None]:
     """What lines with each label mean."""
     text = b"".join(line.octets for line in lines if line.family == main)
+    usual = {line.spelling for line in lines if line.family == main}
+    alike = {line.family for line in lines if line.spelling in usual}
     seen: dict[str, list[int]] = {}
     at = 0
     for line in lines:
@@ -131,7 +133,7 @@ def _roles(lines: Sequence[Line], main: str, directed: set[str]) -> dict[str, Ro
             roles[family] = Role.DATA
         elif found >= _REPEATS * many:
             roles[family] = Role.SAME
-        elif family in directed or main not in directed:
+        elif family in directed or (main not in directed and family in alike):
             roles[family] = Role.DATA
         else:
             roles[family] = None
