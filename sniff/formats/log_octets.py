@@ -211,9 +211,13 @@ def _numbers(match: re.Match[str], tokens: list[str], base: int) -> Run | None:
 def _words(line: str) -> Run | None:
     for match in _WORDS.finditer(line):
         digits = match[0].replace(" ", "")
+        if len(digits) == len(match[0].split()) * 2 and " " in match[0]:
+            continue  # pairs, of which one was cut
         alone = match.end() == len(line.rstrip())
-        if len(digits) >= 12 or (
-            len(digits) >= 4 and alone and (match.start() == 0 or line[match.start() - 1] in " #:=")
+        if (
+            len(digits) >= 12
+            or (len(digits) >= 8 and alone and line[match.start() - 1] == " ")
+            or (len(digits) >= 4 and alone and (match.start() == 0 or line[match.start() - 1] in "#:="))
         ):
             return Run(match.start(), match.end(), bytes.fromhex(digits), "digits without space")
     return None

@@ -81,10 +81,10 @@ def _of_labels(lines: Sequence[Line], base: int) -> Plan | None:
     singles = [line for line in with_octets if line.spelling == "one octet"]
     known = [line for line in with_octets if line.tool]
     multiple = {line.family for line in with_octets if line.spelling != "one octet"}
-    if 2 * len(singles) < written:  # words that end in "be" or "20" are no octets, but the rest of a frame is
-        with_octets = [
-            line for line in with_octets if line.spelling != "one octet" or line.tool or line.family in multiple - {""}
-        ]
+    # words that end in "be" or "20" are no octets, but the rest of a frame is, and so is what is nothing but octets
+    many = Counter(line.family for line in singles if not line.family or line.way)
+    trusted = {family for family, count in many.items() if 2 * count >= written} | (multiple - {""})
+    with_octets = [line for line in with_octets if line.spelling != "one octet" or line.tool or line.family in trusted]
     if not with_octets:
         return None
     amounts: Counter[str] = Counter()
@@ -105,7 +105,7 @@ def _of_labels(lines: Sequence[Line], base: int) -> Plan | None:
         return None
     if main == "" and main not in directed and 3 * len(data) < written:  # a word here and there
         return None
-    octetwise = 2 * sum(len(line.octets) == 1 for line in data) > len(data) and len(data) > 1
+    octetwise = 2 * sum(len(line.octets) == 1 for line in data) > len(data)
     return Plan(
         _name(data, lines), base, None, roles, main in directed, _width(data), octetwise,
         _bit_samples([line.samples for line in data if line.samples is not None]),
@@ -145,13 +145,20 @@ def _base(numbers: Sequence[Sequence[str]]) -> int:
     in decimal where one has three of them, or none is a letter.
     """
     runs = [tokens for tokens in numbers if tokens]
-    mixed = [tokens for tokens in runs if len(tokens) > 3 and any(len(token) != 2 for token in tokens)]
+    mixed = [tokens for tokens in runs if len(tokens) > 3 and _is_unpadded(tokens)]
     if 2 * len(mixed) <= len(runs):
         return PAIRS_ONLY
     tokens = [token for run in mixed for token in run]
     if any(len(token) == 3 for token in tokens):
         return 10
     return 16 if any(not token.isdigit() for token in tokens) else 10
+
+
+def _is_unpadded(tokens: Sequence[str]) -> bool:
+    """Whether numbers have as many digits as they need, or three each: then one digit is no half of a pair."""
+    if all(len(token) == 3 for token in tokens):
+        return True
+    return any(len(token) != 2 for token in tokens) and not any(len(token) > 1 and token[0] == "0" for token in tokens)
 
 
 def _offsets(rows: Sequence[Line]) -> int | None:
