@@ -5,22 +5,24 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 from dissectors import registry
 from dissectors.line import LineSettings
 from dissectors.profiles import Devices, ProfileError
 from sniff.analysis.plain import plain
+from sniff.analysis.told_protocol import detected
 from sniff.cli import UNREADABLE, USAGE, Failure
 from sniff.config import AUTO
 from sniff.engine.capture import Capture, CaptureError
-from sniff.engine.session import OPTIONS, Session
+from sniff.engine.session import ASSUMED, LINE_NOTE, OPTIONS, PROTOCOL_NOTE, Session
 from sniff.formats import read
 
 
-def add_line(parser: argparse.ArgumentParser, auto: bool = False) -> None:
+def add_line(parser: argparse.ArgumentParser, auto: bool = True) -> None:
     """-s and -p, the same everywhere. `auto`: whether this command can find them itself."""
     kinds = (_or_auto(line_settings), _or_auto(protocol)) if auto else (line_settings, protocol)
-    also = "; auto: found by listening" if auto else ""
+    also = "; auto: found by listening, or in the octets of a file" if auto else ""
     parser.add_argument(
         "-s", "--line", type=kinds[0], metavar="LINE", help=f"line settings, for instance 19200,8E1 or 9600,8N1{also}"
     )
@@ -148,7 +150,9 @@ def rotation(text: str) -> str:
 def open_capture(path: str) -> Capture:
     """Open a capture, or end with exit code 3 (2 for an unknown suffix)."""
     try:
-        return read(path)
+        capture = read(path)
+        capture.session = detected(capture.session)
+        return capture
     except CaptureError as error:
         raise Failure(str(error), USAGE if "unknown suffix" in str(error) else UNREADABLE) from None
 
@@ -164,7 +168,7 @@ def open_captures(paths: Sequence[str]) -> list[tuple[str, Capture]]:
 
 
 def settings_of(args: argparse.Namespace, session: Session, path: str) -> Session:
-    """The session of a file with -s and -p applied; says when its line settings are a guess.
+    """The session of a file with -s and -p applied; says when protocol or line settings are not the file's.
 
     Ends with exit code 2 when its protocol is unknown here.
     """
@@ -172,7 +176,8 @@ def settings_of(args: argparse.Namespace, session: Session, path: str) -> Sessio
     from sniff.engine.session import with_settings
 
     try:
-        session = with_settings(session, args.protocol, args.line)
+        protocol, line = (None if said == AUTO else said for said in (args.protocol, args.line))
+        session = with_settings(_searched(args, session), protocol, line)
         dissector_for(session)
     except registry.BrokenPlugin:
         raise
@@ -182,9 +187,21 @@ def settings_of(args: argparse.Namespace, session: Session, path: str) -> Sessio
     return session
 
 
-def say_assumed(session: Session, path: str, way_out: str = "") -> None:
-    """Say on standard error that nobody knows a file's line settings, and what stands in for them."""
+def _searched(args: argparse.Namespace, session: Session) -> Session:
+    """The session with what -p auto and -s auto ask its octets for."""
+    asked = {PROTOCOL_NOTE: args.protocol == AUTO, LINE_NOTE: args.line == AUTO}
+    if not any(asked.values()) or session.unknown:
+        return session
+    notes = {**session.notes, **{note: ASSUMED for note, wanted in asked.items() if wanted}}
+    return detected(replace(session, notes=notes))
 
+
+def say_assumed(session: Session, path: str, way_out: str = "") -> None:
+    """Say on standard error what of protocol and line settings is not a file's own, and where it is from."""
+    told = session.notes.get(PROTOCOL_NOTE)
+    if told is not None:
+        title = registry.get(session.protocol).title
+        print(f"sniff485: no protocol in {plain(path)}: reading it as {title} ({plain(told)})", file=sys.stderr)
     if session.line_is_assumed:
         said = f"no line settings in {plain(path)}: assuming {session.line} for {session.protocol}{way_out}"
         print(f"sniff485: {said}", file=sys.stderr)

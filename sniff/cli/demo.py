@@ -17,7 +17,7 @@ DEFAULT_DURATION = 10.0
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Options of `demo`."""
-    arguments.add_line(parser)
+    arguments.add_line(parser, auto=False)
     arguments.add_devices(parser)
     parser.add_argument("--seed", type=int, default=485, metavar="N", help="which faults strike when (default 485)")
     parser.add_argument("--clean", action="store_true", help="no faults")

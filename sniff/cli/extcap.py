@@ -31,7 +31,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--extcap-version", nargs="?", help="Wireshark's version; not used")
     parser.add_argument("--capture", action="store_true", help="capture to --fifo until it is closed")
     parser.add_argument("--fifo", metavar="PATH", help="where Wireshark reads")
-    arguments.add_line(parser)
+    arguments.add_line(parser, auto=False)
 
 
 def run(args: argparse.Namespace) -> int:

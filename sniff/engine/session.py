@@ -48,6 +48,9 @@ LINE_NOTE = "line"
 ASSUMED = "assumed: the file does not say"
 """Note of a session whose format keeps no line settings: `line` is what such a bus normally runs."""
 
+PROTOCOL_NOTE = "protocol"
+"""Note of a session whose file does not say its protocol: ASSUMED, or how it was told from the octets."""
+
 INFERRED = "inferred from the reads"
 """Where a latency is from that nobody said."""
 
@@ -71,7 +74,7 @@ class Session:
     a stand-in. `given`: somebody named them after a search in vain, so that octets count wherever the search heard
     them with `line`. `profiles`: device profiles in force, name → TOML document, as far as the format keeps them.
     `reads`: when the first reads came, of a saved capture; `said`: the adapter as the file says it, where `adapter`
-    differs from it by what the reads say (`with_latency_of_reads`).
+    differs from it by what the reads say (`with_latency_of_reads`). `sample`: the first reads of a saved capture.
     """
 
     port: str
@@ -87,6 +90,7 @@ class Session:
     profiles: Mapping[str, str] = field(default_factory=dict)
     reads: ReadTimes | None = field(default=None, compare=False, repr=False)
     said: Adapter | None = field(default=None, compare=False, repr=False)
+    sample: tuple[Chunk, ...] = field(default=(), compare=False, repr=False)
 
     def with_latency_of_reads(self) -> Session:
         """The session with the latency that its reads speak for: times that cannot be exact are not taken as exact.
@@ -112,6 +116,11 @@ class Session:
     def line_is_assumed(self) -> bool:
         """Whether neither the file nor the user says the line settings."""
         return self.notes.get(LINE_NOTE) == ASSUMED
+
+    @property
+    def protocol_is_assumed(self) -> bool:
+        """Whether neither the file, its octets nor the user say the protocol."""
+        return self.notes.get(PROTOCOL_NOTE) == ASSUMED
 
     @property
     def timing(self) -> Timing:
@@ -302,6 +311,8 @@ def with_settings(session: Session, protocol: str | None = None, line: LineSetti
         session = replace(session, notes=notes)
     elif protocol is not None and session.line_is_assumed:
         session = replace(session, line=LineSettings.parse(registry.get(protocol).default_line))
+    if protocol is not None:
+        session = replace(session, notes={name: said for name, said in session.notes.items() if name != PROTOCOL_NOTE})
     said = [name for name, value in (("line", line), ("protocol", protocol)) if value is not None]
     unknown = tuple(name for name in session.unknown if name not in said)
     return replace(

@@ -1,44 +1,81 @@
-"""Tables of octets as logic analysers write them (CSV): where octet, begin, end and errors stand in a row. Pure.
+"""Tables of octets as logic analysers and monitors write them (CSV): where octet, time and errors stand in a row. Pure.
 
 | column | its names |
 |---|---|
-| octet | octet, byte, data, value, hex: `0x01`, `01`, `'A' (0x41)`; several octets may stand in one cell |
+| octet | octet, byte, data, value, hex, payload …: one or more, in any spelling of `log_octets.py`, decimal, \
+binary or as characters; which one is told by the whole column |
 | begin, s | t_start_s, start, start_s, begin; start_time, time [s] (Saleae Logic: begin of the start bit) |
 | end, s | t_end_s, end, end_s, time, time_s, timestamp, t; or a duration beside the begin |
+| unit | behind the name: time[ns], time (ms); a time may also be a date and time |
 | errors | parity error, framing error (anything but empty, 0 and false); error: words that name them |
+| kind | type: rows of another type than data hold no octet |
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
 
 from dissectors.frame import Chunk, LineError, Mark
 
-OCTET = ("octet", "byte", "data", "value", "hex")
-BEGIN = ("t_start_s", "start", "start_s", "begin", "start_time", "time [s]")
-END = ("t_end_s", "end", "end_s", "time", "time_s", "timestamp", "t")
-DURATION = ("duration", "duration_s", "duration [s]")
+OCTET = (
+    "octet",
+    "octets",
+    "byte",
+    "bytes",
+    "data",
+    "value",
+    "hex",
+    "payload",
+    "data (hex)",
+    "hex data",
+    "raw",
+    "message",
+)
+ANALYSER = re.compile(r".*\b(?:uart|rs-?485|rs-?232|async serial|modbus|serial)\b.*")
+"""A column that is named for its decoder, when no other holds octets."""
+BEGIN = ("t_start_s", "start", "start_s", "begin", "start_time", "start time")
+END = ("t_end_s", "end", "end_s", "time", "time_s", "timestamp", "t", "date", "datetime", "date/time", "date time")
+DURATION = ("duration", "duration_s")
 ERRORS = {"parity error": LineError.PARITY, "framing error": LineError.FRAMING}
 ANY_ERROR = "error"
+TYPE = "type"
+TYPES_WITH_OCTETS = ("", "data", "result", "rx", "tx", "read", "write", "irp_mj_read", "irp_mj_write")
+
+UNITS = {"s": 1_000_000_000, "ms": 1_000_000, "us": 1000, "µs": 1000, "μs": 1000, "ns": 1}
+_UNIT = re.compile(r"(?P<name>[^\[(]*)[\[(](?P<unit>s|ms|us|µs|μs|ns)[\])]")
+_DELIMITERS = (",", ";", "\t", "|")
+
+MOST_CELL = 1 << 16
+LONGEST_HEADING = 4096
+"""Characters."""
 
 LATEST = 1 << 33
 """s; beyond it a number is no time."""
 
 _SHOWN = re.compile(r"\(0[xX]([0-9A-Fa-f]{2})\)\s*")  # behind the character, as Saleae shows "ASCII and hex"
 _PAIR = re.compile(r"[\s,;]*(?:0[xX])?([0-9A-Fa-f]{2})")
+_DECIMAL = re.compile(r"\d{1,3}")
+_BINARY = re.compile(r"(?:0b)?[01]{4}[ _]?[01]{4}")
+_QUOTED = re.compile(r"'(\d{1,3})'")
+_WORDS_OF_CHARACTERS = {"comma": ",", "' '": " ", "\\t": "\t", "\\r": "\r", "\\n": "\n", "\\\\": "\\", "\\0": "\0"}
 
 
 @dataclass(frozen=True, slots=True)
-class Columns:
+class Table:
     """Where things stand in a row; None where there is no such column."""
 
     octet: int
+    read: Callable[[str], bytes]
+    """How the cells of the octets are written."""
+    delimiter: str = ","
     begin: int | None = None
     end: int | None = None
     duration: int | None = None
+    unit: int = 1_000_000_000
+    kind: int | None = None
     errors: tuple[tuple[int, LineError | None], ...] = ()
     """Column → the error it tells; None: it names the error itself."""
 
@@ -47,26 +84,32 @@ class Columns:
         """Whether the time of each octet is measured on the line: both its ends, or its begin."""
         return self.begin is not None
 
+    def holds(self, row: Sequence[str]) -> bool:
+        """Whether a row is of a type that holds octets."""
+        if self.kind is None or self.kind >= len(row):
+            return True
+        return row[self.kind].strip().lower() in TYPES_WITH_OCTETS
+
     def chunk(self, row: Sequence[str], char: int) -> Chunk:
         """The octets of a row, at their end; `char`: ns of a character, where only the begin is told.
 
         Raises ValueError for a row that says less than it should.
         """
-        octets = octets_of(_cell(row, self.octet))
+        octets = self.read(_cell(row, self.octet))
         if not octets:
             raise ValueError("no octets")
         return Chunk(self._end(row, len(octets) * char), octets, self._marks(row))
 
     def _end(self, row: Sequence[str], length: int) -> int:
         if self.end is not None:
-            return seconds(_cell(row, self.end))
-        begin = seconds(_cell(row, self.begin))
-        return begin + (seconds(_cell(row, self.duration)) if self.duration is not None else length)
+            return time_of(_cell(row, self.end), self.unit)
+        begin = time_of(_cell(row, self.begin), self.unit)
+        return begin + (time_of(_cell(row, self.duration), self.unit) if self.duration is not None else length)
 
     def _marks(self, row: Sequence[str]) -> tuple[Mark, ...]:
         found = LineError(0)
         for place, error in self.errors:
-            said = _cell(row, place).strip().lower()
+            said = _cell(row, place).strip().lower() if place < len(row) else ""
             if error is None:
                 for name in LineError:
                     found |= name if (name.name or "").lower() in said else LineError(0)
@@ -75,23 +118,99 @@ class Columns:
         return (Mark(0, found),) if found else ()
 
 
-def columns(heading: str) -> Columns | None:
-    """The columns that a heading names; None when octets or times are not among them."""
-    names = [name.strip().strip('"').lower() for name in heading.split(",")]
+def delimiter_of(heading: str) -> str:
+    """What stands between the cells of a heading."""
+    return max(_DELIMITERS, key=heading.count)
+
+
+def heading_of(heading: str, delimiter: str, rows: Sequence[str]) -> Table | None:
+    """The columns that a heading names; None when octets or times are not among them. `rows`: the next lines, which
+    tell how octets are written.
+    """
+    if len(heading) > LONGEST_HEADING:
+        return None
+    written = [name.strip().strip('"').strip().lower() for name in heading.split(delimiter)]
+    units = [_UNIT.fullmatch(name) for name in written]
+    names = [name if unit is None else unit["name"].strip() for name, unit in zip(written, units, strict=True)]
 
     def place(known: Iterable[str]) -> int | None:
         return next((names.index(name) for name in known if name in names), None)
 
-    octet, begin, end = place(OCTET), place(BEGIN), place(END)
-    if octet is None or (begin is None and end is None):
+    begin, end = place(BEGIN), place(END)
+    if "time [s]" in written:  # of Saleae Logic
+        begin, end = written.index("time [s]"), None
+    octet = place(OCTET)
+    if octet is None:
+        octet = next((number for number, name in enumerate(names) if ANALYSER.fullmatch(name)), None)
+    when = begin if begin is not None else end
+    if octet is None or when is None or len(names) < 2:
         return None
+    unit = units[when]
     errors = [(names.index(name), error) for name, error in ERRORS.items() if name in names]
     named = [(names.index(ANY_ERROR), None)] if ANY_ERROR in names else []
-    return Columns(octet, begin, end, place(DURATION), (*errors, *named))
+    kind = names.index(TYPE) if TYPE in names else None
+    cells = [row.split(delimiter) for row in rows]
+    shown = [
+        cell[octet].strip().strip('"')
+        for cell in cells
+        if octet < len(cell)
+        and (kind is None or kind >= len(cell) or cell[kind].strip('" ').lower() in TYPES_WITH_OCTETS)
+    ]
+    return Table(
+        octet, spelling_of(shown), delimiter, begin, end, place(DURATION), UNITS[unit["unit"]] if unit else UNITS["s"],
+        kind, (*errors, *named),
+    )  # fmt: skip
+
+
+def spelling_of(cells: Sequence[str]) -> Callable[[str], bytes]:
+    """How a column of octets is written, told by all its cells: hexadecimal, unless only another fits.
+
+    One of `10` and `1` is decimal, since a column of hexadecimal octets has two digits in each.
+    """
+    cells = [cell for cell in cells if cell]
+    if cells and all(_BINARY.fullmatch(cell) for cell in cells):
+        return lambda text: bytes((int(re.sub("[^01]", "", text.strip().removeprefix("0b")), 2),))
+    if any(_QUOTED.fullmatch(cell) or cell.lower() in _WORDS_OF_CHARACTERS for cell in cells):
+        return _character
+    widths = {len(cell) for cell in cells}
+    if cells and all(_DECIMAL.fullmatch(cell) for cell in cells) and (widths != {2}) and widths <= {1, 2, 3}:
+        return _decimal
+    fitting = sum(_fits(octets_of, cell) for cell in cells)
+    if cells and 2 * fitting < len(cells) and all(len(cell) == 1 for cell in cells):
+        return _character
+    return octets_of
+
+
+def _fits(read: Callable[[str], bytes], cell: str) -> bool:
+    try:
+        return bool(read(cell))
+    except ValueError:
+        return False
+
+
+def _decimal(text: str) -> bytes:
+    return bytes((int(text),))
+
+
+def _character(text: str) -> bytes:
+    """A character; 'N' is the number of one that cannot be shown (Saleae Logic)."""
+    quoted = _QUOTED.fullmatch(text.strip())
+    if quoted is not None:
+        return bytes((int(quoted[1]),))
+    text = _WORDS_OF_CHARACTERS.get(text.strip().lower(), text.strip() or " ")
+    shown = _SHOWN.search(text)
+    if shown is not None:
+        return bytes.fromhex(shown[1])
+    escape = re.fullmatch(r"\\x([0-9A-Fa-f]{2})", text)
+    if escape is not None:
+        return bytes.fromhex(escape[1])
+    if len(text) != 1:
+        raise ValueError(f"{text[:20]!r}: expected one character")
+    return text.encode("latin-1")
 
 
 def octets_of(text: str) -> bytes:
-    """The octets of a text of hexadecimal pairs: `01 03`, `0103`, `0x01, 0x03`, `'A' (0x41)`. Raises ValueError."""
+    """The octets of a text: `01 03`, `0103`, `0x01, 0x03`, `'A' (0x41)`, as in lines of logs. Raises ValueError."""
     shown = _SHOWN.search(text)
     if shown is not None and shown.end() == len(text):
         return bytes.fromhex(shown[1])
@@ -100,10 +219,32 @@ def octets_of(text: str) -> bytes:
     while at < len(text):
         match = _PAIR.match(text, at)
         if match is None:
-            raise ValueError(f"octets {text[at : at + 20]!r}: expected hexadecimal pairs")
+            return _as_in_a_line(text)
         found.append(int(match[1], 16))
         at = match.end()
     return bytes(found)
+
+
+def _as_in_a_line(text: str) -> bytes:
+    from sniff.formats.log_octets import octets_in
+
+    run = octets_in(text[:MOST_CELL])
+    if run is None or run.begin or run.end < len(text.rstrip()):
+        raise ValueError(f"octets {text[:20]!r}: expected hexadecimal pairs")
+    return run.octets
+
+
+def time_of(text: str, unit: int) -> int:
+    """A cell with a time → ns: a number of `unit`s (ns), or a date and time. Raises ValueError."""
+    from sniff.formats.log_clock import stamp_of
+
+    try:
+        return seconds(text) * unit // UNITS["s"] if unit != UNITS["s"] else seconds(text)
+    except ValueError:
+        stamp = stamp_of(text.strip())
+        if stamp is None or stamp.begin:
+            raise
+        return stamp.time
 
 
 def seconds(text: str) -> int:

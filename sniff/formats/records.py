@@ -16,7 +16,17 @@ from typing import Protocol
 from dissectors import registry
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
-from sniff.engine.session import ASSUMED, LINE_NOTE, Adapter, Item, LineEvent, LineEventKind, Session, SettingsChange
+from sniff.engine.session import (
+    ASSUMED,
+    LINE_NOTE,
+    PROTOCOL_NOTE,
+    Adapter,
+    Item,
+    LineEvent,
+    LineEventKind,
+    Session,
+    SettingsChange,
+)
 from sniff.formats.linktypes import LINK_TYPES
 from sniff.formats.linktypes import protocol_of as protocol_of_link
 
@@ -66,7 +76,7 @@ def foreign_session(path: str, protocol: str | None, started: int, kind: str) ->
         protocol=name,
         started=started,
         adapter=Adapter(name=f"another program's {kind}", latency=FOREIGN_LATENCY, latency_from="assumed"),
-        notes={LINE_NOTE: ASSUMED},
+        notes={LINE_NOTE: ASSUMED, **({PROTOCOL_NOTE: ASSUMED} if protocol is None else {})},
     )
 
 

@@ -70,6 +70,11 @@ def read_text(text: str) -> tuple[list[Item], str]:
     return found, ""
 
 
+def heard(items: list[Item]) -> bytes:
+    """The octets of all reads; several lines may tell of one."""
+    return b"".join(item.octets for item in items if isinstance(item, Chunk))
+
+
 def whole_lines(text: str, at: int) -> str:
     """The lines that end before a place."""
     return text[: text.rfind("\n", 0, at) + 1]
@@ -128,10 +133,16 @@ def read_log(path: Path, text: str) -> tuple[list[Item], str, str]:
         log = read(path)
     except CaptureError as error:
         return [], "", str(error)
-    assert isinstance(log, ByteLog)
-    found = list(log.items())
+    if not isinstance(log, ByteLog):  # comments alone are an empty text capture
+        return [], "", f"{path}: "
+    found: list[Item] = []
+    try:
+        for item in log.items():
+            found.append(item)
+    except CaptureError as error:  # at the end: too much was not understood
+        return found, log.kind, str(error)
     complete = log.completeness()
-    return found, log.kind or "", "" if complete.whole else complete.text
+    return found, log.kind, "" if complete.whole else complete.text
 
 
 @pytest.mark.parametrize("name", LOGS)
@@ -144,7 +155,8 @@ def test_a_byte_log_cut_at_every_octet(name: str, tmp_path: Path) -> None:
         found, as_kind, said = read_log(path, text[:at])
         if as_kind == kind:
             before, _, _ = read_log(path, whole_lines(text, at))
-            assert found[: len(before)] == whole[: len(before)]
+            assert heard(found).startswith(heard(before))
+            assert heard(whole).startswith(heard(before))
             assert len(found) - len(before) in (0, 1)
         elif not as_kind:
             assert said.startswith((f"{path}: ", *(f"{path}:{number}: " for number in range(1, 5))))
@@ -153,7 +165,7 @@ def test_a_byte_log_cut_at_every_octet(name: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", LOGS)
 def test_a_byte_log_with_any_octet_changed(name: str, tmp_path: Path) -> None:
     text, path = LOGS[name], tmp_path / "x.log"
-    whole, kind, _ = read_log(path, text)
+    _, kind, _ = read_log(path, text)
     for at in range(len(text)):
         before, _, _ = read_log(path, whole_lines(text, at))
         for change in CHANGES[::2]:
@@ -161,7 +173,7 @@ def test_a_byte_log_with_any_octet_changed(name: str, tmp_path: Path) -> None:
             if as_kind == kind == "CSV":  # its rows are put in order of time
                 assert all(item in found for item in before)
             elif as_kind == kind:
-                assert found[: len(before)] == whole[: len(before)]
+                assert heard(found).startswith(heard(before))
             assert said or as_kind
 
 

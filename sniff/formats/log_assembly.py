@@ -1,0 +1,215 @@
+"""Lines of a log to reads of a capture: what several lines tell of one is put together, each with its time. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from dissectors.frame import Chunk
+from dissectors.line import MS, LineSettings
+from sniff.formats.log_clock import DAY, Stamp
+from sniff.formats.log_lines import Kind, Line
+from sniff.formats.log_plan import WINDOW, Plan
+from sniff.formats.log_shapes import Role
+
+LINE_END = 10 * MS
+"""Silence that stands for the end of a line where nobody says how long it was: longer than the gap between frames at
+the usual rates, shorter than what an adapter may hold back, so that it is no proof of two frames."""
+
+COARSE = 2 * MS
+"""A clock that counts so, or in longer steps, does not tell which octets came together."""
+
+SLOW = LineSettings.parse("9600,8E1")
+"""Octets without times are laid so far apart at least, so that they do not lie over one another at a usual rate."""
+
+LONGEST = 4096
+"""Octets put together from several lines; what goes on after them is the next read, without a silence."""
+
+_BACKWARDS = 2_000_000_000
+_MOST_REPEATED = 1 << 16
+
+
+class Assembly:
+    """Lines in, reads out. `was`: what the line taken last turned out to be."""
+
+    def __init__(self, plan: Plan, line: LineSettings) -> None:
+        self.was = Kind.EMPTY
+        self._plan = plan
+        self._char = max(line.char, SLOW.char)
+        self._bit = 1_000_000_000 / line.baud
+        self._recent = b""
+        self._last = 0
+        self._any = False
+        self._day = 0
+        self._clock = -1
+        self._held = bytearray()
+        self._stamp: Stamp | None = None
+        self._samples: tuple[int, int] | None = None
+        self._way = ""
+        self._glued = False  # whether what is held follows what was given without a silence
+        self._heading: Line | None = None
+        self._used = False  # whether octets came below it
+        self._expected = 0  # offset of the next row
+        self._squeezed = False
+        self._row = b""
+        self._goes_on = False
+
+    def take(self, line: Line, text: str) -> Iterator[Chunk]:
+        """Take a line; `text` as it is written."""
+        self.was = line.kind if line.kind is not Kind.STRANGE or self._could_be(line, text) else Kind.TEXT
+        if line.kind is Kind.ROW:
+            self.was = Kind.OCTETS
+            yield from self._take_row(line)
+        elif self._plan.offsets is not None:
+            yield from self._between_rows(line, text)
+        elif line.kind is Kind.OCTETS:
+            yield from self._take_octets(line)
+        elif (line.kind is Kind.SHAPE and line.role is Role.HEADING) or (
+            line.kind is Kind.TEXT and (line.stamp is not None or line.way)
+        ):
+            yield from self._flush()
+            self._head(line)
+        elif line.kind is Kind.EMPTY and not self._plan.octetwise:
+            yield from self._flush()
+
+    def _could_be(self, line: Line, text: str) -> bool:
+        """Whether a line that cannot be read could be one of those that are: it is written as they are."""
+        return bool(line.tool) or self._plan.spellings != frozenset(("0x and digits",)) or text.count("0x") > 1
+
+    def _head(self, line: Line) -> None:
+        """A line that says something of the octets below; two of them may stand above one another."""
+        before = self._heading
+        if before is not None and line.stamp is None and before.stamp is not None and not self._used:
+            line = replace(line, stamp=before.stamp)
+        self._heading, self._used = line, False
+
+    def close(self) -> Iterator[Chunk]:
+        """What is held at the end."""
+        yield from self._flush()
+
+    # -- lines ---------------------------------------------------------------------------------------------------
+
+    def _take_octets(self, line: Line) -> Iterator[Chunk]:
+        role = self._plan.role(line, self._recent)
+        if line.spelling == "one octet" and not line.tool and not self._plan.octetwise and role is not Role.SAME:
+            role = role if not line.bare or self._plan.width or self._goes_on or self._held else Role.NOTHING
+        if role is Role.SAME:
+            self.was = Kind.SHAPE
+            return
+        if role is not Role.DATA:
+            self.was = Kind.STRANGE if role is None and line.spelling in self._plan.spellings else Kind.TEXT
+            return
+        if line.cut:
+            self.was = Kind.STRANGE
+        if self._joins(line):
+            self._held += line.octets
+        else:
+            yield from self._flush()
+            self._begin(line, line.way)
+        self._goes_on = line.goes_on
+        self._recent = (self._recent + line.octets)[-WINDOW:]
+        if len(self._held) >= LONGEST:
+            yield from self._flush()
+            self._glued = True
+
+    def _joins(self, line: Line) -> bool:
+        """Whether a line goes on with what is held."""
+        if not self._held or line.samples is not None:
+            return False
+        if self._goes_on:
+            return line.stamp is None and line.bare
+        if self._plan.octetwise and len(line.octets) == 1:
+            return line.stamp is None and line.way == self._way
+        if not line.bare or line.stamp is not None:
+            return False
+        return self._heading is not None or self._plan.width is not None or bool(self._way) or self._plan.directed
+
+    def _begin(self, line: Line, way: str) -> None:
+        heading = self._heading
+        self._held = bytearray(line.octets)
+        self._samples = line.samples
+        self._stamp = line.stamp
+        self._way = way
+        if line.stamp is None and heading is not None and line.bare:
+            self._stamp, self._way = heading.stamp, way or heading.way
+            self._used = True
+
+    # -- rows of a hexdump -----------------------------------------------------------------------------------------
+
+    def _take_row(self, line: Line) -> Iterator[Chunk]:
+        try:
+            offset = int(line.offset, self._plan.offsets or 16)
+        except ValueError:
+            self.was = Kind.STRANGE
+            return
+        if self._squeezed and self._expected < offset <= self._expected + _MOST_REPEATED and self._row:
+            missing = offset - self._expected
+            self._held += (self._row * (missing // len(self._row) + 1))[:missing]
+            self._expected = offset
+        self._squeezed = False
+        if not line.octets:  # the offset at the end
+            if 0 < self._expected - offset < 2 and self._held:
+                del self._held[-1:]  # an odd octet was filled up to a word
+            return
+        if offset != self._expected or (offset == 0 and self._held) or line.stamp is not None:
+            yield from self._flush()
+            self._expected = offset
+        if not self._held:
+            stamp, glued = line.stamp, self._glued
+            if stamp is None and self._heading is not None:
+                stamp, self._used = self._heading.stamp, True
+            self._stamp, self._glued, self._samples = stamp, glued, None
+        self._held += line.octets
+        self._row = line.octets
+        self._expected += len(line.octets)
+        if len(self._held) >= LONGEST:
+            yield from self._flush()
+            self._glued = True
+
+    def _between_rows(self, line: Line, text: str) -> Iterator[Chunk]:
+        if text.strip() == "*":
+            self._squeezed = True
+            self.was = Kind.SHAPE
+            return
+        if line.kind is Kind.OCTETS:
+            self.was = Kind.TEXT if not line.bare else Kind.STRANGE
+        if line.kind is not Kind.REMARK:
+            yield from self._flush()
+            self._expected = 0
+        if line.stamp is not None:
+            self._head(line)
+
+    # -- times -----------------------------------------------------------------------------------------------------
+
+    def _flush(self) -> Iterator[Chunk]:
+        if not self._held:
+            return
+        octets = bytes(self._held)
+        self._held.clear()
+        length = len(octets) * self._char
+        silence = 0 if self._glued or self._plan.width is not None else LINE_END
+        self._glued = False
+        follows = self._last + length + (silence if self._any else 0)
+        time = follows
+        if self._samples is not None and self._plan.bit_samples:
+            time = max(
+                self._last, int((self._samples[1] + self._plan.bit_samples) / self._plan.bit_samples * self._bit)
+            )
+        elif self._stamp is not None:
+            told = self._told(self._stamp)
+            is_coarse = self._stamp.tick >= COARSE or (told == self._last and self._any)
+            time = told
+            if is_coarse and self._any and told > self._last - _BACKWARDS:
+                together = len(octets) == 1 and self._plan.octetwise
+                time = max(told, self._last + length + (0 if together else silence))
+        self._last, self._any = time, True
+        yield Chunk(time, octets)
+
+    def _told(self, stamp: Stamp) -> int:
+        """ns of a stamp; a time of day goes on after midnight."""
+        if not stamp.daily:
+            return stamp.time
+        if self._clock >= 0 and stamp.time < self._clock - DAY // 2:
+            self._day += 1
+        self._clock = stamp.time
+        return self._day * DAY + stamp.time

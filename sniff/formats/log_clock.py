@@ -1,0 +1,166 @@
+"""The times that tools write into a line of text. Pure. A new clock is a line of CLOCKS."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from decimal import Decimal
+
+from dissectors.line import MS, NS_PER_S
+from sniff.formats.octet_table import seconds
+
+_TIME = (
+    r"(?P<clock>\d{1,2}:\d{2}:\d{2}(?:[.,]\d{1,9}|:\d{3}(?![\d:]))?)(?!\d|:[0-9A-Za-z])(?: ?(?P<half>[AaPp][Mm])\b)?"
+)
+_MONTHS = ["jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec"]
+_MONTH = r"(?P<month>Jan|Feb|Mar|Apr|May|Jun|Jul|Aug|Sep|Oct|Nov|Dec)[a-z]*"
+_BEGIN = r"(?<![0-9A-Za-z:.])"
+DAY = 86_400 * NS_PER_S
+
+
+@dataclass(frozen=True, slots=True)
+class Stamp:
+    """A time in a line. `time`: ns since the epoch (`dated`), since midnight or since the tool's start. `tick`: ns, the
+    finest that it tells. `begin`, `end`: where it stands.
+    """
+
+    time: int
+    tick: int
+    begin: int
+    end: int
+    dated: bool = False
+    daily: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Clock:
+    """A way to write a time. `value`: match → ns; ValueError when it is none after all. `first`: only where nothing but
+    brackets stands before it.
+    """
+
+    name: str
+    pattern: re.Pattern[str]
+    value: Callable[[re.Match[str]], int]
+    dated: bool = False
+    daily: bool = False
+    first: bool = False
+
+
+def _dated(match: re.Match[str]) -> int:
+    found = match.groupdict()
+    zone = found.get("zone") or ""
+    east = 0
+    if zone[:1] in ("+", "-"):
+        east = (int(zone[1:3]) * 60 + int(zone[-2:])) * 60 * NS_PER_S * (1 if zone[0] == "+" else -1)
+    return midnight(found["date"]) + _of_day(match) - east
+
+
+def _named_month(match: re.Match[str]) -> int:
+    found = match.groupdict()
+    year = int(found.get("year") or 1970)
+    month = _MONTHS.index(found["month"].lower()[:3]) + 1
+    return _midnight(year, month, int(found["day"])) + _of_day(match)
+
+
+def _of_day(match: re.Match[str]) -> int:
+    """ns since midnight."""
+    hours, minutes, *rest = match["clock"].replace(",", ".").split(":")
+    hour = int(hours)
+    half = (match.groupdict().get("half") or "").lower()
+    if half:
+        hour = hour % 12 + (12 if half == "pm" else 0)
+    return (hour * 60 + int(minutes)) * 60 * NS_PER_S + seconds(".".join(rest))
+
+
+def _scaled(unit: int) -> Callable[[re.Match[str]], int]:
+    return lambda match: int(Decimal(match["number"]) * unit)
+
+
+def _clock(pattern: str) -> re.Pattern[str]:
+    return re.compile(_BEGIN + pattern)
+
+
+CLOCKS: tuple[Clock, ...] = (
+    Clock("date and time", _clock(rf"(?P<date>\d{{1,4}}[-./]\d{{1,2}}[-./]\d{{1,4}})(?:[ T_]|, ?| +){_TIME}"
+                                  r"(?P<zone>Z|[+-]\d\d:?\d\d(?!\d))?"), _dated, dated=True),
+    Clock("day, month by name, year and time", _clock(rf"(?P<day>\d{{1,2}})[- ]{_MONTH}[- ]"
+                                                               rf"(?P<year>\d{{4}})[ ,T]+{_TIME}"),
+          _named_month, dated=True),
+    Clock("month by name, day, time and year", _clock(rf"{_MONTH} +(?P<day>\d{{1,2}}),? {_TIME}"
+                                                            r"(?: (?P<year>\d{4}))?"),
+          _named_month, dated=True),
+    Clock("time of day", _clock(_TIME), _of_day, daily=True),
+    Clock("ms since the epoch", _clock(r"(?P<number>1\d{12})(?=[\s:;,\])|])"), _scaled(MS), dated=True, first=True),
+    Clock("minutes and seconds", _clock(r"(?P<clock>(?P<m>\d{1,3}):(?P<s>\d{2}\.\d{1,6}))(?![\d:])"),
+          lambda match: int(match["m"]) * 60 * NS_PER_S + seconds(match["s"]), first=True),
+    Clock("ms", _clock(r"\+?(?P<number>\d{1,12}(?:\.\d{1,6})?) ?ms\b"), _scaled(MS), first=True),
+    Clock("µs", _clock(r"\+?(?P<number>\d{1,15}(?:\.\d{1,6})?) ?[uµμ]s\b"), _scaled(MS // 1000), first=True),
+    Clock("seconds", _clock(r"\+?(?P<number>\d{1,10}\.\d{1,9})(?: ?s(?:ec)?\b)?(?=[\s:;,\])|])"), _scaled(NS_PER_S),
+          first=True),
+    Clock("ms before a bar", _clock(r"(?P<number>\d{3,10})\|"), _scaled(MS), first=True),
+)  # fmt: skip
+"""The most telling first."""
+
+_HEAD = 160
+"""Characters at the begin of a line in which a time is looked for."""
+_ONLY_BRACKETS = re.compile(r"[\s\[({<#*|]*(?:\[?[A-Z]\]?[ ]?)?")
+
+
+def stamp_of(line: str) -> Stamp | None:
+    """The time in a line, None when there is none."""
+    head = line[:_HEAD]
+    for clock in CLOCKS:
+        match = clock.pattern.search(head)
+        if match is None or (clock.first and not _ONLY_BRACKETS.fullmatch(head[: match.start()])):
+            continue
+        try:
+            time = clock.value(match)
+        except ValueError:
+            continue
+        tick = _tick(match)
+        return Stamp(time, tick, match.start(), match.end(), clock.dated, clock.daily)
+    return None
+
+
+def _tick(match: re.Match[str]) -> int:
+    """ns: the place of the last digit."""
+    found = match.groupdict()
+    text = found.get("clock") or found.get("number") or ""
+    unit = NS_PER_S
+    if found.get("clock") is None:
+        tail = match[0].lstrip("+")[len(text) :].strip()
+        unit = (
+            MS
+            if tail.startswith(("ms", "|")) or len(text) == 13
+            else MS // 1000
+            if tail[:1] in "uµμ" and tail
+            else unit
+        )
+    elif text.count(":") == 3:
+        return MS
+    _, _, decimals = text.replace(",", ".").partition(".")
+    tick: int = unit // 10 ** len(decimals)
+    return max(1, tick)
+
+
+def midnight(date: str) -> int:
+    """ns since the epoch, as UTC; 13.02.2006 is day first, 2/13/2006 is month first (day first where it must be),
+    2006-02-13 year first. 0 for no such day.
+    """
+    first, second, third = (int(part) for part in re.split(r"[-./]", date))
+    if first > 31:
+        year, month, day = first, second, third
+    elif "." in date or first > 12 or "-" in date:
+        day, month, year = first, second, third
+    else:
+        month, day, year = first, second, third
+    return _midnight(year if year > 99 else 2000 + year, month, day)
+
+
+def _midnight(year: int, month: int, day: int) -> int:
+    try:
+        return int(datetime(year, month, day, tzinfo=UTC).timestamp()) * NS_PER_S
+    except (ValueError, OverflowError):
+        return 0

@@ -1,0 +1,200 @@
+"""One line of a log, taken apart: its time, its direction, its octets, and whose line it is. Pure."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from enum import Enum
+
+from sniff.formats.log_clock import Stamp, stamp_of
+from sniff.formats.log_octets import PAIRS_ONLY, Run, numbers_in, octets_in
+from sniff.formats.log_shapes import COLOURS, REMARK, STAMP, WAYS, Role, shape_of
+
+LONGEST = 1 << 16
+"""Characters of a line that are looked at; a frame of a field bus is far shorter."""
+
+MOST_STAMPS = 3
+"""Times in a line that are taken out of it; a program's log around another's has two."""
+
+MOST_WORDS = 4
+"""Between a direction and the octets; with more it is a word of a sentence."""
+
+_SPACES = re.compile(r"\s{4,}")
+_WORD = re.compile(r"[A-Za-z]{2,}")
+_DIGITS = re.compile(r"\d+")
+_WORDS = re.compile(r"[A-Za-z]{3,}")
+_HEXLIKE = re.compile(r"(?<![0-9A-Za-z])(?:0x)?[0-9A-Fa-f]{2}(?![0-9A-Za-z])")
+_ROW = re.compile(
+    r"(?P<lead>.{0,120}?)(?<![0-9A-Za-z_:.\0])(?:0[xX])?(?P<offset>[0-9A-Fa-f]{4,16})(?P<mark>[:h]?)"
+    r"(?:[ \t]*[|:]?[ \t]+(?P<rest>[0-9A-Fa-f]{2}.*)|\s*)"
+)
+_OCTET = re.compile(r"[0-9A-Fa-f]{1,2}")
+_COLUMN = re.compile(r"\s{2,}|\t|\s*[|>]")
+_PAIRS = re.compile(r"[0-9A-Fa-f]{2}(?:[ -][0-9A-Fa-f]{2})*")
+_WORDS_OF_16 = re.compile(r"(?:[0-9A-Fa-f]{4} )*(?:[0-9A-Fa-f]{4}|[0-9A-Fa-f]{2})")
+
+
+class Kind(Enum):
+    """What was found in a line."""
+
+    OCTETS = "octets"
+    ROW = "row"  # of a hexdump: an offset, then octets
+    SHAPE = "shape"  # of a known tool, without octets of its own
+    TEXT = "text"
+    STRANGE = "strange"  # looks like octets, and is none that can be read
+    EMPTY = "empty"
+    REMARK = "remark"
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A line of a log. `family`: what lines of one sort have in common (their label); `bare`: it has no label. `way`:
+    as written, "" when not told. `offset`: as written, of a row. `samples`: begin and end, of a logic analyser.
+    """
+
+    kind: Kind
+    stamp: Stamp | None = None
+    way: str = ""
+    octets: bytes = b""
+    family: str = ""
+    bare: bool = False
+    role: Role | None = None
+    tool: str = ""
+    spelling: str = ""
+    offset: str = ""
+    samples: tuple[int, int] | None = None
+    cut: bool = False
+    goes_on: bool = False
+    """Whether it ends as a line that another continues."""
+
+
+EMPTY, REMARKED = Line(Kind.EMPTY), Line(Kind.REMARK)
+
+
+def line_of(text: str, base: int = PAIRS_ONLY, rows: bool = True) -> Line:
+    """A line taken apart. `base`: of numbers (`octets_in`); `rows`: whether an offset may stand before octets."""
+    text = _SPACES.sub("   ", COLOURS.sub("", text))[:LONGEST].rstrip()
+    if not text.strip():
+        return EMPTY
+    if text.lstrip().startswith(REMARK):
+        return REMARKED
+    stamp, text = _without_stamps(text)
+    known = shape_of(text)
+    if rows and (known is None or known[0].role is not Role.DATA or "octets" not in known[1].re.groupindex):
+        row = _row(text, stamp)
+        if row is not None:
+            return row
+    if known is None:
+        return _general(text, stamp, base)
+    shape, match = known
+    groups = match.groupdict()
+    way = groups.get("way") or ""
+    if shape.role is not Role.DATA:
+        return Line(Kind.SHAPE, stamp, way, role=shape.role, tool=shape.tool)
+    told = groups.get("octets")
+    run = octets_in(text if told is None else told, base)
+    if told is not None and run is None and _OCTET.fullmatch(told):
+        run = Run(0, 1, bytes((int(told, 16),)), "one octet")
+    if run is None:
+        return Line(Kind.STRANGE, stamp, tool=shape.tool)
+    begin, end = groups.get("begin"), groups.get("end")
+    samples = (int(begin[:18]), int(end[:18])) if begin and end else None
+    if not way and told is None:
+        way = _way(text[: run.begin])
+    return Line(
+        Kind.OCTETS, stamp, way, run.octets, shape.tool, False, Role.DATA, shape.tool, run.spelling,
+        samples=samples, cut=bool(groups.get("cut")),
+    )  # fmt: skip
+
+
+def numbers_of(text: str) -> tuple[str, ...]:
+    """The numbers of a line that may be octets, as they are written."""
+    text = _SPACES.sub("   ", COLOURS.sub("", text))[:LONGEST].rstrip()
+    if text.lstrip().startswith(REMARK):
+        return ()
+    return numbers_in(_without_stamps(text)[1])
+
+
+def _general(text: str, stamp: Stamp | None, base: int) -> Line:
+    run = octets_in(text, base)
+    if run is None:
+        kind = Kind.STRANGE if _looks(text) else Kind.TEXT
+        return Line(kind, stamp, _way(text) if kind is Kind.TEXT else "")
+    lead = text[: run.begin]
+    way = _way(lead)
+    label = " ".join(_DIGITS.sub("#", WAYS.sub("~", lead)).replace(STAMP, "").split())
+    bare = not _WORDS.search(label) and "~" not in label and "#" not in label and STAMP not in lead
+    goes_on = text.rstrip().endswith((",", "\\"))
+    return Line(
+        Kind.OCTETS, stamp, way, run.octets, label if not bare else "", bare, None, "", run.spelling,
+        goes_on=goes_on,
+    )  # fmt: skip
+
+
+def _way(lead: str) -> str:
+    """The direction that a label tells: of several the last, which stands nearest to the octets; "A >> B" whole."""
+    found = list(WAYS.finditer(lead))
+    if not found:
+        return ""
+    last = found[-1]
+    if len(_WORD.findall(lead[last.end() :])) > MOST_WORDS:
+        return ""
+    if len(last[0].strip("<>=-→←")) == 0:  # a sign between two names
+        names = re.split(r"[\s:|\]\0]+", lead.strip(" :|-\t"))
+        return " ".join(names[-3:]).lower() if len(names) >= 3 and last[0] in names[-3:] else last[0]
+    return last[0].lower()
+
+
+def _looks(text: str) -> bool:
+    """Whether a line that tells no octets looks as if it did, or is no words either."""
+    found = len(_HEXLIKE.findall(text))
+    return found >= 3 or (found > 0 and not _WORDS.search(text) and STAMP not in text)
+
+
+def _without_stamps(text: str) -> tuple[Stamp | None, str]:
+    first: Stamp | None = None
+    for _ in range(MOST_STAMPS):
+        stamp = stamp_of(text)
+        if stamp is None:
+            break
+        first = first or stamp
+        text = text[: stamp.begin] + STAMP + text[stamp.end :]
+    return first, text
+
+
+# -- rows of hexdumps ------------------------------------------------------------------------------------------
+
+
+def _row(text: str, stamp: Stamp | None) -> Line | None:
+    match = _ROW.fullmatch(text)
+    if match is None or len(_HEXLIKE.findall(match["lead"])) > 1 or (match["rest"] is None and match["lead"].strip()):
+        return None
+    lead = match["lead"]
+    octets = _of_row(match["rest"] or "", bool(match["mark"]))
+    if octets is None:
+        return None
+    return Line(
+        Kind.ROW, stamp, _way(lead), octets, " ".join(_DIGITS.sub("#", WAYS.sub("~", lead)).split()),
+        not lead.strip(), offset=match["offset"],
+    )  # fmt: skip
+
+
+def _of_row(rest: str, marked: bool) -> bytes | None:
+    """The octets behind an offset, without the characters beside them; b"" for none, None when it is no row.
+
+    Words of 16 bits behind an offset with a colon are as the file has them (xxd); without one they are numbers of a
+    little-endian machine (hexdump, od -x).
+    """
+    found = bytearray()
+    for number, field in enumerate(_COLUMN.split(rest)):
+        if number and (len(found) % 8 or not found or len(field) == len(found)):
+            break
+        if _PAIRS.fullmatch(field):
+            found += bytes.fromhex(field.replace("-", " "))
+        elif not number and _WORDS_OF_16.fullmatch(field):
+            words = [bytes.fromhex(word) for word in field.split()]
+            found += b"".join(words if marked else [word[::-1] for word in words])
+            break
+        else:
+            break
+    return bytes(found) if found or not rest else None

@@ -1,0 +1,235 @@
+"""How tools write octets into a line of text: the spellings, and the octets found in a line. Pure.
+
+A new spelling is a line of SPELLINGS: what an octet looks like, what may stand between two, how it becomes a number.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+
+PAIRS_ONLY = 0
+"""No base: numbers are no octets."""
+
+_SEPARATOR = r"(?:[ ]?[,;][ ]?|[:._-]|[ \t]{1,2})"
+CONTROLS = [
+    "NUL",
+    "SOH",
+    "STX",
+    "ETX",
+    "EOT",
+    "ENQ",
+    "ACK",
+    "BEL",
+    "BS",
+    "HT",
+    "LF",
+    "VT",
+    "FF",
+    "CR",
+    "SO",
+    "SI",
+    "DLE",
+    "DC1",
+    "DC2",
+    "DC3",
+    "DC4",
+    "NAK",
+    "SYN",
+    "ETB",
+    "CAN",
+    "EM",
+    "SUB",
+    "ESC",
+    "FS",
+    "GS",
+    "RS",
+    "US",
+]
+_NAMED = {name: code for code, name in enumerate(CONTROLS)} | {"TAB": 9, "SP": 0x20, "DEL": 0x7F, "NULL": 0}
+
+
+@dataclass(frozen=True, slots=True)
+class Spelling:
+    """One way to write octets. `token`: an octet; `between`: what may stand between two, None where the token is all of
+    them; `least`: how many there must be before it is believed; `decode`: the matched text → octets, ValueError when it
+    is none after all.
+    """
+
+    name: str
+    token: str
+    between: str | None
+    decode: Callable[[str], bytes]
+    least: int = 2
+    before: str = r"(?<![0-9A-Za-z_#.])"
+    after: str = r"(?![0-9A-Za-z_])"
+
+    def pattern(self) -> re.Pattern[str]:
+        """A run of such octets in a line."""
+        run = self.token
+        if self.between is not None:
+            run += rf"(?:{self.between}{self.token}){{{self.least - 1},}}"
+        return re.compile(f"{self.before}(?:{run}){self.after}")
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """Octets found in a line, and where their text stands."""
+
+    begin: int
+    end: int
+    octets: bytes
+    spelling: str
+
+
+def _by(pattern: str, base: int) -> Callable[[str], bytes]:
+    compiled = re.compile(pattern)
+    return lambda text: bytes(int(found, base) for found in compiled.findall(text))
+
+
+def _escaped(text: str) -> bytes:
+    """A string with escapes, as Python, C and strace write it; only characters of one octet."""
+    inner = text[text.index(text[-1]) + 1 : -1] if text[-1] in "'\"" else text
+    inner = re.sub(r"\\(.)", lambda found: "\\x1b" if found[1] == "e" else found[0], inner)
+    quote = '"' if "'" in inner else "'"
+    if quote in inner.replace("\\" + quote, ""):
+        raise ValueError("a quote within")
+    found: object = ast.literal_eval(f"b{quote}{inner}{quote}")
+    assert isinstance(found, bytes)
+    return found
+
+
+def _frame_of_characters(text: str) -> bytes:
+    """A frame written as its characters, with or without names for its end; its sum must fit."""
+    body = re.sub(r"(?:<CR>|<LF>|\\r|\\n|\r|\n)+$", "", text)
+    sums = bytes.fromhex(body[1:]) if body[0] == ":" else b""
+    if body[0] == ":" and sum(sums) % 256 == 0:
+        return body.encode() + b"\r\n"
+    if body[0] == ">" and sum(body[1:-2].encode()) % 256 == int(body[-2:], 16):
+        return body.encode() + b"\r"
+    raise ValueError("no frame")
+
+
+def _controls(text: str) -> bytes:
+    """Characters, and names in angle brackets for those that are none: `<SOH><ETX>A`."""
+    found = bytearray()
+    for name, character in re.findall(r"<([A-Z0-9]{2,4})>|(.)", text):
+        if name and name not in _NAMED:
+            if not re.fullmatch(r"[0-9A-F]{2}", name):
+                raise ValueError(name)
+            found.append(int(name, 16))
+        elif name:
+            found.append(_NAMED[name])
+        else:
+            found += character.encode("latin-1")  # UnicodeEncodeError is a ValueError
+    return bytes(found)
+
+
+_H2 = r"[0-9A-Fa-f]{2}"
+_CONTROL = rf"<(?:{'|'.join(_NAMED)})>"
+_HEX = _by(_H2, 16)
+
+SPELLINGS: tuple[Spelling, ...] = (
+    Spelling("frames as characters", r"(?::(?:[0-9A-F]{2}){3,260}|>[0-9A-F]{4,260})(?:<CR>|<LF>|\\r|\\n)*", None,
+             _frame_of_characters, 1, before=r"(?<![0-9A-Za-z_#.>])"),
+    Spelling("byte strings", r"(?:b|bytearray\(b)?(?P<q>['\"])(?:[^'\"\\]|\\.)*(?P=q)", None, _escaped, 1,
+             before=r"(?<![0-9A-Za-z_])(?=[^'\"\\]{0,14}['\"][^'\"]*\\[x0-7abtnvfr])", after=""),
+    Spelling("escapes", rf"(?:\\x{_H2}|\\[abtnvfr0\\])", r"[ ,]?", _escaped, 2, before=""),
+    Spelling("pairs in brackets", rf"(?:\[{_H2}\]|<{_H2}>|\({_H2}\)|\{{{_H2}\}})", r"[ ,]?", _HEX, 2, before="",
+             after=""),
+    Spelling("names of controls", rf"[!-;=?-~]*{_CONTROL}", r"", _controls, 2, after="[!-;=?-~]*",
+             before=r"(?:(?<=\s)|^)"),
+    Spelling("binary", r"0b[01]{8}(?: ?\(0[xX][0-9A-Fa-f]{1,2}\))?", _SEPARATOR, _by(r"0b([01]{8})", 2), 1),
+    Spelling("0x and digits", r"0[xX][0-9A-Fa-f]{1,2}(?![0-9A-Za-z])", r"['\"]?[ ]?[,;:/|]?[ \t]{0,2}['\"]?",
+             _by(r"0[xX]([0-9A-Fa-f]{1,2})", 16), 2),
+    Spelling("digits and h", rf"{_H2}[hH]", _SEPARATOR, _by(rf"({_H2})[hH]", 16), 2),
+    Spelling("digits after a sign", rf"[$%&#]{_H2}", r"[ ,;]{0,2}", _HEX, 2, before=r"(?<![0-9A-Za-z_])"),
+)  # fmt: skip
+"""Those whose digits need no guess, the most special first."""
+
+_PATTERNS = [(one, one.pattern()) for one in SPELLINGS]
+
+_DIGITS = re.compile(
+    r"(?<![0-9A-Za-z_#.])[0-9A-Fa-f]{1,3}(?![0-9A-Za-z_])"
+    r"(?:(?P<between>[ ]?[,;][ ]?|[:._/-]|[ \t]{1,2})[0-9A-Fa-f]{1,3}(?![0-9A-Za-z_])"
+    r"(?:(?P=between)[ \t]?[0-9A-Fa-f]{1,3}(?![0-9A-Za-z_]))*)?"
+)
+"""A run of one to three digits with the same between any two (one space more is a column)."""
+_WORDS = re.compile(
+    r"(?<![0-9A-Za-z_#.])(?:[0-9A-Fa-f]{2}){1,8}(?: (?:[0-9A-Fa-f]{2}){1,8})+(?![0-9A-Za-z_])"
+    r"|(?<![0-9A-Za-z_.])(?:[0-9A-Fa-f]{2}){2,4096}(?![0-9A-Za-z_])"
+)
+_TOKEN = re.compile(r"[0-9A-Fa-f]{1,3}")
+
+
+def octets_in(line: str, base: int = PAIRS_ONLY) -> Run | None:
+    """The octets that a line tells, None when it tells none. `base`: of runs of numbers; PAIRS_ONLY where only pairs of
+    hexadecimal digits count.
+    """
+    for spelling, pattern in _PATTERNS:
+        for match in pattern.finditer(line):
+            try:
+                octets = spelling.decode(match[0])
+            except (ValueError, SyntaxError):
+                continue
+            if octets:
+                return Run(match.start(), match.end(), octets, spelling.name)
+    return _digits(line, base) or _words(line) or _single(line)
+
+
+def numbers_in(line: str) -> tuple[str, ...]:
+    """The tokens of the run of numbers in a line, () when there is none: pairs and others, as they are written."""
+    match = next((one for one in _DIGITS.finditer(line) if len(_TOKEN.findall(one[0])) > 1), None)
+    return tuple(_TOKEN.findall(match[0])) if match is not None else ()
+
+
+def _digits(line: str, base: int) -> Run | None:
+    at, best = 0, None
+    while (match := _DIGITS.search(line, at)) is not None:
+        tokens = _TOKEN.findall(match[0])
+        at = match.start() + len(tokens[0]) if len(tokens) < 4 else match.end()  # a number may stand before the octets
+        run = _numbers(match, tokens, base) if len(tokens) > 1 else None
+        if run is not None and (best is None or len(run.octets) > len(best.octets)):
+            best = run
+    return best
+
+
+def _numbers(match: re.Match[str], tokens: list[str], base: int) -> Run | None:
+    if base != PAIRS_ONLY:
+        try:
+            octets = bytes(int(token, base) for token in tokens)
+        except ValueError:
+            return None
+        return Run(match.start(), match.end(), octets, "numbers")
+    if all(len(token) == 2 for token in tokens):
+        return Run(match.start(), match.end(), bytes(int(token, 16) for token in tokens), "pairs")
+    return None
+
+
+def _words(line: str) -> Run | None:
+    for match in _WORDS.finditer(line):
+        digits = match[0].replace(" ", "")
+        if len(digits) == len(match[0].split()) * 2 and " " in match[0]:
+            continue  # pairs, of which one was cut
+        alone = match.end() == len(line.rstrip())
+        if (
+            len(digits) >= 12
+            or (len(digits) >= 8 and alone and line[match.start() - 1] == " ")
+            or (len(digits) >= 4 and alone and (match.start() == 0 or line[match.start() - 1] in "#:="))
+        ):
+            return Run(match.start(), match.end(), bytes.fromhex(digits), "digits without space")
+    return None
+
+
+_ALONE = re.compile(rf"(?:^|.*[\s:>\]|#,-])(?P<octet>(?:0[xX])?{_H2})\s*(?:\(\S{{1,6}}\)|'.'|\".\"|[|;].*)?\s*")
+
+
+def _single(line: str) -> Run | None:
+    """One octet, as the last word of a line."""
+    match = _ALONE.fullmatch(line)
+    if match is None:
+        return None
+    octet = bytes((int(match["octet"], 16),))
+    return Run(match.start("octet"), match.end("octet"), octet, "one octet")

@@ -1,0 +1,205 @@
+"""What the lines of one log mean, told by its first lines together: which label's lines hold the octets, which repeat
+them, whether a line is a frame, and how numbers are written. Pure.
+
+A log names what it does in its own words ("Processing", "Getting Frame"), and nobody can list them all. So a label is
+judged by its lines: those that are mostly found in octets told by others repeat them. Labels that say a direction count
+more than others.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from sniff.formats.log_lines import Kind, Line, line_of, numbers_of
+from sniff.formats.log_octets import PAIRS_ONLY
+from sniff.formats.log_shapes import Role
+
+LOOKED_AT = 2000
+"""Lines of a log that are looked at."""
+
+WINDOW = 2048
+"""Octets within which a line that repeats others is looked for."""
+
+_REPEATS = 0.6
+_ROWS_LEAST = 0.7
+_FIXED_LEAST = 3  # lines of one width, before they are taken for the width of a table
+_WIDTHS = (8, 10, 12, 16, 20, 24, 32, 40, 48, 64)
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """How a log is read. `kind`: of what tool or sort it is; `base`: of numbers (`octets_in`); `offsets`: base of the
+    offsets of a hexdump, None where there is none. `roles`: what lines with a label mean. `directed`: whether lines
+    with octets say a direction, so that others need a reason to count. `width`: octets of the lines of a table without
+    offsets, whose ends say nothing; None where a line is a frame, or part of one that a tool got at once. `octetwise`:
+    an octet a line. `bit_samples`: samples of a bit, of a logic analyser; 0 where there are none.
+    `spellings`: how octets are written.
+    """
+
+    kind: str
+    base: int = PAIRS_ONLY
+    offsets: int | None = None
+    roles: dict[str, Role | None] = field(default_factory=dict)
+    directed: bool = False
+    width: int | None = None
+    octetwise: bool = False
+    bit_samples: float = 0.0
+    spellings: frozenset[str] = frozenset()
+
+    def role(self, line: Line, recent: bytes) -> Role | None:
+        """What a line with octets is; None: nobody knows. `recent`: the octets told last."""
+        if line.role is not None:
+            return line.role
+        if line.family in self.roles and not line.bare:
+            return self.roles[line.family]
+        if line.bare or line.way:
+            return Role.DATA
+        if line.octets in recent:
+            return Role.SAME
+        return None if self.directed or len(line.octets) < 3 else Role.DATA
+
+
+def plan_of(texts: Sequence[str]) -> Plan | None:
+    """The plan for a log that begins so; None when no line of it tells octets."""
+    base = _base([numbers_of(text) for text in texts])
+    lines = [line_of(text, base) for text in texts]
+    offsets = _offsets([line for line in lines if line.kind is Kind.ROW])
+    rows = sum(len(line.octets) for line in lines if line.kind is Kind.ROW)
+    others = sum(len(line.octets) for line in lines if line.kind is Kind.OCTETS)
+    if offsets is not None and rows >= others:
+        tools = Counter(line.tool for line in lines if line.tool)
+        return Plan(f"hexdump ({tools.most_common(1)[0][0]})" if tools else "hexdump", base, offsets)
+    lines = [line_of(text, base, rows=False) for text in texts]
+    return _of_labels([line for line in lines if line.kind is not Kind.EMPTY], base)
+
+
+def _of_labels(lines: Sequence[Line], base: int) -> Plan | None:
+    with_octets = [line for line in lines if line.kind is Kind.OCTETS]
+    written = sum(line.kind is not Kind.REMARK for line in lines)
+    singles = [line for line in with_octets if line.spelling == "one octet"]
+    known = [line for line in with_octets if line.tool]
+    multiple = {line.family for line in with_octets if line.spelling != "one octet"}
+    # words that end in "be" or "20" are no octets, but the rest of a frame is, and so is what is nothing but octets
+    many = Counter(line.family for line in singles if not line.family or line.way)
+    trusted = {family for family, count in many.items() if 2 * count >= written} | (multiple - {""})
+    with_octets = [line for line in with_octets if line.spelling != "one octet" or line.tool or line.family in trusted]
+    if not with_octets:
+        return None
+    amounts: Counter[str] = Counter()
+    directed: set[str] = set()
+    for line in with_octets:
+        amounts[line.family] += len(line.octets)
+        if line.way or line.tool:
+            directed.add(line.family)
+    main = max(amounts, key=lambda name: amounts[name])
+    ways = [name for name in amounts if name in directed]
+    best = max(ways, key=lambda name: amounts[name], default=None)
+    if best is not None and 4 * amounts[best] >= amounts[main]:
+        main = best
+    roles = _roles(with_octets, main, directed)
+    data = [line for line in with_octets if line.tool or line.bare or roles.get(line.family) is Role.DATA]
+    told = sum(len(line.octets) for line in data)
+    if not data or (told < 3 and not known and written > len(data)):
+        return None
+    if main == "" and main not in directed and 3 * len(data) < written:  # a word here and there
+        return None
+    octetwise = 2 * sum(len(line.octets) == 1 for line in data) > len(data)
+    return Plan(
+        _name(data, lines), base, None, roles, main in directed, _width(data), octetwise,
+        _bit_samples([line.samples for line in data if line.samples is not None]),
+        frozenset(line.spelling for line in data),
+    )  # fmt: skip
+
+
+def _roles(lines: Sequence[Line], main: str, directed: set[str]) -> dict[str, Role | None]:
+    """What lines with each label mean."""
+    text = b"".join(line.octets for line in lines if line.family == main)
+    usual = {line.spelling for line in lines if line.family == main}
+    alike = {line.family for line in lines if line.spelling in usual}
+    seen: dict[str, list[int]] = {}
+    at = 0
+    for line in lines:
+        if line.family == main:
+            at += len(line.octets)
+            continue
+        count = seen.setdefault(line.family, [0, 0])
+        count[0] += 1
+        count[1] += line.octets in text[max(0, at - WINDOW) : at + WINDOW]
+    roles: dict[str, Role | None] = {main: Role.DATA}
+    for family, (many, found) in seen.items():
+        if family == "":
+            roles[family] = Role.DATA
+        elif found >= _REPEATS * many:
+            roles[family] = Role.SAME
+        elif family in directed or (main not in directed and family in alike):
+            roles[family] = Role.DATA
+        else:
+            roles[family] = None
+    return roles
+
+
+def _base(numbers: Sequence[Sequence[str]]) -> int:
+    """How numbers are written: in pairs of hexadecimal digits in most lines, or in as many digits as they have; then
+    in decimal where one has three of them, or none is a letter.
+    """
+    runs = [tokens for tokens in numbers if tokens]
+    mixed = [tokens for tokens in runs if len(tokens) > 3 and _is_unpadded(tokens)]
+    if 2 * len(mixed) <= len(runs):
+        return PAIRS_ONLY
+    tokens = [token for run in mixed for token in run]
+    if any(len(token) == 3 for token in tokens):
+        return 10
+    return 16 if any(not token.isdigit() for token in tokens) else 10
+
+
+def _is_unpadded(tokens: Sequence[str]) -> bool:
+    """Whether numbers have as many digits as they need, or three each: then one digit is no half of a pair."""
+    if all(len(token) == 3 for token in tokens):
+        return True
+    return any(len(token) != 2 for token in tokens) and not any(len(token) > 1 and token[0] == "0" for token in tokens)
+
+
+def _offsets(rows: Sequence[Line]) -> int | None:
+    """The base in which offsets of rows fit to what the rows hold; None when they do not."""
+    for base in (16, 8, 10):
+        fitting = expected = 0
+        for row in rows:
+            try:
+                offset = int(row.offset, base)
+            except ValueError:
+                continue
+            fitting += offset in (0, expected) or (not row.octets and offset <= expected)
+            expected = offset + len(row.octets)
+        if rows and fitting >= _ROWS_LEAST * len(rows):
+            return base
+    return None
+
+
+def _width(data: Sequence[Line]) -> int | None:
+    """The width of a table, whose lines end where it is full: all but the last of a block are as long."""
+    if any(line.way or line.stamp or not line.bare for line in data):
+        return None
+    lengths = [len(line.octets) for line in data]
+    widest = max(lengths)
+    full = lengths.count(widest)
+    is_table = widest in _WIDTHS and full >= _FIXED_LEAST and full >= 0.8 * (len(lengths) - 1) and lengths[0] == widest
+    return widest if is_table and (widest > 8 or len(set(lengths)) > 1 or len(lengths) > 8) else None
+
+
+def _bit_samples(samples: Sequence[tuple[int, int]]) -> float:
+    """Samples of a bit: an octet's annotation is eight bits wide."""
+    widths = sorted(end - begin for begin, end in samples if end > begin)
+    return widths[len(widths) // 2] / 8 if widths else 0.0
+
+
+def _name(data: Sequence[Line], lines: Sequence[Line]) -> str:
+    tools = Counter(line.tool for line in lines if line.tool)
+    if tools:
+        return tools.most_common(1)[0][0]
+    spelling = Counter(line.spelling for line in data).most_common(1)[0][0]
+    stamped = sum(line.stamp is not None for line in data)
+    directed = sum(bool(line.way) for line in data)
+    words = [word for word, many in (("times", stamped), ("directions", directed)) if 2 * many > len(data)]
+    return f"{', '.join(words)} and {spelling}" if words else spelling

@@ -1,0 +1,115 @@
+"""Lines of known tools whose octets or meaning no general rule finds: one shape, one line of SHAPES. Pure.
+
+Most tools need no line here: a time, a direction and octets are found wherever they stand (`log_clock.py`,
+`log_octets.py`), and what a label means is told by the whole log (`log_plan.py`).
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from enum import Enum
+
+STAMP = "\0"
+"""Stands in a line where a time was."""
+
+
+class Role(Enum):
+    """What a line of a log is."""
+
+    DATA = "data"
+    SAME = "same"  # repeats octets that another line of the log tells
+    HEADING = "heading"  # says time or direction of the octets below
+    NOTHING = "nothing"  # belongs to the log, and tells no octets
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """A shape of lines. `pattern`: found in the line, its time replaced by STAMP; groups that mean something:
+
+    | group | what |
+    |---|---|
+    | `octets` | where the octets stand; without it they are looked for in the whole line |
+    | `way` | the direction; without it it is looked for in the line |
+    | `begin`, `end` | numbers of samples, of a logic analyser |
+    | `cut` | there when the tool left octets out |
+    """
+
+    tool: str
+    pattern: re.Pattern[str]
+    role: Role = Role.DATA
+
+
+_H = r"[0-9A-Fa-f]{1,2}"
+_S = r"\0"
+
+
+def _shape(tool: str, pattern: str, role: Role = Role.DATA) -> Shape:
+    return Shape(tool, re.compile(pattern), role)
+
+
+SHAPES: tuple[Shape, ...] = (
+    _shape("esphome", rf"[Rr]eceived [Bb]yte\s+\d{{1,3}}\s+\(0[xX](?P<octets>{_H})\)"),
+    _shape("esphome", rf"\b(?P<way>Read|Wrote|Write):?\s+(?:0b[01]{{8}}\s+)?\(?0x(?P<octets>{_H})\)?(?:\s|$)"),
+    _shape("esphome", r"\[uart_debug:\d+\]"),
+    _shape("candump", rf"^\s*\({_S}\)\s+\w+\s+(?:[0-9A-Fa-f]+(?:#|\s+\[\d+\]\s+))?(?P<octets>.+)"),
+    _shape("strace", r"\b(?P<way>p?(?:read|write)(?:64|v)?|recv\w*|send\w*)\(\d+(?:<[^>]*>)?, "
+                     r"(?P<octets>\"(?:[^\"\\]|\\.)*\")(?P<cut>\.\.\.)?.*\)\s*=\s*\d+"),
+    _shape("strace", r"^[\d\s\0]*(?:\w+\(.*\)?\s*=\s*-?\d|<\.\.\. |--- SIG|\+\+\+ )", Role.NOTHING),
+    _shape("interceptty", rf"^(?P<way>[<>])\s+0x(?P<octets>{_H})\s+\(.{{1,6}}\)"),
+    _shape("socat", rf"^(?P<way>[<>]) {_S} +length=\d+ from=\d+ to=\d+", Role.HEADING),
+    _shape("socat", r"^--$", Role.NOTHING),
+    _shape("sigrok", r"^(?:(?P<begin>\d+)-(?P<end>\d+)\s+)?[\w /.-]+?: ?(?:.*?\b(?P<way>[RrTt][Xx])(?:[ -]data)?: ?)?"
+                     r"(?P<octets>[0-9A-Fa-f]{2})$"),
+    _shape("sigrok", r"^(?:\d+-\d+\s+)?[\w /.-]+?: ?(?:.*: ?)?"
+                     r"(?:[Ss]tart bit|[Ss]top bit|[Pp]arity|[01]$|Frame error|Break)",
+           Role.NOTHING),
+    _shape("minimalmodbus", r"MinimalModbus debug mode\. (?:Will write|Writing|Response)"),
+    _shape("minimalmodbus", r"MinimalModbus debug mode\. "
+                            r"(?:Clearing|No sleep|Sleeping|Create|Closing|Opening|Will sleep)",
+           Role.NOTHING),
+    _shape("node-modbus-serial", r"<Buffer (?P<octets>[0-9a-f ]+?)(?P<cut> \.\.\.[^>]*)?>"),
+    _shape("node-modbus-serial", r"\"type\":\s*\"Buffer\",\s*\"data\":\s*(?P<octets>\[[\d,\s]+\])"),
+    _shape("QModMaster", rf"\[(?:RTU|ASCII|TCP)\]>\s*(?P<way>[TR]x)\s*>\s*{_S}\s*-"),
+    _shape("QModMaster", r"^Sys\s*>", Role.NOTHING),
+    _shape("Modbus Poll", r"(?P<way>[TR]x):\s?\d{4,9}-"),
+    _shape("libmodbus", r"^(?:Waiting for|ERROR |Request for slave|Opening |Bytes flushed|Connecting|The responding)",
+           Role.NOTHING),
+    _shape("libmodbus", r"^(?:[\[<][0-9A-F]{2}[\]>]){3,}"),
+    _shape("pymodbus", r"\b(?P<way>send|recv|SEND|RECV):\s+0x"),
+    _shape("modbus_tk", r"(?P<way>->|<-)\s*\d{1,3}-\d{1,3}-\d{1,3}"),
+    _shape("jpnevulator", rf"^\s*{_S}: \S+$", Role.HEADING),
+    _shape("Docklight", r"\[(?P<way>TX|RX|C1|C2)\]"),
+    _shape("Docklight", r"^\s*Docklight", Role.NOTHING),
+    _shape("eModbus", r"\|\s*\w+\.(?:cpp|h)\s*\[.*\]"),
+    _shape("Serial Port Monitor", r"(?P<way>Read|Written|Write) data \(COM\d+\)", Role.HEADING),
+    _shape("Serial Port Monitor", r"(?:Open|Close|Opened|Closed)\b.*port|IOCTL_|IRP_MJ_(?:CREATE|CLOSE|DEVICE)",
+           Role.NOTHING),
+    _shape("Device Monitoring Studio", r"IRP_MJ_(?P<way>READ|WRITE)", Role.HEADING),
+    _shape("PuTTY", r"^=~=~=~.*PuTTY log", Role.NOTHING),
+    _shape("PuTTY", rf"^(?P<way>Incoming|Outgoing) (?:raw data|packet) (?:.*{_S})?", Role.HEADING),
+)  # fmt: skip
+"""The first that is found in a line counts."""
+
+WAYS = re.compile(
+    r"(?<![A-Za-z0-9_<>=-])(?:>>>|<<<|>>|<<|-->|<--|==>|<==|->|<-|=>|<=|>|<|→|←)(?![<>=-])"
+    r"|(?<![A-Za-z])(?:tx[d]?|rx[d]?|sen[dt]|sending|recv|rcv[d]?|receiv(?:e[d]?|ing)|writ(?:e|ing|ten)|wrote|read|"
+    r"in|out|input|output|incoming|outgoing|request|response|req|re?sp|query|answer|reply|to|from|"
+    r"master|slave|host|device|dte|dce|c1|c2|poll)(?![A-Za-z])",
+    re.IGNORECASE,
+)
+"""How tools say which way octets went."""
+
+COLOURS = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
+"""What tools for terminals put around a line."""
+
+REMARK = ("#", ";", "//")
+
+
+def shape_of(line: str) -> tuple[Shape, re.Match[str]] | None:
+    """The known shape of a line and where it was found."""
+    for shape in SHAPES:
+        match = shape.pattern.search(line)
+        if match is not None:
+            return shape, match
+    return None
