@@ -18,6 +18,7 @@ from sniff.engine.capture import Capture, CaptureError, CaptureWriter
 from sniff.engine.read_times import LOOKED_AT, ReadTimes
 from sniff.engine.session import Item, LineEventKind, Session
 from sniff.formats.records import FrameFile
+from sniff.formats.several_buses import buses_in
 
 READERS: dict[str, str] = {
     ".cap.txt": "sniff.formats.text:read",
@@ -54,6 +55,12 @@ def read(path: str | Path) -> Capture:
 
 def _with_reads(capture: Capture) -> Capture:
     """The capture; its session knows when its first reads came, and takes no times as exact that cannot be."""
+    buses = buses_in(capture)
+    if len(buses) > 1:
+        for one in buses:
+            _with_reads(one)
+        return capture
+    capture = buses[0]
     session = capture.session
     if session.unknown or session.reads is not None:
         return capture
