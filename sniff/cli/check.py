@@ -24,7 +24,7 @@ from sniff.engine.engine import Output
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.observer import observe
 from sniff.engine.session import LineEvent
-from sniff.formats import READERS
+from sniff.formats.table import suffixes
 
 if TYPE_CHECKING:
     from sniff.bus.live import LiveBus
@@ -86,13 +86,13 @@ def _check(args: argparse.Namespace) -> list[Checked]:
     if not named and ("." in source or "/" in source):
         raise Failure(f"{source}: no such file", UNREADABLE)
     if len(args.sources) > 1:
-        raise Failure(f"{source}: a port is checked alone; files end in {', '.join(READERS)}", USAGE)
+        raise Failure(f"{source}: a port is checked alone; files end in {', '.join(suffixes())}", USAGE)
     return [_listen(source, args)]
 
 
 def _is_file(source: str) -> bool:
     path = Path(source)
-    return source == "-" or source.lower().endswith(tuple(READERS)) or path.is_file() or path.is_fifo()
+    return source == "-" or source.lower().endswith(suffixes()) or path.is_file() or path.is_fifo()
 
 
 def _read(source: str, capture: Capture, args: argparse.Namespace) -> Checked:

@@ -30,7 +30,7 @@ from sniff.engine.capture import CaptureError
 from sniff.engine.engine import Output
 from sniff.engine.session import DEVICES_NOTE, LineEvent, LineEventKind
 from sniff.engine.verdict_join import Settled, Settling
-from sniff.formats import READERS
+from sniff.formats.table import suffixes
 from sniff.sources import PortError
 
 
@@ -316,7 +316,7 @@ def lost_something(live: LiveBus) -> bool:
 def _gone_for_good(live: LiveBus) -> bool:
     """Whether the port ended the capture. A capture file that stands in for one simply ends."""
     ended = live.ended is not None and live.ended.at_end
-    return ended and not live.session.port.lower().endswith(tuple(READERS))
+    return ended and not live.session.port.lower().endswith(suffixes())
 
 
 @contextlib.contextmanager

@@ -15,7 +15,7 @@ from sniff.analysis.plain import plain
 from sniff.cli import UNREADABLE, USAGE, Failure, arguments, json_output
 from sniff.cli.progress import Watched
 from sniff.engine.capture import Capture
-from sniff.formats import READERS
+from sniff.formats.table import suffixes
 from sniff.reporting.collecting import collect
 from sniff.reporting.numbers import Numbers
 
@@ -73,7 +73,7 @@ def require_libraries() -> None:
 def default_place(file: str) -> Path:
     """The capture's name with .html, beside it where one may write, else in this folder."""
     path = Path("standard-input" if file == "-" else file)
-    suffix = next((suffix for suffix in READERS if path.name.lower().endswith(suffix)), path.suffix)
+    suffix = next((suffix for suffix in suffixes() if path.name.lower().endswith(suffix)), path.suffix)
     name = f"{path.name[: -len(suffix)] if suffix else path.name}.html"
     return path.with_name(name) if os.access(path.parent, os.W_OK) else Path(name)
 

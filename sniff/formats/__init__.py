@@ -1,4 +1,4 @@
-"""Capture files by suffix: one file a format, chosen here.
+"""Capture files: one file a format, chosen by content (`table.py` lists them), written by suffix.
 
 `read(path)` gives a Capture (session, items in order, completeness). `create_of_items(path, session)` gives a
 CaptureWriter, which takes the same; `create_of_frames` a FrameFile, which takes frames as records of packets. Who has
@@ -7,9 +7,8 @@ items and wants a file of any kind asks `sniff.bus.capture_writer`, which has an
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -17,40 +16,63 @@ from dissectors.frame import Chunk
 from sniff.engine.capture import Capture, CaptureError, CaptureWriter
 from sniff.engine.read_times import LOOKED_AT, ReadTimes
 from sniff.engine.session import Item, LineEventKind, Session
+from sniff.formats import compressed, table
+from sniff.formats.cut_capture import cut_short
+from sniff.formats.files import explain, open_capture
 from sniff.formats.records import FrameFile
 from sniff.formats.several_buses import buses_in
 
-READERS: dict[str, str] = {
-    ".cap.txt": "sniff.formats.text:read",
-    ".mcap": "sniff.recording.reader:read",
-    ".pcap": "sniff.formats.pcap:read",
-    ".cap": "sniff.formats.pcap:read",
-    ".pcapng": "sniff.formats.pcapng:read",
-    ".log": "sniff.formats.bytelog:read",
-    ".hex": "sniff.formats.bytelog:read",
-    ".csv": "sniff.formats.bytelog:read",
-    ".txt": "sniff.formats.plain_text:read",
-}
-WRITERS: dict[str, str] = {
-    ".cap.txt": "sniff.formats.text:create",
-    ".mcap": "sniff.recording.writer:create",
-}
-FRAME_WRITERS: dict[str, str] = {
-    ".pcap": "sniff.formats.pcap:create",
-    ".pcapng": "sniff.formats.pcapng:create",
-}
+ITEMS, FRAMES = "items_writer", "frames_writer"
+"""Kinds of writers in the table."""
 
 
 def read(path: str | Path) -> Capture:
-    """Open a capture by its suffix, "-" for standard input. Raises CaptureError."""
+    """Open a capture by what is in it, "-" for standard input. Raises CaptureError."""
     if str(path) == "-":
         from sniff.formats import standard_input
 
         return _with_reads(standard_input.read())
     if Path(path).is_dir():
         raise CaptureError(f"{path}: a directory, not a capture; name a file in it")
-    found: Capture = _find(READERS, Path(path))(Path(path))
-    return _with_reads(found)
+    return _with_reads(_opened(Path(path)))
+
+
+def _opened(path: Path) -> Capture:
+    """The capture in a file, whatever it is wrapped in."""
+    place, damage, around = path, "", []
+    while (wrapping := compressed.wrapping_of(start := start_of(place))) is not None:
+        around.append(wrapping.name)
+        if len(around) > compressed.DEEPEST:
+            raise CaptureError(f"{path}: {' in '.join(reversed(around))}; unpack it first")
+        unpacked = compressed.unpack(place, wrapping)
+        place, damage = unpacked.path, damage or unpacked.damage
+    try:
+        found = _reader(place, start)(place)
+    except CaptureError as error:
+        raise CaptureError(str(error).replace(str(place), str(path))) from None
+    return cut_short(found, damage) if damage else found
+
+
+def _reader(path: Path, start: bytes) -> Callable[[Path], Capture]:
+    """The function that opens it. Raises CaptureError, which says what was recognised and what to do."""
+    found = table.told(start, path.name)
+    if found is None or found.last:
+        for magic, what in table.UNREADABLE:
+            if start.startswith(magic):
+                raise CaptureError(f"{path}: {what}")
+    if found is None:
+        raise CaptureError(f"{path}: an empty file")
+    opened: Callable[[Path], Capture] = table.function(found.reader)
+    return opened
+
+
+def start_of(path: Path) -> bytes:
+    """The first octets of a file, enough to tell what it is. Raises CaptureError."""
+    try:
+        with open_capture(path) as stream:
+            return stream.read(table.SEEN)
+    except OSError as error:
+        raise explain(path, error) from None
 
 
 def _with_reads(capture: Capture) -> Capture:
@@ -88,24 +110,23 @@ def with_first_reads(session: Session, items: Iterable[Item]) -> Session:
 
 def keeps_frames(path: str | Path) -> bool:
     """Whether the format of a file to write keeps frames instead of reads."""
-    return any(Path(path).name.lower().endswith(suffix) for suffix in FRAME_WRITERS)
+    return any(Path(path).name.lower().endswith(suffix) for suffix in table.writers(FRAMES))
 
 
 def create_of_items(path: str | Path, session: Session) -> CaptureWriter:
     """Create a capture that keeps items as they are, by its suffix. Raises CaptureError."""
-    made: CaptureWriter = _find(WRITERS, Path(path))(Path(path), session)
+    made: CaptureWriter = _find(table.writers(ITEMS), Path(path))(Path(path), session)
     return made
 
 
 def create_of_frames(path: str | Path, session: Session, link_type: int, live: bool = False) -> FrameFile:
     """Create a packet file, by its suffix; `live` pushes everything through at once. Raises CaptureError."""
-    made: FrameFile = _find(FRAME_WRITERS, Path(path))(Path(path), session, link_type, live)
+    made: FrameFile = _find(table.writers(FRAMES), Path(path))(Path(path), session, link_type, live)
     return made
 
 
-def _find(table: dict[str, str], path: Path) -> Any:
-    for suffix, target in table.items():
+def _find(written: dict[str, str], path: Path) -> Any:
+    for suffix, target in written.items():
         if path.name.lower().endswith(suffix):
-            module, _, attribute = target.partition(":")
-            return getattr(import_module(module), attribute)
-    raise CaptureError(f"{path}: unknown suffix; expected one of {' '.join(table)}")
+            return table.function(target)
+    raise CaptureError(f"{path}: unknown suffix; expected one of {' '.join(written)}")

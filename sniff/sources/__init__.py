@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 from typing import Protocol
 
 from dissectors.line import LineSettings
@@ -56,7 +57,6 @@ class Source(Protocol):
 
 
 _URL = re.compile(r"(?P<scheme>[a-z][a-z0-9+.-]*)://", re.IGNORECASE)
-_CAPTURES = (".mcap", ".cap.txt", ".pcap", ".pcapng")
 
 
 def open_source(spec: str, line: LineSettings, clock: Clock | None = None) -> Source:
@@ -70,7 +70,9 @@ def open_source(spec: str, line: LineSettings, clock: Clock | None = None) -> So
         from sniff.sources.gateway import open_gateway
 
         return open_gateway(spec, line, clock)
-    if spec.lower().endswith(_CAPTURES):
+    from sniff.formats.table import suffixes
+
+    if Path(spec).is_file() or spec.lower().endswith(suffixes()):
         from sniff.sources.capture_file import CaptureFileSource
 
         return CaptureFileSource(spec, clock)

@@ -22,7 +22,8 @@ from sniff.bus.capture_writer import create
 from sniff.engine.capture import CaptureError
 from sniff.engine.follow_settings import SessionEngine
 from sniff.engine.session import Item, LineEvent, LineEventKind, Session
-from sniff.formats import FRAME_WRITERS, WRITERS, read
+from sniff.formats import FRAMES, ITEMS, read
+from sniff.formats.table import writers
 from sniff.simulation.scenarios import scenario, simulate
 from sniff.simulation.tap import CH340
 
@@ -128,7 +129,7 @@ def test_fuzz_readers(benchmark: Any, tmp_path: Path) -> None:
     """Files of every format with octets changed, cut, repeated: a capture or one line that says why not."""
     dice, samples = random.Random(SEED), good("modbus-rtu")
     whole: dict[str, bytes] = {}
-    for suffix in (*WRITERS, *FRAME_WRITERS):
+    for suffix in (*writers(ITEMS), *writers(FRAMES)):
         path = tmp_path / f"seed{suffix}"
         with create(path, Session("fuzz", LineSettings(19200, 8, "E", 1), "modbus-rtu", BASE)) as writer:
             for number, piece in enumerate(samples[:60]):

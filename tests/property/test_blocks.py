@@ -23,6 +23,7 @@ from sniff.engine.capture import Capture, CaptureError
 from sniff.engine.session import Item, LineEvent, LineEventKind, Session, SettingsChange
 from sniff.formats import pcap_walk, pcapng, pcapng_walk
 from sniff.formats.linktypes import RTAC, rtac_record
+from sniff.formats.table import suffixes
 from sniff.recording.rotated import RotatedCapture
 from sniff.recording.rotation import Rotation
 from sniff.recording.writer import Recorder
@@ -168,9 +169,7 @@ def records(many: int, seed: int = 1) -> list[tuple[int, bytes]]:
 
 def _captures(folder: Path) -> list[Path]:
     return sorted(
-        path
-        for path in folder.rglob("*")
-        if path.name.endswith(tuple(formats.READERS)) and not path.name.endswith(".expect.txt")
+        path for path in folder.rglob("*") if path.name.endswith(suffixes()) and not path.name.endswith(".expect.txt")
     )
 
 

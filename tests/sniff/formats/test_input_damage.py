@@ -128,7 +128,8 @@ def read_log(path: Path, text: str) -> tuple[list[Item], str, str]:
         log = read(path)
     except CaptureError as error:
         return [], "", str(error)
-    assert isinstance(log, ByteLog)
+    if not isinstance(log, ByteLog):  # comments alone are an empty text capture
+        return [], "", f"{path}: "
     found = list(log.items())
     complete = log.completeness()
     return found, log.kind or "", "" if complete.whole else complete.text

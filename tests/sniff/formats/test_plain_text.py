@@ -37,17 +37,20 @@ def test_what_a_text_is(content: str, kind: type, tmp_path: Path, monkeypatch: p
         assert octets(capture) == b"\x01\x03"
 
 
-@pytest.mark.parametrize("content", [b"hello\n", b"\xff\xfe\0", b"PK\3\4 and so on"])
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [(b"hello\n", "1: no byte log that this program reads"), (b"PK\3\4 and so on", " a zip archive; unpack it")],
+)
 def test_what_is_neither_is_refused_by_its_name(
-    content: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    content: bytes, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = tmp_path / "site.txt"
     path.write_bytes(content)
     monkeypatch.setattr(sys, "stdin", SimpleNamespace(buffer=io.BytesIO(content)))
     for name in (path, "-"):
-        with pytest.raises(CaptureError, match="no byte log that this program reads") as caught:
+        with pytest.raises(CaptureError) as caught:
             read(name)
-        assert str(caught.value).startswith(f"{name}:1: ")
+        assert str(caught.value).startswith(f"{name}:{said}")
 
 
 def test_comments_alone_are_an_empty_text_capture(tmp_path: Path) -> None:

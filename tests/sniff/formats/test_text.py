@@ -255,7 +255,7 @@ def test_files_that_are_none(tmp_path: Path) -> None:
     with pytest.raises(CaptureError, match="a line longer than"):
         read(path)
     path.write_bytes(b"\x89MCAP0\r\n" + bytes(100))
-    with pytest.raises(CaptureError, match=r"1:1: expected \+D"):
+    with pytest.raises(CaptureError, match="an MCAP file, but not a recording"):
         list(read(path).items())
     with pytest.raises(CaptureError, match="a directory"):
         read(tmp_path.rename(tmp_path.with_name("d.cap.txt")))

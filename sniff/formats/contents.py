@@ -1,0 +1,71 @@
+"""What a file is that has no magic octets at its begin: text, a text capture, octets as they were heard. Pure."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from itertools import islice
+
+from sniff.formats.text_line import MAGIC
+
+_LINES_SEEN = 200
+_OURS = re.compile(r"[+~-][0-9]{1,15}(\.[0-9]{1,6})?\s+([0-9A-Fa-f]{2}([\s!]|[0-9A-Fa-f]{2}|$)|\")")
+"""How a line of a text capture begins; no line of a byte log does."""
+
+_UTF16 = (b"\xff\xfe", b"\xfe\xff")
+_WRITTEN = frozenset((*range(0x20, 0x7F), *b"\t\n\r\f\x1b", *range(0x80, 0x100)))
+"""Octets that text is made of, in any code that ASCII is part of; escapes colour the output of tools."""
+
+_CONTROLS_MOST = 0.01
+_ASCII_FRAME = re.compile(rb":((?:[0-9A-F]{2}){3,260})(?=[\r\n]|$)")
+_N2_FRAME = re.compile(rb"[>A]([0-9A-F]{2,260})([0-9A-F]{2})(?=[\r\n]|$)")
+PUTTY = re.compile(rb"=~=~=~=~=~=~=~=~=~=~=~= PuTTY log [ -~]{0,40} =~=~=~=~=~=~=~=~=~=~=~=\r?\n")
+"""The heading that PuTTY writes above what a port gave."""
+
+
+def is_text_capture(start: bytes) -> bool:
+    """Whether the first line that is no comment is one of a text capture; so are comments alone."""
+    if is_utf16(start):  # the reader says how to save it
+        start = start.decode("utf-16", "replace").encode("utf-8", "replace")
+    return bool(start) and is_written(start) and _first_line_is_ours(start.splitlines())
+
+
+def _first_line_is_ours(lines: Iterable[bytes]) -> bool:
+    for octets in islice(lines, _LINES_SEEN):
+        line = octets.decode("utf-8", "replace").removeprefix("\ufeff").strip()
+        if line.startswith(MAGIC) or _OURS.match(line):
+            return True
+        if line and not line.startswith("#"):
+            return False
+    return True
+
+
+def is_text(start: bytes) -> bool:
+    """Whether it is text that a tool or a person wrote."""
+    return bool(start) and (is_utf16(start) or (is_written(start) and not _is_ascii_traffic(start)))
+
+
+def is_raw(start: bytes) -> bool:
+    """Whether it is octets as they were heard: no text, or frames of characters with nothing beside them."""
+    return bool(start) and not is_utf16(start) and (not is_written(start) or _is_ascii_traffic(start))
+
+
+def is_utf16(start: bytes) -> bool:
+    """Whether it is text of two octets a character, as Windows saves it: every other octet of it is 0, nearly."""
+    tail = start[2:4096]
+    return start.startswith(_UTF16) and 3 * tail.count(0) >= len(tail)
+
+
+def is_written(start: bytes) -> bool:
+    """Whether nearly all octets are those of text."""
+    others = sum(start.count(octet) for octet in range(256) if octet not in _WRITTEN)
+    high = sum(1 for octet in start[:4096] if octet >= 0x80)
+    return others <= _CONTROLS_MOST * len(start) and 2 * high <= len(start[:4096])
+
+
+def _is_ascii_traffic(start: bytes) -> bool:
+    """Whether lines are frames of characters that end with their sum, and hardly anything else is there."""
+    body = PUTTY.sub(b"", start)
+    found = [(len(match[0]), sum(bytes.fromhex(match[1].decode())) % 256 == 0) for match in _ASCII_FRAME.finditer(body)]
+    found += [(len(match[0]), sum(match[1]) % 256 == int(match[2], 16)) for match in _N2_FRAME.finditer(body)]
+    return any(fits for _, fits in found) and 2 * sum(length for length, _ in found) >= len(body)
