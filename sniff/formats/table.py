@@ -75,6 +75,14 @@ BUILT_IN: tuple[Format, ...] = (
            frames_writer="sniff.formats.pcap:create"),
     Format("text capture", (".cap.txt",), content=_IS_TEXT_CAPTURE, reader="sniff.formats.text:read",
            items_writer="sniff.formats.text:create"),
+    Format("sigrok session", (".sr",), (b"PK\3\4",), "sniff.formats.waves_told:is_sigrok",
+           reader="sniff.formats.logic_capture:read_sigrok"),
+    Format("value change dump", (".vcd",), content="sniff.formats.waves_told:is_vcd",
+           reader="sniff.formats.logic_capture:read_vcd"),
+    Format("table of levels", (".csv",), content="sniff.formats.waves_told:is_levels",
+           reader="sniff.formats.logic_capture:read_digital_csv"),
+    Format("Saleae binary export", (".bin",), content="sniff.formats.waves_told:is_saleae_binary",
+           reader="sniff.formats.logic_capture:read_digital_binary"),
     Format("raw dump", _DUMPS, content="sniff.formats.contents:is_raw", reader="sniff.formats.raw_dump:read",
            last=True),
     Format("byte log", _LOGS, content="sniff.formats.contents:is_text", reader="sniff.formats.bytelog:read",
@@ -97,7 +105,6 @@ UNREADABLE: tuple[tuple[bytes, str], ...] = (
     (b"MZ", "a program"),
     (b"<!DOCTYPE", "a web page; save the log as text"),
     (b"<html", "a web page; save the log as text"),
-    (b"<SALEAE>", "a Saleae Logic binary export; export the analyser's table as CSV"),
     (b"btsnoop\0", "a Bluetooth capture; it holds no serial frames"),
     (b"snoop\0\0\0", "a snoop capture; convert it with `editcap -F pcapng`"),
 )
@@ -140,7 +147,8 @@ def told(start: bytes, name: str) -> Format | None:
     if damaged is not None and not any(one.name == "byte log" for one in recognised):
         return damaged
     both = [one for one in recognised if one in named]
-    return both[0] if both else next(iter(recognised), next(iter(named), None))
+    left = next((one for one in named if one.last), next(iter(named), None))
+    return both[0] if both else next(iter(recognised), left)
 
 
 def writers(kind: str) -> dict[str, str]:

@@ -6,8 +6,6 @@ import re
 
 from sniff.formats import saleae, sigrok
 
-SEEN = 1 << 16
-"""Octets that are looked at."""
 _DECLARATION = re.compile(rb"\s*\$(?:date|version|timescale|comment|scope|var)\b")
 
 

@@ -322,3 +322,12 @@ def test_captures_of_others_give_the_frames_beside_them(name: str, frames: int, 
     listed = [line.split(";")[0].split() for line in (folder / "frames.txt").read_text().splitlines() if line[0] != "#"]
     assert len(listed) == frames
     assert _octets(capture) == b"".join(bytes.fromhex("".join(words[1:])) for words in listed)
+
+
+@pytest.mark.parametrize("kind", OPENERS)
+def test_every_kind_is_told_by_its_content(tmp_path: Path, kind: str) -> None:
+    path, octets = _made(tmp_path, kind)
+    for name in (path.name, "night.log", "x"):
+        moved = path.rename(tmp_path / name)
+        assert _octets(read(moved)) == octets
+        path = moved
