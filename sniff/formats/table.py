@@ -143,7 +143,7 @@ def told(start: bytes, name: str) -> Format | None:
     if best is not None:
         both = [one for one in recognised if one in named and not one.last]
         return both[0] if both else best
-    damaged = next((one for one in named if not one.last), None)
+    damaged = next((one for one in named if one.magics), None)
     if damaged is not None and not any(one.name == "byte log" for one in recognised):
         return damaged
     both = [one for one in recognised if one in named]
