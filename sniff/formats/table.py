@@ -28,7 +28,7 @@ class Format:
     | field | what |
     |---|---|
     | `name` | as people call it |
-    | `suffixes` | lower case, with the dot; the first is the usual one |
+    | `suffixes` | lower case, with the dot; the first is the usual one; () where others have it and the content tells |
     | `magics` | how such a file begins, any of them; () when octets at its begin do not tell |
     | `content` | (the first SEEN octets) → whether it is one; "" when `magics` are enough |
     | `reader` | (path) → Capture; "" when it is only written |
@@ -79,9 +79,9 @@ BUILT_IN: tuple[Format, ...] = (
            reader="sniff.formats.logic_capture:read_sigrok"),
     Format("value change dump", (".vcd",), content="sniff.formats.waves_told:is_vcd",
            reader="sniff.formats.logic_capture:read_vcd"),
-    Format("table of levels", (".csv",), content="sniff.formats.waves_told:is_levels",
+    Format("table of levels", (), content="sniff.formats.waves_told:is_levels",
            reader="sniff.formats.logic_capture:read_digital_csv"),
-    Format("Saleae binary export", (".bin",), content="sniff.formats.waves_told:is_saleae_binary",
+    Format("Saleae binary export", (), content="sniff.formats.waves_told:is_saleae_binary",
            reader="sniff.formats.logic_capture:read_digital_binary"),
     Format("raw dump", _DUMPS, content="sniff.formats.contents:is_raw", reader="sniff.formats.raw_dump:read",
            last=True),
@@ -143,12 +143,11 @@ def told(start: bytes, name: str) -> Format | None:
     if best is not None:
         both = [one for one in recognised if one in named and not one.last]
         return both[0] if both else best
-    damaged = next((one for one in named if one.magics), None)
+    damaged = next((one for one in named if not one.last), None)
     if damaged is not None and not any(one.name == "byte log" for one in recognised):
         return damaged
     both = [one for one in recognised if one in named]
-    left = next((one for one in named if one.last), next(iter(named), None))
-    return both[0] if both else next(iter(recognised), left)
+    return both[0] if both else next(iter(recognised), next(iter(named), None))
 
 
 def writers(kind: str) -> dict[str, str]:
