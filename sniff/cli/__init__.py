@@ -18,6 +18,7 @@ from typing import cast
 from dissectors import registry
 from sniff.cli import standard_streams
 from sniff.engine.capture import CaptureError
+from sniff.formats.several_buses import chosen as bus_chosen
 from sniff.version import __version__
 
 COMMANDS: dict[str, str] = {
@@ -164,7 +165,8 @@ def _run(arguments: list[str]) -> int:
     else:
         args = parser.parse_args(arguments)
     assert chosen is not None  # argparse has refused anything else
-    return int(chosen.run(args))
+    with bus_chosen(getattr(args, "bus", None)):
+        return int(chosen.run(args))
 
 
 def _protocols() -> str:

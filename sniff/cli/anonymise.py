@@ -12,6 +12,7 @@ from sniff.cli import USAGE, Failure, arguments, writing
 def configure(parser: argparse.ArgumentParser) -> None:
     """Options of `anonymise`."""
     parser.add_argument("file", metavar="FILE", help="capture")
+    arguments.add_bus(parser)
     writing.add_output(parser)
     arguments.add_line(parser)
     arguments.add_reference(parser)

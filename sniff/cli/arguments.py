@@ -17,6 +17,7 @@ from sniff.config import AUTO
 from sniff.engine.capture import Capture, CaptureError
 from sniff.engine.session import ASSUMED, LINE_NOTE, OPTIONS, PROTOCOL_NOTE, Session
 from sniff.formats import read
+from sniff.formats.several_buses import SeveralBuses, buses_in
 
 
 def add_line(parser: argparse.ArgumentParser, auto: bool = True) -> None:
@@ -50,7 +51,15 @@ def add_files(parser: argparse.ArgumentParser) -> None:
         "files",
         nargs="+",
         metavar="FILE",
-        help="capture: .mcap .cap.txt .pcap .pcapng .log .hex .csv .txt; - for standard input",
+        help="capture: .mcap .cap.txt .pcap .pcapng .sr .vcd .log .hex .csv .txt; - for standard input",
+    )
+    add_bus(parser)
+
+
+def add_bus(parser: argparse.ArgumentParser) -> None:
+    """--bus, of commands that read captures."""
+    parser.add_argument(
+        "--bus", metavar="NAME", help="of a file with several buses (channels of an analyser, connections): this one"
     )
 
 
@@ -148,7 +157,14 @@ def rotation(text: str) -> str:
 
 
 def open_capture(path: str) -> Capture:
-    """Open a capture, or end with exit code 3 (2 for an unknown suffix)."""
+    """Open a capture of one bus, or end with exit code 3 (2 for an unknown suffix, and where --bus must choose)."""
+    capture = _opened(path)
+    if isinstance(capture, SeveralBuses):
+        raise Failure(capture.refusal, USAGE)
+    return capture
+
+
+def _opened(path: str) -> Capture:
     try:
         capture = read(path)
         capture.session = detected(capture.session)
@@ -157,9 +173,16 @@ def open_capture(path: str) -> Capture:
         raise Failure(str(error), USAGE if "unknown suffix" in str(error) else UNREADABLE) from None
 
 
+def open_buses(path: str) -> list[tuple[str, Capture]]:
+    """Open the buses of a file by name, each as a capture of its own; ends as `open_capture` does."""
+    capture = _opened(path)
+    buses = buses_in(capture)
+    return [(path, capture)] if len(buses) < 2 else [(f"{path} [{one.session.bus}]", one) for one in buses]
+
+
 def open_captures(paths: Sequence[str]) -> list[tuple[str, Capture]]:
     """Open captures by name, the parts of one recording as one; ends as `open_capture` does."""
-    opened = [(path, open_capture(path)) for path in paths]
+    opened = [one for path in paths for one in open_buses(path)]
     if len(opened) < 2:
         return opened
     from sniff.recording.rotated import joined

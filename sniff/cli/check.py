@@ -41,6 +41,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     """Options of `check`."""
     arguments.add_reference(parser)
     parser.add_argument("sources", nargs="+", metavar="FILE|PORT", help="captures, or one port or configured bus")
+    arguments.add_bus(parser)
     arguments.add_line(parser, auto=True)
     arguments.add_devices(parser)
     parser.add_argument("--format", choices=("text", "json", "junit"), default="text", help="default: text")

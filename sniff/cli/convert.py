@@ -22,6 +22,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     """Options of `convert`."""
     parser.add_argument("source", metavar="IN", help="capture to read")
     parser.add_argument("output", metavar="OUT", help="capture to write")
+    arguments.add_bus(parser)
     arguments.add_line(parser)
     arguments.add_devices(parser)
     arguments.add_reference(parser)

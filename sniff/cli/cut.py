@@ -13,6 +13,7 @@ from sniff.cli.progress import Watched
 def configure(parser: argparse.ArgumentParser) -> None:
     """Options of `cut`."""
     parser.add_argument("file", metavar="FILE", help="capture")
+    arguments.add_bus(parser)
     writing.add_output(parser)
     arguments.add_line(parser)
     arguments.add_reference(parser)

@@ -39,8 +39,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Describe every capture in turn."""
-    for number, path in enumerate(args.files):
-        capture = arguments.open_capture(path)
+    opened = [one for path in args.files for one in arguments.open_buses(path)]
+    for number, (path, capture) in enumerate(opened):
         session = arguments.settings_of(args, capture.session, path)
         summary, events = _summarise(capture, session, args.reference)
         if args.json:

@@ -12,6 +12,7 @@ from sniff.cli import arguments, writing
 def configure(parser: argparse.ArgumentParser) -> None:
     """Options of `recover`."""
     parser.add_argument("file", metavar="FILE", help="capture, damaged or not")
+    arguments.add_bus(parser)
     writing.add_output(parser)
     arguments.add_reference(parser)
 

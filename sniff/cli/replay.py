@@ -15,6 +15,7 @@ from sniff.cli.interruption import until_interrupted
 def configure(parser: argparse.ArgumentParser) -> None:
     """Options of `replay`."""
     parser.add_argument("file", metavar="FILE", help="capture")
+    arguments.add_bus(parser)
     parser.add_argument(
         "--to", required=True, metavar="pty|tcp|tcp:PORT", help="a new pseudo-terminal, or a TCP port of this machine"
     )

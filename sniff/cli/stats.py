@@ -37,6 +37,7 @@ TABLES = ("nodes", "health", "transactions", "latency", "load", "ring")
 def configure(parser: argparse.ArgumentParser) -> None:
     """Options of `stats`."""
     parser.add_argument("words", nargs="+", metavar="FILE", help="captures of one bus; parts of a rotation together")
+    arguments.add_bus(parser)
     parser.add_argument("--table", choices=TABLES, help="which table; may also stand after the files (default: nodes)")
     arguments.add_line(parser)
     parser.add_argument("--every", type=arguments.duration, default=1.0, metavar="TIME", help="load: length of a row")

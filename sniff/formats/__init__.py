@@ -20,6 +20,7 @@ from sniff.formats import compressed, table
 from sniff.formats.cut_capture import cut_short
 from sniff.formats.files import explain, open_capture
 from sniff.formats.records import FrameFile
+from sniff.formats.several_buses import buses_in
 
 SAMPLE = 6000
 """Octets at the begin of a capture that are kept with its session, to tell its protocol."""
@@ -79,6 +80,12 @@ def start_of(path: Path) -> bytes:
 
 def _with_reads(capture: Capture) -> Capture:
     """The capture; its session knows when its first reads came, and takes no times as exact that cannot be."""
+    buses = buses_in(capture)
+    if len(buses) > 1:
+        for one in buses:
+            _with_reads(one)
+        return capture
+    capture = buses[0]
     session = capture.session
     if session.unknown or session.reads is not None:
         return capture

@@ -28,7 +28,7 @@ class Format:
     | field | what |
     |---|---|
     | `name` | as people call it |
-    | `suffixes` | lower case, with the dot; the first is the usual one |
+    | `suffixes` | lower case, with the dot; the first is the usual one; () where others have it and the content tells |
     | `magics` | how such a file begins, any of them; () when octets at its begin do not tell |
     | `content` | (the first SEEN octets) → whether it is one; "" when `magics` are enough |
     | `reader` | (path) → Capture; "" when it is only written |
@@ -75,6 +75,14 @@ BUILT_IN: tuple[Format, ...] = (
            frames_writer="sniff.formats.pcap:create"),
     Format("text capture", (".cap.txt",), content=_IS_TEXT_CAPTURE, reader="sniff.formats.text:read",
            items_writer="sniff.formats.text:create"),
+    Format("sigrok session", (".sr",), (b"PK\3\4",), "sniff.formats.waves_told:is_sigrok",
+           reader="sniff.formats.logic_capture:read_sigrok"),
+    Format("value change dump", (".vcd",), content="sniff.formats.waves_told:is_vcd",
+           reader="sniff.formats.logic_capture:read_vcd"),
+    Format("table of levels", (), content="sniff.formats.waves_told:is_levels",
+           reader="sniff.formats.logic_capture:read_digital_csv"),
+    Format("Saleae binary export", (), content="sniff.formats.waves_told:is_saleae_binary",
+           reader="sniff.formats.logic_capture:read_digital_binary"),
     Format("raw dump", _DUMPS, content="sniff.formats.contents:is_raw", reader="sniff.formats.raw_dump:read",
            last=True),
     Format("byte log", _LOGS, content="sniff.formats.contents:is_text", reader="sniff.formats.bytelog:read",
@@ -97,7 +105,6 @@ UNREADABLE: tuple[tuple[bytes, str], ...] = (
     (b"MZ", "a program"),
     (b"<!DOCTYPE", "a web page; save the log as text"),
     (b"<html", "a web page; save the log as text"),
-    (b"<SALEAE>", "a Saleae Logic binary export; export the analyser's table as CSV"),
     (b"btsnoop\0", "a Bluetooth capture; it holds no serial frames"),
     (b"snoop\0\0\0", "a snoop capture; convert it with `editcap -F pcapng`"),
 )

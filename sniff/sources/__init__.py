@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 from typing import Protocol
 
 from dissectors.line import LineSettings
@@ -71,7 +72,7 @@ def open_source(spec: str, line: LineSettings, clock: Clock | None = None) -> So
         return open_gateway(spec, line, clock)
     from sniff.formats.table import suffixes
 
-    if spec.lower().endswith(suffixes()):
+    if Path(spec).is_file() or spec.lower().endswith(suffixes()):
         from sniff.sources.capture_file import CaptureFileSource
 
         return CaptureFileSource(spec, clock)
