@@ -8,7 +8,7 @@ total: any events, any times.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import Enum
+from enum import Enum, StrEnum
 from typing import Protocol
 
 from dissectors.frame import Assembly, Event, Header, Role
@@ -41,8 +41,18 @@ class Verdict(Enum):
 
 _WORDS = {Verdict.NO_RESPONSE: "no answer", Verdict.DATA: "one-way", Verdict.UNSOLICITED: "unasked"}
 
-PASSING = frozenset(("token", "poll-for-master"))
-"""Kinds of transactions that pass on the right to send, or look for a station to pass it to: they ask for nothing."""
+
+class Passing(StrEnum):
+    """Kinds of transactions that pass on the right to send, or look for a station to pass it to: they ask for nothing.
+
+    Protocols that pass a token use these for `Header.kind` and `Transaction.kind`, whatever their own standard says.
+    """
+
+    TOKEN = "token"
+    POLL = "poll-for-master"
+
+
+PASSING = frozenset(kind.value for kind in Passing)
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from enum import IntEnum
 
+from dissectors.tracker import Passing
+
 PREAMBLE = b"\x55\xff"
 HEADER = 8  # octets, preamble and header CRC included
 
@@ -34,6 +36,8 @@ PROPRIETARY = 128
 
 NAMES: dict[int, str] = {
     **{member.value: member.name.lower().replace("_", "-") for member in FrameType},
+    FrameType.TOKEN: Passing.TOKEN.value,
+    FrameType.POLL_FOR_MASTER: Passing.POLL.value,
     FrameType.IPV6: "ipv6",
 }
 

@@ -18,6 +18,7 @@ from dissectors.frame import Check, Found
 from dissectors.modbus.ascii_framing import LONGEST_SILENCE, MAX_CHARACTERS
 from dissectors.modbus.candidates import SHORT_FRAME
 from dissectors.modbus.header_columns import Words, headers
+from dissectors.modbus.hex_columns import octets_of_pairs
 from dissectors.modbus.length_columns import PADDING, lengths, predicting, shapes, unit_bits
 from dissectors.modbus.lengths import NEVER
 
@@ -28,10 +29,7 @@ if TYPE_CHECKING:
 _START, _CR, _LF = ord(":"), 0x0D, 0x0A
 _DIAGNOSTICS: Final = 0x08
 _LEAST: Final = 1 + 2 * 3 + 2  # ':' unit function LRC CR LF
-_NO_DIGIT: Final = 0xFF
-_DIGITS = np.full(256, _NO_DIGIT, np.uint8)
-for _value in range(16):
-    _DIGITS[ord(f"{_value:X}")] = _value
+_IS_UPPER = np.isin(np.arange(256), np.frombuffer(b"0123456789ABCDEF", np.uint8))
 _GOOD = np.uint8(CHECKS.index(Check.GOOD))
 _DELIMITER = np.uint8(FOUNDS.index(Found.DELIMITER))
 
@@ -56,7 +54,7 @@ def _stretches(octets: Octets, reads: Reads, times: OctetTimes, timing: Timing) 
     length = ends - begins
     formed = (length >= _LEAST) & (length <= MAX_CHARACTERS) & (length & 1 == 1)
     formed &= (octets.take(begins) == _START) & (octets.take(ends - 2, mode="clip") == _CR)
-    strange = np.concatenate(([0], np.cumsum(_DIGITS.take(octets) == _NO_DIGIT, dtype=np.int64)))
+    strange = np.concatenate(([0], np.cumsum(~_IS_UPPER.take(octets), dtype=np.int64)))
     formed &= strange[ends] - strange[begins] == 3
     reads_begin = reads.begins[:-1]
     formed &= ~holds_any(begins + 1, ends, reads_begin[times.gaps() - timing.latency >= LONGEST_SILENCE])
@@ -70,13 +68,9 @@ def _decoded(octets: Octets, begins: Times, ends: Times) -> tuple[Octets, Times,
     where each begins, and its length."""
     pairs = (ends - begins - 3) >> 1
     sizes = pairs + 1
-    places = np.concatenate((np.zeros(min(1, len(sizes)), np.int64), np.cumsum(sizes)[:-1]))
-    total = int(sizes.sum())
-    inside = np.arange(total) - np.repeat(places, sizes)
-    at = np.repeat(begins + 1, sizes) + 2 * inside
-    high, low = _DIGITS.take(octets.take(at, mode="clip")), _DIGITS.take(octets.take(at + 1, mode="clip"))
-    binary = np.zeros(total + MAX_CHARACTERS + PADDING, np.uint8)
-    binary[:total] = high << 4 | low
+    places = np.cumsum(sizes) - sizes
+    binary = np.zeros(int(sizes.sum()) + MAX_CHARACTERS + PADDING, np.uint8)
+    binary[: -MAX_CHARACTERS - PADDING] = octets_of_pairs(octets, begins + 1, sizes)
     binary[places + pairs] = 0
     return binary, places, sizes
 

@@ -13,9 +13,10 @@ from dissectors.line import MS
 from dissectors.modbus.asked import Asked
 from dissectors.modbus.envelope import RTU_NAME, readable_adu, rtu_check
 from dissectors.modbus.exchange import is_begin_of
-from dissectors.modbus.functions import BROADCAST, FUNCTIONS, answer_length
+from dissectors.modbus.functions import BROADCAST, EXCEPTION_BIT, FUNCTIONS, answer_length
 from dissectors.modbus.judgement import judge
 from dissectors.modbus.learnt import READ
+from dissectors.modbus.pairing import is_answer
 from dissectors.modbus.remembered import (
     BEGIN,
     FINAL_KEPT,
@@ -89,7 +90,7 @@ class ModbusFindings(Remembered):
     def settle(self, transaction: Transaction) -> None:
         """See `dissectors.findings.Judge`."""
         asked = self.asked.pop(transaction.id, None)
-        code = self.codes.pop(transaction.id, 0)
+        code = self.codes.pop(transaction.id, None)
         answer = self.answers.pop(transaction.id, b"")
         stray, flaw = self.stray.pop(transaction.id, b""), self.flaws.pop(transaction.id, None)
         ended = self.bad_ends.pop(transaction.id, None)
@@ -215,7 +216,8 @@ class ModbusFindings(Remembered):
             self.seen.broadcast_answers[placement.source] += 1
         self.broadcast = self.open = None
         if header.ok:
-            if header.error is not None and len(octets) > 2 and octets[1] & 0x80:
+            is_exception = len(octets) > 2 and bool(octets[1] & EXCEPTION_BIT)
+            if header.error is not None and is_exception:
                 self.codes[placement.tx] = octets[2]
                 if len(self.codes) > OPEN_KEPT:
                     self.codes.clear()
@@ -223,6 +225,8 @@ class ModbusFindings(Remembered):
                 self.answers[placement.tx] = octets
                 if len(self.answers) > OPEN_KEPT:
                     self.answers.clear()
+                if header.error is not None:
+                    self.contradictory.append(placement.tx)
         elif placement.source is not None:
             self.damaged.append(placement.tx)
             self._gather(frame)
@@ -292,7 +296,7 @@ class ModbusFindings(Remembered):
         self.seen.unasked.add(transaction.start, transaction.response)
 
     def settle_request(
-        self, station: Station, transaction: Transaction, asked: Asked, code: int, answer: bytes
+        self, station: Station, transaction: Transaction, asked: Asked, code: int | None, answer: bytes
     ) -> None:
         """A request that closed, with its answer, the code of its exception, or neither."""
         verdict = transaction.verdict
@@ -341,15 +345,19 @@ class ModbusFindings(Remembered):
                 station.compare(asked.key, asked.octets, came)
         if verdict is Verdict.EXCEPTION:
             if asked.fault is None:
-                station.exception(asked.key, code).add(transaction.end, transaction.request, transaction.response)
+                station.exception(asked.key, code or 0).add(transaction.end, transaction.request, transaction.response)
             else:
-                self.seen.malformed_codes[code] += 1
-        elif (
-            transaction.error is not None and asked.header.ok and not transaction.error.startswith("before the answer")
-        ):
+                self.seen.malformed_codes[code or 0] += 1
+        elif transaction.error is not None and asked.header.ok and self._is_unfit(transaction, asked, code, answer):
             station.unfit.add(transaction.end, transaction.request, transaction.response)
             if len(station.unfit_words) < _WORDS_KEPT:
                 station.unfit_words[transaction.error] += 1
+
+    def _is_unfit(self, transaction: Transaction, asked: Asked, code: int | None, answer: bytes) -> bool:
+        """Whether the answer itself is not what was asked for: damage before a good answer is none of its faults."""
+        if code is not None or transaction.id in self.contradictory:  # an exception to something else
+            return True
+        return bool(answer) and not is_answer(asked.octets, answer)
 
     def _compare_with_timeout(self, station: Station, transaction: Transaction, least: int) -> None:
         """Whether an answer took long; counted anew when the timeout gets known, since the limit is another then."""

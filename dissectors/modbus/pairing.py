@@ -26,6 +26,12 @@ def mismatch(request: bytes, response: bytes) -> str | None:
     return rule(request, response) if rule else None
 
 
+def is_answer(request: bytes, response: bytes) -> bool:
+    """Whether a response is one to that request: of its function, and with what it asks for."""
+    same = len(request) > 1 and len(response) > 1 and response[1] & ~EXCEPTION_BIT == request[1]
+    return same and mismatch(request, response) is None
+
+
 def another_function(request: bytes, response: bytes) -> str:
     """In words: the station that was asked answered with another function code."""
     asked, answered = request[1], response[1]

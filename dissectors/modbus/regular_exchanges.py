@@ -20,6 +20,7 @@ from dissectors.frame import Role
 from dissectors.modbus.envelope import RTU_NAME
 from dissectors.modbus.exchange import is_begin_of
 from dissectors.modbus.functions import EXCEPTION_BIT
+from dissectors.modbus.hex_columns import DIGITS, NO_DIGIT, octets_of_pairs
 from dissectors.stretches import Stretches
 from dissectors.tracker import Verdict
 
@@ -153,19 +154,14 @@ def adus_of(rows: RowColumns) -> Adus:
 
 def _unpacked(octets: Octets, offset: Times, length: Times, is_frame: Masks) -> Adus:
     """The octets of ASCII frames: `:`, pairs of hex digits, CR and one more."""
-    values = np.full(256, 0xFF, np.uint8)
-    for digit in b"0123456789ABCDEFabcdef":
-        values[digit] = int(chr(digit), 16)
-    nibbles = values[octets]
     pairs = (length - 3) >> 1
     sound = is_frame & (length >= 9) & (length & 1 == 1)
     at = np.where(sound, offset, 0)
     end = at + np.where(sound, length, 2)
     sound &= (octets[at] == ord(":")) & (octets[end - 2] == _CR) & (octets[end - 1] & 0x7F != _CR)
-    bad = np.append(0, np.cumsum(nibbles > 0xF))
+    bad = np.append(0, np.cumsum(DIGITS.take(octets) == NO_DIGIT))
     sound &= bad[np.where(sound, end - 2, 0)] == bad[np.where(sound, at + 1, 0)]
     size = np.where(sound, pairs - 1, 0)
     begin = np.cumsum(size) - size
-    place = np.repeat(at + 1 - 2 * begin, size) + 2 * np.arange(int(size.sum()))
-    whole = nibbles[place] << 4 | nibbles[place + 1]
+    whole = octets_of_pairs(octets, at + 1, size)
     return Adus(np.concatenate((whole, np.zeros(_PADDING, np.uint8))), begin, size, sound)

@@ -50,6 +50,7 @@ class Remembered:
         self.copied: deque[int | None] = deque(maxlen=64)  # the last transactions whose request came twice at once
         self.no_requests: deque[int] = deque(maxlen=64)  # frames that the tracker takes for requests, but are none
         self.damaged: deque[int] = deque(maxlen=64)  # transactions of the last damaged answers
+        self.contradictory: deque[int] = deque(maxlen=64)  # transactions whose good answer contradicts itself
         self.flaws: dict[int, Flaw] = {}  # of damaged frames, by transaction
         self.newest: int | None = None  # the transaction of the newest request
         self.stray: dict[int, bytes] = {}  # octets that are no good frame, by the transaction they came in

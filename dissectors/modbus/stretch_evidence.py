@@ -246,7 +246,7 @@ class StretchEvidence:
         elif what != UNANSWERED:
             self._settle(at)
             refused = bool(one.found.refused[at])
-            code, answer = (one.octets[one.answer_begin[at] + 2], b"") if refused else (0, one.answer(at))
+            code, answer = (one.octets[one.answer_begin[at] + 2], b"") if refused else (None, one.answer(at))
             judge.settle_request(judge.station(one.unit[at]), one.transaction(at), one.asked(at), code, answer)
             self._learn_timeout()
 
@@ -262,7 +262,7 @@ class StretchEvidence:
         self._settle(before)
         asked = one.asked(before)
         judge.waited_in_vain(asked, one.asked(at))
-        judge.settle_request(judge.station(one.unit[before]), one.transaction(before), asked, 0, b"")
+        judge.settle_request(judge.station(one.unit[before]), one.transaction(before), asked, None, b"")
         self._learn_timeout()
 
     def _took_long(self, at: int) -> None:

@@ -72,7 +72,7 @@ class LineFindings:
         self._patterns = TimePatterns(session)
         self._use = LineUse(session.line)
         adapter = session.adapter
-        self._senders = Senders(session.timing, "whole" in adapter.detail if adapter.reports is not None else None)
+        self._senders = Senders(session.timing, adapter.packets)
         self._octets = self._in_frames = self._marked = self._rows = self._frames = self._good = 0
         self._first = self._now = 0
         self._damaged = self._damaged_here = 0  # rows that are no good frame, and those of them with an overrun

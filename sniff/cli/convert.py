@@ -44,9 +44,8 @@ def run(args: argparse.Namespace) -> int:
     options = {"link-type": str(args.link_type)} if args.link_type is not None else None
     devices = arguments.noted_devices(args, session)
     session = with_devices(session, devices)
-    values = devices if args.output.lower().endswith(".mcap") else None
     notes = _evidence(capture, session, devices, args.reference) if args.output.lower().endswith(".pcapng") else None
-    writing.write(args, session, capture, [args.source], options, devices=values, notes=notes)
+    writing.write(args, session, capture, [args.source], options, devices=devices, notes=notes)
     writing.say_incomplete(args.source, capture)
     return 0
 

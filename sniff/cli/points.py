@@ -87,7 +87,7 @@ def _samples(args: argparse.Namespace, capture: Capture, session: Session) -> It
     from sniff.engine.bulk import tables as tables_of
 
     reader = PointReader(dissector_for(session), arguments.noted_devices(args, session))
-    watched = Watched(capture)
+    watched = Watched(capture, prints=True)
     if args.reference:
         for output in outputs(watched.items(), session):
             if isinstance(output, Output):

@@ -20,12 +20,18 @@ Read = TypeVar("Read")
 
 
 class Watched:
-    """A capture whose reading is told. `clock`: seconds."""
+    """A capture whose reading is told. `clock`: seconds. `prints`: whether who reads it prints rows meanwhile: what was
+    said is then wiped away before each part is handed on, so that no row lands behind it."""
 
     def __init__(
-        self, capture: Source, stream: TextIO | None = None, clock: Callable[[], float] = time.monotonic
+        self,
+        capture: Source,
+        stream: TextIO | None = None,
+        clock: Callable[[], float] = time.monotonic,
+        prints: bool = False,
     ) -> None:
         self._capture = capture
+        self._prints = prints
         self._stream = sys.stderr if stream is None else stream
         self._clock = clock
 
@@ -47,17 +53,18 @@ class Watched:
         due, octets, said = began + AFTER, 0, False
         try:
             for part in parts:
+                if said and self._prints:
+                    self._say("")
+                    said = False
                 yield part
                 octets += octets_of(part)
                 now = self._clock()
                 if now >= due:
                     due, said = now + EVERY, True
-                    print(
-                        f"\rreading: {octets:,} octets, {now - began:.0f} s\x1b[K",
-                        end="",
-                        file=self._stream,
-                        flush=True,
-                    )
+                    self._say(f"reading: {octets:,} octets, {now - began:.0f} s")
         finally:
             if said:
-                print("\r\x1b[K", end="", file=self._stream, flush=True)
+                self._say("")
+
+    def _say(self, words: str) -> None:
+        print(f"\r{words}\x1b[K", end="", file=self._stream, flush=True)

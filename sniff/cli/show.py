@@ -97,7 +97,7 @@ def _filter(args: argparse.Namespace, dissector: Dissector) -> Filter:
 def _settled(
     args: argparse.Namespace, capture: Capture, session: Session, devices: Devices | None, wanted: Filter
 ) -> Iterator[Settled]:
-    watched = Watched(capture)
+    watched = Watched(capture, prints=True)
     if args.reference:
         return settled(watched.items(), session, devices, wanted)
     return settled_in_bulk(watched, session, devices, wanted)
@@ -145,7 +145,7 @@ def _show_in_bulk(
     from sniff.cli.row_columns import RowColumns
 
     made = RowColumns(dissector_for(session), session)
-    for settled_rows in settled_columns(Watched(capture), session) if left != 0 else ():
+    for settled_rows in settled_columns(Watched(capture, prints=True), session) if left != 0 else ():
         places = _chosen(settled_rows, wanted)
         if left is not None:
             places = places[:left]

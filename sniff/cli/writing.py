@@ -17,6 +17,7 @@ from sniff.bus.capture_writer import create
 from sniff.bus.offline import Source
 from sniff.cli import UNREADABLE, USAGE, Failure
 from sniff.cli.progress import Watched
+from sniff.devices import noted_devices
 from sniff.engine.capture import BlockWriter, Capture, CaptureError, CaptureWriter
 from sniff.engine.engine import Output
 from sniff.engine.follow_settings import dissector_for, engine_for
@@ -48,7 +49,8 @@ def write(
 ) -> int:
     """Write a capture to `args.output`; say on standard error what it holds and what it lost. Gives the octets.
 
-    `with_frames`: with what the engine finds in them, on /frames. `devices`: with their values, on /values.
+    `with_frames`: with what the engine finds in them, on /frames. `devices`: whose values a recording gets on /values;
+    None: those that the session names.
     `notes`: by row number, for the comments of packets where OUT has such. Ends with exit code 2 when OUT is there.
     """
     target = Path(args.output)
@@ -58,8 +60,9 @@ def write(
     try:
         with create(target, session, options, notes) as writer:
             takers: list[_Frames | _Values] = [_Frames(writer, session)] if with_frames else []
-            if devices:
-                takers.append(_Values(writer, session, devices))
+            known = noted_devices(session) if devices is None else devices
+            if known and target.name.lower().endswith(".mcap"):  # no other format holds values
+                takers.append(_Values(writer, session, known))
             if isinstance(writer, BlockWriter) and not args.reference:
                 _write_blocks(writer, watched.blocks(), session, takers, counts)
             else:

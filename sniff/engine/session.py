@@ -5,6 +5,7 @@ Frozen values without I/O; every source makes them, every format keeps as much o
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
@@ -24,7 +25,8 @@ class Adapter:
 
     `latency`: ns that adapter and host may hold an octet back; `latency_from`: where that number is from, in words.
     `reports`: line errors it can report ("parity", "framing", "break", "overrun"); None when nobody knows.
-    `detail`: what limits these reports, in words ("one flag covers a whole USB packet").
+    `packets`: whether one report stands for all octets of a packet, so that the error is somewhere among them; None
+    when nobody knows. `detail`: what limits these reports, in words.
     """
 
     name: str = "unknown"
@@ -34,6 +36,7 @@ class Adapter:
     reports: tuple[str, ...] | None = None
     detail: str = ""
     serial_number: str = ""
+    packets: bool | None = None
 
     @property
     def lineless(self) -> bool:
@@ -158,6 +161,7 @@ class Session:
             "adapter_reports": "unknown" if reports is None else ",".join(reports),
             "adapter_detail": self.adapter.detail,
             "adapter_serial_number": self.adapter.serial_number,
+            **({} if self.adapter.packets is None else {"adapter_packets": "yes" if self.adapter.packets else "no"}),
             **({"unknown": ",".join(self.unknown)} if self.unknown else {}),
             **({"given": "after the search"} if self.given else {}),
             **{f"note_{key}": value for key, value in self.notes.items()},
@@ -185,6 +189,7 @@ class Session:
                 reports=None if reports == "unknown" else tuple(name for name in reports.split(",") if name),
                 detail=record.get("adapter_detail", ""),
                 serial_number=record.get("adapter_serial_number", ""),
+                packets={"yes": True, "no": False}.get(record.get("adapter_packets", "")),
             ),
             program=record.get("program", ""),
             notes={key[5:]: value for key, value in record.items() if key.startswith("note_")},
@@ -287,6 +292,20 @@ def refused_line(event: LineEvent) -> LineSettings | None:
         return LineSettings.parse(event.text.partition(":")[0])
     except ValueError:
         return None
+
+
+_GONE = re.compile(r".* is gone \((?P<why>.*)\)", re.DOTALL)
+
+
+def gone(port: str, why: str) -> str:
+    """Text of an UNPLUGGED event."""
+    return f"{port} is gone ({why})"
+
+
+def gone_why(event: LineEvent) -> str:
+    """Why a port went, of an UNPLUGGED event, in two or three words; its whole text where `gone` did not make it."""
+    match = _GONE.fullmatch(event.text)
+    return match["why"] if match else event.text
 
 
 Item = Chunk | LineEvent

@@ -28,6 +28,7 @@ HEADER = {
     "reports": "adapter_reports",  # "unknown", or the line errors it reports with commas between
     "detail": "adapter_detail",
     "serial-number": "adapter_serial_number",
+    "packets": "adapter_packets",  # "yes" where one report stands for a whole packet, "no" where it does not
     "unknown": "unknown",  # "line", "protocol" or both: of a capture whose settings were searched for in vain
     "given": "given",
 }

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from sniff.engine.table import Table
 from sniff.recording.frames import EVENTS, MARKS, TRANSACTIONS, Column, event_values, message_of, number_of
 
 AT_ONCE = 1000
-"""Rows of a message."""
+"""Rows of a message, about: those of a table are dealt out evenly, so that none holds only what was left over."""
 
 _TEXT = next(column for column in EVENTS if column.kind == "text")
 
@@ -26,19 +27,32 @@ def messages(table: Table, offset: int) -> Iterator[tuple[int, int, bytes]]:
     strings: dict[str, int] = {}
     events = _events(table, offset, strings)
     closed = _transactions(table, strings)
+    texts = list(strings)
     by = np.where(table.closed_by < 0, max(len(table) - 1, 0), table.closed_by)
-    for begin in range(0, max(len(table), 1), AT_ONCE):
-        end = min(begin + AT_ONCE, len(table))
-        first, last = (int(np.searchsorted(by, place)) for place in (begin, begin + AT_ONCE))
+    count = max(1, round(len(table) / AT_ONCE))
+    ends = [len(table) * part // count for part in range(count + 1)]
+    for begin, end in pairwise(ends):
+        first = int(np.searchsorted(by, begin))
+        last = len(by) if end == len(table) else int(np.searchsorted(by, end))
         if end == begin and first == last:
             continue
         odd = [(place - begin, row) for place, row in table.odd.items() if begin <= place < end]
-        tables = (
-            (EVENTS, [column[begin:end] for column in events]),
-            (MARKS, _marks(odd)),
-            (TRANSACTIONS, [column[first:last] for column in closed]),
-        )
-        yield *_span(table, begin, end, first, last), message_of(tables, strings)
+        rows, ended = [column[begin:end] for column in events], [column[first:last] for column in closed]
+        said = _renumbered((*zip(EVENTS, rows, strict=True), *zip(TRANSACTIONS, ended, strict=True)), texts)
+        message = message_of(((EVENTS, rows), (MARKS, _marks(odd)), (TRANSACTIONS, ended)), said)
+        yield *_span(table, begin, end, first, last), message
+
+
+def _renumbered(columns: Iterable[tuple[Column, Values]], texts: list[str]) -> dict[str, int]:
+    """Change the numbers of texts, in place, to those of a message that holds only the texts that it needs."""
+    told = [values for column, values in columns if column.kind == "text"]
+    used = np.unique(np.concatenate(told))
+    used = used[(used > 0) & (used <= len(texts))]
+    numbers = np.zeros(1 << 16, np.uint16)
+    numbers[used] = np.arange(1, len(used) + 1)
+    for values in told:
+        values[:] = numbers[values]
+    return {texts[number - 1]: place for place, number in enumerate(used.tolist(), 1)}
 
 
 def _span(table: Table, begin: int, end: int, first: int, last: int) -> tuple[int, int]:

@@ -56,8 +56,15 @@ class TapModel:
 
     def adapter(self, line: LineSettings) -> Adapter:
         """The adapter as a session describes it."""
-        detail = "one flag covers a whole packet" if self.whole_packet else ""
-        return Adapter(f"simulated {self.name}", "simulated", self.latency(line), "simulated", self.reports, detail)
+        return Adapter(
+            f"simulated {self.name}",
+            "simulated",
+            self.latency(line),
+            "simulated",
+            self.reports,
+            "one flag covers a whole packet" if self.whole_packet else "",
+            packets=self.whole_packet,
+        )
 
 
 _CUT_APART = 200_000  # most ns between the parts of a cut read

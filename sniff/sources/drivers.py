@@ -20,7 +20,9 @@ ALL = ("parity", "framing", "break", "overrun")
 
 @dataclass(frozen=True, slots=True)
 class Driver:
-    """One driver. `reports`: None where nobody knows. `hold`, `hold_chars`: ns and characters it may keep an octet."""
+    """One driver. `reports`: None where nobody knows. `hold`, `hold_chars`: ns and characters it may keep an octet.
+    `packets`: as in `Adapter`.
+    """
 
     name: str
     reports: tuple[str, ...] | None
@@ -28,6 +30,7 @@ class Driver:
     hold: int
     hold_from: str
     hold_chars: int = 0
+    packets: bool | None = False
 
 
 DRIVERS: dict[str, Driver] = {
@@ -39,6 +42,7 @@ DRIVERS: dict[str, Driver] = {
             "one flag covers a whole USB packet of up to 62 octets: an error is somewhere among the octets marked",
             17 * MS,
             "latency timer at its default of 16 ms + 1 ms USB",
+            packets=True,
         ),
         Driver(
             "cp210x",
@@ -54,13 +58,14 @@ DRIVERS: dict[str, Driver] = {
             4 * MS,
             "assumed for ch341",
         ),
-        Driver("pl2303", ALL, "one flag covers a whole USB transfer", 4 * MS, "assumed for pl2303"),
+        Driver("pl2303", ALL, "one flag covers a whole USB transfer", 4 * MS, "assumed for pl2303", packets=True),
         Driver(
             "cdc_acm",
             ("parity", "framing", "break", "overrun"),
             "one notification covers a whole transfer, and many devices send none",
             4 * MS,
             "assumed for cdc_acm",
+            packets=True,
         ),
         Driver("8250", ALL, "per octet", 1 * MS, "FIFO timeout of 4 characters + 1 ms of scheduling", 4),
         Driver("pl011", ALL, "per octet", 1 * MS, "FIFO timeout of 4 characters + 1 ms of scheduling", 4),
@@ -88,7 +93,9 @@ _ALIASES = {
 BY_VENDOR = {0x0403: "ftdi_sio", 0x10C4: "cp210x", 0x1A86: "ch341", 0x067B: "pl2303"}
 """USB vendor → driver, for systems that do not name one: how long the chip holds octets back is the same there."""
 
-UNKNOWN = Driver("", None, "unknown driver: errors may go unreported", 20 * MS, "assumed for an unknown driver")
+UNKNOWN = Driver(
+    "", None, "unknown driver: errors may go unreported", 20 * MS, "assumed for an unknown driver", packets=None
+)
 
 
 def find_driver(name: str) -> Driver:
@@ -106,7 +113,7 @@ def guess_driver(vendor: int | None) -> Driver:
     known = DRIVERS.get(BY_VENDOR.get(vendor or 0, ""))
     if known is None:
         return UNKNOWN
-    return replace(known, reports=None, detail="what this system's driver reports is not known")
+    return replace(known, reports=None, packets=None, detail="what this system's driver reports is not known")
 
 
 def _today(driver: Driver) -> Driver:

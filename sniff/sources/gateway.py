@@ -12,7 +12,7 @@ from typing import Protocol
 from urllib.parse import urlsplit
 
 from dissectors.line import MS, NS_PER_S, LineSettings
-from sniff.engine.session import Adapter, Item, LineEvent, LineEventKind
+from sniff.engine.session import Adapter, Item, LineEvent, LineEventKind, gone
 from sniff.sources import PortError
 from sniff.sources.clock import Clock
 from sniff.sources.reconnecting import Reconnecting
@@ -130,7 +130,7 @@ class GatewaySource:
             self._stream = None
             return [
                 *items,
-                LineEvent(self._again.lost(), LineEventKind.UNPLUGGED, f"{self.spec} is gone ({_reason(error)})"),
+                LineEvent(self._again.lost(), LineEventKind.UNPLUGGED, gone(self.spec, _reason(error))),
             ]
 
     def reconfigure(self, line: LineSettings) -> None:

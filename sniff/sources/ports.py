@@ -71,6 +71,7 @@ def describe_port(device: str, line: LineSettings | None = None) -> Adapter:
         reports=reports,
         detail=detail,
         serial_number=product.serial_number,
+        packets=driver.packets,
     )
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from dissectors.frame import Chunk
 from dissectors.line import MS, NS_PER_S, LineSettings
-from sniff.engine.session import Adapter, Item, LineEvent, LineEventKind
+from sniff.engine.session import Adapter, Item, LineEvent, LineEventKind, gone
 from sniff.sources import PortError
 from sniff.sources.clock import Clock
 from sniff.sources.identity import PortIdentity
@@ -184,7 +184,7 @@ class SerialSource:
         now = self._again.lost()
         # The number of a pseudo-terminal is soon given to somebody else's terminal: only a link made anew is followed.
         self._ended = self._pty and self._identity.link is None
-        return [*items, LineEvent(now, LineEventKind.UNPLUGGED, f"{self.device} is gone ({reason})")]
+        return [*items, LineEvent(now, LineEventKind.UNPLUGGED, gone(self.device, reason))]
 
     def _look(self) -> list[Item]:
         """Whether the port is there again."""

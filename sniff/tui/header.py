@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from enum import Enum
 from typing import ClassVar
 
 from rich.cells import cell_len
@@ -11,7 +12,7 @@ from textual.widget import Widget
 
 from sniff.bus.feed import FeedStatus
 from sniff.bus.rows import Store
-from sniff.engine.session import LineEventKind
+from sniff.engine.session import LineEventKind, gone_why
 from sniff.tui.analyzer import analyzer
 from sniff.tui.columns import fit
 from sniff.tui.plain import plain
@@ -25,17 +26,43 @@ REASON = 20
 PORT_EVENTS = (LineEventKind.UNPLUGGED, LineEventKind.REPLUGGED)
 
 
-def record_state(status: FeedStatus) -> str:
-    """One word or two: what happens to what comes in."""
+class RecordState(Enum):
+    """What happens to what comes in; the value is what people read."""
+
+    ENDED = "ENDED"
+    FILE = "FILE"
+    FAILS = "REC FAILS"
+    BEHIND = "REC BEHIND"
+    RECORDED = "REC"
+    NOT_RECORDED = "NOT REC"
+
+
+STATE_STYLES = {
+    RecordState.RECORDED: "bad",
+    RecordState.FAILS: "bad",
+    RecordState.BEHIND: "bad",
+    RecordState.NOT_RECORDED: "doubt",
+    RecordState.ENDED: "doubt",
+}
+
+
+def record_state(status: FeedStatus) -> RecordState:
+    """Whether what comes in is recorded, and how well."""
     if status.ended:
-        return "ENDED"
+        return RecordState.ENDED
     if not status.live:
-        return "FILE"
+        return RecordState.FILE
     if status.trouble:
-        return "REC FAILS"
+        return RecordState.FAILS
     if status.recording and status.behind:
-        return f"REC {status.behind:.0f} s BEHIND"
-    return "REC" if status.recording else "NOT REC"
+        return RecordState.BEHIND
+    return RecordState.RECORDED if status.recording else RecordState.NOT_RECORDED
+
+
+def state_words(status: FeedStatus) -> str:
+    """The same in a word or two, with how far the recording is behind."""
+    state = record_state(status)
+    return f"REC {status.behind:.0f} s BEHIND" if state is RecordState.BEHIND else state.value
 
 
 def progress_of(status: FeedStatus) -> str:
@@ -56,25 +83,20 @@ def why_ended(status: FeedStatus, store: Store) -> tuple[str, str]:
     if not of_port or of_port[-1].kind is not LineEventKind.UNPLUGGED:
         return status.ended, status.ended
     said = of_port[-1].text or "unplugged"
-    inner = said.rpartition("(")[2].removesuffix(")")  # "/dev/ttyUSB0 is gone (hung up)"
-    return inner, f"{said}; {status.ended}"
+    return gone_why(of_port[-1]) or said, f"{said}; {status.ended}"
 
 
 def status_line(status: FeedStatus, store: Store, viewing: Viewing, width: int) -> list[tuple[str, str]]:
     """Pieces of text with a style name each, together at most `width` cells: the port gives way first."""
-    state = record_state(status)
+    state, words = record_state(status), state_words(status)
     reason = plain(why_ended(status, store)[0])
-    style = "REC" if state.startswith("REC ") else state
-    shown_state = f"{state}: {fit(reason, min(cell_len(reason), REASON))}" if reason else state
+    shown_state = f"{words}: {fit(reason, min(cell_len(reason), REASON))}" if reason else words
     pieces = [
         *([(f"searching {plain(status.searching)} …", "doubt")] if status.searching else []),
         *([] if status.searching else [(plain(status.line), ""), (plain(status.protocol), "")]),
         (f"load {store.load.share():.0%}", ""),
         (f"err {store.error_total}", "bad" if store.error_total else ""),
-        (
-            shown_state,
-            {"REC": "bad", "NOT REC": "doubt", "ENDED": "doubt"}.get(style, ""),
-        ),
+        (shown_state, STATE_STYLES.get(state, "")),
         *([(progress, "")] if (progress := progress_of(status)) else []),
         *([(size(status.file_size), "")] if status.recording or not (status.live or progress) else []),
     ]

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain
 from pathlib import Path
-from types import ModuleType, SimpleNamespace
+from types import ModuleType
 
 import pytest
 
@@ -23,8 +23,9 @@ from sniff.engine.capture import CaptureError
 from sniff.engine.engine import Output, Row
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.observer import observe
-from sniff.engine.session import Adapter, LineEvent, Session
+from sniff.engine.session import Adapter, Item, LineEvent, Session
 from sniff.engine.table import Table
+from sniff.engine.table_join import TableJoin
 from sniff.formats import read
 from tests.bench import bulk_ascii, bulk_mstp, bulk_n2, bulk_rtu
 
@@ -39,70 +40,59 @@ NAMES = sorted(
 )
 
 
-def of_reference(path: Path) -> tuple[list[Row], list[Transaction], list[LineEvent]]:
-    capture = read(path)
-    rows: list[Row] = []
-    closed: list[Transaction] = []
-    events: list[LineEvent] = []
-    for item in outputs(capture.items(), capture.session):
-        if isinstance(item, Output):
-            rows += item.rows
-            closed += item.transactions
-        else:
-            events.append(item)
-    return rows, closed, events
+@dataclass(frozen=True)
+class Given:
+    """What both ways give of one capture, in order."""
+
+    session: Session
+    by_reference: list[Output | LineEvent]
+    by_tables: list[Table | LineEvent]
 
 
-def of_tables(path: Path) -> tuple[list[Row], list[Transaction], list[LineEvent]]:
-    capture = read(path)
-    rows: list[Row] = []
-    closed: list[Transaction] = []
-    events: list[LineEvent] = []
-    for item in tables(blocks_of(capture.items()), capture.session):
-        if isinstance(item, Table):
-            assert not len(item) or item.first == len(rows) + 1
-            rows += item.rows()
-            closed += [item.transaction(place) for place in range(len(item.transactions))]
-        else:
-            events.append(item)
-    return rows, closed, events
-
-
-@pytest.mark.parametrize("path", NAMES, ids=lambda path: path.name)
-def test_what_is_counted_over_tables_is_what_is_counted_over_rows(path: Path) -> None:
+@pytest.fixture(scope="module", params=NAMES, ids=lambda path: path.name)
+def given(request: pytest.FixtureRequest) -> Given:
+    """A capture, read once for all that is asked of it."""
     try:
-        session = read(path).session
-        by_rows, by_tables = Summary(session.line), Summary(session.line)
-        observe(outputs(read(path).items(), session), by_rows)
+        capture = read(request.param)
+        by_reference = list(outputs(capture.items(), capture.session))
     except CaptureError as error:
         pytest.skip(str(error))
-    for table in tables(blocks_of(read(path).items()), session):
-        if isinstance(table, Table):
-            by_tables.add_table(table)
+    capture = read(request.param)
+    return Given(capture.session, by_reference, list(tables(blocks_of(capture.items()), capture.session)))
+
+
+def test_what_is_counted_over_tables_is_what_is_counted_over_rows(given: Given) -> None:
+    by_rows, by_tables = Summary(given.session.line), Summary(given.session.line)
+    observe(given.by_reference, by_rows)
+    for item in given.by_tables:
+        if isinstance(item, Table):
+            by_tables.add_table(item)
         else:
-            by_tables.add_line_event(table)
+            by_tables.add_line_event(item)
     assert by_tables == by_rows
 
 
-@pytest.mark.parametrize("path", NAMES, ids=lambda path: path.name)
-def test_a_capture_gives_the_same_rows_as_tables(path: Path) -> None:
-    try:
-        expected_rows, expected_closed, expected_events = of_reference(path)
-    except CaptureError as error:
-        pytest.skip(str(error))
-    rows, closed, events = of_tables(path)
-    for row, expected in zip(rows, expected_rows, strict=True):
-        assert row == expected
-    assert closed == expected_closed
-    assert events == expected_events
+def test_a_capture_gives_the_same_rows_as_tables(given: Given) -> None:
+    expected = [one for one in given.by_reference if isinstance(one, Output)]
+    made = [one for one in given.by_tables if isinstance(one, Table)]
+    rows: list[Row] = []
+    for table in made:
+        assert not len(table) or table.first == len(rows) + 1
+        rows += table.rows()
+    for row, other in zip(rows, (row for one in expected for row in one.rows), strict=True):
+        assert row == other
+    closed = [table.transaction(place) for table in made for place in range(len(table.transactions))]
+    assert closed == [one for output in expected for one in output.transactions]
+    events = [one for one in given.by_tables if isinstance(one, LineEvent)]
+    assert events == [one for one in given.by_reference if isinstance(one, LineEvent)]
 
 
 def _mstp(damaged: float) -> tuple[Session, Reads]:
-    return Session("x", bulk_mstp.LINE, "mstp"), bulk_mstp.reads(12_000, damaged=damaged)
+    return Session("x", bulk_mstp.LINE, "mstp"), bulk_mstp.reads(4000, damaged=damaged)
 
 
 def _polled(
-    damaged: float, protocol: str, made: ModuleType, timing: Timing, count: int = 12_000
+    damaged: float, protocol: str, made: ModuleType, timing: Timing, count: int = 4000
 ) -> tuple[Session, Reads]:
     """A bus on which stations are asked in turn."""
     table, length = made.frames(count)
@@ -116,11 +106,11 @@ def _rtu(damaged: float, timing: Timing = bulk_rtu.TIMING) -> tuple[Session, Rea
 
 
 def _ascii(damaged: float, timing: Timing = bulk_ascii.TIMING) -> tuple[Session, Reads]:
-    return _polled(damaged, "modbus-ascii", bulk_ascii, timing, 6000)
+    return _polled(damaged, "modbus-ascii", bulk_ascii, timing, 3000)
 
 
 def _n2(damaged: float, timing: Timing = bulk_n2.TIMING) -> tuple[Session, Reads]:
-    return _polled(damaged, "n2", bulk_n2, timing, 6000)
+    return _polled(damaged, "n2", bulk_n2, timing, 3000)
 
 
 def _hidden(damaged: float) -> tuple[Session, Reads]:
@@ -147,8 +137,8 @@ def test_long_buses_give_the_same_rows_as_tables(bus: Bus, damaged: float) -> No
     """With seams between blocks, and between columns and the reference."""
     session, reads = bus(damaged)
     begins, blocks = reads.begins, []
-    for begin in range(0, len(reads), 5000):
-        end = min(begin + 5000, len(reads))
+    for begin in range(0, len(reads), 1500):
+        end = min(begin + 1500, len(reads))
         octets = reads.octets[begins[begin] : begins[end]]
         blocks.append(Block(Reads(octets, reads.times[begin:end], reads.lengths[begin:end], reads.marked[begin:end])))
     rows: list[Row] = []
@@ -182,13 +172,21 @@ FILTERS = (
 )
 
 
+def _filtered(session: Session, items: list[Item], parts: Iterable[Block | LineEvent]) -> None:
+    """Every filter, over rows that the reference gave and over tables of the same."""
+    everything = list(settled(items, session))
+    made = [one for one in tables(parts, session) if isinstance(one, Table)]
+    for text in FILTERS:
+        wanted = compile_filter(text, dissector_for(session))
+        join = TableJoin(wanted)
+        found = [one for table in made for one in join.add(table)] + list(join.flush())
+        assert found == [one for one in everything if wanted(one.row, one.transaction)], text
+
+
 @pytest.mark.parametrize("path", sorted(CAPTURES.rglob("*.cap.txt"))[::4], ids=lambda path: path.name)
 def test_a_filter_over_tables_accepts_what_it_accepts_row_by_row(path: Path) -> None:
-    capture = read(path)
-    for text in FILTERS:
-        wanted = compile_filter(text, dissector_for(capture.session))
-        by_rows = list(settled(capture.items(), capture.session, None, wanted))
-        assert list(settled_in_bulk(capture, capture.session, None, wanted)) == by_rows, text
+    items = list(read(path).items())
+    _filtered(read(path).session, items, blocks_of(items))
 
 
 @pytest.mark.parametrize("bus", [_mstp, _rtu])
@@ -196,8 +194,12 @@ def test_a_filter_over_long_buses_accepts_the_same(bus: Bus) -> None:
     session, whole = bus(0.01)
     part, octets = slice(0, 3000), whole.octets[: whole.begins[3000]]
     block = Block(Reads(octets, whole.times[part], whole.lengths[part], whole.marked[part]))
-    source = SimpleNamespace(items=block.chunks, blocks=lambda: iter([block]))
-    for text in FILTERS:
-        wanted = compile_filter(text, dissector_for(session))
-        by_rows = list(settled(block.chunks(), session, None, wanted))
-        assert list(settled_in_bulk(source, session, None, wanted)) == by_rows, text
+    _filtered(session, list(block.chunks()), [block])
+
+
+def test_who_asks_for_a_filter_gets_its_rows() -> None:
+    capture = read(CAPTURES / "rtu-usual-faults.cap.txt")
+    wanted = compile_filter("!ok", dissector_for(capture.session))
+    by_rows = list(settled(capture.items(), capture.session, None, wanted))
+    assert by_rows
+    assert list(settled_in_bulk(capture, capture.session, None, wanted)) == by_rows

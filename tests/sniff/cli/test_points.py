@@ -105,6 +105,34 @@ def test_convert_writes_the_values(sniff485: Run, drive: Path, tmp_path: Path) -
     assert "drive 1: run, reverse" in sniff485("show", target).out
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("redissect",),
+        ("merge",),
+        ("cut", "--frames", "1-100"),
+        ("recover",),
+        ("anonymise",),
+        ("recover", "--reference"),
+    ],
+)
+def test_what_is_made_of_a_recording_keeps_its_values(
+    sniff485: Run, drive: Path, tmp_path: Path, words: tuple[str, ...]
+) -> None:
+    from mcap.reader import make_reader
+
+    source, target = tmp_path / "drive.mcap", tmp_path / "made.mcap"
+    assert sniff485("convert", drive, source, "-d", "1=teco-e510").code == 0
+    assert sniff485(*words, source, "-o", target).code == 0
+    with target.open("rb") as stream:
+        found = [
+            json.loads(message.data)["value"]
+            for _, channel, message in make_reader(stream).iter_messages()
+            if channel.topic.endswith("/1/output-frequency")
+        ]
+    assert found == [60.0, 20.0]
+
+
 def test_a_file_may_not_name_a_profile_by_path(sniff485: Run, drive: Path, tmp_path: Path) -> None:
     from dataclasses import replace
 

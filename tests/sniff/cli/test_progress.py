@@ -20,10 +20,15 @@ class Terminal(io.StringIO):
         return True
 
 
-def watched(stream: io.StringIO, step: float) -> list[Any]:
+def watched(stream: io.StringIO, step: float, prints: bool = False) -> list[Any]:
     seconds = (step * turn for turn in count())
     capture: Any = SimpleNamespace(items=lambda: iter(CHUNKS))
-    return list(Watched(capture, stream, lambda: next(seconds)).items())
+    got = []
+    for item in Watched(capture, stream, lambda: next(seconds), prints).items():
+        got.append(item)
+        if prints:
+            stream.write("a row\n")
+    return got
 
 
 def test_what_takes_long_is_told_and_wiped_at_the_end() -> None:
@@ -39,3 +44,12 @@ def test_what_takes_long_is_told_and_wiped_at_the_end() -> None:
 def test_nothing_is_said_of_what_is_quick_or_where_nobody_looks(stream: io.StringIO, step: float) -> None:
     assert watched(stream, step) == CHUNKS
     assert stream.getvalue() == ""
+
+
+def test_no_row_lands_behind_what_is_told() -> None:
+    terminal = Terminal()
+    watched(terminal, 0.3, prints=True)
+    assert "reading: 40 octets" in terminal.getvalue()
+    *rows, _ = terminal.getvalue().split("\n")
+    assert len(rows) == len(CHUNKS)
+    assert all(row == "a row" or row.endswith("\r\x1b[Ka row") for row in rows)

@@ -18,7 +18,7 @@ from sniff.formats import read
 from sniff.recording.batch import LONGEST, MOST_TIME, Batcher, Message
 from sniff.recording.block_batches import add_block
 from sniff.recording.frame_columns import messages
-from sniff.recording.frames import FrameBatch
+from sniff.recording.frames import EVENTS, TRANSACTIONS, FrameBatch
 
 CAPTURES = sorted((Path(__file__).parents[3] / "captures").glob("*.cap.txt"))
 
@@ -62,6 +62,11 @@ def test_blocks_make_the_messages_of_their_reads(given_items: list[Item]) -> Non
     assert made + in_blocks.close() == expected + one_by_one.close()
 
 
+def _texts_used(batch: FrameBatch) -> set[int]:
+    tables = ((EVENTS, batch.events), (TRANSACTIONS, batch.transactions))
+    return {0}.union(*(values[one.name] for columns, values in tables for one in columns if one.kind == "text"))
+
+
 @pytest.mark.parametrize("path", CAPTURES, ids=lambda path: path.name)
 def test_frames_of_tables_are_the_rows(path: Path) -> None:
     capture = read(path)
@@ -79,6 +84,7 @@ def test_frames_of_tables_are_the_rows(path: Path) -> None:
             batch = FrameBatch.decode(data)
             assert batch is not None
             rows += batch.rows(octets)
+            assert _texts_used(batch) == {0, *range(1, len(batch.strings) + 1)}
             closed += len(list(batch.transaction_values()))
         assert closed >= len(table.transactions)
         offset += len(table.octets)

@@ -10,7 +10,7 @@ from rich.cells import cell_len
 
 from sniff.bus.feed import FeedStatus
 from sniff.engine.session import LineEvent, LineEventKind
-from sniff.tui.header import record_state, status_line, why_ended
+from sniff.tui.header import state_words, status_line, why_ended
 from sniff.tui.viewing import Viewing
 
 LIVE = FeedStatus("/dev/ttyUSB0", "19200,8E1", "modbus-rtu", "/tmp/x.mcap", 12_345_678, live=True)
@@ -42,7 +42,7 @@ def test_frozen_says_how_many_rows_came(busy_bus: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    ("status", "state"),
+    ("status", "words"),
     [
         (LIVE, "REC"),
         (FeedStatus("p", "l", "n2", live=True), "NOT REC"),
@@ -53,8 +53,8 @@ def test_frozen_says_how_many_rows_came(busy_bus: Any) -> None:
         (FeedStatus("p", "l", "n2", "/x", live=True, ended="unplugged"), "ENDED"),
     ],
 )
-def test_record_state(status: FeedStatus, state: str) -> None:
-    assert record_state(status) == state
+def test_what_happens_to_what_comes_in(status: FeedStatus, words: str) -> None:
+    assert state_words(status) == words
 
 
 @pytest.mark.parametrize("width", [40, 60, 80, 120])
