@@ -31,8 +31,8 @@ Words = npt.NDArray[np.uint16]
 class Block:
     """One stretch of registers, as one question asks for it again and again.
 
-    `device`, `space`, `first`: whose, and the first register, as on the wire. `times`: ns; `rows`: the words of each
-    answer. `written`: registers that a master was seen to write. `count`: answers, those let go too.
+    `device`, `space`, `first`, `width`: whose, and which registers, as on the wire. `times`: ns; `rows`: the words of
+    each answer that is kept. `count`: answers, those let go too.
     """
 
     device: int
@@ -61,11 +61,15 @@ class Block:
 
 
 class RegisterSeries:
-    """Fed the samples of one bus or more; gives blocks. `written`: device, space, register of what a master wrote."""
+    """Fed the samples of one bus or more; gives blocks. `written`: device, space, register of what a master wrote.
+
+    `objects`: by device, what it told that is no register: its kinds of objects.
+    """
 
     def __init__(self) -> None:
         self._blocks: dict[tuple[int, str, int, int], Block] = {}
         self.written: set[tuple[int, str, int]] = set()
+        self.objects: dict[int, set[str]] = {}
 
     def of(self, dissector: Dissector) -> SeriesReader:
         """An observer that feeds it what a bus answers."""
@@ -76,7 +80,11 @@ class RegisterSeries:
         run: list[Sample] = []
         for sample in samples:
             reading = sample.value.reading
-            if sample.device is None or reading.space not in WORD_SPACES or reading.raw is None or sample.value.bit:
+            if sample.device is None:
+                continue
+            if reading.space not in WORD_SPACES:
+                self.objects.setdefault(sample.device, set()).add(reading.space)
+            if reading.space not in WORD_SPACES or reading.raw is None or sample.value.bit:
                 continue
             if reading.how is How.WRITE:
                 self.written.add((sample.device, reading.space, reading.address))
