@@ -146,9 +146,9 @@ class StatusHeader(Widget):
         else:  # closer together, then as much of each as fits, then the numbers alone
             for most in range(max(len(label) for label, _ in tabs), SHORTEST, -1):
                 labels = [f"[{label}]" if here else label[:most] for label, here in tabs]
-                if sum(map(len, labels)) + len(labels) - 1 <= width:
+                if sum(map(len, labels)) + len(labels) <= width:
                     break
-            if sum(map(len, labels)) + len(labels) - 1 > width:
+            if sum(map(len, labels)) + len(labels) > width:
                 labels = [f"[{label}]" if here else label.split()[0] for label, here in tabs]
             labels = [label + " " for label in labels]
         text = Text(end="")

@@ -58,7 +58,7 @@ def test_an_unknown_start_screen_is_refused(busy_bus: Any) -> None:
 
 def test_back_walks_the_screens_and_then_quits(look: Any, busy_bus: Any) -> None:
     async def script(see: Any) -> None:
-        await see.press("2", "3", "8", "2")
+        await see.press("2", "3", "9", "2")
         for before in ("line", "nodes", "transactions", "frames"):
             await see.press("q")
             assert see.app.current_mode == before
