@@ -1,7 +1,8 @@
 """list: what there is. show NAME: registers, objects, limits. check FILE…: whether profiles are right. guess CAPTURE…:
 which profiles fit the stations that were heard. draft CAPTURE…: a profile of a station that has none, from what its
-registers did; types, orders and uses are guesses, with how sure. Own profiles: ./profiles/NAME.toml, or the user's
-folder.
+registers did; types, orders and uses are guesses, with how sure. import MAP: a profile out of a register map: a table
+as CSV with headings (address, name, type, scale, unit, function …), or Home Assistant's modbus: YAML. Own profiles:
+./profiles/NAME.toml, or the user's folder.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from dissectors.profiles.decoding import number, plain_name
 from dissectors.profiles.parsing import is_name
 from sniff.analysis.plain import plain
 from sniff.bus.offline import survey
-from sniff.cli import UNREADABLE, USAGE, Failure, arguments, json_output, tables, writing
+from sniff.cli import UNREADABLE, USAGE, Failure, arguments, json_output, register_maps, tables, writing
 from sniff.cli.progress import Watched
 from sniff.devices import UnknownProfile, available, find, read
 from sniff.engine.follow_settings import dissector_for
@@ -33,7 +34,7 @@ ENTRY_HEADINGS = ("place", "point", "unit", "range", "access", "what")
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
-    """`list`, `show`, `check`, `guess` and `draft`."""
+    """`list`, `show`, `check`, `guess`, `draft` and `import`."""
     actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
     listing = actions.add_parser("list", help="profiles by name, with where they are from")
     listing.add_argument("--json", action="store_true", help="one JSON object a profile")
@@ -55,11 +56,15 @@ def configure(parser: argparse.ArgumentParser) -> None:
     draft.add_argument(
         "--table", choices=["holding", "input"], help="only these registers, where both tables were read"
     )
-    _add_document(draft)
+    _add_document(draft, "device")
+    register_maps.configure(
+        actions.add_parser("import", help="a profile out of a register map: CSV, Home Assistant's YAML"), _add_document
+    )
 
 
-def _add_document(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--name", type=_profile_name, default="device", help="of the profile (default: device)")
+def _add_document(parser: argparse.ArgumentParser, name: str | None) -> None:
+    usual = name or "that of the file"
+    parser.add_argument("--name", type=_profile_name, default=name, help=f"of the profile (default: {usual})")
     parser.add_argument("-w", "--write", metavar="FILE", type=Path, help="write it there instead of standard output")
     parser.add_argument("-f", "--force", action="store_true", help="overwrite FILE")
 
@@ -72,8 +77,9 @@ def _profile_name(text: str) -> str:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Do one of the five."""
-    return {"list": _list, "show": _show, "check": _check, "guess": _guess, "draft": _draft}[args.action](args)
+    """Do one of the six."""
+    actions = {"list": _list, "show": _show, "check": _check, "guess": _guess, "draft": _draft}
+    return {**actions, "import": register_maps.run}[args.action](args)
 
 
 def _list(args: argparse.Namespace) -> int:
@@ -269,23 +275,13 @@ def _draft(args: argparse.Namespace) -> int:
     if not chosen:
         raise Failure(f"{', '.join(args.files)}: {_nothing_to_draft(args, series, stations)}", UNREADABLE)
     document = drafted(args.name, next(iter(families)), list(protocols), chosen)
-    _write_document(args, document)
+    register_maps.write_document(args, document)
     if args.write is not None:
         sure = sum(one.sure is Sure.SURE for one in chosen)
         print(f"sniff485: {len(chosen)} values drafted to {plain(args.write)}, {sure} of them sure", file=sys.stderr)
     if len({one.space for one in chosen}) > 1:
         print("sniff485: holding and input registers were read; each is described by itself", file=sys.stderr)
     return 0
-
-
-def _write_document(args: argparse.Namespace, document: str) -> None:
-    if args.write is None:
-        print(document, end="")
-        return
-    try:
-        args.write.write_text(document, encoding="utf-8")
-    except OSError as error:
-        raise Failure(f"{args.write}: {error.strerror or error}", UNREADABLE) from None
 
 
 def _nothing_to_draft(args: argparse.Namespace, series: RegisterSeries, stations: Sequence[int]) -> str:
