@@ -5,14 +5,21 @@ from __future__ import annotations
 import random
 import struct
 from collections.abc import Callable
+from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from dissectors.profiles.model import Kind
 from sniff.analysis.register_guess import RegisterGuess, Sure, Use, guessed
-from sniff.analysis.register_series import Block
+from sniff.analysis.register_series import Block, RegisterSeries
+from sniff.bus.offline import survey
+from sniff.engine.follow_settings import dissector_for
+from sniff.formats import read
+
+CAPTURES = Path(__file__).parents[3] / "captures"
 
 SECOND = 1_000_000_000
 Series = Callable[[random.Random, int], list[float]]
@@ -174,3 +181,29 @@ def test_every_register_of_all_blocks_has_one_guess(shapes: list[tuple[int, int,
         blocks.append(block)
     covered = [one.address + step for one in guessed(blocks, set()) for step in range(one.kind.registers)]
     assert covered == sorted({first + step for first, width, _ in shapes for step in range(width)})
+
+
+@pytest.mark.parametrize("name", ["rtu-clean", "rtu-usual-faults", "ascii-clean", "n2-clean", "rtu-noisy-ftdi"])
+def test_series_of_tables_are_those_of_rows(name: str) -> None:
+    def series(reference: bool) -> RegisterSeries:
+        capture = read(CAPTURES / f"{name}.cap.txt")
+        made = RegisterSeries()
+        survey(capture, capture.session, made.of(dissector_for(capture.session)), reference=reference)
+        return made
+
+    rows, columns = series(True), series(False)
+    assert list(rows.blocks()) == list(columns.blocks())
+    assert (rows.written, rows.objects) == (columns.written, columns.objects)
+
+
+@given(st.lists(st.integers(0, 700), max_size=5))
+def test_many_answers_are_thinned_as_one_by_one(parts: list[int]) -> None:
+    one, many = Block(1, "holding", 0, 1), Block(1, "holding", 0, 1)
+    at = 0
+    for part in parts:
+        times = np.arange(at, at + part, dtype=np.int64)
+        for time in times.tolist():
+            one.add(time, (time & 0xFFFF,))
+        many.add_many(times, (times & 0xFFFF).astype(np.uint16).reshape(-1, 1))
+        at += part
+    assert one == many
