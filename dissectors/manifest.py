@@ -17,6 +17,7 @@ from dissectors.frame import Frame, Header, Role
 from dissectors.framer import Framer
 from dissectors.line import Timing
 from dissectors.pseudonyms import Renamer
+from dissectors.questions import Questions
 from dissectors.readings import Readings, Refusal
 from dissectors.token_ring import TokenRing
 from dissectors.tracker import Tracker
@@ -68,6 +69,7 @@ class Dissector:
     `ring`: how its token ring is watched and shown, if it passes a token.
     `readings`: what exchanges say of the things inside a station; `refusal`: the code with which one refuses.
     `reading_columns`: `readings` of many exchanges at once, as far as they are plain registers or say nothing.
+    `questions`: what its requests ask, without the values that they carry.
     `packet_file`: how its frames lie in packet files.
     `renamer`: makes what gives stations other numbers and blanks texts, checks made right again.
     `kernel`: framer and peek for clean stretches of many frames at once (`dissectors/columns.py`).
@@ -95,6 +97,7 @@ class Dissector:
     readings: Readings | None = None
     reading_columns: BulkReadings | None = None
     refusal: Refusal | None = None
+    questions: Questions | None = None
     packet_file: PacketFile | None = None
     renamer: Callable[[], Renamer] | None = None
     makers: Mapping[str, Callable[..., bytes]] = field(default_factory=dict)

@@ -20,6 +20,7 @@ from dissectors.bacnet.summary import text
 from dissectors.bacnet.tracker import MstpTracker
 from dissectors.frame import Frame
 from dissectors.manifest import Dissector, PacketFile, on_first_use
+from dissectors.questions import Questions
 from dissectors.token_ring import TokenRing
 
 __all__ = [
@@ -41,6 +42,9 @@ __all__ = [
 packet = on_first_use("dissectors.bacnet.packets:packet")
 kernel = on_first_use("dissectors.bacnet.kernel:kernel")
 reading_columns = on_first_use("dissectors.bacnet.reading_columns:reading_columns")
+questions = Questions(
+    on_first_use("dissectors.bacnet.questions:question"), on_first_use("dissectors.bacnet.questions:stems")
+)
 pairing = on_first_use("dissectors.bacnet.block_pairing:pairing")
 
 
@@ -77,6 +81,7 @@ MSTP = Dissector(
     ring=RING,
     readings=readings,
     reading_columns=reading_columns,
+    questions=questions,
     packet_file=PacketFile((165, 252), "mstp", least=8, longer=True),
     renamer=MstpRenamer,
     makers={"mstp": frame},

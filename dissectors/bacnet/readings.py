@@ -16,7 +16,7 @@ from dissectors.bacnet.values import BitString, Date, Double, Enumerated, Object
 from dissectors.frame import Frame
 from dissectors.readings import How, Reading
 
-_PRESENT_VALUE = 85
+PRESENT_VALUE = 85
 _READ, _READ_MULTIPLE, _WRITE, _WRITE_MULTIPLE = 12, 14, 15, 16
 _CONFIRMED_COV, _UNCONFIRMED_COV = 1, 2
 
@@ -125,7 +125,7 @@ def _reading(
 ) -> Reading | None:
     space, _, number = str(thing).partition(",")
     which = record["property-identifier"]
-    part = "" if which.value == _PRESENT_VALUE else str(which) + (f".{index}" if index is not None else "")
+    part = "" if which.value == PRESENT_VALUE else str(which) + (f".{index}" if index is not None else "")
     raw, shown = _shown(value)
     if shown is None:
         return None

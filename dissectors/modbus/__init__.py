@@ -15,6 +15,7 @@ from dissectors.modbus.renamer import AsciiRenamer, RtuRenamer
 from dissectors.modbus.rules import RULES
 from dissectors.modbus.text import text
 from dissectors.modbus.tracker import ModbusTracker
+from dissectors.questions import Questions
 
 __all__ = [
     "ASCII",
@@ -36,6 +37,9 @@ pairing = on_first_use("dissectors.modbus.block_pairing:rtu_pairing")
 judge = on_first_use("dissectors.modbus.judging_columns:BulkModbusFindings")
 ascii_kernel = on_first_use("dissectors.modbus.ascii_kernel:kernel")
 ascii_pairing = on_first_use("dissectors.modbus.block_pairing:ascii_pairing")
+question = on_first_use("dissectors.modbus.questions:question")
+rtu_questions = Questions(question, on_first_use("dissectors.modbus.questions:rtu_stems"))
+ascii_questions = Questions(question, on_first_use("dissectors.modbus.questions:ascii_stems"))
 reading_columns = on_first_use("dissectors.modbus.reading_columns:reading_columns")
 
 
@@ -77,6 +81,7 @@ RTU = Dissector(
     readings=readings,
     reading_columns=reading_columns,
     refusal=refusal,
+    questions=rtu_questions,
     kernel=kernel,
     pairing=pairing,
 )
@@ -101,6 +106,7 @@ ASCII = Dissector(
     rules=RULES,
     readings=readings,
     refusal=refusal,
+    questions=ascii_questions,
     kernel=ascii_kernel,
     pairing=ascii_pairing,
 )

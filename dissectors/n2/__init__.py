@@ -15,6 +15,7 @@ from dissectors.n2.renamer import N2Renamer
 from dissectors.n2.rules import RULES
 from dissectors.n2.text import text
 from dissectors.n2.tracker import N2Tracker
+from dissectors.questions import Questions
 
 __all__ = [
     "N2",
@@ -34,6 +35,7 @@ __all__ = [
 packet = on_first_use("dissectors.n2.packets:packet")
 judge = on_first_use("dissectors.n2.judging_columns:BulkN2Findings")
 kernel = on_first_use("dissectors.n2.kernel:kernel")
+questions = Questions(on_first_use("dissectors.n2.questions:question"))
 pairing = on_first_use("dissectors.n2.block_pairing:pairing")
 
 
@@ -59,6 +61,7 @@ N2 = Dissector(
     rules=RULES,
     readings=readings,
     refusal=refusal,
+    questions=questions,
     renamer=N2Renamer,
     makers={"n2": make_command, "n2-answer": make_answer},
     scenarios=on_first_use("dissectors.n2.scenario:scenarios"),

@@ -59,21 +59,21 @@ def _commanded(command: Command) -> tuple[Reading, ...]:
     value = command.value
     if value is None or command.region is None or command.object is None:
         return ()
-    part = _part(command.region, command.attribute)
+    part = part_of(command.region, command.attribute)
     return (Reading(region_name(command.region), command.object, _raw(value), value, How.WRITE, part),)
 
 
 def _read(told: Interpretation) -> tuple[Reading, ...]:
     if told.value is None or told.region is None or told.object is None:
         return ()
-    part, value = _part(told.region, told.attribute), told.value
+    part, value = part_of(told.region, told.attribute), told.value
     space = region_name(told.region)
     if told.region in _BINARY and not part and isinstance(value, int):
         return (Reading(space, told.object, value, value >> _STATE_BIT & 1, How.READ, sure=False),)
     return (Reading(space, told.object, _raw(value), value, How.READ, part),)
 
 
-def _part(region: int, attribute: int | None) -> str:
+def part_of(region: int, attribute: int | None) -> str:
     """Empty for the value itself, else the attribute's name."""
     known = REGIONS.get(region)
     if attribute is None or (known is not None and attribute == known.current):

@@ -59,17 +59,20 @@ def _modbus(modbus: Table) -> tuple[list[Entry], tuple[str, ...]]:
     offset = modbus.whole("address-offset", 0)
     tables = modbus.texts("tables", ("holding",))
     entries: list[Entry] = []
+    unknown: set[str] = set()
     for table in modbus.tables("register"):
-        entries += [_register(table, space, offset, modbus) for space in tables]
+        own = table.texts("tables", tables)  # where a number means one thing in one table, another in the other
+        unknown |= set(own)
+        entries += [_register(table, space, offset, modbus) for space in own]
     described = {entry.address for entry in entries}
     absent: list[str] = []
     for table in modbus.tables("parameters"):
         more, missing = _parameters(table, offset, tables, modbus)
         entries += [entry for entry in more if entry.address not in described]
         absent += missing
-    unknown = set(tables) - {*REGISTER_TABLES, *BIT_TABLES}
+    unknown = (unknown | set(tables)) - {*REGISTER_TABLES, *BIT_TABLES}
     if unknown:
-        raise modbus.error("tables", f"{', '.join(unknown)}: expected holding, input, coil or discrete")
+        raise modbus.error("tables", f"{', '.join(sorted(unknown))}: expected holding, input, coil or discrete")
     return entries, tuple(absent)
 
 
@@ -318,9 +321,14 @@ def _check(profile: Profile) -> None:
             )
 
 
+def is_name(text: str) -> bool:
+    """Whether a profile, or something in it, can have this name."""
+    return _NAME.fullmatch(text) is not None
+
+
 def _name(table: Table, key: str) -> str:
     name = table.text(key)
-    if not _NAME.fullmatch(name):
+    if not is_name(name):
         raise table.error(key, f"{name!r}: expected letters, digits, dots and hyphens")
     return name
 

@@ -8,10 +8,13 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from dissectors.columns import NONE, Codes, Masks, Numbers, Times
+from dissectors.histogram import Histogram
 from dissectors.profiles.decoding import Quality, Value, plain_name
 from dissectors.reading_columns import HOWS
-from dissectors.readings import Reading
-from sniff.analysis.points import HISTORY, Key, PointTable, Sample, station_name
+from dissectors.readings import How, Reading
+from sniff.analysis.points import HISTORY, Key, PointTable, Run, Sample, station_name
+
+_WRITE = HOWS.index(How.WRITE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,8 +137,13 @@ class _Run:
         last = next(plain.take(places[-1:]).samples())
         newest = places[-HISTORY:]
         history = list(zip(plain.time[newest].tolist(), plain.raw[newest].astype(float).tolist(), strict=True))
-        first = int(raws[0]), int(plain.time[places[0]])
-        table.add_run(self.key, last, len(places), first, changed, history)
+        times = plain.time[places]
+        first = int(raws[0]), int(times[0])
+        every = Histogram()
+        every.add_many(np.diff(times))
+        written = int(np.count_nonzero(plain.how[places] == _WRITE))
+        seen = Run(len(places), every, float(raws.min()), float(raws.max()), written)
+        table.add_run(self.key, last, first, changed, history, seen)
 
 
 def _runs(plain: PlainSamples, keys: Sequence[Key], which: Times) -> Iterator[_Run]:

@@ -10,8 +10,12 @@ import math
 from collections import OrderedDict, deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import NamedTuple
 
 from dissectors.frame import Frame, Role
+from dissectors.histogram import Histogram
+from dissectors.line import NS_PER_S
 from dissectors.manifest import Dissector
 from dissectors.profiles import Devices, Entry
 from dissectors.profiles.decoding import Quality, Value, decode, say
@@ -26,7 +30,7 @@ MOST_ASKED = 512
 """Requests remembered after their transaction closed, for answers that come late."""
 
 MOST_POINTS = 50_000
-HISTORY = 60
+HISTORY = 120
 BROADCAST = 0
 
 ALL = "all"
@@ -196,15 +200,30 @@ def words(dissector: Dissector, devices: Devices, row: Row, request: Frame | Non
     return f"{who}: {said}" if said else ""
 
 
+class Run(NamedTuple):
+    """Samples of one point that follow one another, as in `Point`."""
+
+    samples: int
+    every: Histogram
+    low: float
+    high: float
+    written: int
+
+
 @dataclass(slots=True)
 class Point:
     """The latest of one point. `changed`: ns, when its value last became another one, 0 when it never did; `history`:
-    (ns, value). `first`: value and time, ns, of the earliest sample."""
+    (ns, value). `first`: value and time, ns, of the earliest sample. `every`: ns from one sample to the next; `low`,
+    `high`: of its numbers; `written`: how many of the samples a master wrote."""
 
     sample: Sample
     count: int = 0
     changed: int = 0
     history: deque[tuple[int, float]] = field(default_factory=lambda: deque(maxlen=HISTORY))
+    every: Histogram = field(default_factory=Histogram)
+    low: float | None = None
+    high: float | None = None
+    written: int = 0
     first: tuple[int | float | str, int] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -225,18 +244,56 @@ class Point:
         """Of the latest sample."""
         return self.sample.value.quality
 
+    @property
+    def interval(self) -> int | None:
+        """From one sample to the next as it usually is, ns; None where there was but one."""
+        return self.every.quantile(0.5)
+
+    @property
+    def jitter(self) -> int | None:
+        """By how much nine of ten intervals differ, halved: ± ns; None with less than three samples."""
+        low, high = self.every.quantile(0.05), self.every.quantile(0.95)
+        return None if low is None or high is None or self.every.count < 2 else (high - low) // 2
+
+    @property
+    def rate(self) -> float | None:
+        """Mean change a second, up and down, lately; None where no time went by."""
+        if len(self.history) < 2 or self.history[-1][0] <= self.history[0][0]:
+            return None
+        moved = sum(abs(now - was) for (_, was), (_, now) in pairwise(self.history))
+        return moved * NS_PER_S / (self.history[-1][0] - self.history[0][0])
+
     def add(self, sample: Sample) -> None:
         """Take a later sample."""
-        if self.count and sample.value.value != self.sample.value.value:
-            self.changed = sample.time
+        if self.count:
+            self.every.add(sample.time - self.sample.time)
+            if sample.value.value != self.sample.value.value:
+                self.changed = sample.time
         self.sample = sample
         self.count += 1
+        self.written += sample.value.how is How.WRITE
         if sample.finite and not isinstance(sample.value.value, str):
-            self.history.append((sample.time, float(sample.value.value)))
+            number = float(sample.value.value)
+            self.history.append((sample.time, number))
+            self.reach(number, number)
+
+    def reach(self, low: float, high: float) -> None:
+        """Its numbers went from `low` to `high`."""
+        self.low = low if self.low is None else min(self.low, low)
+        self.high = high if self.high is None else max(self.high, high)
 
     def copy(self) -> Point:
         """The same, which goes on by itself."""
-        copy = Point(self.sample, self.count, self.changed, self.history.copy())
+        copy = Point(
+            self.sample,
+            self.count,
+            self.changed,
+            self.history.copy(),
+            self.every.copy(),
+            self.low,
+            self.high,
+            self.written,
+        )
         copy.first = self.first
         return copy
 
@@ -246,6 +303,11 @@ class Point:
             self.changed = later.changed
         elif later.first[0] != self.sample.value.value:
             self.changed = later.first[1]
+        self.every = self.every.merge(later.every)
+        self.every.add(later.first[1] - self.sample.time)
+        if later.low is not None and later.high is not None:
+            self.reach(later.low, later.high)
+        self.written += later.written
         self.sample = later.sample
         self.count += later.count
         self.history.extend(later.history)
@@ -280,14 +342,15 @@ class PointTable:
         self,
         key: Key,
         last: Sample,
-        count: int,
         first: tuple[float, int],
         changed: int | None,
         history: Iterable[tuple[int, float]],
+        seen: Run,
     ) -> None:
-        """Take `count` samples of one point, numbers all, of which `last` is the last. `first`: value and time of the
+        """Take samples of one point, numbers all, of which `last` is the last. `first`: value and time of the
         first; `changed`: ns, of the last that was another one than the one before it among them, None where none was;
-        `history`: of the last `HISTORY`."""
+        `history`: of the last `HISTORY`; `seen`: what they add up to."""
+        count = seen.samples
         point = self._points.get(key)
         if point is None:
             if len(self._points) >= MOST_POINTS:
@@ -295,13 +358,18 @@ class PointTable:
                 return
             point = self._points[key] = Point(last)
             point.first = first
-        elif point.sample.value.value != first[0]:
-            point.changed = first[1]
+        else:
+            point.every.add(first[1] - point.sample.time)
+            if point.sample.value.value != first[0]:
+                point.changed = first[1]
         if changed is not None:
             point.changed = changed
         point.sample = last
         point.count += count
         point.history.extend(history)
+        point.every = point.every.merge(seen.every)
+        point.reach(seen.low, seen.high)
+        point.written += seen.written
         self.version += count
 
     def merge(self, later: PointTable) -> PointTable:

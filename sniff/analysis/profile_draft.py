@@ -16,13 +16,15 @@ _USES = {
     Use.COUNTER: "only grows",
     Use.SETTING: "written by a master",
     Use.BITS: "single bits come and go",
-    Use.TEXT: "text",
 }
 
 
 def drafted(name: str, family: str, protocols: Sequence[str], guesses: Iterable[RegisterGuess]) -> str:
-    """The document for one device. `protocols`: registry names it was heard with; `family`: theirs (`Dissector`)."""
-    held = sorted(guesses, key=lambda one: (one.address, one.space != "holding"))
+    """The document for one device. `protocols`: registry names it was heard with; `family`: theirs (`Dissector`).
+
+    A register of one table is another thing than the one of the same number in the other table: each is described.
+    """
+    held = sorted(guesses, key=lambda one: (one.space != "holding", one.address))
     both = {one.space for one in held}
     tables = [space for space in ("holding", "input") if space in both] or ["holding"]
     lines = [
@@ -36,12 +38,8 @@ def drafted(name: str, family: str, protocols: Sequence[str], guesses: Iterable[
         f"[{family}]",
         f"tables = [{', '.join(map(_quoted, tables))}]",
     ]
-    done: set[int] = set()
     for guess in held:
-        places = set(range(guess.address, guess.address + guess.kind.registers))
-        if not places & done:  # in both tables: described once
-            done |= places
-            lines += ["", *_register(family, guess)]
+        lines += ["", *_register(family, guess, of_table=len(tables) > 1)]
     return "\n".join(lines) + "\n"
 
 
@@ -54,7 +52,7 @@ def told(guess: RegisterGuess) -> str:
     return f"{_HOW[guess.sure]}; {_USES[guess.use]}; {span} in {guess.answers} answers"
 
 
-def _register(family: str, guess: RegisterGuess) -> list[str]:
+def _register(family: str, guess: RegisterGuess, of_table: bool) -> list[str]:
     place = plain_name(guess.space, guess.address).replace("/", "-")
     lines = [
         f"# {told(guess)}",
@@ -62,6 +60,8 @@ def _register(family: str, guess: RegisterGuess) -> list[str]:
         f"address = 0x{guess.address:04X}",
         f"name = {_quoted(place)}",
     ]
+    if of_table:
+        lines.append(f"tables = [{_quoted(guess.space)}]")
     if guess.kind is not Kind.U16:
         lines.append(f"type = {_quoted(guess.kind.value)}")
     if guess.swapped:

@@ -6,7 +6,7 @@ runs through all its values while its neighbour stays where the exponents of usu
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
 
@@ -18,6 +18,7 @@ from sniff.analysis.register_series import Block, Words
 
 Floats = npt.NDArray[np.float64]
 Wide = npt.NDArray[np.int64]
+_Place = tuple[int, str, int]  # device, table, register
 
 ENOUGH = 8
 """Different values that a register must have shown before anything of it is sure."""
@@ -45,7 +46,6 @@ class Use(IntEnum):
     COUNTER = 2
     SETTING = 3  # a master writes it
     BITS = 4
-    TEXT = 5
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,18 +79,52 @@ _ORDERS = (_Order(False, False), _Order(True, False), _Order(True, True), _Order
 
 
 def guessed(blocks: Iterable[Block], written: set[tuple[int, str, int]]) -> Iterator[RegisterGuess]:
-    """A guess for each register that was read, the surest of all blocks that it is in; by device, table, register."""
-    best: dict[tuple[int, str, int], RegisterGuess] = {}
-    for block in blocks:
-        for guess in _of_block(block, written):
-            places = [(guess.device, guess.space, guess.address + step) for step in range(guess.kind.registers)]
-            held = {best[place] for place in places if place in best}
-            if all((guess.sure, guess.answers) > (one.sure, one.answers) for one in held):
-                for one in held:
-                    for step in range(one.kind.registers):
-                        best.pop((one.device, one.space, one.address + step), None)
-                best.update(dict.fromkeys(places, guess))
-    yield from (best[place] for place in sorted(best) if best[place].address == place[2])
+    """A guess for each register that was read, the surest of all blocks that it is in; by device, table, register.
+
+    Blocks that overlap may be read in ways that exclude each other. Then none of these is sure, and what the one that
+    is taken leaves over stands by itself.
+    """
+    held = list(blocks)
+    found = _undisputed([guess for block in held for guess in _of_block(block, written)])
+    taken: dict[_Place, RegisterGuess] = {}
+    for guess in sorted(found, key=lambda one: (-one.sure, -one.answers, one.device, one.space, one.address)):
+        if not any(place in taken for place in _places(guess)):
+            taken.update(dict.fromkeys(_places(guess), guess))
+    for guess in _left_over(held, taken, written):
+        taken[guess.device, guess.space, guess.address] = guess
+    yield from (taken[place] for place in sorted(taken) if taken[place].address == place[2])
+
+
+def _places(guess: RegisterGuess) -> list[_Place]:
+    return [(guess.device, guess.space, guess.address + step) for step in range(guess.kind.registers)]
+
+
+def _undisputed(found: Sequence[RegisterGuess]) -> list[RegisterGuess]:
+    """The guesses, none of them sure that shares a register with another sure one of another reading."""
+    readings: dict[_Place, set[tuple[int, Kind, bool, bool]]] = {}
+    for one in found:
+        for place in _places(one) if one.sure is Sure.SURE else ():
+            readings.setdefault(place, set()).add((one.address, one.kind, one.swapped, one.little))
+    disputed = {place for place, ways in readings.items() if len(ways) > 1}
+    return [
+        replace(one, sure=Sure.LIKELY) if one.sure is Sure.SURE and disputed & {*_places(one)} else one for one in found
+    ]
+
+
+def _left_over(
+    blocks: Iterable[Block], taken: Mapping[_Place, RegisterGuess], written: set[tuple[int, str, int]]
+) -> Iterator[RegisterGuess]:
+    """Registers whose guess gave way to one of another block, each by itself, as the block asked most often has it."""
+    done: set[_Place] = set()
+    for block in sorted(blocks, key=lambda one: -one.count):
+        for at in range(block.width):
+            place = block.device, block.space, block.first + at
+            if place in taken or place in done:
+                continue
+            done.add(place)
+            words, seconds = block.words, np.array(block.times, np.int64) / 1e9
+            guess = _guess(block, words, seconds, at, _one(words[:, at]), written)
+            yield replace(guess, sure=min(guess.sure, Sure.LIKELY))
 
 
 def _of_block(block: Block, written: set[tuple[int, str, int]]) -> list[RegisterGuess]:

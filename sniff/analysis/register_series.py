@@ -9,11 +9,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from dissectors.columns import NONE, Times, counted
+from dissectors.reading_columns import HOWS
 from dissectors.readings import How
 from sniff.analysis.points import PointReader, Sample
 
 if TYPE_CHECKING:
     from dissectors.manifest import Dissector
+    from sniff.analysis.point_columns import PlainSamples, TableSamples
     from sniff.engine.engine import Output
     from sniff.engine.session import LineEvent
     from sniff.engine.table import Table
@@ -24,6 +27,8 @@ MOST_SAMPLES = 512
 MOST_BLOCKS = 4096
 WORD_SPACES = ("holding", "input")
 
+_WRITE = HOWS.index(How.WRITE)
+
 Words = npt.NDArray[np.uint16]
 
 
@@ -31,8 +36,8 @@ Words = npt.NDArray[np.uint16]
 class Block:
     """One stretch of registers, as one question asks for it again and again.
 
-    `device`, `space`, `first`: whose, and the first register, as on the wire. `times`: ns; `rows`: the words of each
-    answer. `written`: registers that a master was seen to write. `count`: answers, those let go too.
+    `device`, `space`, `first`, `width`: whose, and which registers, as on the wire. `times`: ns; `rows`: the words of
+    each answer that is kept. `count`: answers, those let go too.
     """
 
     device: int
@@ -54,6 +59,19 @@ class Block:
             self.rows.append(words)
         self.count += 1
 
+    def add_many(self, times: Times, rows: Words) -> None:
+        """Take answers that follow one another; the same as one after the other."""
+        at = 0
+        while at < len(times):
+            skipped = -self.count % self._every  # none of these would be kept
+            if at + skipped >= len(times):
+                self.count += len(times) - at
+                return
+            at += skipped
+            self.count += skipped
+            self.add(int(times[at]), tuple(rows[at].tolist()))
+            at += 1
+
     @property
     def words(self) -> Words:
         """uint16[answers, width]."""
@@ -61,11 +79,15 @@ class Block:
 
 
 class RegisterSeries:
-    """Fed the samples of one bus or more; gives blocks. `written`: device, space, register of what a master wrote."""
+    """Fed the samples of one bus or more; gives blocks. `written`: device, space, register of what a master wrote.
+
+    `objects`: by device, what it told that is no register: its kinds of objects.
+    """
 
     def __init__(self) -> None:
         self._blocks: dict[tuple[int, str, int, int], Block] = {}
         self.written: set[tuple[int, str, int]] = set()
+        self.objects: dict[int, set[str]] = {}
 
     def of(self, dissector: Dissector) -> SeriesReader:
         """An observer that feeds it what a bus answers."""
@@ -76,7 +98,11 @@ class RegisterSeries:
         run: list[Sample] = []
         for sample in samples:
             reading = sample.value.reading
-            if sample.device is None or reading.space not in WORD_SPACES or reading.raw is None or sample.value.bit:
+            if sample.device is None:
+                continue
+            if reading.space not in WORD_SPACES:
+                self.objects.setdefault(sample.device, set()).add(reading.space)
+            if reading.space not in WORD_SPACES or reading.raw is None or sample.value.bit:
                 continue
             if reading.how is How.WRITE:
                 self.written.add((sample.device, reading.space, reading.address))
@@ -88,6 +114,50 @@ class RegisterSeries:
         if run:
             self._keep(run)
 
+    def add_samples(self, samples: TableSamples) -> None:
+        """Take those of a table."""
+        if any(sample.value.reading.space in WORD_SPACES for _, sample in samples.others):
+            self.add(samples.in_order())  # one that came late stands between others
+            return
+        self.add_columns(samples.plain)
+        self.add(sample for _, sample in samples.others)
+
+    def add_columns(self, plain: PlainSamples) -> None:
+        """Take samples of many exchanges; the same as one after the other."""
+        if not len(plain):
+            return
+        spaces = np.array([space in WORD_SPACES for space in plain.spaces])
+        of_station = plain.device != NONE
+        told = of_station & ~spaces[plain.space]
+        for (device, space), _ in counted(plain.device[told], plain.space[told]):
+            self.objects.setdefault(device, set()).add(plain.spaces[space])
+        words = plain.take(of_station & spaces[plain.space])
+        writes = words.how == _WRITE
+        for (device, space, address), _ in counted(words.device[writes], words.space[writes], words.address[writes]):
+            self.written.add((device, words.spaces[space], address))
+        self._keep_columns(words.take(~writes))
+
+    def _keep_columns(self, words: PlainSamples) -> None:
+        """Cut the columns where a sample is not the next register of the same answer, and keep the pieces by block."""
+        if not len(words):
+            return
+        follows = np.zeros(len(words), bool)
+        follows[1:] = words.address[1:] == words.address[:-1] + 1
+        for name in ("order", "frame", "device", "space"):
+            column = getattr(words, name)
+            follows[1:] &= column[1:] == column[:-1]
+        begins = np.flatnonzero(~follows)
+        widths = np.diff(np.append(begins, len(words)))
+        keys = np.stack([words.device[begins], words.space[begins], words.address[begins], widths], axis=1)
+        distinct, first, which = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+        which = which.reshape(-1)
+        for number in np.argsort(first).tolist():
+            device, space, address, width = distinct[number].tolist()
+            block = self._block((device, words.spaces[space], address, width))
+            if block is not None:
+                at = begins[which == number]
+                block.add_many(words.time[at], (words.raw[at[:, None] + np.arange(width)] & 0xFFFF).astype(np.uint16))
+
     def blocks(self) -> Iterator[Block]:
         """All blocks, by device, table and register."""
         return (self._blocks[key] for key in sorted(self._blocks))
@@ -96,12 +166,16 @@ class RegisterSeries:
         first = run[0]
         assert first.device is not None
         key = first.device, first.value.reading.space, first.value.reading.address, len(run)
-        block = self._blocks.get(key)
+        block = self._block(key)
         if block is None:
-            if len(self._blocks) >= MOST_BLOCKS:
-                return
-            block = self._blocks[key] = Block(*key)
+            return
         block.add(first.time, tuple((sample.value.reading.raw or 0) & 0xFFFF for sample in run))
+
+    def _block(self, key: tuple[int, str, int, int]) -> Block | None:
+        block = self._blocks.get(key)
+        if block is None and len(self._blocks) < MOST_BLOCKS:
+            block = self._blocks[key] = Block(*key)
+        return block
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,7 +193,7 @@ class SeriesReader:
         """Take many at once."""
         from sniff.analysis.table_points import samples_of
 
-        self.series.add(samples_of(self.reader, table).in_order())
+        self.series.add_samples(samples_of(self.reader, table))
 
     def add_line_event(self, event: LineEvent) -> None:
         """It says nothing of a register."""

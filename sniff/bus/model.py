@@ -11,6 +11,7 @@ from sniff.analysis.health import HealthReport, health_of
 from sniff.analysis.judging import Judging
 from sniff.analysis.load import KEPT_SECONDS
 from sniff.analysis.points import PointReader, PointTable, Sample
+from sniff.analysis.polls import Polls
 from sniff.analysis.summary import Summary
 from sniff.bus.telling_rows import telling_rows, telling_transactions
 from sniff.engine.engine import Output
@@ -24,7 +25,7 @@ class BusModel:
     """What is counted, found and measured on one bus.
 
     `summary`: counts, stations, load. `judging`: the rules. `reader`, `points`: values by device. `samples`: those that
-    the newest output completed. `version` changes whenever anything changed.
+    the newest output completed. `polls`: the master's programme. `version` changes whenever anything changed.
     """
 
     def __init__(
@@ -35,7 +36,7 @@ class BusModel:
         kept_seconds: int = KEPT_SECONDS,
         with_points: bool = True,
     ) -> None:
-        """`with_points`: else no values are read, which costs as much as a third of the judging."""
+        """`with_points`: else neither values nor requests are read, which costs as much as a third of the judging."""
         self._with_points = with_points
         self.devices = devices or Devices()
         self.summary = Summary(session.line, kept_seconds=kept_seconds)
@@ -49,6 +50,7 @@ class BusModel:
         self.dissector = dissector
         self.judging = Judging(session, dissector, self.devices)
         self.reader = PointReader(dissector, self.devices)
+        self.polls = Polls(dissector)
         self._found: tuple[int, tuple[Finding, ...]] = (-1, ())
 
     def settle(self, session: Session, dissector: Dissector) -> None:
@@ -65,6 +67,7 @@ class BusModel:
         if self._with_points:
             self.samples = self.reader.add(output)
             self.points.add(self.samples)
+            self.polls.add(output)
 
     def add_table(self, table: Table) -> None:
         """Take many rows at once."""
@@ -74,6 +77,7 @@ class BusModel:
         if self._with_points:
             self.samples = self.reader.add(telling_rows(table, telling_transactions(table)))
             self.points.add(self.samples)
+            self.polls.add_table(table)
 
     def add_line_event(self, event: LineEvent) -> None:
         """Take something that happened to the line."""

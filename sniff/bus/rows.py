@@ -23,6 +23,7 @@ from dissectors.tracker import Transaction, Verdict
 from sniff.analysis.load import Load
 from sniff.analysis.nodes import NodeTable
 from sniff.analysis.points import PointTable, words
+from sniff.analysis.polls import Polls
 from sniff.analysis.summary import Summary
 from sniff.analysis.wording import describe
 from sniff.bus.ascending import Ascending
@@ -257,6 +258,11 @@ class Store:
     def points(self) -> PointTable:
         """The latest values."""
         return self.model.points
+
+    @property
+    def polls(self) -> Polls:
+        """The master's programme."""
+        return self.model.polls
 
     def __len__(self) -> int:
         return self.kept.last_no - self.kept.first_no + 1

@@ -145,6 +145,13 @@ def positive(text: str) -> int:
     return int(text)
 
 
+def whole(text: str) -> int:
+    """argparse type for a number that may be 0."""
+    if not (text.isascii() and text.isdigit()):
+        raise argparse.ArgumentTypeError(f"{text!r}: expected a whole number, 0 or more")
+    return int(text)
+
+
 def rotation(text: str) -> str:
     """argparse type for --rotate."""
     from sniff.recording.rotation import Rotation

@@ -9,7 +9,7 @@ import argparse
 
 from sniff.bus.model import BusModel
 from sniff.bus.offline import survey
-from sniff.cli import arguments, tables
+from sniff.cli import arguments, tables, writing
 from sniff.cli.progress import Watched
 from sniff.devices import noted_devices
 from sniff.engine.follow_settings import dissector_for
@@ -39,6 +39,7 @@ def run(args: argparse.Namespace) -> int:
         model = BusModel(session, dissector_for(session), said.over(noted_devices(session)))
         survey(Watched(capture), session, model, reference=args.reference)
         arguments.say_assumed(session, path)
+        writing.say_incomplete(path, capture)
         sides.append(Side(path, model.summary, model.findings(), session.adapter.latency, tuple(model.points)))
     found = list(differences(*sides))
     rows = [(one.subject, one.what, one.before, one.after) for one in found]

@@ -1,7 +1,8 @@
 """list: what there is. show NAME: registers, objects, limits. check FILE…: whether profiles are right. guess CAPTURE…:
 which profiles fit the stations that were heard. draft CAPTURE…: a profile of a station that has none, from what its
-registers did; types, orders and uses are guesses, with how sure. Own profiles: ./profiles/NAME.toml, or the user's
-folder.
+registers did; types, orders and uses are guesses, with how sure. import MAP: a profile out of a register map: a table
+as CSV with headings (address, name, type, scale, unit, function …), or Home Assistant's modbus: YAML. Own profiles:
+./profiles/NAME.toml, or the user's folder.
 """
 
 from __future__ import annotations
@@ -10,20 +11,22 @@ import argparse
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from dissectors.line import MS
 from dissectors.profiles import Entry, Profile, ProfileError
 from dissectors.profiles.decoding import number, plain_name
-from sniff.analysis.profile_draft import drafted
-from sniff.analysis.profile_guess import Guess, Guessing
-from sniff.analysis.register_guess import Sure, guessed
-from sniff.analysis.register_series import RegisterSeries
+from dissectors.profiles.parsing import is_name
+from sniff.analysis.plain import plain
 from sniff.bus.offline import survey
-from sniff.cli import UNREADABLE, USAGE, Failure, arguments, json_output, tables
+from sniff.cli import UNREADABLE, USAGE, Failure, arguments, json_output, register_maps, tables, writing
 from sniff.cli.progress import Watched
 from sniff.devices import UnknownProfile, available, find, read
 from sniff.engine.follow_settings import dissector_for
+
+if TYPE_CHECKING:
+    from sniff.analysis.profile_guess import Guess
+    from sniff.analysis.register_series import RegisterSeries
 
 TIE = 0.1
 """Share by which a profile must fit better than another to be preferred."""
@@ -31,7 +34,7 @@ ENTRY_HEADINGS = ("place", "point", "unit", "range", "access", "what")
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
-    """`list`, `show`, `check`, `guess` and `draft`."""
+    """`list`, `show`, `check`, `guess`, `draft` and `import`."""
     actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
     listing = actions.add_parser("list", help="profiles by name, with where they are from")
     listing.add_argument("--json", action="store_true", help="one JSON object a profile")
@@ -49,14 +52,34 @@ def configure(parser: argparse.ArgumentParser) -> None:
     arguments.add_files(draft)
     arguments.add_line(draft)
     arguments.add_reference(draft)
-    draft.add_argument("--station", type=int, metavar="N", help="which one, where several were heard")
-    draft.add_argument("--name", default="device", help="of the profile (default: device)")
-    draft.add_argument("-w", "--write", metavar="FILE", type=Path, help="write it there instead of standard output")
+    draft.add_argument("--station", type=arguments.whole, metavar="N", help="which one, where several were heard")
+    draft.add_argument(
+        "--table", choices=["holding", "input"], help="only these registers, where both tables were read"
+    )
+    _add_document(draft, "device")
+    register_maps.configure(
+        actions.add_parser("import", help="a profile out of a register map: CSV, Home Assistant's YAML"), _add_document
+    )
+
+
+def _add_document(parser: argparse.ArgumentParser, name: str | None) -> None:
+    usual = name or "that of the file"
+    parser.add_argument("--name", type=_profile_name, default=name, help=f"of the profile (default: {usual})")
+    parser.add_argument("-w", "--write", metavar="FILE", type=Path, help="write it there instead of standard output")
+    parser.add_argument("-f", "--force", action="store_true", help="overwrite FILE")
+
+
+def _profile_name(text: str) -> str:
+    """argparse type for the name of a profile."""
+    if not is_name(text):
+        raise argparse.ArgumentTypeError(f"{text!r}: expected letters, digits, dots and hyphens")
+    return text
 
 
 def run(args: argparse.Namespace) -> int:
-    """Do one of the five."""
-    return {"list": _list, "show": _show, "check": _check, "guess": _guess, "draft": _draft}[args.action](args)
+    """Do one of the six."""
+    actions = {"list": _list, "show": _show, "check": _check, "guess": _guess, "draft": _draft}
+    return {**actions, "import": register_maps.run}[args.action](args)
 
 
 def _list(args: argparse.Namespace) -> int:
@@ -208,6 +231,8 @@ def _check(args: argparse.Namespace) -> int:
 
 
 def _guess(args: argparse.Namespace) -> int:
+    from sniff.analysis.profile_guess import Guessing
+
     profiles = [listed.profile for listed in available() if listed.profile is not None]
     rows: list[tuple[tables.Cell, ...]] = []
     for path in args.files:
@@ -218,39 +243,59 @@ def _guess(args: argparse.Namespace) -> int:
         guesses = list(guessing.guesses(profiles))
         rows += [(guess.station, guess.profile.name, f"{guess.score:.0%}", guess.why) for guess in guesses]
         _say_ties(guesses)
+        writing.say_incomplete(path, capture)
     tables.write(("station", "profile", "fits", "why"), rows, "json" if args.json else "text")
     return 0
 
 
 def _draft(args: argparse.Namespace) -> int:
-    series, protocols, family = RegisterSeries(), dict[str, None](), ""
+    from sniff.analysis.profile_draft import drafted
+    from sniff.analysis.register_guess import Sure, guessed
+    from sniff.analysis.register_series import RegisterSeries
+
+    if args.write is not None:
+        writing.refuse_to_overwrite(args.write, args.files, args.force)
+    series, protocols, families = RegisterSeries(), dict[str, None](), dict[str, str]()
     for path in args.files:
         capture = arguments.open_capture(path)
         session = arguments.settings_of(args, capture.session, path)
         dissector = dissector_for(session)
-        family = dissector.profile_family
+        families.setdefault(dissector.profile_family, path)
+        if len(families) > 1:
+            held = "; ".join(f"{path}: {family}" for family, path in families.items())
+            raise Failure(f"{held}: registers of one family of protocols make a profile; draft one at a time", USAGE)
         protocols[dissector.name] = None
         survey(Watched(capture), session, series.of(dissector), reference=args.reference)
-    found = list(guessed(series.blocks(), series.written))
+        writing.say_incomplete(path, capture)
+    found = [one for one in guessed(series.blocks(), series.written) if args.table in (None, one.space)]
     stations = sorted({one.device for one in found})
     if args.station is None and len(stations) > 1:
         raise Failure(f"stations {', '.join(map(str, stations))} answered registers: name one with --station", USAGE)
     chosen = [one for one in found if args.station in (None, one.device)]
     if not chosen:
-        who = "no station" if args.station is None else f"station {args.station}"
-        raise Failure(f"{', '.join(args.files)}: {who} answered no registers", UNREADABLE)
-    document = drafted(args.name, family, list(protocols), chosen)
-    if args.write is None:
-        print(document, end="")
-        return 0
-    try:
-        with args.write.open("x", encoding="utf-8") as file:
-            file.write(document)
-    except OSError as error:
-        raise Failure(f"{args.write}: {error.strerror or error}", UNREADABLE) from None
-    sure = sum(one.sure is Sure.SURE for one in chosen)
-    print(f"sniff485: {len(chosen)} values drafted to {args.write}, {sure} of them sure", file=sys.stderr)
+        raise Failure(f"{', '.join(args.files)}: {_nothing_to_draft(args, series, stations)}", UNREADABLE)
+    document = drafted(args.name, next(iter(families)), list(protocols), chosen)
+    register_maps.write_document(args, document)
+    if args.write is not None:
+        sure = sum(one.sure is Sure.SURE for one in chosen)
+        print(f"sniff485: {len(chosen)} values drafted to {plain(args.write)}, {sure} of them sure", file=sys.stderr)
+    if len({one.space for one in chosen}) > 1:
+        print("sniff485: holding and input registers were read; each is described by itself", file=sys.stderr)
     return 0
+
+
+def _nothing_to_draft(args: argparse.Namespace, series: RegisterSeries, stations: Sequence[int]) -> str:
+    """Why there is no register to describe."""
+    of = "registers" if args.table is None else f"{args.table} registers"
+    objects = {kind for station, kinds in series.objects.items() if args.station in (None, station) for kind in kinds}
+    if objects and not stations:
+        who = "nobody" if args.station is None else f"station {args.station}"
+        kinds = ", ".join(sorted(objects)[:4])
+        return f"{who} answered {of}, only other things ({kinds}); `sniff485 points` shows their values"
+    if not stations:
+        return f"nobody answered a read of {of}; a draft is made of answers"
+    others = f"station{'s' * (len(stations) > 1)} {', '.join(map(str, stations))} did"
+    return f"station {args.station} answered no read of {of}; {others}"
 
 
 def _say_ties(guesses: Sequence[Guess]) -> None:

@@ -50,7 +50,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("-Y", dest="filter", metavar="FILTER", default="", help="only frames that match")
     style.add_argument("-T", dest="table", choices=["fields"], help="tab-separated fields, chosen by -e")
     parser.add_argument("-e", dest="names", metavar="NAME", action="append", default=[], help="a field; repeatable")
-    parser.add_argument("-c", "--count", type=int, metavar="N", help="stop after N frames shown")
+    parser.add_argument("-c", "--count", type=arguments.whole, metavar="N", help="stop after N frames shown")
 
 
 def run(args: argparse.Namespace) -> int:

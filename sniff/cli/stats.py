@@ -1,6 +1,7 @@
 """Tables: nodes (each station), health (bus and stations, and why), transactions (by kind and verdict), latency (each
-station's response times), load (by second or --every), ring (of a protocol that passes a token). Response times are
-uncertain by what the adapter may hold back: see `info`.
+station's response times), load (by second or --every), ring (of a protocol that passes a token), polls (the master's
+programme: each request, how often it is asked, what became of it, and when that changed). Response times are uncertain
+by what the adapter may hold back: see `info`.
 """
 
 from __future__ import annotations
@@ -25,13 +26,12 @@ from sniff.cli import USAGE, Failure, arguments, tables
 from sniff.cli.progress import Watched
 from sniff.cli.rows import iso
 from sniff.cli.tables import Cell
-from sniff.devices import noted_devices
 from sniff.editing.merging import Merged, merged_session
 from sniff.engine.engine import Output
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import LineEvent
 
-TABLES = ("nodes", "health", "transactions", "latency", "load", "ring")
+TABLES = ("nodes", "health", "transactions", "latency", "load", "ring", "polls")
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -40,6 +40,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     arguments.add_bus(parser)
     parser.add_argument("--table", choices=TABLES, help="which table; may also stand after the files (default: nodes)")
     arguments.add_line(parser)
+    arguments.add_devices(parser)
     parser.add_argument("--every", type=arguments.duration, default=1.0, metavar="TIME", help="load: length of a row")
     style = parser.add_mutually_exclusive_group()
     style.add_argument("--json", action="store_const", const="json", dest="style", help="one JSON object a row")
@@ -71,10 +72,15 @@ def run(args: argparse.Namespace) -> int:
 
         return ring.show(Watched(source), session, shown, args.style, args.reference)
     if table == "health":
-        devices = noted_devices(session)
+        devices = arguments.noted_devices(args, session)
         model = BusModel(session, dissector_for(session), devices, with_points=False)
         survey(Watched(source), session, model, reference=args.reference)
         tables.write(HEALTH_HEADINGS, _health(model.health(), station_word(session.protocol)), args.style)
+        return 0
+    if table == "polls":
+        from sniff.cli import polls
+
+        polls.show(args, Watched(source), session)
         return 0
     summary, kinds = Summary(session.line), _Kinds()
     survey(Watched(source), session, summary, kinds, reference=args.reference)

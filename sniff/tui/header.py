@@ -23,6 +23,9 @@ ROOMY = 100
 """Width from which two spaces stand between the pieces; by the width alone, so that nothing jumps."""
 REASON = 20
 """Cells for why the capture has ended."""
+SHORTEST = 6
+"""Characters of a tab, its number among them, below which the numbers stand alone."""
+
 PORT_EVENTS = (LineEventKind.UNPLUGGED, LineEventKind.REPLUGGED)
 
 
@@ -162,9 +165,12 @@ class StatusHeader(Widget):
         tabs = [(f"{key} {title}", title == self.here) for key, title in analyzer(self).tabs]
         if sum(len(label) + 2 for label, _ in tabs) <= width:
             labels = [f"[{label}]" if here else f" {label} " for label, here in tabs]
-        else:  # closer together, then the numbers alone
-            labels = [f"[{label}]" if here else label for label, here in tabs]
-            if sum(map(len, labels)) + len(labels) - 1 > width:
+        else:  # closer together, then as much of each as fits, then the numbers alone
+            for most in range(max(len(label) for label, _ in tabs), SHORTEST, -1):
+                labels = [f"[{label}]" if here else label[:most] for label, here in tabs]
+                if sum(map(len, labels)) + len(labels) <= width:
+                    break
+            if sum(map(len, labels)) + len(labels) > width:
                 labels = [f"[{label}]" if here else label.split()[0] for label, here in tabs]
             labels = [label + " " for label in labels]
         text = Text(end="")

@@ -34,7 +34,8 @@ SCREENS: tuple[Entry, ...] = (
     Entry("5", "Findings", "sniff.tui.screens.findings:FindingsScreen"),
     Entry("6", "Timeline", "sniff.tui.screens.timeline:TimelineScreen"),
     Entry("7", "Ring", "sniff.tui.screens.ring:RingScreen"),
-    Entry("8", "Line", "sniff.tui.screens.line:LineScreen"),
+    Entry("8", "Polls", "sniff.tui.screens.polls:PollsScreen"),
+    Entry("9", "Line", "sniff.tui.screens.line:LineScreen"),
 )
 
 

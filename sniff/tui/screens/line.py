@@ -1,4 +1,4 @@
-"""Screen 8: the line, what the adapter can know of it, and what happened to it."""
+"""Screen 9: the line, what the adapter can know of it, and what happened to it."""
 
 from __future__ import annotations
 

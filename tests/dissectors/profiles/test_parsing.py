@@ -42,6 +42,29 @@ def test_the_manuals_numbers_may_lie_beside_the_wire() -> None:
     assert profile.entries[0].number == "0010h"
 
 
+def test_one_number_may_mean_two_things_in_two_tables() -> None:
+    profile = pump("""
+[modbus]
+tables = ["holding", "input"]
+[[modbus.register]]
+address = 0
+name = "flow-limit"
+tables = ["holding"]
+[[modbus.register]]
+address = 0
+name = "flow"
+tables = ["input"]
+type = "f32"
+[[modbus.register]]
+address = 9
+name = "both"
+""")
+    places = [(entry.space, entry.address, entry.name) for entry in profile.entries]
+    assert places == [("holding", 0, "flow-limit"), ("input", 0, "flow"), ("holding", 9, "both"), ("input", 9, "both")]
+    with pytest.raises(ProfileError, match=r"nowhere: expected holding, input, coil or discrete"):
+        register('tables = ["nowhere"]')
+
+
 def test_orders_of_the_whole_map_and_of_one_register() -> None:
     document = """
 [modbus]

@@ -5,14 +5,21 @@ from __future__ import annotations
 import random
 import struct
 from collections.abc import Callable
+from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from dissectors.profiles.model import Kind
 from sniff.analysis.register_guess import RegisterGuess, Sure, Use, guessed
-from sniff.analysis.register_series import Block
+from sniff.analysis.register_series import Block, RegisterSeries
+from sniff.bus.offline import survey
+from sniff.engine.follow_settings import dissector_for
+from sniff.formats import read
+
+CAPTURES = Path(__file__).parents[3] / "captures"
 
 SECOND = 1_000_000_000
 Series = Callable[[random.Random, int], list[float]]
@@ -130,3 +137,73 @@ def test_any_words_give_a_guess_for_every_register(rows: list[tuple[int, ...]]) 
     found = list(guessed([block], set()))
     assert sum(guess.kind.registers for guess in found) == 5
     assert [guess.address for guess in found] == sorted(guess.address for guess in found)
+
+
+@pytest.mark.parametrize("cut", [(0, 4), (1, 4), (1, 3), (0, 3)])
+def test_overlapping_questions_lose_no_register_and_dispute_nothing_surely(cut: tuple[int, int]) -> None:
+    dice = random.Random(3)
+    layout = [one for one in METER if one[0] is Kind.F32][:2]
+    whole = block_of(dice, layout, True, False, 300)
+    begin, end = cut
+    part = Block(1, "holding", 100 + begin, end - begin)
+    for time, row in zip(whole.times, whole.rows, strict=True):
+        part.add(time, row[begin:end])
+    found = list(guessed([whole, part], set()))
+    covered = [one.address + step for one in found for step in range(one.kind.registers)]
+    assert covered == [100, 101, 102, 103]
+
+
+def test_sure_guesses_that_exclude_each_other_are_both_likely() -> None:
+    """The same registers as a float once in this order, once, by another question, one register further on."""
+    dice = random.Random(4)
+    one = block_of(dice, [(Kind.F32, METER[0][1])] * 2, True, False, 300)
+    other = block_of(dice, [(Kind.F32, METER[0][1])] * 2, True, False, 200)
+    shifted = Block(1, "holding", 101, 4, other.times, other.rows, other.count)
+    alone = [list(guessed([block], set())) for block in (one, shifted)]
+    assert all(guess.sure is Sure.SURE for found in alone for guess in found)
+    both = list(guessed([one, shifted], set()))
+    assert all(guess.sure < Sure.SURE for guess in both)
+    assert [guess.address + step for guess in both for step in range(guess.kind.registers)] == list(range(100, 105))
+
+
+blocks_that_overlap = st.lists(
+    st.tuples(st.integers(0, 6), st.integers(1, 6), st.integers(0, 99)), min_size=1, max_size=4
+)
+
+
+@given(blocks_that_overlap)
+def test_every_register_of_all_blocks_has_one_guess(shapes: list[tuple[int, int, int]]) -> None:
+    blocks = []
+    for first, width, seed in shapes:
+        dice, block = random.Random(seed), Block(1, "holding", first, width)
+        for at in range(20):
+            block.add(at, tuple(dice.randrange(0x10000) for _ in range(width)))
+        blocks.append(block)
+    covered = [one.address + step for one in guessed(blocks, set()) for step in range(one.kind.registers)]
+    assert covered == sorted({first + step for first, width, _ in shapes for step in range(width)})
+
+
+@pytest.mark.parametrize("name", ["rtu-clean", "rtu-usual-faults", "ascii-clean", "n2-clean", "rtu-noisy-ftdi"])
+def test_series_of_tables_are_those_of_rows(name: str) -> None:
+    def series(reference: bool) -> RegisterSeries:
+        capture = read(CAPTURES / f"{name}.cap.txt")
+        made = RegisterSeries()
+        survey(capture, capture.session, made.of(dissector_for(capture.session)), reference=reference)
+        return made
+
+    rows, columns = series(True), series(False)
+    assert list(rows.blocks()) == list(columns.blocks())
+    assert (rows.written, rows.objects) == (columns.written, columns.objects)
+
+
+@given(st.lists(st.integers(0, 700), max_size=5))
+def test_many_answers_are_thinned_as_one_by_one(parts: list[int]) -> None:
+    one, many = Block(1, "holding", 0, 1), Block(1, "holding", 0, 1)
+    at = 0
+    for part in parts:
+        times = np.arange(at, at + part, dtype=np.int64)
+        for time in times.tolist():
+            one.add(time, (time & 0xFFFF,))
+        many.add_many(times, (times & 0xFFFF).astype(np.uint16).reshape(-1, 1))
+        at += part
+    assert one == many

@@ -221,3 +221,15 @@ def test_parquet_overwrites_nothing_unasked(poll: Path, sniff485: Callable, tmp_
     assert sniff485("show", poll, "--parquet", target, "-f", "-c", "2").code == 0
     assert target.read_bytes()[:4] == b"PAR1"
     assert [path.name for path in tmp_path.iterdir() if path.name.startswith(".")] == []
+
+
+@pytest.mark.parametrize("count", ["-3", "x", "1.5", ""])
+def test_a_count_is_a_whole_number(sniff485: Callable, count: str) -> None:
+    ran = sniff485("show", "captures/rtu-clean.cap.txt", f"--count={count}")
+    assert (ran.code, ran.out) == (2, "")
+    assert "expected a whole number, 0 or more" in ran.err
+
+
+def test_a_count_of_none_shows_none(sniff485: Callable) -> None:
+    ran = sniff485("show", "captures/rtu-clean.cap.txt", "-c", 0)
+    assert (ran.code, ran.out) == (0, "")

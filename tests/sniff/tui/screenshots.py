@@ -61,7 +61,8 @@ SHOTS = (
     Shot("findings", "modbus-rtu", (100, 30), ("5",)),
     Shot("timeline", "modbus-rtu", (100, 24), ("6",)),
     Shot("ring", "mstp", (100, 24), ("7",)),
-    Shot("line", "modbus-rtu", (100, 30), ("8",)),
+    Shot("line", "modbus-rtu", (100, 30), ("9",)),
+    Shot("polls", "modbus-rtu", (100, 30), ("8",)),
     Shot("help", "modbus-rtu", (80, 24), ("question_mark",)),
 )
 

@@ -274,7 +274,7 @@ def test_rows_dropped_from_memory_leave_the_view_where_it_is(look: Any, make_bus
         assert [line.split()[0] for line in before] == [line.split()[0] for line in see.lines()[3:13]]
         await see.press("home")
         assert see.main.cursor == bus.store.first_no
-        await see.press("8")
+        await see.press("9")
         gone = bus.store.dropped_rows
         assert f"{gone} older ones had to go, the file has them" in " ".join(see.text().split())
 
@@ -284,7 +284,7 @@ def test_rows_dropped_from_memory_leave_the_view_where_it_is(look: Any, make_bus
 def test_an_empty_bus_says_so(look: Any, make_bus: Any) -> None:
     async def script(see: Any) -> None:
         assert "no frames in this file" in see.text()
-        await see.press("e", "x", "m", "apostrophe", "enter", "down", "end", "y", "2", "enter", "e", "3", "enter", "8")
+        await see.press("e", "x", "m", "apostrophe", "enter", "down", "end", "y", "2", "enter", "e", "3", "enter", "9")
         assert "nothing happened to the line" in see.text()
 
     look(make_bus().store, script)

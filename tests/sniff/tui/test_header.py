@@ -78,17 +78,17 @@ def test_the_port_gives_way(busy_bus: Any, width: int, port: str) -> None:
 @pytest.mark.parametrize(
     ("width", "tabs"),
     [
-        (120, " 1 Frames  2 Transactions  3 Nodes  4 Points  5 Findings  6 Timeline  7 Ring [8 Line]"),
-        (80, "1 Frames 2 Transactions 3 Nodes 4 Points 5 Findings 6 Timeline 7 Ring [8 Line]"),
-        (40, "1 2 3 4 5 6 7 [8 Line]"),
+        (120, " 1 Frames  2 Transactions  3 Nodes  4 Points  5 Findings  6 Timeline  7 Ring  8 Polls [9 Line]"),
+        (80, "1 Frames 2 Transac 3 Nodes 4 Points 5 Finding 6 Timelin 7 Ring 8 Polls [9 Line]"),
+        (40, "1 2 3 4 5 6 7 8 [9 Line]"),
     ],
 )
-def test_eight_screens_fit(look: Any, busy_bus: Any, width: int, tabs: str) -> None:
-    names = ("Frames", "Transactions", "Nodes", "Points", "Findings", "Timeline", "Ring", "Line")
+def test_nine_screens_fit(look: Any, busy_bus: Any, width: int, tabs: str) -> None:
+    names = ("Frames", "Transactions", "Nodes", "Points", "Findings", "Timeline", "Ring", "Polls", "Line")
 
     async def script(see: Any) -> None:
         see.app.tabs = tuple((str(key), name) for key, name in enumerate(names, 1))
-        await see.press("8")
+        await see.press("9")
         assert see.lines()[1] == tabs
 
     look(busy_bus.store, script, (width, 24))

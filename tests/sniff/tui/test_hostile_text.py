@@ -40,7 +40,14 @@ def hostile(busy_bus: Any) -> Store:
 
 def test_nothing_hostile_reaches_the_terminal(look: Any, hostile: Store) -> None:
     async def script(see: Any) -> None:
-        for keys in (["1", "end", "enter", "down", "down"], ["2", "end"], ["3"], ["8", "end"], ["question_mark"]):
+        for keys in (
+            ["1", "end", "enter", "down", "down"],
+            ["2", "end"],
+            ["3"],
+            ["8", "end"],
+            ["9", "end"],
+            ["question_mark"],
+        ):
             await see.press(*keys)
             for line in see.lines():
                 assert line.isprintable(), line

@@ -33,7 +33,7 @@ def test_pictures(look: Any, golden: Any, busy_bus: Any, size: str) -> None:
         await compare("transactions")
         await see.press("3")
         await compare("nodes")
-        await see.press("8")
+        await see.press("9")
         await compare("line")
 
     look(busy_bus.store, script, SIZES[size], live=True, recording="/tmp/x.mcap")

@@ -60,7 +60,7 @@ def test_all_screens_show_it(look: Any, stores: dict[str, Store], name: str) -> 
     store = stores[name]
 
     async def script(see: Any) -> None:
-        for key in ("1", "e", "e", "x", "2", "e", "3", "8"):
+        for key in ("1", "e", "e", "x", "2", "e", "3", "8", "9"):
             await see.press(key)
             text = see.text()
             assert "None" not in text

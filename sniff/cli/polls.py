@@ -1,0 +1,95 @@
+"""The table `stats FILE polls`: the master's programme."""
+
+from __future__ import annotations
+
+import argparse
+
+from dissectors.line import MS
+from sniff.analysis.poll import Poll
+from sniff.analysis.poll_words import asked, changes, told
+from sniff.analysis.polls import Polls
+from sniff.analysis.wording import station_word
+from sniff.bus.offline import Source, survey
+from sniff.cli import arguments, tables
+from sniff.cli.rows import iso
+from sniff.cli.tables import Cell
+from sniff.engine.follow_settings import dissector_for
+from sniff.engine.session import Session
+
+HEADINGS = (
+    "from",
+    "station",
+    "request",
+    "asks",
+    "every ms",
+    "± ms",
+    "asked",
+    "answered",
+    "exceptions",
+    "no answer",
+    "late",
+    "damaged",
+    "repeats",
+    "first",
+    "last",
+    "changed",
+)
+_SELDOM = ("from", "exceptions", "late", "damaged", "repeats", "changed")
+"""Columns that a person need not see when there is nothing in them."""
+
+
+def show(args: argparse.Namespace, source: Source, session: Session) -> None:
+    """Print the programme of a capture."""
+    devices = arguments.noted_devices(args, session)
+    polls = Polls(dissector_for(session))
+    survey(source, session, polls, reference=args.reference)
+    held = list(polls)
+    begin = min((poll.first for poll in held if poll.first is not None), default=0)
+    end = max((poll.last for poll in held if poll.last is not None), default=0)
+    clock = iso if args.style != "text" else _clock
+    rows = [
+        _row(poll, asked(poll, devices), told(changes(poll, begin, end), clock), args.style == "text") for poll in held
+    ]
+    if args.style != "text":
+        tables.write(HEADINGS, rows, args.style)
+        return
+    if not rows:
+        print(f"no {station_word(session.protocol)} was asked anything")
+        return
+    kept = [at for at, name in enumerate(HEADINGS) if name not in _SELDOM or any(row[at] for row in rows)]
+    tables.write([HEADINGS[at] for at in kept], [[row[at] for at in kept] for row in rows])
+    if polls.dropped:
+        print(f"and {polls.dropped} requests more, of entries beyond the {len(held)} above")
+
+
+def _row(poll: Poll, asks: str, changed: str, brief: bool) -> tuple[Cell, ...]:
+    key, interval, jitter = poll.key, poll.interval, poll.jitter
+    clock = _clock if brief else iso
+    return (
+        key.source,
+        "all" if key.station is None else key.station,
+        key.kind,
+        asks,
+        None if interval is None else _ms(interval, brief),
+        None if jitter is None else _ms(jitter, brief),
+        poll.asked + poll.repeats,
+        poll.answered,
+        poll.exceptions,
+        poll.unanswered,
+        poll.late,
+        poll.damaged,
+        poll.repeats,
+        None if poll.first is None else clock(poll.first),
+        None if poll.last is None else clock(poll.last),
+        changed,
+    )
+
+
+def _ms(time: int, brief: bool) -> Cell:
+    """Milliseconds; for people with what the stated precision of an interval is worth."""
+    return round(time / MS, 3) if not brief else f"{time / MS:.1f}" if time < 10 * MS else f"{time / MS:.0f}"
+
+
+def _clock(time: int) -> str:
+    """The time of day of a long capture's moment, UTC."""
+    return iso(time)[11:19]

@@ -1,0 +1,228 @@
+"""Screen 8: the master's programme: what is asked of whom, how often, and with which success."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from rich.text import Text
+from textual import events
+from textual.app import ComposeResult
+from textual.widgets import DataTable, Static
+
+from dissectors.line import MS
+from dissectors.words import milliseconds
+from sniff.analysis.poll import Poll
+from sniff.analysis.poll_words import asked, changes, told
+from sniff.tui.analyzer import analyzer
+from sniff.tui.charts import sparkline
+from sniff.tui.plain import plain
+from sniff.tui.screens.tabling import TableScreen
+from sniff.tui.still_judging import still_judging
+from sniff.tui.tables import StationTable
+from sniff.tui.times import clock
+
+SHOWN = 500
+"""Entries in the table at most."""
+
+WIDE = 110
+"""From this width on all columns are shown."""
+
+CHART = 60
+"""Characters of the chart of one entry."""
+
+Cell = Callable[[Poll], str]
+
+
+def _time(value: int | None) -> str:
+    return "–" if value is None else f"{value / MS:.0f}" if value >= 10 * MS else f"{value / MS:.1f}"
+
+
+def _count(value: int) -> str:
+    return str(value) if value else "·"
+
+
+NARROW: tuple[tuple[str, Cell], ...] = (
+    ("every ms", lambda poll: _time(poll.interval)),
+    ("±", lambda poll: _time(poll.jitter)),
+    ("asked", lambda poll: str(poll.asked + poll.repeats)),
+    ("none", lambda poll: _count(poll.unanswered)),
+    ("exc.", lambda poll: _count(poll.exceptions)),
+)
+MORE: tuple[tuple[str, Cell], ...] = (
+    ("late", lambda poll: _count(poll.late)),
+    ("dam.", lambda poll: _count(poll.damaged)),
+    ("rep.", lambda poll: _count(poll.repeats)),
+    ("p95 ms", lambda poll: _time(poll.latency.quantile(0.95))),
+)
+TROUBLE = {"none", "exc.", "late", "dam."}
+"""Columns where anything is worth a look: such cells get a "!"."""
+
+
+def _answered(poll: Poll) -> float:
+    return poll.answered / (poll.asked + poll.repeats)
+
+
+Order = Callable[[Poll], tuple[float, ...]]
+ORDERS: tuple[tuple[str, Order], ...] = (
+    ("when first asked", lambda poll: (poll.first or 0,)),
+    ("station", lambda poll: (-1 if poll.key.station is None else poll.key.station, poll.first or 0)),
+    ("least answered", lambda poll: (_answered(poll), poll.first or 0)),
+    ("most often asked", lambda poll: (-poll.asked - poll.repeats, poll.first or 0)),
+    ("most uneven", lambda poll: (-(poll.jitter or 0), poll.first or 0)),
+)
+
+
+class PollsScreen(TableScreen):
+    """One line a distinct request; enter shows the newest frame that asked it."""
+
+    TITLE = "Polls"
+    ORDERS = tuple(name for name, _ in ORDERS)
+    HINT = "holding   output-frequency   write"
+    LEGEND = (
+        ("stn", "who is asked; 1→5: by whom, where the frames say"),
+        ("asks", "what for, with names where a profile is known; the values written are not part of it"),
+        ("every ms", "from one request to the next: half of the intervals are shorter; repeats not counted"),
+        ("±", "by how much nine of ten intervals differ, halved"),
+        ("none  exc.", "requests without answer, and refused"),
+        ("late  dam.", "answers that came too late, and damaged ones"),
+        ("rep.", "requests that were repeats"),
+        ("p95 ms", "response time: 95 of 100 are shorter"),
+    )
+    CSS_PATH = "polls.tcss"
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._drawn: tuple[int, tuple[object, ...]] | None = None
+        self._shown: dict[str, Poll] = {}
+        self._hidden = 0
+        self._columns: tuple[tuple[str, Cell], ...] = ()
+
+    def compose_view(self) -> ComposeResult:
+        """The table, and more about the entry under the cursor."""
+        yield StationTable(id="main", cursor_type="row", zebra_stripes=True)
+        yield Static(id="detail", markup=False)
+
+    def on_mount(self) -> None:
+        """Columns."""
+        self.query_one(StationTable).cell_padding = 1
+        self._lay_out(self.app.size.width)
+
+    def on_resize(self, event: events.Resize) -> None:
+        """Columns that fit."""
+        self._lay_out(event.size.width)
+
+    def _lay_out(self, width: int) -> None:
+        columns = (*NARROW, *MORE) if width >= WIDE else NARROW
+        if columns == self._columns:
+            return
+        self._columns = columns
+        table = self.query_one(StationTable)
+        table.clear(columns=True)
+        table.add_column(Text("stn", justify="right"), key="stn")
+        table.add_column(Text("asks"), key="asks")
+        for title, _ in columns:
+            table.add_column(Text(title, justify="right"), key=title)
+        self._drawn = None
+
+    def draw(self) -> None:
+        """Bring the table up to date, unless frozen."""
+        state = (self.store.polls.version, self.view)
+        if self._drawn == state or (self.viewing.frozen and self._drawn and self._drawn[1] == self.view):
+            return
+        self._drawn = state
+        held = [
+            poll for poll in self.store.polls if self.holds(_who(poll), self._asks(poll), poll.key.kind, _bad(poll))
+        ]
+        held.sort(key=ORDERS[self.order][1])
+        self._hidden = max(0, len(held) - SHOWN)
+        self._shown = {_key(poll): poll for poll in held[:SHOWN]}
+        self.query_one(StationTable).fill((key, self._cells(poll)) for key, poll in self._shown.items())
+        self._describe()
+
+    def _asks(self, poll: Poll) -> str:
+        said = asked(poll, self.store.model.devices)
+        return said or poll.key.kind
+
+    def _cells(self, poll: Poll) -> list[Text]:
+        room = max(20, self.app.size.width - (44 if self._columns == NARROW else 78))
+        said = plain(self._asks(poll))
+        said = said if len(said) <= room else said[: room - 1] + "…"
+        return [Text(_who(poll), justify="right"), Text(said), *(_cell(title, of(poll)) for title, of in self._columns)]
+
+    def _describe(self) -> None:
+        poll, open_end = self._here(), still_judging(analyzer(self).status, self.store)
+        said = [self._detail(poll)] if poll is not None else ["nobody asked anything" + (" so" if self.words else "")]
+        more = f" · {self._hidden} more are not shown" if self._hidden else ""
+        summary = f"{len(self._shown)} requests, {self.said}{more}"
+        self.query_one("#detail", Static).update("\n".join(part for part in (*said, summary, open_end) if part))
+
+    def _detail(self, poll: Poll) -> str:
+        key = poll.key
+        whom = "all stations" if key.station is None else f"{self.store.dissector.noun} {key.station}"
+        words = [f"{key.kind} to {whom}" + (f" from {key.source}" if key.source is not None else "")]
+        said = asked(poll, self.store.model.devices)
+        words += [said] if said else []
+        counts = f"{poll.answered} of {poll.asked + poll.repeats} answered"
+        words.append(counts + (f", {poll.repeats} were repeats" if poll.repeats else ""))
+        if poll.latency.count:
+            low, high = poll.latency.quantile(0.5), poll.latency.most
+            words.append(f"answers after {milliseconds(low or 0)}, at most {milliseconds(high or 0)}")
+        first, last = poll.first or 0, poll.last or 0
+        words.append(f"{clock(first)} … {clock(last)}" if first != last else clock(first))
+        begin = min((one.first for one in self.store.polls if one.first is not None), default=0)
+        end = max((one.last for one in self.store.polls if one.last is not None), default=0)
+        turned = told(changes(poll, begin, end), lambda time: clock(time)[:8])
+        words += [turned] if turned else []
+        chart = _chart(poll)
+        return plain(" · ".join(words)) + (f"\nhow often  {chart}" if chart else "")
+
+    def _here(self) -> Poll | None:
+        key = self.query_one(StationTable).key_here()
+        return None if key is None else self._shown.get(key)
+
+    def on_data_table_row_highlighted(self, event: DataTable.RowHighlighted) -> None:
+        """The cursor went to another entry."""
+        event.stop()
+        self._describe()
+
+    def on_data_table_row_selected(self, event: DataTable.RowSelected) -> None:
+        """Enter or click on an entry."""
+        event.stop()
+        poll = self._here()
+        if poll is None:
+            return
+        if self.store.by_no(poll.request) is None:
+            self.notify("its frames are no longer in memory", timeout=2)
+        else:
+            analyzer(self).show_row(poll.request)
+
+
+def _who(poll: Poll) -> str:
+    station = "all" if poll.key.station is None else str(poll.key.station)
+    return station if poll.key.source is None else f"{poll.key.source}→{station}"
+
+
+def _key(poll: Poll) -> str:
+    return repr(poll.key)
+
+
+def _bad(poll: Poll) -> str:
+    """Words that are found by who looks for trouble."""
+    return " ".join(word for word, there in (("none", poll.unanswered), ("exception", poll.exceptions)) if there)
+
+
+def _cell(title: str, text: str) -> Text:
+    if title in TROUBLE and text != "·":
+        return Text(f"!{text}", style="bold", justify="right")
+    return Text(text, justify="right")
+
+
+def _chart(poll: Poll) -> str:
+    """How many requests when, from the first to the last."""
+    counts = poll.slices.counts
+    if len(counts) < 3:
+        return ""
+    low, high = min(counts), max(counts)
+    step = -(-(high - low + 1) // CHART)
+    sums = [sum(counts.get(place + ahead, 0) for ahead in range(step)) for place in range(low, high + 1, step)]
+    return sparkline(sums, max(sums))
