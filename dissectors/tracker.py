@@ -41,7 +41,7 @@ class Verdict(Enum):
 
 _WORDS = {Verdict.NO_RESPONSE: "no answer", Verdict.DATA: "one-way", Verdict.UNSOLICITED: "unasked"}
 
-PASSING = frozenset(("token", "poll-for-master"))
+PASSING = frozenset(("token", "poll-for-master", "fdl-status"))
 """Kinds of transactions that pass on the right to send, or look for a station to pass it to: they ask for nothing."""
 
 
