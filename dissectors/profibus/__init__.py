@@ -41,5 +41,6 @@ PROFIBUS = Dissector(
     readings=readings,
     packet_file=PacketFile((147,), least=1),
     renamer=ProfibusRenamer,
+    scenarios=on_first_use("dissectors.profibus.scenario:scenarios"),
     makers={"profibus": telegram, "profibus-token": token},
 )

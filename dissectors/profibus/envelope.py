@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from dissectors.checksums import sum8
 from dissectors.frame import Check, Damage, Flaw, Repair
 from dissectors.profibus.control import Control
-from dissectors.profibus.telegram import BROADCAST, ED, FIXED, LEAST_LE, MOST_LE, SD1, SD2, SD3, body_of
+from dissectors.profibus.telegram import BROADCAST, ED, FIXED, LEAST_LE, MOST_LE, SD1, SD2, SD3, SD4, body_of
 
 
 def length_of(octets: bytes | bytearray, at: int = 0) -> int | None:
@@ -69,6 +69,8 @@ def damaged(octets: bytes) -> Damaged | None:
         return _of_right_length(octets[:expected])
     if octets[0] == SD2 and expected:  # a good header and too few octets
         return Damaged(len(octets), Check.ABSENT, Damage.SHORT, expected, _ended(octets, expected))
+    if octets[0] == SD4 and len(octets) >= FIXED[SD4] and max(octets[1:3]) < BROADCAST:
+        return Damaged(FIXED[SD4], Check.ABSENT, Damage.FORM, FIXED[SD4])  # none that this ring would pass
     whole = _begun(octets)
     if whole is not None:
         flaw, count, repaired = whole

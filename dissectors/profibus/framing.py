@@ -1,11 +1,11 @@
 """Octets and times → telegrams and noise. Telegrams are found by start, length, sum and end, never by silence.
 
-    octets ─► search for a start ─► checked telegram (SD1, SD2, SD3): its sum and end are right
-                                 ─► token (SD4), no check: between known masters, or in a chain of tokens, or in front
-                                    of a request by whom it goes to
-                                 ─► short acknowledgement (SC), no check: directly after a request that wants an answer
-    what lies between two of them, once a good telegram was seen on this bus: damaged, if its form tells so
-                                  else noise
+    octets ─► search for a start
+      ─► checked telegram (SD1, SD2, SD3): its sum and end are right; with line errors only where it is expected
+      ─► token (SD4), no check: between known masters, or by one to somebody who then sends; where none is known, in a
+         chain of tokens or in front of a request by the new holder
+      ─► short acknowledgement (SC), no check: directly after a request that wants an answer
+      ─► what lies between two of them: damaged, if its form tells so, and once a good one was seen; else noise
 
 A stretch that is no telegram is given out when the next good one is found behind it, after MOST_HELD octets, or when
 a silence that no telegram has inside is proved. The decision about an octet needs nothing but the octets before it
@@ -17,7 +17,7 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 
-from dissectors.frame import Check, Event, Found, Frame, Reason
+from dissectors.frame import Check, Event, Found, Frame, LineError, Reason
 from dissectors.line import MS, Timing
 from dissectors.plain_framers import PlainFramer
 from dissectors.profibus.envelope import damaged, is_sound, length_of
@@ -46,6 +46,8 @@ class ProfibusFramer(PlainFramer):
         super().__init__(timing, "profibus", SILENCE)
         self._masters: set[int] = set()
         self._is_open = False  # the telegram before wants an answer
+        self._asked: tuple[int | None, int | None] = (None, None)  # whom the last request was for, and by whom
+        self._holder: int | None = None  # of the token
         self._is_proved = False  # a checked telegram was seen
         self._at = 0  # where the search goes on: nothing begins before it
 
@@ -90,7 +92,17 @@ class ProfibusFramer(PlainFramer):
             return length
         if len(octets) < at + length:
             return None
-        return length if is_sound(bytes(octets[at : at + length])) else 0
+        whole = bytes(octets[at : at + length])
+        if not is_sound(whole) or (self._is_marked(at, length) and not self._is_in_place(whole)):
+            return 0
+        return length
+
+    def _is_in_place(self, octets: bytes) -> bool:
+        """Whether a telegram with line errors is expected here: two wrong bits may leave its sum right."""
+        telegram = parse(octets)
+        if telegram.is_request:
+            return telegram.source in self._masters
+        return (telegram.source, telegram.destination) == self._asked
 
     def _may_acknowledge(self, at: int) -> bool:
         return not at or (at <= _STRAY_MOST and not _STARTS.search(self._window.octets, 0, at))
@@ -102,14 +114,19 @@ class ProfibusFramer(PlainFramer):
         to, source = octets[at + 1], octets[at + 2]
         if to > HIGHEST or source > HIGHEST:
             return 0
-        if source in self._masters and (to in self._masters or not at):
-            return 3
-        return self._chained(at + 3, to, source)
+        if source in self._masters:
+            if not self._is_marked(at, 3):
+                return 3 if to in self._masters else self._chained(at + 3, to, source, 2)
+            return self._chained(at + 3, to, source, 2) if source == self._holder else 0
+        return 0 if self._masters else self._chained(at + 3, to, source, _CHAIN)
 
-    def _chained(self, at: int, holder: int, source: int) -> int | None:
-        """3 where what follows the token proves it: more of them, or a request by the new holder."""
+    def _is_marked(self, at: int, count: int) -> bool:
+        return bool(self._window.errors(at, at + count) & ~LineError.OVERRUN)
+
+    def _chained(self, at: int, holder: int, source: int, count: int) -> int | None:
+        """3 where what follows the token proves it: more of them, `count` in all, or a request by the new holder."""
         octets = self._window.octets
-        for _ in range(_CHAIN - 1):
+        for _ in range(count - 1):
             if len(octets) <= at:
                 return None
             if octets[at] in _CHECKED:
@@ -123,18 +140,18 @@ class ProfibusFramer(PlainFramer):
             if len(octets) < at + 3:
                 return None
             to, by = octets[at + 1], octets[at + 2]
-            if to > HIGHEST or by not in (holder, source):
+            if to > HIGHEST or (by != holder and (to, by) != (holder, source)):
                 return 0
             holder, source, at = to, by, at + 3
         return 3
 
     def _telegram(self, length: int) -> Frame:
-        octets = bytes(self._window.octets[:length])
         is_checked = length > 3
-        self._learn(octets)
-        self._is_proved |= is_checked
         found, check = (Found.DELIMITER, Check.GOOD) if is_checked else (Found.LENGTH, Check.ABSENT)
-        return self._frame(length, found, check, None, length)
+        frame = self._frame(length, found, check, None, length)
+        self._learn(frame.octets)
+        self._is_proved |= is_checked
+        return frame
 
     def _between(self, count: int) -> Event:
         """What lies in front of the next telegram, or of silence: all of it, or the damaged telegram at its begin."""
@@ -153,8 +170,11 @@ class ProfibusFramer(PlainFramer):
         """Who is a master, and whether an answer is due."""
         telegram = parse(octets)
         self._is_open = telegram.control is not None and telegram.control.wants_answer
+        if telegram.is_request:
+            self._asked, self._holder = (telegram.destination, telegram.source), telegram.source
         if telegram.is_token:
             self._masters.update(octets[1:3])
+            self._holder = telegram.destination
         elif telegram.control is not None:
             master = telegram.source if telegram.is_request else telegram.destination
             if master is not None and master <= HIGHEST:

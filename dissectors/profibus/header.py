@@ -15,7 +15,7 @@ DAMAGES: dict[Damage, str] = {
     Damage.CHECK: "wrong FCS",
     Damage.SHORT: "too short",
     Damage.LONG: "too long",
-    Damage.FORM: "wrong start, end or frame control",
+    Damage.FORM: "wrong start, end, frame control or parity",
     Damage.HEADER: "wrong length",
     Damage.TIMEOUT: "no end, silence",
     Damage.RESTARTED: "no end, another telegram began",

@@ -83,6 +83,7 @@ def test_tokens_are_told_by_the_ring_alone():
     assert frames(token(2, 2) + STATUS) == [token(2, 2), STATUS]
     assert frames(token(7, 5) + STATUS) == [STATUS]
     assert frames(STATUS, token(2, 2), silence=300 * MS) == [STATUS, token(2, 2)]
+    assert frames(STATUS, token(7, 2), silence=300 * MS) == [STATUS]  # nobody there sends
     assert frames(STATUS, b"\x01\x02\x03\x04" + token(9, 8), silence=300 * MS) == [STATUS]
 
 
