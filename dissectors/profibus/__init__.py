@@ -4,14 +4,20 @@ from __future__ import annotations
 
 from dissectors.frame import Frame
 from dissectors.manifest import Dissector, PacketFile, on_first_use
+from dissectors.profibus import ring_words
 from dissectors.profibus.fields import fields
+from dissectors.profibus.findings import ProfibusFindings
 from dissectors.profibus.framing import ProfibusFramer
 from dissectors.profibus.header import peek
 from dissectors.profibus.readings import readings
 from dissectors.profibus.renamer import ProfibusRenamer
+from dissectors.profibus.ring import ring_window
+from dissectors.profibus.rules import RULES
 from dissectors.profibus.telegram import telegram, token
 from dissectors.profibus.text import text
 from dissectors.profibus.tracker import ProfibusTracker
+from dissectors.profibus.watch import BusWatch
+from dissectors.token_ring import TokenRing
 
 __all__ = ["PROFIBUS", "ProfibusFramer", "ProfibusTracker", "fields", "peek", "text"]
 
@@ -26,6 +32,15 @@ def bits(frame: Frame) -> float:
     return _EVIDENCE.get(len(frame.octets), 24.0)
 
 
+RING = TokenRing(
+    observer=BusWatch,
+    window=ring_window,
+    order=lambda ring: ring.order,
+    headings=ring_words.HEADINGS,
+    rows=ring_words.rows,
+    sentences=ring_words.sentences,
+)
+
 PROFIBUS = Dissector(
     name="profibus",
     title="PROFIBUS DP",
@@ -38,6 +53,9 @@ PROFIBUS = Dissector(
     default_line="1500000,8E1",
     field_prefixes=("pb.",),
     bits=bits,
+    judge=ProfibusFindings,
+    rules=RULES,
+    ring=RING,
     readings=readings,
     packet_file=PacketFile((147,), least=1),
     renamer=ProfibusRenamer,

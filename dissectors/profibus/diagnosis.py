@@ -75,6 +75,11 @@ class Diagnosis:
         )
 
     @property
+    def wants_parameters(self) -> bool:
+        """Whether it must be parameterised anew."""
+        return bool(self.second & PARAMETERS_WANTED)
+
+    @property
     def status_words(self) -> tuple[str, ...]:
         """The bits of the status octets that are set, in words."""
         words = [word for bit, word in _FIRST if self.first & bit] + [

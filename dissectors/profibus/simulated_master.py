@@ -216,7 +216,7 @@ class Master:
 
     def _command(self) -> bytes | None:
         """Global_Control, where what it says has changed."""
-        is_clear = self._ring.is_clear or any(job.step is not _Step.EXCHANGE for job in self._jobs)
+        is_clear = self._ring.is_clear or not any(job.step is _Step.EXCHANGE for job in self._jobs)
         if self._life.told is None or (self._life.told and not is_clear):
             self._life.told = is_clear
             data = bytes((2 if is_clear else 0, 0))
