@@ -189,6 +189,13 @@ class OctetWindow:
         """Nominal (latest) end of octet `index`, ns."""
         return self._end_in(self._run(index), index)
 
+    def errors(self, begin: int, end: int) -> LineError:
+        """What the UART reported about octets `begin` … `end` - 1 of the window, together."""
+        together = LineError(0)
+        for at in range(begin, end) if self._marks else ():
+            together |= self._marks.get(at, together)
+        return together
+
     def take(self, count: int) -> Taken:
         """Remove and give the first `count` octets (1 … len)."""
         runs, char = self._runs, self._char

@@ -56,7 +56,7 @@ class Lengthy:
     silence: int = SILENCE
 
 
-class _PlainFramer:
+class PlainFramer:
     """What the two share: the window, silence, and giving out frames and noise."""
 
     def __init__(self, timing: Timing, protocol: str, silence: int) -> None:
@@ -115,7 +115,7 @@ class _PlainFramer:
         )
 
 
-class DelimitedFramer(_PlainFramer):
+class DelimitedFramer(PlainFramer):
     """A start octet begins a frame, always; the end octet, too many octets or silence end it. All else is noise."""
 
     def __init__(self, timing: Timing, form: Delimited) -> None:
@@ -151,7 +151,7 @@ class DelimitedFramer(_PlainFramer):
         return self._frame(count, Found.DELIMITER, Check.ABSENT, damage, None)
 
 
-class LengthFramer(_PlainFramer):
+class LengthFramer(PlainFramer):
     """A start octet and a length that can be begin a frame. One whose check is bad is looked through for a good one
     that begins inside it: the start may have been an octet of something else."""
 

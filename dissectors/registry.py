@@ -22,6 +22,7 @@ BUILT_IN: Mapping[str, str] = {
     "modbus-ascii": "dissectors.modbus:ASCII",
     "n2": "dissectors.n2:N2",
     "mstp": "dissectors.bacnet:MSTP",
+    "profibus": "dissectors.profibus:PROFIBUS",
 }
 
 DEFAULT = next(iter(BUILT_IN))

@@ -50,6 +50,7 @@ class Passing(StrEnum):
 
     TOKEN = "token"
     POLL = "poll-for-master"
+    STATUS = "fdl-status"
 
 
 PASSING = frozenset(kind.value for kind in Passing)

@@ -1,0 +1,64 @@
+"""PROFIBUS DP: FDL telegrams, the DP services on them, the token ring of its masters. README.md draws the telegrams."""
+
+from __future__ import annotations
+
+from dissectors.frame import Frame
+from dissectors.manifest import Dissector, PacketFile, on_first_use
+from dissectors.profibus import ring_words
+from dissectors.profibus.fields import fields
+from dissectors.profibus.findings import ProfibusFindings
+from dissectors.profibus.framing import ProfibusFramer
+from dissectors.profibus.header import peek
+from dissectors.profibus.readings import readings
+from dissectors.profibus.renamer import ProfibusRenamer
+from dissectors.profibus.ring import ring_window
+from dissectors.profibus.rules import RULES
+from dissectors.profibus.telegram import telegram, token
+from dissectors.profibus.text import text
+from dissectors.profibus.tracker import ProfibusTracker
+from dissectors.profibus.watch import BusWatch
+from dissectors.token_ring import TokenRing
+
+__all__ = ["PROFIBUS", "ProfibusFramer", "ProfibusTracker", "fields", "peek", "text"]
+
+packet = on_first_use("dissectors.profibus.packets:packet")
+
+_EVIDENCE = {1: 2.0, 3: 8.0, 6: 22.0}
+"""Bits of evidence by length: short acknowledgement and token have no check, and are believed only in their place."""
+
+
+def bits(frame: Frame) -> float:
+    """Evidence of a good telegram: start, sum, end and frame control; the second start and length where there are."""
+    return _EVIDENCE.get(len(frame.octets), 24.0)
+
+
+RING = TokenRing(
+    observer=BusWatch,
+    window=ring_window,
+    order=lambda ring: ring.order,
+    headings=ring_words.HEADINGS,
+    rows=ring_words.rows,
+    sentences=ring_words.sentences,
+)
+
+PROFIBUS = Dissector(
+    name="profibus",
+    title="PROFIBUS DP",
+    framer=ProfibusFramer,
+    peek=peek,
+    tracker=ProfibusTracker,
+    text=text,
+    fields=fields,
+    packet=packet,
+    default_line="1500000,8E1",
+    field_prefixes=("pb.",),
+    bits=bits,
+    judge=ProfibusFindings,
+    rules=RULES,
+    ring=RING,
+    readings=readings,
+    packet_file=PacketFile((147,), least=1),
+    renamer=ProfibusRenamer,
+    scenarios=on_first_use("dissectors.profibus.scenario:scenarios"),
+    makers={"profibus": telegram, "profibus-token": token},
+)

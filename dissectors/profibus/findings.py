@@ -1,0 +1,219 @@
+"""The rules of PROFIBUS at work: what the watch notices and how exchanges end becomes findings. `rules.py` has them."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator
+
+from dissectors.findings import Finding, Severity, Tally, counted, times
+from dissectors.frame import Event, Frame, Header, Role
+from dissectors.line import NS_PER_S, Timing
+from dissectors.profibus.configuration import parse_configuration
+from dissectors.profibus.diagnosis import CONFIGURATION_FAULT, LOCKED, PARAMETER_FAULT
+from dissectors.profibus.record import Record
+from dissectors.profibus.ring import Ring
+from dissectors.profibus.rules import RULES, usual_tsdr
+from dissectors.profibus.slave_watch import SlaveView
+from dissectors.profibus.watch import BusWatch, Notice
+from dissectors.subject import BUS, Subject, station
+from dissectors.tracker import Placement, Transaction
+from dissectors.words import milliseconds
+
+_LEAST = 3
+_SHARE = 0.01
+_URGENT_MOST = 20
+_CLEAR_LONG = 10 * NS_PER_S
+_ONE_STATION = 0.9
+_TOLERANCE = 5
+"""Bit times by which a measured answer time may be off."""
+
+
+class ProfibusFindings:
+    """The judge of one bus."""
+
+    def __init__(self, timing: Timing) -> None:
+        self._watch = BusWatch(timing, self._noticed)
+        self._slow = timing.line.bits(usual_tsdr(timing.line.baud) + _TOLERANCE)
+        self._records: dict[int, Record] = defaultdict(Record)
+        self._noted: dict[tuple[Notice, int], Tally] = defaultdict(Tally)
+        self._diagnosed: dict[int, dict[str, Tally]] = defaultdict(lambda: defaultdict(Tally))
+        self._damaged = Tally()
+        self._frames = 0
+        self._tokens = 0
+
+    def see(self, no: int, event: Event, header: Header | None, placement: Placement | None) -> None:
+        """Take the next row."""
+        if isinstance(event, Frame):
+            self._frames += 1
+            if not event.ok:
+                self._damaged.add(event.start, no)
+            elif header is not None and header.role is Role.TOKEN:
+                self._tokens += 1
+        self._watch.see(no, event, header)
+
+    def settle(self, transaction: Transaction) -> None:
+        """Take a transaction that closed."""
+        if transaction.station is not None and not transaction.is_passing:
+            self._records[transaction.station].settle(transaction, self._slow)
+
+    def ring(self) -> Ring:
+        """The ring so far."""
+        return self._watch.ring()
+
+    def findings(self) -> tuple[Finding, ...]:
+        """All findings so far."""
+        return tuple(self._all())
+
+    def _noticed(self, what: Notice, address: int, no: int, time: int) -> None:
+        if what is Notice.DIAGNOSIS:
+            for code in self._codes_of(self._watch.slaves[address]):
+                self._diagnosed[address][code].add(time, no)
+        else:
+            self._noted[what, address].add(time, no)
+
+    @staticmethod
+    def _codes_of(slave: SlaveView) -> Iterator[str]:
+        """What a diagnosis that was just told speaks of."""
+        told, given = slave.told, slave.given
+        if told is None:
+            return
+        if told.first & PARAMETER_FAULT:
+            yield "PB004"
+        if told.first & CONFIGURATION_FAULT:
+            yield "PB005"
+        if given is not None and given.ident != told.ident:
+            yield "PB006"
+        if told.first & LOCKED:
+            yield "PB011"
+        if slave.has_trouble:
+            yield "PB009"
+
+    def _all(self) -> Iterator[Finding]:
+        for address in sorted(self._records):
+            yield from self._of_exchanges(station(address), self._records[address])
+        for address in sorted(self._watch.slaves):
+            yield from self._of_diagnosis(address, self._watch.slaves[address])
+        yield from self._of_damage()
+        yield from self._of_masters()
+
+    def _of_exchanges(self, who: Subject, record: Record) -> Iterator[Finding]:
+        silent, total = record.unanswered, record.requests
+        if silent.count and not record.answers and silent.count >= _LEAST:
+            yield silent.found(RULES["PB001"], who, f"no answer to any of {counted(total, 'request')}")
+        elif silent.count and record.answers:
+            grave = _grave(silent.count, total)
+            yield silent.found(RULES["PB002"], who, f"{silent.count} of {total} requests without answer", grave)
+        if record.repeated.count and record.answers:
+            seen = f"{record.repeated.count} of {total} requests are repeats; at worst {record.worst} in a row"
+            yield record.repeated.found(RULES["PB003"], who, seen, _grave(record.repeated.count, total))
+        if record.twice.count:
+            grave = Severity.ERROR if record.twice.count > 1 else Severity.NOTE
+            seen = f"a second, different answer came {times(record.twice.count)}"
+            yield record.twice.found(RULES["PB010"], who, seen, grave)
+        if record.refused.count:
+            seen = f"{record.refused.count} of {total} requests refused: {'; '.join(sorted(record.refusals)[:4])}"
+            yield record.refused.found(RULES["PB017"], who, seen, _grave(record.refused.count, total))
+        if record.slow.count >= _LEAST and record.slow.count >= _SHARE * total:
+            slowest = milliseconds(record.slowest)
+            seen = f"{record.slow.count} of {total} answers later than usual; the slowest after {slowest}"
+            yield record.slow.found(RULES["PB018"], who, seen)
+
+    def _of_diagnosis(self, address: int, slave: SlaveView) -> Iterator[Finding]:
+        who, told, tallies = station(address), slave.told, self._diagnosed.get(address, {})
+        if told is None:
+            return
+        words = "; ".join((*told.status_words, *told.block_words))
+        for code, tally in sorted(tallies.items()):
+            yield tally.found(
+                RULES[code], who, self._diagnosis_seen(code, slave, words), self._diagnosis_grave(code, slave)
+            )
+        fallen = self._noted.get((Notice.DROP, address))
+        if fallen is not None:
+            grave = Severity.ERROR if fallen.count >= _LEAST else Severity.WARNING
+            seen = f"left data exchange {times(fallen.count)}{_watchdog(slave)}"
+            yield fallen.found(RULES["PB007"], who, seen, grave)
+        if slave.urgent >= _URGENT_MOST and "PB009" not in tallies:
+            time, _ = slave.changes[-1] if slave.changes else (0, None)
+            tally = Tally()
+            tally.add(time)
+            seen = f"a diagnosis is announced by {slave.urgent} answers in a row, and not fetched"
+            yield tally.found(RULES["PB009"], who, seen)
+
+    @staticmethod
+    def _diagnosis_seen(code: str, slave: SlaveView, words: str) -> str:
+        told, given = slave.told, slave.given
+        if code == "PB006" and told is not None and given is not None:
+            return f"the master gives ident {given.ident:04X}h, the slave has {told.ident:04X}h"
+        if code == "PB005":
+            wanted = "; ".join(module.words for module in parse_configuration(slave.configured)) or "not seen"
+            has = "; ".join(module.words for module in parse_configuration(slave.has))
+            return f"the master configures {wanted}" + (f"; the slave has {has}" if has else "")
+        if code == "PB009" and not slave.has_trouble:
+            return "had a diagnosis to tell, which is gone"
+        return f"its newest diagnosis: {words or 'nothing to report'}"
+
+    @staticmethod
+    def _diagnosis_grave(code: str, slave: SlaveView) -> Severity:
+        told = slave.told
+        assert told is not None
+        still = {
+            "PB004": bool(told.first & PARAMETER_FAULT),
+            "PB005": bool(told.first & CONFIGURATION_FAULT),
+            "PB009": slave.has_trouble,
+            "PB011": bool(told.first & LOCKED),
+        }.get(code, True)
+        return RULES[code].severity if still else Severity.NOTE
+
+    def _of_damage(self) -> Iterator[Finding]:
+        damaged = self._damaged
+        if not damaged.count:
+            return
+        answers = {address: one.damaged for address, one in self._records.items() if one.damaged.count}
+        total = sum(tally.count for tally in answers.values())
+        worst = max(answers, key=lambda address: answers[address].count, default=None)
+        others = any(one.answers >= _LEAST for address, one in self._records.items() if address != worst)
+        grave = _grave(damaged.count, self._frames)
+        is_one = (
+            worst is not None
+            and others
+            and answers[worst].count >= max(_LEAST, _ONE_STATION * total)
+            and answers[worst].count >= _ONE_STATION * damaged.count
+        )
+        if is_one and worst is not None:
+            asked = self._records[worst].requests
+            seen = f"{answers[worst].count} of {asked} answers damaged, {damaged.count} telegrams in all"
+            yield answers[worst].found(RULES["PB008"], station(worst), seen, grave)
+        else:
+            yield damaged.found(RULES["PB008"], BUS, f"{damaged.count} of {self._frames} telegrams damaged", grave)
+
+    def _of_masters(self) -> Iterator[Finding]:
+        for (what, address), tally in sorted(self._noted.items(), key=lambda one: (one[0][0].value, one[0][1])):
+            if what is Notice.CLAIM:
+                seen = f"station {address} made a token of its own {times(tally.count)}"
+                yield tally.found(RULES["PB013"], BUS, seen)
+            elif what is Notice.TOKEN_AGAIN:
+                seen = f"the token to it was sent again {times(tally.count)}"
+                yield tally.found(RULES["PB014"], station(address), seen, _grave(tally.count, self._tokens))
+            elif what is Notice.OUT_OF_TURN and tally.count >= _LEAST:
+                seen = f"{counted(tally.count, 'request')} while another master held the token"
+                yield tally.found(RULES["PB015"], station(address), seen)
+            elif what is Notice.CLEAR and tally.last - tally.first >= _CLEAR_LONG:
+                seen = f"outputs are cleared for {(tally.last - tally.first) / NS_PER_S:.0f} s of data exchange"
+                yield tally.found(RULES["PB012"], station(address), seen)
+        ring = self._watch.ring()
+        for address, view in sorted(ring.masters.items()):
+            if view.polls > view.answered:
+                tally = Tally(view.polls - view.answered, ring.first, ring.last)
+                share = ring.wasted / ring.span if ring.span else 0
+                seen = f"{tally.count} of {view.polls} polls found nobody; all masters' take {share:.1%} of the time"
+                yield tally.found(RULES["PB016"], station(address), seen)
+
+
+def _grave(count: int, total: int) -> Severity:
+    """How grave it is that `count` of `total` are wrong: noted below one in a hundred."""
+    return Severity.WARNING if count >= _LEAST and count >= _SHARE * total else Severity.NOTE
+
+
+def _watchdog(slave: SlaveView) -> str:
+    watchdog = None if slave.given is None else slave.given.watchdog_ms
+    return "" if watchdog is None else f"; its watchdog is set to {watchdog} ms"

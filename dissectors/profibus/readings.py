@@ -1,0 +1,34 @@
+"""What exchanges tell: the words of cyclic inputs and outputs, high octet first.
+
+`space` is "input" or "output", `address` the word, from 0. Data of an odd number of octets are told octet by octet
+("input-octet"): only configuration and GSD say what they are.
+"""
+
+from __future__ import annotations
+
+from dissectors.frame import Frame
+from dissectors.profibus.header import refusal_words
+from dissectors.profibus.services import Service, service_of
+from dissectors.profibus.telegram import parse
+from dissectors.readings import How, Reading
+
+
+def readings(request: Frame | None, response: Frame | None) -> tuple[Reading, ...]:
+    """The outputs that a slave took and the inputs that it gave; total."""
+    asked = parse(request.octets) if request is not None else None
+    told = parse(response.octets) if response is not None else None
+    if asked is None or told is None or refusal_words(told) is not None:
+        return ()
+    service = service_of(asked)
+    if service is Service.DATA_EXCHANGE:
+        return (*_words("output", asked.data, How.WRITE), *_words("input", told.data, How.READ))
+    if service is Service.READ_INPUTS:
+        return _words("input", told.data, How.READ)
+    return _words("output", told.data, How.READ) if service is Service.READ_OUTPUTS else ()
+
+
+def _words(space: str, data: bytes, how: How) -> tuple[Reading, ...]:
+    if len(data) % 2:
+        return tuple(Reading(f"{space}-octet", at, octet, octet, how) for at, octet in enumerate(data))
+    words = (data[at] << 8 | data[at + 1] for at in range(0, len(data), 2))
+    return tuple(Reading(space, at, word, word, how) for at, word in enumerate(words))

@@ -1,0 +1,34 @@
+"""Telegrams under other names: addresses renumbered; ident numbers and values are kept."""
+
+from __future__ import annotations
+
+from dissectors.frame import Frame
+from dissectors.profibus.telegram import BROADCAST, FIXED, SC, SD2, SD4
+from dissectors.pseudonyms import Pseudonyms, inflicted
+
+
+class ProfibusRenamer:
+    """Renames telegrams; each keeps its length, and its damage if it has one."""
+
+    def __init__(self) -> None:
+        self.stations = Pseudonyms(range(1, 127), kept=(BROADCAST,))
+
+    def __call__(self, frame: Frame) -> bytes:
+        """The frame under another name."""
+        if frame.repair is None:
+            return self._renamed(frame.octets, frame.ok)
+        whole = frame.repair.octets
+        return inflicted(frame.octets, whole, self._renamed(whole, sure=False))
+
+    def _renamed(self, octets: bytes, sure: bool) -> bytes:
+        """`sure`: every address in it is somebody's. The sum is moved by as much as the addresses are."""
+        at, renamed = 4 if octets[0] == SD2 else 1, bytearray(octets)
+        if octets[0] == SC or len(octets) < at + 2:
+            return octets
+        name = self.stations.of if sure else self.stations.if_known
+        for place in (at, at + 1):
+            renamed[place] = renamed[place] & 0x80 | name(renamed[place] & 0x7F)
+        size = octets[1] + 6 if octets[0] == SD2 else FIXED.get(octets[0], 0)
+        if octets[0] != SD4 and len(octets) == size:
+            renamed[-2] = renamed[-2] + sum(renamed[at : at + 2]) - sum(octets[at : at + 2]) & 0xFF
+        return bytes(renamed)

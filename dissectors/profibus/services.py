@@ -1,0 +1,106 @@
+"""What a telegram is for: the DP service by its service access points (IEC 61158-5-3; notes of pyprofibus)."""
+
+from __future__ import annotations
+
+from enum import Enum
+
+from dissectors.profibus.control import FDL_STATUS
+from dissectors.profibus.telegram import Telegram
+
+MASTER_SAP = 62
+"""The master's own access point in all services of a DP master of class 1."""
+
+
+class Service(Enum):
+    """A service; the value is the kind of a frame in lists and filters."""
+
+    DATA_EXCHANGE = "data-exchange"
+    SET_ADDRESS = "set-slave-address"
+    READ_INPUTS = "read-inputs"
+    READ_OUTPUTS = "read-outputs"
+    GLOBAL_CONTROL = "global-control"
+    GET_CONFIGURATION = "get-configuration"
+    DIAGNOSIS = "slave-diagnosis"
+    SET_PARAMETERS = "set-parameters"
+    CHECK_CONFIGURATION = "check-configuration"
+    EXTENDED_PARAMETERS = "extended-parameters"
+    ALARM = "alarm"
+    SERVER = "read-write"
+    RESOURCE_MANAGER = "resource-manager"
+    MASTER_TO_MASTER = "master-to-master"
+    FDL_STATUS = "fdl-status"
+    TOKEN = "token"
+    SHORT_ACKNOWLEDGE = "short-acknowledge"
+    ACKNOWLEDGE = "acknowledge"  # an answer without data and without access points
+    OTHER = "fdl-data"
+
+    @property
+    def title(self) -> str:
+        """As the standard writes it, or in words."""
+        return _TITLES[self]
+
+
+_TITLES = {
+    Service.DATA_EXCHANGE: "Data_Exchange",
+    Service.SET_ADDRESS: "Set_Slave_Add",
+    Service.READ_INPUTS: "RD_Inp",
+    Service.READ_OUTPUTS: "RD_Outp",
+    Service.GLOBAL_CONTROL: "Global_Control",
+    Service.GET_CONFIGURATION: "Get_Cfg",
+    Service.DIAGNOSIS: "Slave_Diag",
+    Service.SET_PARAMETERS: "Set_Prm",
+    Service.CHECK_CONFIGURATION: "Chk_Cfg",
+    Service.EXTENDED_PARAMETERS: "Ext_User_Prm",
+    Service.ALARM: "alarm",
+    Service.SERVER: "DP-V1 read or write",
+    Service.RESOURCE_MANAGER: "DP-V1 resource manager",
+    Service.MASTER_TO_MASTER: "master to master",
+    Service.FDL_STATUS: "FDL status",
+    Service.TOKEN: "token",
+    Service.SHORT_ACKNOWLEDGE: "short acknowledgement",
+    Service.ACKNOWLEDGE: "acknowledgement",
+    Service.OTHER: "FDL data",
+}
+
+_BY_SAP = {
+    49: Service.RESOURCE_MANAGER,
+    50: Service.ALARM,
+    51: Service.SERVER,
+    53: Service.EXTENDED_PARAMETERS,
+    54: Service.MASTER_TO_MASTER,
+    55: Service.SET_ADDRESS,
+    56: Service.READ_INPUTS,
+    57: Service.READ_OUTPUTS,
+    58: Service.GLOBAL_CONTROL,
+    59: Service.GET_CONFIGURATION,
+    60: Service.DIAGNOSIS,
+    61: Service.SET_PARAMETERS,
+    62: Service.CHECK_CONFIGURATION,
+}
+_SRD = (0xC, 0xD)
+
+
+def service_of(telegram: Telegram) -> Service:
+    """What a telegram is for, as far as it says itself: a bare acknowledgement may answer several things."""
+    control = telegram.control
+    if telegram.is_token:
+        return Service.TOKEN
+    if telegram.is_short:
+        return Service.SHORT_ACKNOWLEDGE
+    if control is None:
+        return Service.OTHER
+    if control.is_request and control.code == FDL_STATUS:
+        return Service.FDL_STATUS
+    point = slave_sap(telegram)
+    if point is not None:
+        return _BY_SAP.get(point, Service.OTHER)
+    if telegram.dsap is not None or telegram.ssap is not None:
+        return Service.OTHER
+    if control.is_request:
+        return Service.DATA_EXCHANGE if control.code in _SRD else Service.OTHER
+    return Service.DATA_EXCHANGE if telegram.data or control.code >= 8 else Service.ACKNOWLEDGE
+
+
+def slave_sap(telegram: Telegram) -> int | None:
+    """The slave's access point: where a request goes to, where an answer comes from."""
+    return telegram.dsap if telegram.is_request else telegram.ssap

@@ -1,0 +1,140 @@
+"""One line for the frame list: `2 → 8 Slave_Diag`, `8 → 2 Slave_Diag: not ready, wants parameters; ident F510h`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from dissectors.checksums import sum8
+from dissectors.frame import Check, Frame, Header, Role
+from dissectors.profibus.configuration import parse_configuration
+from dissectors.profibus.control import FDL_STATUS, Control
+from dissectors.profibus.diagnosis import NO_MASTER, parse_diagnosis
+from dissectors.profibus.header import damage_of, meant, refusal_words
+from dissectors.profibus.parameters import parse_global_control, parse_new_address, parse_parameters
+from dissectors.profibus.services import Service, service_of
+from dissectors.profibus.telegram import BROADCAST, Telegram, body_of, parse
+
+
+def text(frame: Frame, header: Header, role: Role) -> str:
+    """One line without control characters."""
+    telegram = parse(meant(frame))
+    return _line(telegram) + _damage(frame)
+
+
+def _line(telegram: Telegram) -> str:
+    if telegram.is_short:
+        return "SC"
+    way = f"{_station(telegram.source)} → {_station(telegram.destination)}"
+    if telegram.is_token:
+        return f"{way} token"
+    if telegram.control is None:
+        return f"{way} ?"
+    return f"{way} {content(telegram)}{_count(telegram.control)}"
+
+
+def content(telegram: Telegram) -> str:
+    """What a telegram with a frame control octet says."""
+    service, control = service_of(telegram), telegram.control
+    assert control is not None
+    refused = refusal_words(telegram)
+    if refused is not None:
+        return refused if service is Service.ACKNOWLEDGE else f"{service.title}: {refused}"
+    if service is Service.ACKNOWLEDGE:
+        station = control.station_type
+        return f"{control.words} ({station.words})" if station is not None else control.words
+    told = _TOLD.get((service, control.is_request))
+    said = told(telegram.data) if told is not None else ""
+    if service is Service.OTHER:
+        points = "" if telegram.dsap is None and telegram.ssap is None else f" SAP {telegram.ssap} → {telegram.dsap}"
+        return f"{control.words}{points}" + (f" {telegram.data.hex(' ')}" if telegram.data else "")
+    if service is Service.DATA_EXCHANGE and control.status is not None and control.status.is_urgent:
+        said += ", diagnosis pending"
+    if not said and telegram.data and control.code != FDL_STATUS:
+        said = telegram.data.hex(" ")
+    return f"{service.title}: {said}" if said else service.title
+
+
+def _station(address: int | None) -> str:
+    return "?" if address is None else "all" if address == BROADCAST else str(address)
+
+
+def _count(control: Control) -> str:
+    """The frame count bit, where it is in use: a repeat shows the same one again."""
+    if not control.is_request or control.is_sdn:
+        return ""
+    if control.fcv:
+        return f" [FCB {int(control.fcb)}]"
+    return " [first]" if control.fcb else ""
+
+
+def _diagnosis(data: bytes) -> str:
+    said = parse_diagnosis(data)
+    if said is None:
+        return f"too short: {data.hex(' ')}"
+    words = ", ".join(said.status_words) or "nothing to report"
+    master = "no master" if said.master == NO_MASTER else f"master {said.master}"
+    return "; ".join((words, master, f"ident {said.ident:04X}h", *said.block_words))
+
+
+def _parameters(data: bytes) -> str:
+    said = parse_parameters(data)
+    if said is None:
+        return f"too short: {data.hex(' ')}"
+    watchdog = said.watchdog_ms
+    parts = [", ".join(said.words) or "no lock", f"ident {said.ident:04X}h"]
+    if watchdog is not None:
+        parts.append(f"watchdog {watchdog} ms")
+    if said.groups:
+        parts.append(f"groups {said.groups:02X}h")
+    return "; ".join([*parts, f"user {said.user.hex(' ')}"] if said.user else parts)
+
+
+def _configuration(data: bytes) -> str:
+    return "; ".join(module.words for module in parse_configuration(data)) or f"none ({data.hex(' ')})"
+
+
+def _control(data: bytes) -> str:
+    said = parse_global_control(data)
+    if said is None:
+        return f"too short: {data.hex(' ')}"
+    return said.words + (f", groups {said.groups:02X}h" if said.groups else "")
+
+
+def _new_address(data: bytes) -> str:
+    said = parse_new_address(data)
+    if said is None:
+        return f"too short: {data.hex(' ')}"
+    return f"{said.address}, ident {said.ident:04X}h" + (", for good" if said.is_final else "")
+
+
+def _outputs(data: bytes) -> str:
+    return f"out {data.hex(' ')}" if data else "no outputs"
+
+
+def _inputs(data: bytes) -> str:
+    return f"in {data.hex(' ')}" if data else "no inputs"
+
+
+_TOLD: dict[tuple[Service, bool], Callable[[bytes], str]] = {
+    (Service.DIAGNOSIS, False): _diagnosis,
+    (Service.SET_PARAMETERS, True): _parameters,
+    (Service.CHECK_CONFIGURATION, True): _configuration,
+    (Service.GET_CONFIGURATION, False): _configuration,
+    (Service.GLOBAL_CONTROL, True): _control,
+    (Service.SET_ADDRESS, True): _new_address,
+    (Service.DATA_EXCHANGE, True): _outputs,
+    (Service.DATA_EXCHANGE, False): _inputs,
+    (Service.READ_INPUTS, False): _inputs,
+    (Service.READ_OUTPUTS, False): _outputs,
+}
+
+
+def _damage(frame: Frame) -> str:
+    words = damage_of(frame)
+    if words is None:
+        return ""
+    if frame.repair is not None:
+        return f" [{words}; repaired]"
+    if frame.check is Check.BAD and frame.expected == len(frame.octets):
+        return f" [{words}: {frame.octets[-2]:02X}, {sum8(body_of(frame.octets)):02X} expected]"
+    return f" [{words}]"

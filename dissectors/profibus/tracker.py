@@ -1,0 +1,211 @@
+"""Telegrams become transactions.
+
+    request ──► open ──► answer of that station to that master, or SC          answered; after a repeat: retry
+                  │ ───► answer that refuses (UE, RR, RS)                      exception
+                  │ ───► damaged telegram or rubbish in its place              damaged answer
+                  │ ───► next request, token, silence                          no answer
+    SDN, to one or to all                                                      data, broadcast
+    token                                                                      one-way
+    answer without a request                  late after no answer; answered twice, echo after an answer; else unasked
+
+A request with the frame count bit in use and the same as in the one before it, to the same station, is that one again:
+the master has not understood the answer. Where octets were damaged since, nothing is said of that: the request between
+may have been lost here.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from dissectors.frame import Event, Frame, Header, Noise, Role
+from dissectors.line import NS_PER_S, Timing
+from dissectors.profibus.control import Control
+from dissectors.profibus.header import meant
+from dissectors.profibus.telegram import parse
+from dissectors.tracker import NOTHING_TRACKED, Interval, Placement, Tracked, Transaction, Verdict
+
+PATIENCE = NS_PER_S
+"""ns after which no answer comes any more; a master's slot time is far shorter, and its next telegram says so."""
+
+_ASKS = (Role.REQUEST, Role.POLL)
+
+
+@dataclass(slots=True)
+class _Asked:
+    """A request. `attempt`, `of`: as in `Transaction`. `disturbed`: rubbish came where its answer should be."""
+
+    id: int
+    no: int
+    frame: Frame
+    header: Header
+    control: Control | None
+    attempt: int = 1
+    of: int | None = None
+    disturbed: bool = False
+    answer: bytes = b""
+    is_answered: bool = False
+
+
+class ProfibusTracker:
+    """The tracker of one bus."""
+
+    def __init__(self, timing: Timing) -> None:
+        self._patience = PATIENCE + timing.latency
+        self._tx = 0
+        self._open: _Asked | None = None
+        self._past: _Asked | None = None  # the last request, once it is closed
+        self._last: dict[tuple[int | None, int | None], _Asked] = {}  # by master and station; at most 128²
+        self._is_clear = True  # nothing was damaged since the last good request
+
+    def track(self, no: int, event: Event, header: Header | None) -> Tracked:
+        """Take the next event."""
+        before = self.advance(event.start)
+        if header is None or not isinstance(event, Frame):
+            self._is_clear = False
+            if self._open is not None and isinstance(event, Noise):
+                self._open.disturbed = True
+            return Tracked(None, before) if before else NOTHING_TRACKED
+        if header.role is Role.RESPONSE:
+            return self._answer(no, event, header, before)
+        if header.role in _ASKS and (event.ok or event.repair is not None or self._open is None):
+            return self._ask(no, event, header, before)
+        if not event.ok and event.repair is None and self._open is not None:
+            return self._answer(no, event, header, before)  # damaged, in the place of the answer
+        return self._send(no, event, header, before)
+
+    def advance(self, now: int) -> tuple[Transaction, ...]:
+        """Say that nothing came up to `now` (ns)."""
+        if self._open is None or now - self._open.frame.end <= self._patience:
+            return ()
+        return self._give_up()
+
+    def close(self) -> tuple[Transaction, ...]:
+        """End of capture: an answer could still have come."""
+        asked, self._open = self._open, None
+        return () if asked is None else (_closed(asked, Verdict.OPEN),)
+
+    def _ask(self, no: int, frame: Frame, header: Header, before: tuple[Transaction, ...]) -> Tracked:
+        before += self._give_up()
+        control = parse(meant(frame)).control
+        asked = _Asked(self._next(), no, frame, header, control)
+        pair = header.source, header.destination
+        earlier = self._last.get(pair)
+        if earlier is not None and frame.ok and self._repeats(asked, earlier):
+            asked.attempt, asked.of = earlier.attempt + 1, earlier.of or earlier.id
+        if frame.ok:
+            self._last[pair] = asked
+            self._is_clear = True
+        else:
+            self._is_clear = False
+        self._open = asked
+        return Tracked(_placed(no, asked.id, header), before)
+
+    def _repeats(self, asked: _Asked, earlier: _Asked) -> bool:
+        if asked.frame.octets != earlier.frame.octets or asked.header.role is Role.POLL:
+            return False
+        if not earlier.is_answered:
+            return True
+        counts = asked.control is not None and asked.control.fcv
+        return counts and self._is_clear
+
+    def _answer(self, no: int, frame: Frame, header: Header, before: tuple[Transaction, ...]) -> Tracked:
+        asked = self._open
+        if not frame.ok:
+            self._is_clear = False
+        if asked is None or (frame.ok and not _is_of(header, asked)):
+            return self._unasked(no, frame, header, before)
+        self._open, self._past = None, asked
+        asked.is_answered, asked.answer = frame.ok, frame.octets
+        if not frame.ok:
+            verdict = Verdict.DAMAGED_ANSWER
+        elif header.error is not None:
+            verdict = Verdict.EXCEPTION
+        else:
+            verdict = Verdict.ANSWERED if asked.attempt == 1 else Verdict.RETRY
+        role = Role.RESPONSE
+        closed = _closed(asked, verdict, no, frame, header.error)
+        source, destination = asked.header.destination, asked.header.source
+        return Tracked(Placement(no, asked.id, role, source, destination), (*before, closed))
+
+    def _unasked(self, no: int, frame: Frame, header: Header, before: tuple[Transaction, ...]) -> Tracked:
+        """An answer that nobody waits for: late, a second one, or of a request that was not heard here."""
+        past, verdict, of = self._past, Verdict.UNSOLICITED, None
+        if not frame.ok:
+            verdict = Verdict.DATA
+        elif past is not None and self._open is None and _is_of(header, past):
+            of = past.id
+            if not past.is_answered:
+                verdict = Verdict.LATE
+            else:
+                verdict = Verdict.ECHO if frame.octets == past.answer else Verdict.ANSWERED_TWICE
+        elif past is not None and not past.is_answered and header.source is not None and _is_of(header, past):
+            verdict, of = Verdict.LATE, past.id
+        tx = self._next()
+        station = header.source if of is None or past is None else past.header.destination
+        closed = Transaction(tx, station, header.kind, None, no, verdict, frame.start, frame.end, of=of)
+        return Tracked(Placement(no, tx, header.role, station, header.destination), (*before, closed))
+
+    def _send(self, no: int, frame: Frame, header: Header, before: tuple[Transaction, ...]) -> Tracked:
+        """What nobody answers: tokens, SDN, broadcasts; and what is too damaged to tell."""
+        before += self._give_up()
+        self._past = None if frame.ok else self._past
+        self._is_clear &= frame.ok
+        verdict = Verdict.BROADCAST if header.role is Role.BROADCAST else Verdict.DATA
+        if not frame.ok and header.role in _ASKS:
+            verdict = Verdict.DAMAGED_REQUEST
+        tx = self._next()
+        station = header.destination if header.role is not Role.BROADCAST else None
+        closed = Transaction(tx, station, header.kind, no, None, verdict, frame.start, frame.end)
+        return Tracked(_placed(no, tx, header), (*before, closed))
+
+    def _give_up(self) -> tuple[Transaction, ...]:
+        """The open request is not answered any more. One that was damaged need not be."""
+        asked, self._open = self._open, None
+        if asked is None:
+            return ()
+        self._past = asked
+        if not asked.frame.ok:
+            verdict = Verdict.DAMAGED_REQUEST
+        else:
+            verdict = Verdict.DAMAGED_ANSWER if asked.disturbed else Verdict.NO_RESPONSE
+        return (_closed(asked, verdict),)
+
+    def _next(self) -> int:
+        self._tx += 1
+        return self._tx
+
+
+def _is_of(answer: Header, asked: _Asked) -> bool:
+    """Whether an answer fits a request: a short acknowledgement names nobody; others name both."""
+    if answer.source is None:
+        return True
+    return answer.source == asked.header.destination and answer.destination == asked.header.source
+
+
+def _placed(no: int, tx: int, header: Header) -> Placement:
+    return Placement(no, tx, header.role, header.source, header.destination)
+
+
+def _closed(
+    asked: _Asked, verdict: Verdict, no: int | None = None, answer: Frame | None = None, error: str | None = None
+) -> Transaction:
+    latency = None
+    end = asked.frame.end
+    if answer is not None:
+        gap = max(0, answer.start - asked.frame.end)
+        latency = Interval(gap, max(0, gap - answer.slack), gap + asked.frame.slack)
+        end = answer.end
+    return Transaction(
+        asked.id,
+        asked.header.destination,
+        asked.header.kind,
+        asked.no,
+        no,
+        verdict,
+        asked.frame.start,
+        end,
+        latency,
+        asked.attempt,
+        asked.of,
+        error,
+    )

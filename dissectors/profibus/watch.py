@@ -1,0 +1,185 @@
+"""Watches a bus telegram by telegram: who holds the token, what masters ask, how slaves come up.
+
+What it notices it tells as events to whoever judges; the ring as a value is made when it is asked for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from enum import Enum, auto
+
+from dissectors.frame import Event, Frame, Header
+from dissectors.histogram import Histogram
+from dissectors.line import Timing
+from dissectors.profibus.parameters import parse_global_control
+from dissectors.profibus.ring import MasterView, Ring, SlaveRow
+from dissectors.profibus.services import Service, service_of
+from dissectors.profibus.slave_watch import SlaveView
+from dissectors.profibus.telegram import HIGHEST, Telegram, parse
+
+
+class Notice(Enum):
+    """What was noticed, about which station."""
+
+    CLAIM = auto()  # a master made a token of its own although a ring was running
+    TOKEN_AGAIN = auto()  # a token was sent again: its taker did not show itself
+    OUT_OF_TURN = auto()  # a request by who did not hold the token
+    DROP = auto()  # a slave left data exchange by itself
+    DIAGNOSIS = auto()  # a slave told its diagnosis
+    CLEAR = auto()  # data is exchanged while the master is in Clear
+
+
+@dataclass(slots=True)
+class _Master:
+    """A master on its way. `got`: when it last got the token; None after a disturbance."""
+
+    view: MasterView = field(default_factory=MasterView)
+    got: int | None = None
+    rotation: Histogram = field(default_factory=Histogram)
+    is_clear: bool | None = None
+    cleared: int = 0
+    following: dict[int, int] = field(default_factory=dict)
+
+
+Told = Callable[[Notice, int, int, int], None]
+"""(what, station, number of the frame, ns)"""
+
+
+def _to_nobody(what: Notice, station: int, no: int, time: int) -> None:
+    """Nobody wants to know."""
+
+
+class BusWatch:
+    """The observer of one bus. `tell`: is told what is noticed."""
+
+    def __init__(self, timing: Timing, tell: Told = _to_nobody) -> None:
+        self.slaves: dict[int, SlaveView] = {}
+        self._masters: dict[int, _Master] = {}
+        self._tell = tell
+        self._first: int | None = None
+        self._last = 0
+        self._wasted = 0
+        self._holder: int | None = None
+        self._token: tuple[int, int] | None = None  # source and destination of the last token, nothing after it
+        self._asked: tuple[Telegram, Service, int] | None = None  # an open request and its end
+
+    def see(self, no: int, event: Event, header: Header | None) -> None:
+        """Take the next row."""
+        self._first = event.start if self._first is None else self._first
+        self._last = max(self._last, event.end)
+        if not isinstance(event, Frame) or header is None or not event.ok:
+            self.miss(event.end)
+            return
+        telegram = parse(event.octets)
+        if telegram.is_token:
+            self._pass(no, telegram, event)
+        elif telegram.is_request:
+            self._ask(no, telegram, event)
+        else:
+            self._answer(no, telegram, event)
+
+    def miss(self, time: int) -> None:
+        """Octets were lost or damaged: what is missing there says nothing."""
+        self._asked = self._token = self._holder = None
+        for master in self._masters.values():
+            master.got = None
+
+    def ring(self) -> Ring:
+        """The ring so far."""
+        masters = {
+            address: replace(
+                one.view,
+                rotation=one.rotation.copy(),
+                following=max(one.following, key=lambda to: one.following[to], default=None),
+            )
+            for address, one in self._masters.items()
+        }
+        slaves = {
+            address: SlaveRow(view.state, view.changes[-1][0], view.changed, view.exchanges, tuple(view.changes))
+            for address, view in self.slaves.items()
+            if view.state is not None
+        }
+        return Ring(masters, slaves, self._first or 0, self._last, self._wasted)
+
+    def _master(self, address: int) -> _Master:
+        return self._masters.setdefault(address, _Master())
+
+    def _pass(self, no: int, token: Telegram, frame: Frame) -> None:
+        source, to = token.source, token.destination
+        if source is None or to is None:
+            return
+        self._unanswered(frame.start)
+        giver = self._master(source)
+        is_again = self._token == (source, to) and source != to
+        by_another = self._token is None or self._token[0] != source  # else its taker is gone, and it goes on alone
+        is_claim = source == to and by_another and self._holder not in (None, source)
+        was_in_ring = any(other != source for other in giver.following)
+        giver.view = replace(
+            giver.view,
+            tokens=giver.view.tokens + (not is_again),
+            repeats=giver.view.repeats + is_again,
+            claims=giver.view.claims + (is_claim and was_in_ring),
+        )
+        if is_again:
+            self._tell(Notice.TOKEN_AGAIN, to, no, frame.start)
+        elif is_claim and was_in_ring:
+            self._tell(Notice.CLAIM, source, no, frame.start)
+        if not is_claim:
+            giver.following[to] = giver.following.get(to, 0) + 1
+        taker = self._master(to)
+        if not is_again:
+            if taker.got is not None:
+                taker.rotation.add(frame.end - taker.got)
+            taker.got = frame.end
+        self._holder, self._token = to, (source, to)
+
+    def _ask(self, no: int, asked: Telegram, frame: Frame) -> None:
+        self._unanswered(frame.start)
+        source, to = asked.source, asked.destination
+        assert source is not None
+        assert to is not None
+        service, master = service_of(asked), self._master(source)
+        is_poll = service is Service.FDL_STATUS
+        if self._holder is not None and self._holder != source:
+            self._tell(Notice.OUT_OF_TURN, source, no, frame.start)
+            self._holder = None
+        master.view = replace(
+            master.view, requests=master.view.requests + (not is_poll), polls=master.view.polls + is_poll
+        )
+        self._token = None
+        if service is Service.GLOBAL_CONTROL and (control := parse_global_control(asked.data)) is not None:
+            master.is_clear = control.is_clear
+        if asked.control is not None and asked.control.wants_answer and to <= HIGHEST:
+            self._asked = asked, service, frame.end
+
+    def _answer(self, no: int, answer: Telegram, frame: Frame) -> None:
+        if self._asked is None:
+            return
+        (asked, service, _), self._asked = self._asked, None
+        if answer.source is not None and (answer.source, answer.destination) != (asked.destination, asked.source):
+            return
+        assert asked.destination is not None
+        assert asked.source is not None
+        master = self._master(asked.source)
+        if service is Service.FDL_STATUS:
+            master.view = replace(master.view, answered=master.view.answered + 1)
+            return
+        slave = self.slaves.setdefault(asked.destination, SlaveView())
+        fell = slave.answered(service, asked, answer, frame.end)
+        if fell:
+            self._tell(Notice.DROP, asked.destination, no, frame.start)
+        if service is Service.DIAGNOSIS:
+            self._tell(Notice.DIAGNOSIS, asked.destination, no, frame.start)
+        elif service is Service.DATA_EXCHANGE and master.is_clear:
+            self._tell(Notice.CLEAR, asked.source, no, frame.start)
+
+    def _unanswered(self, time: int) -> None:
+        """The open request was not answered."""
+        if self._asked is None:
+            return
+        (asked, service, end), self._asked = self._asked, None
+        if service is Service.FDL_STATUS:
+            self._wasted += max(0, time - end)
+        elif asked.destination is not None:
+            self.slaves.setdefault(asked.destination, SlaveView()).missed(time)
