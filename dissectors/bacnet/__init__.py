@@ -39,6 +39,7 @@ __all__ = [
 
 
 packet = on_first_use("dissectors.bacnet.packets:packet")
+stencil = on_first_use("dissectors.bacnet.stencils:mstp_stencil")
 kernel = on_first_use("dissectors.bacnet.kernel:kernel")
 reading_columns = on_first_use("dissectors.bacnet.reading_columns:reading_columns")
 pairing = on_first_use("dissectors.bacnet.block_pairing:pairing")
@@ -82,5 +83,6 @@ MSTP = Dissector(
     makers={"mstp": frame},
     kernel=kernel,
     pairing=pairing,
+    stencil=stencil,
     scenarios=on_first_use("dissectors.bacnet.scenario:scenarios"),
 )
