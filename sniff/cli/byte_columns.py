@@ -6,7 +6,7 @@ be shorter than its column is wide. No text has an octet 0 of its own.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -57,6 +57,16 @@ def joined(columns: Sequence[Column], begin: int, end: int) -> Iterator[bytes]:
     """The columns of rows [begin, end) side by side, row after row; in parts."""
     for first in range(begin, end, _AT_ONCE):
         yield _some(columns, slice(first, min(first + _AT_ONCE, end)))
+
+
+def pieced(columns: Sequence[Column], alone: Masks, line: Callable[[int], bytes]) -> Iterator[bytes]:
+    """Lines of columns, with those rows that stand alone as `line` gives them."""
+    begin = 0
+    for at in np.flatnonzero(alone).tolist():
+        yield from joined(columns, begin, at)
+        yield line(at)
+        begin = at + 1
+    yield from joined(columns, begin, len(alone))
 
 
 def _some(columns: Sequence[Column], rows: slice) -> bytes:

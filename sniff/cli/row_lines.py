@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from dissectors.columns import NONE, VERDICTS, Masks, Times
-from dissectors.line import NS_PER_S
 from dissectors.manifest import Dissector
 from dissectors.tracker import Interval
 from dissectors.words import milliseconds
 from sniff.analysis.wording import duration
 from sniff.cli import rows
-from sniff.cli.byte_columns import Chosen, Codes, Column, digits, encoded, fixed_digits, joined
+from sniff.cli.byte_columns import Chosen, Codes, Column, digits, encoded, fixed_digits, pieced
+from sniff.cli.distinct import distinct_codes
 from sniff.cli.said_texts import SaidTexts
 from sniff.engine.column_join import SettledRows
 from sniff.engine.session import Session
@@ -66,29 +66,6 @@ class RowLines:
             both = [text for text in (noted[note] if noted else "", self._told.text(code)) if text]
             texts.append(encoded(f"  [{'; '.join(both)}]" if both else ""))
         return Chosen.of(texts, codes)
-
-
-def pieced(columns: Sequence[Column], alone: Masks, line: Callable[[int], bytes]) -> Iterator[bytes]:
-    """Lines of columns, with those rows that stand alone as `line` gives them."""
-    begin = 0
-    for at in np.flatnonzero(alone).tolist():
-        yield from joined(columns, begin, at)
-        yield line(at)
-        begin = at + 1
-    yield from joined(columns, begin, len(alone))
-
-
-def distinct_codes(codes: Times) -> tuple[Times, Codes]:
-    """Which numbers, 0 or more, there are, and the place of each row's among them."""
-    if not len(codes):
-        return np.zeros(1, np.int64), codes
-    most = int(codes.max())
-    if most > 1 << 20:
-        distinct, inverse = np.unique(codes, return_inverse=True)
-        return distinct, inverse
-    used = np.zeros(most + 1, bool)
-    used[codes] = True
-    return np.flatnonzero(used), (np.cumsum(used) - 1)[codes]
 
 
 _BAD = np.array([verdict.value not in rows.GOOD_VERDICTS for verdict in VERDICTS])
@@ -171,9 +148,3 @@ def _is_last(settled: SettledRows, at: Times, which: Times) -> Masks:
     told = np.where(response > 0, response, closed.request[which])
     is_last: Masks = (which >= 0) & (told == at + settled.table.first)
     return is_last
-
-
-def seconds_of(times: Times) -> tuple[Times, Times]:
-    """Whole seconds and the ns beyond them."""
-    seconds = times // NS_PER_S
-    return seconds, times - seconds * NS_PER_S

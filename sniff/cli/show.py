@@ -8,8 +8,8 @@ from __future__ import annotations
 import argparse
 import csv
 import sys
-from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterable, Iterator
+from typing import TYPE_CHECKING
 
 from dissectors import registry
 from dissectors.manifest import Dissector
@@ -18,9 +18,9 @@ from sniff.analysis.filtering import Filter, FilterError, compile_filter
 from sniff.analysis.packet_tree import Field
 from sniff.analysis.row_tree import tree_of
 from sniff.bus.offline import settled, settled_columns, settled_in_bulk
-from sniff.cli import USAGE, Failure, arguments, json_output, rows, standard_streams, writing
+from sniff.cli import USAGE, Failure, arguments, rows, standard_streams, writing
 from sniff.cli.progress import Watched
-from sniff.cli.tables import safe_cell
+from sniff.cli.tables import Cell, plain_cell
 from sniff.config import nearest
 from sniff.engine.capture import Capture
 from sniff.engine.follow_settings import dissector_for
@@ -30,8 +30,6 @@ from sniff.formats.parquet import ParquetWriter
 
 if TYPE_CHECKING:
     from dissectors.columns import Times
-    from sniff.cli.row_columns import RowColumns
-    from sniff.cli.row_lines import RowLines
     from sniff.engine.column_join import SettledRows
 
 
@@ -121,7 +119,7 @@ def _show(
         if table is not None:
             table.add(rows.typed(item, dissector, session))
         elif args.csv:
-            writer.writerow([_cell(value) for value in rows.to_json(item, dissector, session).values()])
+            writer.writerow([plain_cell(value) for value in rows.to_json(item, dissector, session).values()])
         elif args.table:
             writer.writerow(_cells(item, args.names, dissector, session))
         elif args.json:
@@ -145,17 +143,14 @@ def _show_in_bulk(
     left: int | None,
     table: ParquetWriter | None,
 ) -> int | None:
-    from sniff.cli.row_columns import RowColumns
-    from sniff.cli.row_lines import RowLines
-
-    made = RowColumns(dissector_for(session), session)
-    lines = RowLines(dissector_for(session), session, arguments.colour())
+    listed = _listed(args, dissector_for(session), session, table)
     for settled_rows in settled_columns(Watched(capture), session) if left != 0 else ():
         places = _chosen(settled_rows, wanted)
         if left is not None:
             places = places[:left]
             left -= len(places)
-        _write(args, made, lines, settled_rows, places, table)
+        if len(places):
+            listed(settled_rows, places)
         if left == 0:
             break
     return left
@@ -183,46 +178,39 @@ def _chosen(some: SettledRows, wanted: Filter) -> Times:
     return places[~asked]
 
 
-def _write(
-    args: argparse.Namespace,
-    made: RowColumns,
-    lines: RowLines,
-    some: SettledRows,
-    places: Times,
-    table: ParquetWriter | None,
-) -> None:
-    if not len(places):
-        return
+def _listed(
+    args: argparse.Namespace, dissector: Dissector, session: Session, table: ParquetWriter | None
+) -> Callable[[SettledRows, Times], None]:
+    """What lists rows at some places."""
+    from sniff.cli.row_cells import RowCells, json_lines, separated
+    from sniff.cli.row_columns import RowColumns
+    from sniff.cli.row_lines import RowLines
+
     if table is not None:
-        for cells in made.cells(some, places.tolist(), rows.JSON_KEYS, lambda cell: cell, instants=True):
-            table.add(cells)
-    elif args.csv or args.table:
-        writer = csv.writer(sys.stdout, delimiter="," if args.csv else "\t", lineterminator="\n")
-        writer.writerows(made.cells(some, places.tolist(), rows.JSON_KEYS if args.csv else args.names, _cell))
+        columns = RowColumns(dissector, session)
+
+        def added(some: SettledRows, places: Times) -> None:
+            for cells in columns.cells(some, places.tolist(), rows.JSON_KEYS, lambda cell: cell, instants=True):
+                table.add(cells)
+
+        return added
+    made: RowCells | RowLines
+    if args.csv:
+        made = RowCells(dissector, session, rows.JSON_KEYS, separated(len(rows.JSON_KEYS), ","))
+    elif args.table:
+        made = RowCells(dissector, session, args.names, separated(len(args.names), "\t"))
     elif args.json:
-        form = "{" + ", ".join(f'"{key}": %s' for key in rows.JSON_KEYS) + "}\n"
-        sys.stdout.writelines(map(form.__mod__, made.cells(some, places.tolist(), rows.JSON_KEYS, _as_json)))
+        made = RowCells(dissector, session, rows.JSON_KEYS, json_lines(rows.JSON_KEYS))
     else:
-        standard_streams.write(lines.lines(some, places))
+        made = RowLines(dissector, session, arguments.colour())
+    return lambda some, places: standard_streams.write(made.lines(some, places))
 
 
-def _as_json(cell: Any) -> Any:
-    return cell if isinstance(cell, int | float) and not isinstance(cell, bool) else json_output.dumps(cell)
-
-
-def _cells(item: Settled, names: list[str], dissector: Dissector, session: Session) -> list[str]:
+def _cells(item: Settled, names: list[str], dissector: Dissector, session: Session) -> list[Cell]:
     fields = rows.fields_of(item, dissector)
     if any(name not in fields for name in names):
         fields = {**rows.to_json(item, dissector, session), **fields}
-    return [_cell(fields.get(name)) for name in names]
-
-
-def _cell(value: object) -> str:
-    if value is None:
-        return ""
-    return (
-        str(int(value)) if isinstance(value, bool) else str(safe_cell(str(value)) if isinstance(value, str) else value)
-    )
+    return [plain_cell(fields.get(name)) for name in names]
 
 
 def _tree(item: Settled, dissector: Dissector) -> str:
