@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from dissectors.columns import Kernel, Pairing
     from dissectors.reading_columns import BulkReadings
     from dissectors.simulated import SimulatedBus
+    from dissectors.stencil import Stencils
 
 RARE_BITS = 8.0
 """Evidence of a good frame where its protocol does not say: one in 256 of random octets."""
@@ -74,6 +75,7 @@ class Dissector:
     `renamer`: makes what gives stations other numbers and blanks texts, checks made right again.
     `kernel`: framer and peek for clean stretches of many frames at once (`dissectors/columns.py`).
     `pairing`: the same for the tracker.
+    `stencil`: what `text` reads of frames, for many lines at once (`dissectors/stencil.py`).
     `makers`: whole frames from their parts, checks included, by the kind of frame; parts are keywords.
     `scenarios()`: simulated buses by name, for demonstrations and tests; the protocol's own name for the usual one.
     """
@@ -104,6 +106,7 @@ class Dissector:
     scenarios: Callable[[], Mapping[str, SimulatedBus]] = dict
     kernel: Kernel | None = None
     pairing: Pairing | None = None
+    stencil: Stencils | None = None
 
     @property
     def prefixes(self) -> tuple[str, ...]:

@@ -40,6 +40,7 @@ __all__ = [
 
 
 packet = on_first_use("dissectors.bacnet.packets:packet")
+stencil = on_first_use("dissectors.bacnet.stencils:mstp_stencil")
 kernel = on_first_use("dissectors.bacnet.kernel:kernel")
 reading_columns = on_first_use("dissectors.bacnet.reading_columns:reading_columns")
 questions = Questions(
@@ -87,5 +88,6 @@ MSTP = Dissector(
     makers={"mstp": frame},
     kernel=kernel,
     pairing=pairing,
+    stencil=stencil,
     scenarios=on_first_use("dissectors.bacnet.scenario:scenarios"),
 )

@@ -32,6 +32,7 @@ __all__ = [
 
 
 packet = on_first_use("dissectors.modbus.packets:dissect")
+stencil = on_first_use("dissectors.modbus.stencils:rtu_stencil")
 kernel = on_first_use("dissectors.modbus.kernel:kernel")
 pairing = on_first_use("dissectors.modbus.block_pairing:rtu_pairing")
 judge = on_first_use("dissectors.modbus.judging_columns:BulkModbusFindings")
@@ -84,6 +85,7 @@ RTU = Dissector(
     questions=rtu_questions,
     kernel=kernel,
     pairing=pairing,
+    stencil=stencil,
 )
 
 ASCII = Dissector(

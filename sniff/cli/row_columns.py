@@ -12,11 +12,7 @@ from typing import Any
 import numpy as np
 
 from dissectors.columns import FOUNDS, NONE, ROLES, VERDICTS, Times
-from dissectors.line import NS_PER_S
 from dissectors.manifest import Dissector
-from dissectors.tracker import Interval
-from dissectors.words import milliseconds
-from sniff.analysis.wording import describe, duration, is_error
 from sniff.cli import rows
 from sniff.engine.column_join import SettledRows
 from sniff.engine.engine import Row
@@ -44,13 +40,12 @@ _OF_TRANSACTION = {
 
 
 class RowColumns:
-    """Makes cells and lines of the rows of one capture."""
+    """Makes cells of the rows of one capture."""
 
     def __init__(self, dissector: Dissector, session: Session) -> None:
         self._dissector = dissector
         self._session = session
         self._cells: dict[Key, tuple[Cell, ...]] = {}
-        self._texts: dict[Key, tuple[str, str, str]] = {}
 
     def cells(
         self, settled: SettledRows, places: Sequence[int], names: Sequence[str], render: Render, instants: bool = False
@@ -59,11 +54,6 @@ class RowColumns:
         `render` must stay the same. `instants`: "t" as ns since the epoch."""
         for begin in range(0, len(places), AT_ONCE):
             yield from self._some_cells(settled, places[begin : begin + AT_ONCE], names, render, instants)
-
-    def lines(self, settled: SettledRows, places: Sequence[int], colour: bool) -> Iterator[str]:
-        """What `rows.text_line` says of each."""
-        for begin in range(0, len(places), AT_ONCE):
-            yield from self._some_lines(settled, places[begin : begin + AT_ONCE], colour)
 
     # cells
 
@@ -138,38 +128,6 @@ class RowColumns:
             return [round(time / 1e6, 6) if there else none for time, there in pairs]
         return [time / 1e6 if there else none for time, there in pairs]
 
-    # lines
-
-    def _some_lines(self, settled: SettledRows, places: Sequence[int], colour: bool) -> Iterator[str]:
-        table, session, known = settled.table, self._session, self._texts
-        at = np.asarray(places, np.int64)
-        which = settled.which[at - settled.begin]
-        last = _is_last(settled, at, which)
-        seconds = [time / NS_PER_S for time in _since(table.frames.start[at], session)]
-        keys = list(_keys(settled, places))
-        for key, row in _unknown(settled, places, keys, known):
-            known[key] = self._said(row)
-        lines = zip(places, seconds, _told(settled, np.where(last, which, -1)), keys, strict=True)
-        for place, second, (bad, words), key in lines:
-            if place in table.odd:
-                yield rows.text_line(settled.item(place), self._dissector, session, colour)
-                continue
-            mark, text, note = known[key]
-            if words:
-                note = f"{note}; {words}" if note else words
-            mark = bad or mark
-            line = "%6d %12.6f s  %s %s" % (table.first + place, second, mark, text)  # noqa: UP031  twice as fast
-            if note:
-                line = f"{line}  [{note}]"
-            yield f"\x1b[31m{line}\x1b[0m" if colour and mark == "!" else line
-
-    def _said(self, row: Row) -> tuple[str, str, str]:
-        """The mark, the text and the note of a row by itself."""
-        text = describe(self._dissector, row)
-        error = row.header.error if row.header is not None else None
-        note = error if not getattr(row.event, "ok", True) and error and error not in text else ""
-        return "!" if is_error(row) else " ", text, note or ""
-
 
 def _held(table: Table, places: Sequence[int], name: str, render: Render) -> list[Cell]:
     """A column that the table holds; right for plain rows."""
@@ -241,37 +199,6 @@ def _keys(settled: SettledRows, places: Sequence[int]) -> Iterator[Key]:
     between = np.where(inside, ways << 8 | placed.role[at], -1)
     whole = made << 33 | (frames.expected[at].astype(np.int64) + 1)
     return zip(octets, whole.tolist(), between.tolist(), strict=True)
-
-
-def _is_last(settled: SettledRows, at: Times, which: Times) -> np.ndarray[Any, np.dtype[np.bool_]]:
-    """Whether a row is the one that its transaction's verdict is told at."""
-    closed = settled.closed
-    if not len(closed):
-        return np.zeros(len(at), bool)
-    response = closed.response[which]
-    told = np.where(response > 0, response, closed.request[which])
-    is_last: np.ndarray[Any, np.dtype[np.bool_]] = (which >= 0) & (told == at + settled.table.first)
-    return is_last
-
-
-def _told(settled: SettledRows, which: Times) -> list[tuple[str, str]]:
-    """What the last row of each transaction says of it: "!" where that is bad, and the words; nothing for -1."""
-    closed, there = settled.closed, np.flatnonzero(which >= 0)
-    told = [("", "")] * len(which)
-    at = which[there]
-    columns = (closed.verdict, closed.latency, closed.least, closed.most)
-    entries = zip(there.tolist(), *(column[at].tolist() for column in columns), strict=True)
-    for place, verdict, nominal, least, most in entries:
-        bad, words = _VERDICTS[verdict]
-        if nominal != NONE:
-            exact = least == nominal == most
-            took = milliseconds(nominal) if exact else duration(Interval(nominal, least, most))
-            words = f"{words}; {took}" if words else took
-        told[place] = bad, words
-    return told
-
-
-_VERDICTS = [("", "") if one.value in rows.GOOD_VERDICTS else ("!", one.words) for one in VERDICTS]
 
 
 def _since(times: Times, session: Session) -> list[int]:

@@ -8,8 +8,8 @@ from __future__ import annotations
 import argparse
 import csv
 import sys
-from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterable, Iterator
+from typing import TYPE_CHECKING
 
 from dissectors import registry
 from dissectors.manifest import Dissector
@@ -18,9 +18,9 @@ from sniff.analysis.filtering import Filter, FilterError, compile_filter
 from sniff.analysis.packet_tree import Field
 from sniff.analysis.row_tree import tree_of
 from sniff.bus.offline import settled, settled_columns, settled_in_bulk
-from sniff.cli import USAGE, Failure, arguments, json_output, rows, writing
+from sniff.cli import USAGE, Failure, arguments, rows, standard_streams, writing
 from sniff.cli.progress import Watched
-from sniff.cli.tables import safe_cell
+from sniff.cli.tables import Cell, plain_cell
 from sniff.config import nearest
 from sniff.engine.capture import Capture
 from sniff.engine.follow_settings import dissector_for
@@ -29,7 +29,7 @@ from sniff.engine.verdict_join import Settled
 from sniff.formats.parquet import ParquetWriter
 
 if TYPE_CHECKING:
-    from sniff.cli.row_columns import RowColumns
+    from dissectors.columns import Times
     from sniff.engine.column_join import SettledRows
 
 
@@ -80,16 +80,17 @@ def _show_all(args: argparse.Namespace, table: ParquetWriter | None) -> int:
         if args.reference or spoken or args.tree or args.hex or args.fields:
             left = _show(args, _settled(args, capture, session, spoken, wanted), session, dissector, left, table)
         else:
-            left = _show_in_bulk(args, capture, session, wanted, left, table)
+            in_tables = _filter(args, dissector, with_closings=True)
+            left = _show_in_bulk(args, capture, session, in_tables, left, table)
         writing.say_incomplete(path, capture)
         if left == 0:
             break
     return 0
 
 
-def _filter(args: argparse.Namespace, dissector: Dissector) -> Filter:
+def _filter(args: argparse.Namespace, dissector: Dissector, with_closings: bool = False) -> Filter:
     try:
-        return compile_filter(args.filter, dissector)
+        return compile_filter(args.filter, dissector, with_closings)
     except FilterError as error:
         raise Failure(f"filter {args.filter!r}: {error}", USAGE) from None
 
@@ -118,7 +119,7 @@ def _show(
         if table is not None:
             table.add(rows.typed(item, dissector, session))
         elif args.csv:
-            writer.writerow([_cell(value) for value in rows.to_json(item, dissector, session).values()])
+            writer.writerow([plain_cell(value) for value in rows.to_json(item, dissector, session).values()])
         elif args.table:
             writer.writerow(_cells(item, args.names, dissector, session))
         elif args.json:
@@ -142,75 +143,74 @@ def _show_in_bulk(
     left: int | None,
     table: ParquetWriter | None,
 ) -> int | None:
-    from sniff.cli.row_columns import RowColumns
-
-    made = RowColumns(dissector_for(session), session)
+    listed = _listed(args, dissector_for(session), session, table)
     for settled_rows in settled_columns(Watched(capture, prints=True), session) if left != 0 else ():
         places = _chosen(settled_rows, wanted)
         if left is not None:
             places = places[:left]
             left -= len(places)
-        _write(args, made, settled_rows, places, table)
+        if len(places):
+            listed(settled_rows, places)
         if left == 0:
             break
     return left
 
 
-def _chosen(some: SettledRows, wanted: Filter) -> list[int]:
+def _chosen(some: SettledRows, wanted: Filter) -> Times:
     """Places of the rows that a filter accepts."""
-    places = wanted.candidates(some.table)
-    if places is None:
-        places = list(range(some.begin, some.end))
-    else:
-        places = [place for place in places if some.begin <= place < some.end]
-    odd = some.table.odd
-    if wanted.exact:
-        return [place for place in places if place not in odd or wanted(odd[place], some.transaction(place))]
+    import numpy as np
+
     from sniff.engine.table import AT_ONCE, rows_at
 
-    chosen: list[int] = []
-    for begin in range(0, len(places), AT_ONCE):
-        part = places[begin : begin + AT_ONCE]
-        rows_of = zip(part, rows_at(some.table, part), strict=True)
-        chosen += [place for place, row in rows_of if wanted(row, some.transaction(place))]
-    return chosen
-
-
-def _write(
-    args: argparse.Namespace, made: RowColumns, some: SettledRows, places: list[int], table: ParquetWriter | None
-) -> None:
-    if not places:
-        return
-    if table is not None:
-        for cells in made.cells(some, places, rows.JSON_KEYS, lambda cell: cell, instants=True):
-            table.add(cells)
-    elif args.csv or args.table:
-        writer = csv.writer(sys.stdout, delimiter="," if args.csv else "\t", lineterminator="\n")
-        writer.writerows(made.cells(some, places, rows.JSON_KEYS if args.csv else args.names, _cell))
-    elif args.json:
-        form = "{" + ", ".join(f'"{key}": %s' for key in rows.JSON_KEYS) + "}\n"
-        sys.stdout.writelines(map(form.__mod__, made.cells(some, places, rows.JSON_KEYS, _as_json)))
+    odd = some.table.odd
+    if wanted.columns is None:
+        places = np.arange(some.begin, some.end)
     else:
-        sys.stdout.writelines(f"{line}\n" for line in made.lines(some, places, arguments.colour()))
+        mask = wanted.columns(some.table, some.closings if wanted.of_closing else None)
+        mask[list(odd)] = True
+        places = np.flatnonzero(mask[some.begin : some.end]) + some.begin
+    asked = np.isin(places, list(odd)) if wanted.exact else np.ones(len(places), bool)
+    for at in range(0, len(asked_places := np.flatnonzero(asked)), AT_ONCE):
+        part = asked_places[at : at + AT_ONCE]
+        chosen = places[part].tolist()
+        rows_of = zip(chosen, rows_at(some.table, chosen), strict=True)
+        asked[part] = [not wanted(row, some.transaction(place)) for place, row in rows_of]
+    return places[~asked]
 
 
-def _as_json(cell: Any) -> Any:
-    return cell if isinstance(cell, int | float) and not isinstance(cell, bool) else json_output.dumps(cell)
+def _listed(
+    args: argparse.Namespace, dissector: Dissector, session: Session, table: ParquetWriter | None
+) -> Callable[[SettledRows, Times], None]:
+    """What lists rows at some places."""
+    from sniff.cli.row_cells import RowCells, json_lines, separated
+    from sniff.cli.row_columns import RowColumns
+    from sniff.cli.row_lines import RowLines
+
+    if table is not None:
+        columns = RowColumns(dissector, session)
+
+        def added(some: SettledRows, places: Times) -> None:
+            for cells in columns.cells(some, places.tolist(), rows.JSON_KEYS, lambda cell: cell, instants=True):
+                table.add(cells)
+
+        return added
+    made: RowCells | RowLines
+    if args.csv:
+        made = RowCells(dissector, session, rows.JSON_KEYS, separated(len(rows.JSON_KEYS), ","))
+    elif args.table:
+        made = RowCells(dissector, session, args.names, separated(len(args.names), "\t"))
+    elif args.json:
+        made = RowCells(dissector, session, rows.JSON_KEYS, json_lines(rows.JSON_KEYS))
+    else:
+        made = RowLines(dissector, session, arguments.colour())
+    return lambda some, places: standard_streams.write(made.lines(some, places))
 
 
-def _cells(item: Settled, names: list[str], dissector: Dissector, session: Session) -> list[str]:
+def _cells(item: Settled, names: list[str], dissector: Dissector, session: Session) -> list[Cell]:
     fields = rows.fields_of(item, dissector)
     if any(name not in fields for name in names):
         fields = {**rows.to_json(item, dissector, session), **fields}
-    return [_cell(fields.get(name)) for name in names]
-
-
-def _cell(value: object) -> str:
-    if value is None:
-        return ""
-    return (
-        str(int(value)) if isinstance(value, bool) else str(safe_cell(str(value)) if isinstance(value, str) else value)
-    )
+    return [plain_cell(fields.get(name)) for name in names]
 
 
 def _tree(item: Settled, dissector: Dissector) -> str:

@@ -12,6 +12,8 @@ import sys
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from _typeshed import ReadableBuffer as Buffer
 
 ESCAPE = "sniff485.escape"
@@ -44,6 +46,21 @@ def say(text: str) -> None:
     """A line on standard error, if that takes it."""
     with contextlib.suppress(OSError, ValueError):
         print(f"sniff485: {text}", file=sys.stderr, flush=True)
+
+
+def write(parts: Iterable[bytes]) -> None:
+    """Print lines that are UTF-8 already, as they are where standard output takes that."""
+    stream = sys.stdout
+    as_it_is = isinstance(stream, io.TextIOWrapper) and codecs.lookup(stream.encoding).name == "utf-8"
+    if not as_it_is or os.linesep != "\n":
+        for part in parts:
+            stream.write(part.decode())
+        return
+    stream.flush()
+    for part in parts:
+        stream.buffer.write(part)
+    if stream.line_buffering:
+        stream.flush()
 
 
 def output_error() -> OSError | None:

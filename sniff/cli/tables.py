@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import sys
 from collections.abc import Iterable, Sequence
+from typing import cast
 
 from sniff.analysis.plain import plain
 from sniff.cli import json_output
@@ -28,6 +29,15 @@ def write(headings: Sequence[str], rows: Iterable[Sequence[Cell]], style: str = 
 def safe_cell(cell: Cell) -> Cell:
     """A cell that no spreadsheet takes for a formula (it would run what begins with = + - @)."""
     return "'" + cell if isinstance(cell, str) and cell[:1] in ("=", "+", "-", "@", "\t", "\r") else cell
+
+
+def plain_cell(value: object) -> Cell:
+    """A value as CSV has it: nothing for None, 1 and 0 for truth, text that no spreadsheet takes for a formula."""
+    if value is None:
+        return ""
+    if isinstance(value, bool):
+        return str(int(value))
+    return safe_cell(value) if isinstance(value, str) else cast(Cell, value)
 
 
 def _shown(cell: Cell) -> str:

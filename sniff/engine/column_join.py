@@ -13,6 +13,7 @@ import numpy as np
 
 from dissectors.columns import Times, TransactionColumns
 from dissectors.tracker import Transaction
+from sniff.engine.closings import Closings
 from sniff.engine.table import Table, joined_columns, transaction_columns
 from sniff.engine.verdict_join import HELD, REMEMBERED, Settled
 
@@ -35,6 +36,14 @@ class SettledRows:
         """Of the row at a place in the table."""
         which = int(self.which[place - self.begin])
         return None if which < 0 else self.closed.transaction(which)
+
+    @property
+    def closings(self) -> Closings:
+        """What became of all rows of the table, as far as it is settled: of the others nothing."""
+        tx, closed = np.zeros(len(self.table), np.int64), self.closed
+        tx[self.begin : self.end] = self.which + 1
+        numbers = np.arange(1, len(closed) + 1)
+        return Closings(tx, 1, len(closed), [lambda name: numbers if name == "id" else getattr(closed, name)])
 
     def item(self, place: int) -> Settled:
         """The row at a place in the table, as an object."""
