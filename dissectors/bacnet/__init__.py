@@ -40,6 +40,7 @@ __all__ = [
 
 packet = on_first_use("dissectors.bacnet.packets:packet")
 kernel = on_first_use("dissectors.bacnet.kernel:kernel")
+field_types = on_first_use("dissectors.bacnet.field_types:types")
 reading_columns = on_first_use("dissectors.bacnet.reading_columns:reading_columns")
 pairing = on_first_use("dissectors.bacnet.block_pairing:pairing")
 
@@ -82,5 +83,6 @@ MSTP = Dissector(
     makers={"mstp": frame},
     kernel=kernel,
     pairing=pairing,
+    field_types=field_types,
     scenarios=on_first_use("dissectors.bacnet.scenario:scenarios"),
 )

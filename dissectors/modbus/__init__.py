@@ -36,6 +36,8 @@ pairing = on_first_use("dissectors.modbus.block_pairing:rtu_pairing")
 judge = on_first_use("dissectors.modbus.judging_columns:BulkModbusFindings")
 ascii_kernel = on_first_use("dissectors.modbus.ascii_kernel:kernel")
 ascii_pairing = on_first_use("dissectors.modbus.block_pairing:ascii_pairing")
+rtu_field_types = on_first_use("dissectors.modbus.field_types:rtu_types")
+ascii_field_types = on_first_use("dissectors.modbus.field_types:ascii_types")
 reading_columns = on_first_use("dissectors.modbus.reading_columns:reading_columns")
 
 
@@ -79,6 +81,7 @@ RTU = Dissector(
     refusal=refusal,
     kernel=kernel,
     pairing=pairing,
+    field_types=rtu_field_types,
 )
 
 ASCII = Dissector(
@@ -103,4 +106,5 @@ ASCII = Dissector(
     refusal=refusal,
     kernel=ascii_kernel,
     pairing=ascii_pairing,
+    field_types=ascii_field_types,
 )

@@ -35,6 +35,7 @@ packet = on_first_use("dissectors.n2.packets:packet")
 judge = on_first_use("dissectors.n2.judging_columns:BulkN2Findings")
 kernel = on_first_use("dissectors.n2.kernel:kernel")
 pairing = on_first_use("dissectors.n2.block_pairing:pairing")
+field_types = on_first_use("dissectors.n2.field_types:types")
 
 
 def bits(frame: Frame) -> float:
@@ -62,4 +63,5 @@ N2 = Dissector(
     renamer=N2Renamer,
     makers={"n2": make_command, "n2-answer": make_answer},
     scenarios=on_first_use("dissectors.n2.scenario:scenarios"),
+    field_types=field_types,
 )
