@@ -8,11 +8,15 @@ from typing import Any
 
 from dissectors import registry
 from dissectors.field_types import FieldType, Kind
+from dissectors.findings import Finding
 from dissectors.manifest import Dissector
 from dissectors.profiles import Devices
+from sniff.bus.offline import Source, survey
 from sniff.cli import USAGE, Failure
+from sniff.cli.progress import Watched
 from sniff.engine.capture import Capture
 from sniff.engine.follow_settings import dissector_for
+from sniff.engine.observer import Observer
 from sniff.engine.session import Session
 from sniff.filter import Filter, FilterError, Scope, compile_filter
 from sniff.filter.errors import nearest
@@ -38,7 +42,7 @@ def add_help_fields(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def filter_of(args: argparse.Namespace, capture: Capture, session: Session, devices: Devices | None = None) -> Filter:
+def filter_of(args: argparse.Namespace, capture: Source, session: Session, devices: Devices | None = None) -> Filter:
     """What -Y says, for a capture; ends with exit code 2 where it cannot be read."""
     dissector = dissector_for(session)
     scope = Scope(session.started, devices or Devices())
@@ -52,10 +56,52 @@ def filter_of(args: argparse.Namespace, capture: Capture, session: Session, devi
     return wanted
 
 
-def _evidence(capture: Capture, session: Session, devices: Devices) -> dict[int, frozenset[str]]:
+def surveyed(
+    args: argparse.Namespace,
+    capture: Source,
+    session: Session,
+    *observers: Observer,
+    every_row: bool = False,
+    devices: Devices | None = None,
+) -> None:
+    """Hand a capture to observers, as far as -Y accepts it; an exchange counts where one of its frames is accepted.
+
+    `every_row`: all rows, and only the exchanges that are accepted."""
+    if not args.filter:
+        survey(Watched(capture), session, *observers, reference=args.reference)
+        return
+    from sniff.bus.sifting import sift
+
+    sift(Watched(capture), session, filter_of(args, capture, session, devices), *observers, every_row=every_row)
+
+
+def sifted(args: argparse.Namespace, capture: Capture, session: Session, devices: Devices | None = None) -> Source:
+    """The octets of the rows that -Y accepts; the capture itself without it."""
+    if not args.filter:
+        return capture
+    from sniff.bus.sifting import Sifted
+
+    return Sifted(capture, session, filter_of(args, capture, session, devices))
+
+
+def shown_findings(
+    args: argparse.Namespace,
+    capture: Capture,
+    session: Session,
+    findings: tuple[Finding, ...],
+    devices: Devices | None = None,
+) -> tuple[Finding, ...]:
+    """Findings with a row among their evidence that -Y accepts."""
+    if not args.filter:
+        return findings
+    from sniff.bus.sifting import shown_findings as shown
+
+    return shown(capture, session, filter_of(args, capture, session, devices), findings)
+
+
+def _evidence(capture: Source, session: Session, devices: Devices) -> dict[int, frozenset[str]]:
     """Codes of the findings that each row is evidence of."""
     from sniff.analysis.judging import Judging
-    from sniff.bus.offline import survey
 
     judging = Judging(session, dissector_for(session), devices)
     survey(capture, session, judging)
