@@ -12,6 +12,7 @@ from functools import cache
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from dissectors.field_types import FieldTypes
 from dissectors.findings import Judge, Rule
 from dissectors.frame import Frame, Header, Role
 from dissectors.framer import Framer
@@ -76,6 +77,8 @@ class Dissector:
     `kernel`: framer and peek for clean stretches of many frames at once (`dissectors/columns.py`).
     `pairing`: the same for the tracker.
     `stencil`: what `text` reads of frames, for many lines at once (`dissectors/stencil.py`).
+    `field_types()`: the types of all that `fields` may give, by name; "kind" and "func" too. Where it is not given any
+    name with one of the prefixes may be a field, of any type.
     `makers`: whole frames from their parts, checks included, by the kind of frame; parts are keywords.
     `scenarios()`: simulated buses by name, for demonstrations and tests; the protocol's own name for the usual one.
     """
@@ -107,6 +110,7 @@ class Dissector:
     kernel: Kernel | None = None
     pairing: Pairing | None = None
     stencil: Stencils | None = None
+    field_types: Callable[[], FieldTypes] | None = None
 
     @property
     def prefixes(self) -> tuple[str, ...]:

@@ -42,6 +42,7 @@ __all__ = [
 packet = on_first_use("dissectors.bacnet.packets:packet")
 stencil = on_first_use("dissectors.bacnet.stencils:mstp_stencil")
 kernel = on_first_use("dissectors.bacnet.kernel:kernel")
+field_types = on_first_use("dissectors.bacnet.field_types:types")
 reading_columns = on_first_use("dissectors.bacnet.reading_columns:reading_columns")
 questions = Questions(
     on_first_use("dissectors.bacnet.questions:question"), on_first_use("dissectors.bacnet.questions:stems")
@@ -89,5 +90,6 @@ MSTP = Dissector(
     kernel=kernel,
     pairing=pairing,
     stencil=stencil,
+    field_types=field_types,
     scenarios=on_first_use("dissectors.bacnet.scenario:scenarios"),
 )

@@ -44,6 +44,11 @@ def is_enumeration(type_name: str) -> bool:
     return type_name in _TABLES
 
 
+def numbered(enumeration: str) -> dict[int, str]:
+    """All names of an enumeration by number."""
+    return _TABLES[enumeration]
+
+
 def known(enumeration: str | None, number: int) -> str | None:
     """The name of a number, None when the enumeration has none for it."""
     table = _TABLES.get(enumeration) if enumeration is not None else None

@@ -41,6 +41,8 @@ ascii_pairing = on_first_use("dissectors.modbus.block_pairing:ascii_pairing")
 question = on_first_use("dissectors.modbus.questions:question")
 rtu_questions = Questions(question, on_first_use("dissectors.modbus.questions:rtu_stems"))
 ascii_questions = Questions(question, on_first_use("dissectors.modbus.questions:ascii_stems"))
+rtu_field_types = on_first_use("dissectors.modbus.field_types:rtu_types")
+ascii_field_types = on_first_use("dissectors.modbus.field_types:ascii_types")
 reading_columns = on_first_use("dissectors.modbus.reading_columns:reading_columns")
 
 
@@ -86,6 +88,7 @@ RTU = Dissector(
     kernel=kernel,
     pairing=pairing,
     stencil=stencil,
+    field_types=rtu_field_types,
 )
 
 ASCII = Dissector(
@@ -111,4 +114,5 @@ ASCII = Dissector(
     questions=ascii_questions,
     kernel=ascii_kernel,
     pairing=ascii_pairing,
+    field_types=ascii_field_types,
 )

@@ -37,6 +37,7 @@ judge = on_first_use("dissectors.n2.judging_columns:BulkN2Findings")
 kernel = on_first_use("dissectors.n2.kernel:kernel")
 questions = Questions(on_first_use("dissectors.n2.questions:question"))
 pairing = on_first_use("dissectors.n2.block_pairing:pairing")
+field_types = on_first_use("dissectors.n2.field_types:types")
 
 
 def bits(frame: Frame) -> float:
@@ -65,4 +66,5 @@ N2 = Dissector(
     renamer=N2Renamer,
     makers={"n2": make_command, "n2-answer": make_answer},
     scenarios=on_first_use("dissectors.n2.scenario:scenarios"),
+    field_types=field_types,
 )

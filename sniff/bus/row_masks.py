@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 import numpy.typing as npt
 
-from sniff.analysis.filtering import Filter
 from sniff.bus.kept_tables import KeptTables, Part
 from sniff.engine.closings import Closings
 from sniff.engine.packed_table import PackedTable
+from sniff.filter import Filter
 
 if TYPE_CHECKING:
     from sniff.engine.table import Table
@@ -29,7 +29,7 @@ States = npt.NDArray[np.uint8]
 
 
 class RowMasks:
-    """What a filter says of rows and closings. The filter holds with `columns`, made with closings."""
+    """What a filter says of rows and closings. Columns say something of the filter."""
 
     def __init__(self, kept: KeptTables, filter: Filter) -> None:
         self._kept = kept
@@ -73,20 +73,17 @@ class RowMasks:
         return held[1]
 
     def _states(self, part: Part) -> States:
-        mask = self._filter.columns
-        assert mask is not None
         view = cast("Table", part.view())
         closings = None
         if self._filter.of_closing:
             closings = self._closings(part)
-            if closings is None:
-                return np.full(part.rows, DOUBTFUL, np.uint8)
-        states = mask(view, closings).astype(np.uint8)
-        if not self._filter.exact:
-            states <<= 1
-        odd = part.whole.odd
-        if odd:
-            states[list(odd)] = DOUBTFUL
+        said = self._filter.masks(view, closings)
+        if said is None:
+            return np.full(part.rows, DOUBTFUL, np.uint8)
+        sure, may = said
+        states: States = sure.astype(np.uint8)
+        if sure is not may:
+            states[may & ~sure] = DOUBTFUL
         return states
 
     def _closings(self, part: Part) -> Closings | None:

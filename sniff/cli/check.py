@@ -15,7 +15,7 @@ from dissectors.findings import Finding, Severity
 from sniff.bus.live import LiveItem
 from sniff.bus.model import BusModel
 from sniff.bus.offline import survey
-from sniff.cli import INTERRUPTED, PORT_TROUBLE, UNREADABLE, USAGE, Failure, arguments, check_output
+from sniff.cli import INTERRUPTED, PORT_TROUBLE, UNREADABLE, USAGE, Failure, arguments, check_output, filtering
 from sniff.cli.check_output import Checked
 from sniff.cli.interruption import until_interrupted
 from sniff.cli.progress import Watched
@@ -40,6 +40,7 @@ SEVERITIES = tuple(severity.label for severity in Severity)
 def configure(parser: argparse.ArgumentParser) -> None:
     """Options of `check`."""
     arguments.add_reference(parser)
+    filtering.add_filter(parser, "only findings with a frame that matches among their evidence")
     parser.add_argument("sources", nargs="+", metavar="FILE|PORT", help="captures, or one port or configured bus")
     arguments.add_bus(parser)
     arguments.add_line(parser, auto=True)
@@ -87,6 +88,8 @@ def _check(args: argparse.Namespace) -> list[Checked]:
         raise Failure(f"{source}: no such file", UNREADABLE)
     if len(args.sources) > 1:
         raise Failure(f"{source}: a port is checked alone; files end in {', '.join(suffixes())}", USAGE)
+    if args.filter:
+        raise Failure("-Y: a port is checked whole; record it, then check the file", USAGE)
     return [_listen(source, args)]
 
 
@@ -107,7 +110,9 @@ def _read(source: str, capture: Capture, args: argparse.Namespace) -> Checked:
     if session.unknown:
         name = " and ".join(arguments.options(session))
         notes.append(f"no settings were found while this was recorded, so nothing is judged; name them with {name}")
-    return run_of.result(source, "; ".join(notes))
+    result = run_of.result(source, "; ".join(notes))
+    shown = filtering.shown_findings(args, capture, session, result.findings, run_of.model.devices)
+    return result.with_findings(shown)
 
 
 def _listen(port: str, args: argparse.Namespace) -> Checked:

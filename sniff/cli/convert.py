@@ -9,7 +9,7 @@ import argparse
 from dissectors.profiles import Devices
 from sniff.analysis.judging import Judging
 from sniff.bus.offline import survey
-from sniff.cli import arguments, writing
+from sniff.cli import arguments, filtering, writing
 from sniff.cli.progress import Watched
 from sniff.devices import with_devices
 from sniff.engine.capture import Capture
@@ -26,6 +26,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     arguments.add_line(parser)
     arguments.add_devices(parser)
     arguments.add_reference(parser)
+    filtering.add_filter(parser, "only the octets of frames that match")
     parser.add_argument(
         "--link-type",
         type=int,
@@ -44,8 +45,10 @@ def run(args: argparse.Namespace) -> int:
     options = {"link-type": str(args.link_type)} if args.link_type is not None else None
     devices = arguments.noted_devices(args, session)
     session = with_devices(session, devices)
-    notes = _evidence(capture, session, devices, args.reference) if args.output.lower().endswith(".pcapng") else None
-    writing.write(args, session, capture, [args.source], options, devices=devices, notes=notes)
+    noted = args.output.lower().endswith(".pcapng") and not args.filter  # of a part the rows have other numbers
+    notes = _evidence(capture, session, devices, args.reference) if noted else None
+    source = filtering.sifted(args, capture, session, devices)
+    writing.write(args, session, source, [args.source], options, devices=devices, notes=notes)
     writing.say_incomplete(args.source, capture)
     return 0
 

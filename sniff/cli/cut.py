@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import argparse
 
-from sniff.cli import USAGE, Failure, arguments, writing
+from sniff.cli import USAGE, Failure, arguments, filtering, writing
 from sniff.cli.progress import Watched
 
 
@@ -17,6 +17,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     writing.add_output(parser)
     arguments.add_line(parser)
     arguments.add_reference(parser)
+    filtering.add_filter(parser, "of it only the octets of frames that match; alone: of the whole capture")
     parser.add_argument("--from", dest="since", metavar="TIME", help="begin here")
     parser.add_argument("--to", dest="until", metavar="TIME", help="end here")
     parser.add_argument("--frames", metavar="A-B", help="these frames")
@@ -31,7 +32,7 @@ def run(args: argparse.Namespace) -> int:
     from sniff.editing import cutting
 
     chosen = [bool(args.since or args.until), bool(args.frames), bool(args.around)]
-    if sum(chosen) != 1:
+    if sum(chosen) > 1 or not (sum(chosen) or args.filter):
         raise Failure("say what to keep: --from and --to, or --frames, or --around", USAGE)
     capture = arguments.open_capture(args.file)
     session = arguments.settings_of(args, capture.session, args.file)
@@ -49,7 +50,8 @@ def run(args: argparse.Namespace) -> int:
         raise Failure(str(error), USAGE) from None
     margin = args.margin if args.margin is not None else 2.0 if args.around else 0.0
     stretch = stretch.widened(int(margin * 1e9))
-    count = writing.write(args, session, cutting.CutOut(capture, stretch, session.line.char), [args.file])
+    source = filtering.sifted(args, capture, session)
+    count = writing.write(args, session, cutting.CutOut(source, stretch, session.line.char), [args.file])
     if not count:
         raise Failure(f"{args.file}: nothing in that stretch; {args.output} is empty", USAGE)
     writing.say_incomplete(args.file, capture)

@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import argparse
 
+from sniff.analysis.summary import Summary
 from sniff.bus.model import BusModel
 from sniff.bus.offline import survey
-from sniff.cli import arguments, tables, writing
+from sniff.cli import arguments, filtering, tables, writing
 from sniff.cli.progress import Watched
 from sniff.devices import noted_devices
 from sniff.engine.follow_settings import dissector_for
@@ -21,6 +22,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("after", metavar="AFTER", help="capture")
     arguments.add_devices(parser)
     arguments.add_reference(parser)
+    filtering.add_filter(parser, "only what matches, and exchanges with a frame that does")
     style = parser.add_mutually_exclusive_group()
     style.add_argument("--json", action="store_const", const="json", dest="style", help="one JSON object a difference")
     style.add_argument("--csv", action="store_const", const="csv", dest="style", help="comma-separated values")
@@ -40,7 +42,15 @@ def run(args: argparse.Namespace) -> int:
         survey(Watched(capture), session, model, reference=args.reference)
         arguments.say_assumed(session, path)
         writing.say_incomplete(path, capture)
-        sides.append(Side(path, model.summary, model.findings(), session.adapter.latency, tuple(model.points)))
+        summary, points = model.summary, tuple(model.points)
+        if args.filter:
+            counted = BusModel(session, dissector_for(session), model.devices)
+            taken = Summary(session.line)
+            filtering.surveyed(args, capture, session, counted, every_row=True, devices=model.devices)
+            filtering.surveyed(args, capture, session, taken, devices=model.devices)
+            summary, points = taken, tuple(counted.points)
+        findings = filtering.shown_findings(args, capture, session, model.findings(), model.devices)
+        sides.append(Side(path, summary, findings, session.adapter.latency, points))
     found = list(differences(*sides))
     rows = [(one.subject, one.what, one.before, one.after) for one in found]
     if rows or args.style != "text":

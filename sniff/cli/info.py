@@ -13,9 +13,7 @@ from dissectors.words import milliseconds
 from sniff.analysis.nodes import Node
 from sniff.analysis.plain import plain
 from sniff.analysis.summary import Summary, ranked
-from sniff.bus.offline import survey
-from sniff.cli import arguments, json_output
-from sniff.cli.progress import Watched
+from sniff.cli import arguments, filtering, json_output
 from sniff.cli.rows import iso
 from sniff.engine.capture import Capture
 from sniff.engine.engine import Output
@@ -34,6 +32,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     arguments.add_files(parser)
     arguments.add_line(parser)
     arguments.add_reference(parser)
+    filtering.add_filter(parser, "only what matches, and exchanges with a frame that does")
     parser.add_argument("--json", action="store_true", help="one JSON object a file")
 
 
@@ -42,7 +41,7 @@ def run(args: argparse.Namespace) -> int:
     opened = [one for path in args.files for one in arguments.open_buses(path)]
     for number, (path, capture) in enumerate(opened):
         session = arguments.settings_of(args, capture.session, path)
-        summary, events = _summarise(capture, session, args.reference)
+        summary, events = _summarise(args, capture, session)
         if args.json:
             print(json_output.dumps(_as_json(path, capture, session, summary)))
             continue
@@ -52,9 +51,9 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _summarise(capture: Capture, session: Session, reference: bool) -> tuple[Summary, list[LineEvent]]:
+def _summarise(args: argparse.Namespace, capture: Capture, session: Session) -> tuple[Summary, list[LineEvent]]:
     summary, happened = Summary(session.line), _Happened()
-    survey(Watched(capture), session, summary, happened, reference=reference)
+    filtering.surveyed(args, capture, session, summary, happened)
     return summary, happened.events
 
 

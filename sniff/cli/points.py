@@ -15,7 +15,7 @@ from dissectors.profiles.decoding import number
 from sniff.analysis.points import Point, PointReader, PointTable, Sample
 from sniff.bus.offline import outputs
 from sniff.bus.sample_row import COLUMNS, sample_row, shown_value
-from sniff.cli import USAGE, Failure, arguments, tables, writing
+from sniff.cli import USAGE, Failure, arguments, filtering, tables, writing
 from sniff.cli.progress import Watched
 from sniff.cli.rows import iso
 from sniff.cli.tables import Cell
@@ -37,6 +37,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     arguments.add_line(parser)
     arguments.add_devices(parser)
     arguments.add_reference(parser)
+    filtering.add_filter(parser, "only values of exchanges with a frame that matches")
     parser.add_argument("-n", "--name", action="append", default=[], metavar="GLOB", help="only points like output-*")
     parser.add_argument("--bits", action="store_true", help="in the table, also the single bits of registers")
     style = parser.add_mutually_exclusive_group()
@@ -88,6 +89,11 @@ def _samples(args: argparse.Namespace, capture: Capture, session: Session) -> It
 
     reader = PointReader(dissector_for(session), arguments.noted_devices(args, session))
     watched = Watched(capture, prints=True)
+    if args.filter:
+        taken = _Taken(reader)
+        filtering.surveyed(args, capture, session, taken, every_row=True, devices=reader.devices)
+        yield _wanted(args, TableSamples(no_samples(), [(0, sample) for sample in taken.samples]))
+        return
     if args.reference:
         for output in outputs(watched.items(), session):
             if isinstance(output, Output):
@@ -96,6 +102,21 @@ def _samples(args: argparse.Namespace, capture: Capture, session: Session) -> It
     for table in tables_of(watched.blocks(), session):
         if not isinstance(table, LineEvent):
             yield _wanted(args, samples_of(reader, table))
+
+
+class _Taken:
+    """The samples of exchanges that are handed on."""
+
+    def __init__(self, reader: PointReader) -> None:
+        self._reader = reader
+        self.samples: list[Sample] = []
+
+    def add(self, output: Output) -> None:
+        """Take rows and exchanges."""
+        self.samples += self._reader.add(output)
+
+    def add_line_event(self, event: LineEvent) -> None:
+        """Nothing of it is kept."""
 
 
 def _wanted(args: argparse.Namespace, samples: TableSamples) -> TableSamples:

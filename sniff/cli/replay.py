@@ -8,7 +8,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from sniff.cli import PORT_TROUBLE, USAGE, Failure, arguments
+from sniff.cli import PORT_TROUBLE, USAGE, Failure, arguments, filtering
 from sniff.cli.interruption import until_interrupted
 
 
@@ -19,6 +19,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--to", required=True, metavar="pty|tcp|tcp:PORT", help="a new pseudo-terminal, or a TCP port of this machine"
     )
+    filtering.add_filter(parser, "only the octets of frames that match")
     parser.add_argument("--speed", type=float, default=1.0, metavar="X", help="2 is twice as fast (default 1)")
 
 
@@ -35,6 +36,7 @@ def run(args: argparse.Namespace) -> int:
         )
     capture = arguments.open_capture(args.file)  # says what is wrong with the file before anything is opened
     arguments.say_assumed(capture.session, args.file)
+    played = filtering.sifted(args, capture, capture.session)
     try:
         replay: Replay = (
             PtyReplay(Path(args.file), args.speed)
@@ -43,6 +45,8 @@ def run(args: argparse.Namespace) -> int:
         )
     except OSError as error:
         raise Failure(f"--to {args.to}: {error.strerror or error}", PORT_TROUBLE) from None
+    if args.filter:
+        replay.capture = played
     with replay, until_interrupted() as caught:
         print(replay.port, flush=True)
         while not caught and not replay.wait(0.1):

@@ -12,7 +12,7 @@ import sys
 from pathlib import Path
 
 from sniff.analysis.plain import plain
-from sniff.cli import UNREADABLE, USAGE, Failure, arguments, json_output
+from sniff.cli import UNREADABLE, USAGE, Failure, arguments, filtering, json_output
 from sniff.cli.progress import Watched
 from sniff.engine.capture import Capture
 from sniff.formats.table import suffixes
@@ -28,6 +28,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     arguments.add_line(parser)
     arguments.add_devices(parser)
     arguments.add_reference(parser)
+    filtering.add_filter(parser, "only what matches, exchanges with a frame that does, and findings that one shows")
     parser.add_argument(
         "-o",
         "--output",
@@ -81,4 +82,6 @@ def default_place(file: str) -> Path:
 def _numbers(path: str, capture: Capture, args: argparse.Namespace) -> Numbers:
     session = arguments.settings_of(args, capture.session, path)
     devices = arguments.noted_devices(args, session)
-    return collect(Path(path).name, capture, session, devices, Watched(capture), args.reference)
+    wanted = filtering.filter_of(args, capture, session, devices) if args.filter else None
+    name = f"{Path(path).name}, only {args.filter}" if args.filter else Path(path).name
+    return collect(name, capture, session, devices, Watched(capture), args.reference, wanted)

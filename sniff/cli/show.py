@@ -1,6 +1,5 @@
-"""Filters (-Y) use columns and Wireshark's field names: `dst == 3 && kind contains "write"`, `latency_ms > 50`,
-`verdict in {no-response, late}`. Columns: no src dst addr role kind func register count ok error noise found damage
-len marks tx verdict latency_ms attempt text hex. Dotted names: see --fields.
+"""Filters (-Y) have Wireshark's grammar and names: `dst in {1..5, 9} && kind contains "write"`, `latency_ms > 5ms`,
+`frame.time >= "10:02"`, `verdict in {no-response, late}`, `frame.octets[2:2] == 03:00`. --help-fields lists the names.
 """
 
 from __future__ import annotations
@@ -11,21 +10,20 @@ import sys
 from collections.abc import Callable, Iterable, Iterator
 from typing import TYPE_CHECKING
 
-from dissectors import registry
 from dissectors.manifest import Dissector
 from dissectors.profiles import Devices
-from sniff.analysis.filtering import Filter, FilterError, compile_filter
 from sniff.analysis.packet_tree import Field
 from sniff.analysis.row_tree import tree_of
 from sniff.bus.offline import settled, settled_columns, settled_in_bulk
-from sniff.cli import USAGE, Failure, arguments, rows, standard_streams, writing
+from sniff.cli import USAGE, Failure, arguments, filtering, rows, standard_streams, writing
 from sniff.cli.progress import Watched
 from sniff.cli.tables import Cell, plain_cell
-from sniff.config import nearest
 from sniff.engine.capture import Capture
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import Session
 from sniff.engine.verdict_join import Settled
+from sniff.filter import Filter
+from sniff.filter.choosing import chosen
 from sniff.formats.parquet import ParquetWriter
 
 if TYPE_CHECKING:
@@ -47,7 +45,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--fields", action="store_true", help="with --json: add every field under Wireshark's names")
     parser.add_argument("-V", dest="tree", action="store_true", help="full tree of each frame")
     parser.add_argument("-x", dest="hex", action="store_true", help="octets of each frame")
-    parser.add_argument("-Y", dest="filter", metavar="FILTER", default="", help="only frames that match")
+    filtering.add_filter(parser)
+    filtering.add_help_fields(parser)
+    parser.add_argument("--explain", action="store_true", help="say how -Y is carried out, and show nothing")
     style.add_argument("-T", dest="table", choices=["fields"], help="tab-separated fields, chosen by -e")
     parser.add_argument("-e", dest="names", metavar="NAME", action="append", default=[], help="a field; repeatable")
     parser.add_argument("-c", "--count", type=arguments.whole, metavar="N", help="stop after N frames shown")
@@ -59,10 +59,9 @@ def run(args: argparse.Namespace) -> int:
         raise Failure(
             "-T fields: say which with -e NAME (repeatable), such as -e kind; --json --fields lists them", USAGE
         )
-    of_protocols = tuple(prefix for dissector in registry.usable() for prefix in dissector.prefixes)
-    for name in args.names:
-        if name not in rows.JSON_KEYS and not name.startswith((*of_protocols, "frame.", "tx.", "line.")):
-            raise Failure(f"-e {name}: unknown field{nearest(name, rows.JSON_KEYS)}; --fields lists a capture's", USAGE)
+    if args.names and not args.table:
+        raise Failure(f"-e {args.names[0]} goes with -T fields", USAGE)
+    filtering.check_names(args.names)
     with writing.parquet_file(args, rows.COLUMNS) as table:
         return _show_all(args, table)
 
@@ -75,24 +74,19 @@ def _show_all(args: argparse.Namespace, table: ParquetWriter | None) -> int:
         session = arguments.settings_of(args, capture.session, path)
         dissector = dissector_for(session)
         devices = arguments.noted_devices(args, session)
-        wanted = _filter(args, dissector)
+        wanted = filtering.filter_of(args, capture, session, devices)
+        if args.explain:
+            print(wanted.explain())
+            continue
         spoken = devices if not args.table or "text" in args.names else None
         if args.reference or spoken or args.tree or args.hex or args.fields:
             left = _show(args, _settled(args, capture, session, spoken, wanted), session, dissector, left, table)
         else:
-            in_tables = _filter(args, dissector, with_closings=True)
-            left = _show_in_bulk(args, capture, session, in_tables, left, table)
+            left = _show_in_bulk(args, capture, session, wanted, left, table)
         writing.say_incomplete(path, capture)
         if left == 0:
             break
     return 0
-
-
-def _filter(args: argparse.Namespace, dissector: Dissector, with_closings: bool = False) -> Filter:
-    try:
-        return compile_filter(args.filter, dissector, with_closings)
-    except FilterError as error:
-        raise Failure(f"filter {args.filter!r}: {error}", USAGE) from None
 
 
 def _settled(
@@ -145,7 +139,7 @@ def _show_in_bulk(
 ) -> int | None:
     listed = _listed(args, dissector_for(session), session, table)
     for settled_rows in settled_columns(Watched(capture, prints=True), session) if left != 0 else ():
-        places = _chosen(settled_rows, wanted)
+        places = chosen(settled_rows, wanted)
         if left is not None:
             places = places[:left]
             left -= len(places)
@@ -154,28 +148,6 @@ def _show_in_bulk(
         if left == 0:
             break
     return left
-
-
-def _chosen(some: SettledRows, wanted: Filter) -> Times:
-    """Places of the rows that a filter accepts."""
-    import numpy as np
-
-    from sniff.engine.table import AT_ONCE, rows_at
-
-    odd = some.table.odd
-    if wanted.columns is None:
-        places = np.arange(some.begin, some.end)
-    else:
-        mask = wanted.columns(some.table, some.closings if wanted.of_closing else None)
-        mask[list(odd)] = True
-        places = np.flatnonzero(mask[some.begin : some.end]) + some.begin
-    asked = np.isin(places, list(odd)) if wanted.exact else np.ones(len(places), bool)
-    for at in range(0, len(asked_places := np.flatnonzero(asked)), AT_ONCE):
-        part = asked_places[at : at + AT_ONCE]
-        chosen = places[part].tolist()
-        rows_of = zip(chosen, rows_at(some.table, chosen), strict=True)
-        asked[part] = [not wanted(row, some.transaction(place)) for place, row in rows_of]
-    return places[~asked]
 
 
 def _listed(

@@ -6,16 +6,22 @@ from __future__ import annotations
 
 import argparse
 import sys
+from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from sniff.analysis.plain import plain
-from sniff.cli import UNREADABLE, Failure, arguments
+from sniff.cli import UNREADABLE, Failure, arguments, filtering
 from sniff.engine.capture import CaptureError
+
+if TYPE_CHECKING:
+    from sniff.testing import CaptureReading
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Options of `snapshot`."""
     parser.add_argument("files", nargs="+", metavar="FILE", help="capture")
+    filtering.add_filter(parser, "only what matches, and findings with such a frame among their evidence")
     parser.add_argument("--check", action="store_true", help="write nothing; exit code 1 and a diff where one differs")
 
 
@@ -29,7 +35,7 @@ def run(args: argparse.Namespace) -> int:
         arguments.say_assumed(arguments.open_capture(name).session, name)
         path = Path(name)
         place = expectation_path(path)
-        found = render(read_capture(path))
+        found = render(_of_filter(args, read_capture(path)))
         try:
             expected = place.read_text(encoding="utf-8") if place.exists() else ""
             if not args.check and expected != found:
@@ -46,3 +52,19 @@ def run(args: argparse.Namespace) -> int:
     if differing:
         print(f"sniff485: {differing} of {len(args.files)} captures differ", file=sys.stderr)
     return 1 if differing else 0
+
+
+def _of_filter(args: argparse.Namespace, reading: CaptureReading) -> CaptureReading:
+    """What -Y accepts of a reading."""
+    if not args.filter:
+        return reading
+    wanted = filtering.filter_of(args, arguments.open_capture(str(reading.path)), reading.session)
+    rows = tuple(item for item in reading.rows if wanted(item.row, item.transaction))
+    numbers = {item.row.no for item in rows}
+    return replace(
+        reading,
+        rows=rows,
+        transactions=tuple(one for one in reading.transactions if numbers.intersection((one.request, one.response))),
+        findings=tuple(one for one in reading.findings if numbers.intersection(one.evidence)),
+        points=(),
+    )

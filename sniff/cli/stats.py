@@ -22,7 +22,7 @@ from sniff.analysis.summary import Summary
 from sniff.analysis.wording import station_word
 from sniff.bus.model import BusModel
 from sniff.bus.offline import survey
-from sniff.cli import USAGE, Failure, arguments, tables
+from sniff.cli import USAGE, Failure, arguments, filtering, tables
 from sniff.cli.progress import Watched
 from sniff.cli.rows import iso
 from sniff.cli.tables import Cell
@@ -46,6 +46,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     style.add_argument("--json", action="store_const", const="json", dest="style", help="one JSON object a row")
     style.add_argument("--csv", action="store_const", const="csv", dest="style", help="comma-separated values")
     arguments.add_reference(parser)
+    filtering.add_filter(parser, "only what matches, and exchanges with a frame that does")
     parser.set_defaults(style="text")
 
 
@@ -63,6 +64,8 @@ def run(args: argparse.Namespace) -> int:
     names = [name for name, _ in opened]
     session = arguments.settings_of(args, merged_session(captures, names), names[0])
     source = Merged(captures) if len(captures) > 1 else captures[0]
+    if args.filter and table in ("ring", "health"):
+        raise Failure(f"{table}: of a whole bus; -Y does not go with it", USAGE)
     if table == "ring":
         shown = dissector_for(session).ring
         if shown is None:
@@ -83,7 +86,7 @@ def run(args: argparse.Namespace) -> int:
         polls.show(args, Watched(source), session)
         return 0
     summary, kinds = Summary(session.line), _Kinds()
-    survey(Watched(source), session, summary, kinds, reference=args.reference)
+    filtering.surveyed(args, source, session, summary, kinds)
     if table == "nodes":
         nodes = [_node(node) for node in summary.nodes.present()]
         if nodes or args.style != "text":

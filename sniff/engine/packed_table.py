@@ -223,6 +223,7 @@ class TableView:
         self._whole = whole
         self.protocol, self.first = whole.protocol, whole.first
         self.odd: Mapping[int, Row] = whole.odd
+        self.octets = whole.octets
         self.frames = _Columns(whole, "frames", whole.names)
         self.placed = _Columns(whole, "placed")
 

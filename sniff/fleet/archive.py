@@ -15,7 +15,8 @@ from pathlib import Path
 
 from sniff.engine.capture import Capture, CaptureError
 from sniff.engine.session import Session
-from sniff.formats import READERS, read
+from sniff.formats import read
+from sniff.formats.table import suffixes
 from sniff.recording import scan
 from sniff.recording.reader import McapCapture
 
@@ -88,7 +89,7 @@ def _captures(path: Path) -> Iterable[tuple[str, Path]]:
         names.sort()
         inside = Path(folder).relative_to(path).parts
         for name in sorted(files):
-            if name.lower().endswith(tuple(READERS)) and not name.endswith(".expect.txt"):
+            if name.lower().endswith(suffixes()) and not name.endswith(".expect.txt"):
                 yield (inside[0] if inside else ""), Path(folder, name)
 
 

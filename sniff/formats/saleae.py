@@ -21,7 +21,7 @@ from dissectors.line import NS_PER_S
 from sniff.engine.capture import CaptureError
 from sniff.engine.session import Completeness
 from sniff.formats.files import explain, open_capture
-from sniff.formats.octet_table import columns, seconds
+from sniff.formats.octet_table import heading_of, seconds
 from sniff.formats.waves import MOST_CHANNELS, Edges
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ LATEST = float(1 << 33)
 def is_digital_csv(lines: list[str]) -> bool:
     """Whether the first lines of a text are a table of levels over time."""
     rows = [line for line in lines if line.strip()]
-    if len(rows) < 2 or not rows[0].strip().strip('"').lower().startswith("time") or columns(rows[0]) is not None:
+    if len(rows) < 2 or not rows[0].strip().strip('"').lower().startswith("time") or heading_of(rows[0], ",", rows[1:]) is not None:
         return False
     names, first = rows[0].split(","), rows[1].split(",")
     return len(names) == len(first) >= 2 and all(value.strip() in ("0", "1") for value in first[1:])

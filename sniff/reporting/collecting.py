@@ -20,10 +20,12 @@ from sniff.analysis.summary import Summary, ranked
 from sniff.analysis.wording import describe
 from sniff.bus.model import BusModel
 from sniff.bus.offline import Source, outputs, survey
+from sniff.bus.sifting import shown_findings, sift
 from sniff.engine.capture import Capture
 from sniff.engine.engine import Output, Row
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import DEVICES_NOTE, LineEvent, Session
+from sniff.filter import Filter
 from sniff.formats.text import iso
 from sniff.reporting.happenings import Happenings
 from sniff.reporting.numbers import (
@@ -54,9 +56,11 @@ def collect(
     devices: Devices,
     watched: Source | None = None,
     reference: bool = False,
+    wanted: Filter | None = None,
 ) -> Numbers:
     """Read a capture to its end. `session`: with the settings to use; `watched`: the same capture, whose reading is
-    told; `reference`: row by row, for comparison. Raises CaptureError."""
+    told; `reference`: row by row, for comparison. `wanted`: numbers are of what a filter accepts; the bus is judged
+    whole, and of what was found that is told which shows such a row. Raises CaptureError."""
     read = watched or capture
     dissector = dissector_for(session)
     model, timeline, told = (
@@ -64,8 +68,15 @@ def collect(
         Timeline(session.line.char),
         Happenings(session),
     )
-    survey(read, session, model, timeline, told, reference=reference)
+    if wanted is None:
+        survey(read, session, model, timeline, told, reference=reference)
+    else:
+        survey(read, session, model, reference=reference)
     summary, findings, healths = model.summary, model.findings(), model.health()
+    if wanted is not None:
+        summary = Summary(session.line)
+        sift(capture, session, wanted, summary, timeline, told)
+        findings = shown_findings(capture, session, wanted, findings)
     health = healths.bus if summary.octets else None
     stations = tuple(
         _station(node, told.trouble.get(node.address, Counter()), healths.stations.get(node.address))

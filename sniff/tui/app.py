@@ -11,9 +11,9 @@ from textual.events import Event, InputEvent
 from textual.screen import Screen
 from textual.timer import Timer
 
-from sniff.analysis.filtering import FilterError
 from sniff.bus.feed import Feed, FeedStatus
 from sniff.bus.rows import Store
+from sniff.filter import FilterError
 from sniff.tui.analyzer import Analyzer
 from sniff.tui.header import StatusHeader, why_ended
 from sniff.tui.help import HelpScreen

@@ -6,9 +6,9 @@ from bisect import bisect_right, insort
 from dataclasses import dataclass, field
 
 from dissectors.findings import Finding
-from sniff.analysis.filtering import Filter, compile_filter
 from sniff.bus.row_masks import RowMasks
 from sniff.bus.rows import Store
+from sniff.filter import Filter, Scope, compile_filter
 from sniff.tui.times import TimeMode
 
 
@@ -61,11 +61,29 @@ class Viewing:
     def set_filter(self, text: str) -> None:
         """Show only what `text` accepts; an empty text shows everything. Raises FilterError."""
         text = text.strip()
-        accepts = compile_filter(text, self.store.dissector, with_closings=True) if text else None
+        accepts = self.compiled(text) if text else None
         self.accepts = accepts
-        self.masks = RowMasks(self.store.kept, accepts) if accepts is not None and accepts.columns else None
+        self.masks = RowMasks(self.store.kept, accepts) if accepts is not None and accepts.in_columns else None
         self.filter = text
         self.filter_version += 1
+
+    def compiled(self, text: str) -> Filter:
+        """A filter for these rows. Raises FilterError."""
+        return compile_filter(text, self.store.dissector, self._scope(text))
+
+    def _scope(self, text: str) -> Scope:
+        store = self.store
+        findings: dict[int, frozenset[str]] | None = None
+        if "finding" in text:
+            findings = {}
+            for one in store.findings():
+                for no in one.evidence:
+                    findings[no] = findings.get(no, frozenset()) | {one.code}
+        return Scope(store.session.started, store.devices, {}, findings, self._begin_of)
+
+    def _begin_of(self, no: int) -> int | None:
+        row = self.store.by_no(no)
+        return None if row is None else row.event.start
 
     def accepts_row(self, no: int) -> bool:
         """Whether the filter lets a row through."""

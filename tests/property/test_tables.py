@@ -14,7 +14,6 @@ import pytest
 from dissectors.columns import Reads
 from dissectors.line import Timing
 from dissectors.tracker import Transaction
-from sniff.analysis.filtering import compile_filter
 from sniff.analysis.summary import Summary
 from sniff.bus.offline import outputs, settled, settled_in_bulk
 from sniff.engine.blocks import Block, blocks_of
@@ -26,6 +25,7 @@ from sniff.engine.observer import observe
 from sniff.engine.session import Adapter, Item, LineEvent, Session
 from sniff.engine.table import Table
 from sniff.engine.table_join import TableJoin
+from sniff.filter import compile_filter
 from sniff.formats import read
 from tests.bench import bulk_ascii, bulk_mstp, bulk_n2, bulk_rtu
 
@@ -167,7 +167,11 @@ FILTERS = (
     'found != "gap" and not damage',
     'proto == "mstp" || marks || "token"',
     "no in {1, 3, 5} || tx == 2",
-    'dst == "x" || dst != "x"',
+    "dst in {1..2, 5} && frame.octets[1] == 03",
+    "hex contains 00:00 || frame.time_delta > 2ms",
+    "no % 3 == 1 && len + 1 > 8",
+    "frame.time_relative > 10ms && addr != 2",
+    "mstp.frame_type == Token || modbus.func_code == 3",
     "mstp.src == 1 && frame.len == 8",
 )
 

@@ -8,7 +8,8 @@ from typing import ClassVar
 
 from textual.binding import Binding, BindingType
 
-from sniff.analysis.filtering import FIELDS, FilterError, compile_filter
+from sniff.filter import FilterError
+from sniff.filter.fields import known_names
 from sniff.tui.analyzer import analyzer
 from sniff.tui.filter_line import FilterLine
 from sniff.tui.index import Index, Known
@@ -125,7 +126,7 @@ class ListingScreen(ViewScreen):
     def action_filter(self) -> None:
         """Ask for a filter."""
         hint = 'addr == 3 && verdict == no-response      kind contains "write"'
-        self.query_one(Prompt).ask("filter", self.viewing.filter, hint, self._wrong, FIELDS)
+        self.query_one(Prompt).ask("filter", self.viewing.filter, hint, self._wrong, known_names(self.store.dissector))
 
     def action_data(self) -> None:
         """Hide what only keeps a token-passing bus going, or show it again."""
@@ -133,7 +134,7 @@ class ListingScreen(ViewScreen):
 
     def _wrong(self, text: str) -> str:
         try:
-            compile_filter(text, self.store.dissector)
+            self.viewing.compiled(text)
         except FilterError as error:
             return str(error)
         return ""

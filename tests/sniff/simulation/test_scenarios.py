@@ -32,7 +32,11 @@ from sniff.simulation.tap import EXACT, FTDI, FTDI_LOW_LATENCY, OCTETS, UART, Ta
 from sniff.simulation.wire import Sent
 
 NAMES = scenarios.names()
-QUICK = {"modbus-rtu-busy": 2, "mstp": 4, "profibus": 4}  # seconds that show enough of a bus with hundreds of frames in each
+QUICK = {
+    "modbus-rtu-busy": 2,
+    "mstp": 4,
+    "profibus": 4,
+}  # seconds that show enough of a bus with hundreds of frames in each
 
 
 def sniff(plan: Scenario, seconds: float, tap: TapModel = EXACT) -> tuple[list[Row], list[Transaction]]:

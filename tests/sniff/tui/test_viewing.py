@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from sniff.analysis.filtering import FilterError
+from sniff.filter import FilterError
 from sniff.tui.viewing import Viewing
 
 

@@ -6,11 +6,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from dissectors.field_types import FieldType, Kind
 from dissectors.frame import Check, Found, Frame, Header, Noise, Place, Reason, Role
 from dissectors.manifest import Dissector
 from dissectors.tracker import Interval, Placement, Transaction, Verdict
-from sniff.analysis.filtering import FilterError, compile_filter
 from sniff.engine.engine import Row
+from sniff.filter import FilterError, compile_filter
 
 NO: Any = None
 DISSECTOR = Dissector(
@@ -22,6 +23,10 @@ DISSECTOR = Dissector(
     text=lambda frame, header, role: f"3 ← {header.kind}",
     fields=lambda frame, role: {"modbus.func_code": 16, "modbus.regval_uint16": "1,20,300"},
     packet=NO,
+    field_types=lambda: {
+        "modbus.func_code": FieldType(Kind.NUMBER, words={"Write Multiple Registers": 16}),
+        "modbus.regval_uint16": FieldType(Kind.NUMBER),
+    },
 )
 FRAME = Frame("test", bytes.fromhex("0310"), 0, 1, Check.GOOD, Found.GAP)
 ROW = Row(
@@ -60,7 +65,44 @@ NOISE = Row(8, Noise(b"\x00\x00", 2, 3, Place.BETWEEN, Reason.NO_FRAME))
         ("modbus.func_code == 0x10", True),
         ("modbus.regval_uint16 == 20", True),
         ("modbus.regval_uint16 == 2", False),
-        ("modbus.nothing_such", False),
+        ("modbus.regval_uint16 in {2..19, 300}", True),
+        ("count(modbus.regval_uint16) == 3", True),
+        ("all modbus.regval_uint16 > 1", False),
+        ("any modbus.regval_uint16 > 299", True),
+        ("modbus.regval_uint16 != 20", False),  # as in Wireshark: none of them is
+        ("modbus.regval_uint16 !== 20", True),  # one of them is not
+        ("dst in {1..2}", False),
+        ("dst in {2..4}", True),
+        ("dst in {4, 1..3}", True),
+        ("dst not in {4, 1..3}", False),
+        ("2 < dst <= 3", True),
+        ("dst + 4 == no", True),
+        ("no - dst == 4 && no % 2 == 1 && no / 2 == 3 && no & 3 == 3", True),
+        ("dst == no - 4", True),
+        ("addr != 3", False),
+        ("role == response || role == request", True),
+        ("latency_ms > 5ms && latency_ms < 0.1s && latency_ms == 8200us", True),
+        ("latency_ms * 2 > 16ms", True),
+        ("frame.octets == 03:10 && frame.octets[0] == 03 && frame.octets[-1] == 10", True),
+        ("frame.octets[0:2] == 03:10 && frame.octets[1-1] == 0x10", True),
+        ("frame.octets[2]", False),
+        ("hex contains 31", False),  # 0x0310 holds 31 at half an octet only
+        ('hex contains "03:10" && hex contains 03-10', True),
+        ('frame.octets contains "\\x10"', False),
+        ("len(frame.octets) == 2 && len == 2", True),
+        ('hex matches "^03"', True),
+        ('hex matches "31"', False),
+        ("tx == 4 ^^ dst == 3", False),
+        ("tx == 4 xor dst == 4", True),
+        ('string(dst) matches "^3$"', True),
+        ("max(dst, no) == 7 && min(dst, no) == 3", True),
+        ("frame.time == 1970-01-01", True),
+        ('frame.time >= "00:01"', False),
+        ("frame.time_relative >= 0", True),
+        ("frame.time_delta", False),
+        ("test", True),
+        ("modbus-rtu", False),
+        ("!noise_before && !marks", True),
         ("noise", False),
         ("error", False),
         ('"3 ← write"', True),
@@ -90,12 +132,13 @@ def test_noise_has_only_what_it_has(text: str, expected: bool) -> None:
         ("dst == 3 &&", 11, "expected a name"),
         ('kind matches "("', 13, "regular expression"),
         ("dst == 3 # x", 9, "unexpected '#'"),
-        ("verdict == noanswer", 11, "unknown verdict 'noanswer' (did you mean 'no-response'?)"),
-        ("dst == 3 && role in {request, 7}", 30, "unknown role 7 (expected one of request,"),
+        ("dst = 3", 4, "did you mean ==?"),
+        ("verdict == noanswer", 11, "unknown verdict 'noanswer' (did you mean \"no answer\"?)"),
+        ("dst == 3 && role in {request, 7}", 30, "unknown role '7' (expected one of request,"),
         ("found == splt", 9, "did you mean 'split'?"),
         ("damage != chek", 10, "did you mean 'check'?"),
         ("tx.verdict == lat", 14, "did you mean 'late'?"),
-        ("!" * 500 + "ok", 200, "nested"),
+        ("!" * 500 + "ok", 64, "nested"),
     ],
 )
 def test_a_mistake_is_shown_at_its_column(text: str, column: int, expected: str) -> None:

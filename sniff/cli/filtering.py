@@ -1,0 +1,167 @@
+"""-Y, wherever frames are read, and the names of fields."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterable
+from typing import Any
+
+from dissectors import registry
+from dissectors.field_types import FieldType, Kind
+from dissectors.findings import Finding
+from dissectors.manifest import Dissector
+from dissectors.profiles import Devices
+from sniff.bus.offline import Source, survey
+from sniff.cli import USAGE, Failure
+from sniff.cli.progress import Watched
+from sniff.engine.capture import Capture
+from sniff.engine.follow_settings import dissector_for
+from sniff.engine.observer import Observer
+from sniff.engine.session import Session
+from sniff.filter import Filter, FilterError, Scope, compile_filter
+from sniff.filter.errors import nearest
+from sniff.filter.fields import ALIASES, COLUMN_TYPES, column_type, types_of
+
+MOST_WORDS = 12
+"""Words of a field that a list names."""
+
+
+def add_filter(parser: argparse.ArgumentParser, what: str = "only frames that match") -> None:
+    """-Y, the same everywhere."""
+    parser.add_argument("-Y", dest="filter", metavar="FILTER", default="", help=f"{what} (show --help-fields)")
+
+
+def add_help_fields(parser: argparse.ArgumentParser) -> None:
+    """--help-fields: lists every field and ends."""
+    parser.add_argument(
+        "--help-fields",
+        action=_HelpFields,
+        nargs="?",
+        metavar="PROTOCOL",
+        help="list every field with its type and its words, and end",
+    )
+
+
+def filter_of(args: argparse.Namespace, capture: Source, session: Session, devices: Devices | None = None) -> Filter:
+    """What -Y says, for a capture; ends with exit code 2 where it cannot be read."""
+    dissector = dissector_for(session)
+    scope = Scope(session.started, devices or Devices())
+    try:
+        wanted = compile_filter(args.filter, dissector, scope)
+        if "finding" in wanted.names:
+            found = _evidence(capture, session, scope.devices)
+            wanted = compile_filter(args.filter, dissector, Scope(session.started, scope.devices, {}, found))
+    except FilterError as error:
+        raise Failure(f"filter {args.filter!r}: {error}", USAGE) from None
+    return wanted
+
+
+def surveyed(
+    args: argparse.Namespace,
+    capture: Source,
+    session: Session,
+    *observers: Observer,
+    every_row: bool = False,
+    devices: Devices | None = None,
+) -> None:
+    """Hand a capture to observers, as far as -Y accepts it; an exchange counts where one of its frames is accepted.
+
+    `every_row`: all rows, and only the exchanges that are accepted."""
+    if not args.filter:
+        survey(Watched(capture), session, *observers, reference=args.reference)
+        return
+    from sniff.bus.sifting import sift
+
+    sift(Watched(capture), session, filter_of(args, capture, session, devices), *observers, every_row=every_row)
+
+
+def sifted(args: argparse.Namespace, capture: Capture, session: Session, devices: Devices | None = None) -> Source:
+    """The octets of the rows that -Y accepts; the capture itself without it."""
+    if not args.filter:
+        return capture
+    from sniff.bus.sifting import Sifted
+
+    return Sifted(capture, session, filter_of(args, capture, session, devices))
+
+
+def shown_findings(
+    args: argparse.Namespace,
+    capture: Capture,
+    session: Session,
+    findings: tuple[Finding, ...],
+    devices: Devices | None = None,
+) -> tuple[Finding, ...]:
+    """Findings with a row among their evidence that -Y accepts."""
+    if not args.filter:
+        return findings
+    from sniff.bus.sifting import shown_findings as shown
+
+    return shown(capture, session, filter_of(args, capture, session, devices), findings)
+
+
+def _evidence(capture: Source, session: Session, devices: Devices) -> dict[int, frozenset[str]]:
+    """Codes of the findings that each row is evidence of."""
+    from sniff.analysis.judging import Judging
+
+    judging = Judging(session, dissector_for(session), devices)
+    survey(capture, session, judging)
+    found: dict[int, frozenset[str]] = {}
+    for finding in judging.findings():
+        for no in finding.evidence:
+            found[no] = found.get(no, frozenset()) | {finding.code}
+    return found
+
+
+def check_names(names: Iterable[str]) -> None:
+    """Whether there are such fields; ends with exit code 2 where there is none."""
+    from sniff.cli.rows import JSON_KEYS
+
+    for name in names:
+        if name in JSON_KEYS or name in COLUMN_TYPES or name in ALIASES:
+            continue
+        silent = tuple(prefix for one in registry.usable() if not types_of(one) for prefix in one.prefixes)
+        known = [field for one in registry.usable() for field in types_of(one)]
+        if name not in known and not (silent and name.startswith(silent)):
+            hint = nearest(name, [*JSON_KEYS, *COLUMN_TYPES, *ALIASES, *known])
+            raise Failure(f"-e {name}: unknown field ({hint}); --help-fields lists them", USAGE)
+
+
+class _HelpFields(argparse.Action):
+    def __call__(
+        self, parser: argparse.ArgumentParser, namespace: argparse.Namespace, values: Any, option: str | None = None
+    ) -> None:
+        try:
+            protocols = [registry.get(values)] if values else list(registry.usable())
+        except registry.UnknownProtocol as error:
+            raise Failure(str(error), USAGE) from None
+        for line in field_lines(protocols):
+            print(line)
+        parser.exit()
+
+
+def field_lines(protocols: list[Dissector]) -> Iterable[str]:
+    """Every field: its name, its type, what it says and its words."""
+    yield "of every protocol"
+    for name in COLUMN_TYPES:
+        yield from _lines(name, column_type(name, protocols[0]))
+    for alias, name in ALIASES.items():
+        yield f"  {alias:<36} = {name}"
+    for one in protocols:
+        yield ""
+        yield f"{one.name}"
+        types = types_of(one)
+        if not types:
+            yield f"  fields begin with {', '.join(one.prefixes)}; their types are not declared"
+        for name, type in types.items():
+            if name not in COLUMN_TYPES:
+                yield from _lines(name, type)
+
+
+def _lines(name: str, type: FieldType) -> Iterable[str]:
+    unit = f" ({type.unit})" if type.kind is Kind.DURATION else ""
+    says = f"  {type.says}" if type.says else ""
+    yield f"  {name:<36} {type.kind.value + unit:<13}{says}".rstrip()
+    if type.words:
+        words = [word if value == word else f"{word} ({value})" for word, value in type.words.items()]
+        more = f", … {len(words)} in all" if len(words) > MOST_WORDS else ""
+        yield f"  {'':<36}   {', '.join(words[:MOST_WORDS])}{more}"

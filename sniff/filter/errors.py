@@ -1,0 +1,39 @@
+"""What is wrong with a filter, and where."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Iterable
+
+
+class FilterError(ValueError):
+    """A filter that cannot be read: the message says what was expected, `column` (0 …) where."""
+
+    def __init__(self, message: str, column: int) -> None:
+        super().__init__(f"{message} at column {column + 1}")
+        self.column = column
+
+
+def nearest(word: str, known: Iterable[str], most: int = 8) -> str:
+    """ "did you mean 'late'?", or which there are."""
+    names = list(dict.fromkeys(known))
+    lowered = {name.lower(): name for name in names}
+    close = difflib.get_close_matches(word.lower(), lowered, 1, 0.6)
+    if close:
+        return f"did you mean {shown(lowered[close[0]])}?"
+    more = ", …" if len(names) > most else ""
+    return f"expected one of {', '.join(map(_written, names[:most]))}{more}"
+
+
+def shown(name: str) -> str:
+    """A name in quotes, in those of the language where it needs them."""
+    return repr(name) if _WORD.fullmatch(name) else f'"{name}"'
+
+
+def _written(name: str) -> str:
+    return name if _WORD.fullmatch(name) else f'"{name}"'
+
+
+_WORD = re.compile(r"[A-Za-z0-9_](?:[A-Za-z0-9_:]|-(?=[A-Za-z0-9_])|\.(?!\.))*")
+"""What may stand without quotes."""

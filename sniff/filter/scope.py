@@ -1,0 +1,30 @@
+"""What a filter may know beside the row: when the capture began, who is who, what was found."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+from dissectors.profiles import Devices
+
+
+@dataclass(frozen=True, slots=True)
+class Scope:
+    """`started`: ns, what `frame.time_relative` counts from; None: the first row. `devices`: stations are named by
+    their profiles. `names`: other names of stations. `findings`: codes by the numbers of the rows that show them; None
+    where nothing was judged. `begin_of`: when a row began, ns, by its number, for `frame.time_delta`; None where rows
+    come in order.
+    """
+
+    started: int | None = None
+    devices: Devices = field(default_factory=Devices)
+    names: Mapping[str, int] = field(default_factory=dict)
+    findings: Mapping[int, frozenset[str]] | None = None
+    begin_of: Callable[[int], int | None] | None = None
+
+    def stations(self) -> dict[str, tuple[int, ...]]:
+        """Addresses by name."""
+        found: dict[str, tuple[int, ...]] = {name.lower(): (address,) for name, address in self.names.items()}
+        for address, profile in sorted(self.devices.by_address.items()):
+            found[profile.name.lower()] = (*found.get(profile.name.lower(), ()), address)
+        return found
