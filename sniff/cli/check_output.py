@@ -81,7 +81,7 @@ def write_text(checked: Sequence[Checked], colour: bool) -> None:
             _write_finding(one, finding, width, colour)
         print()
         print(_count_words(one.findings))
-    if len(checked) > 1:
+    if len(checked) > 1 and len({one.session.bus for one in checked}) == 1:  # several buses are told apart
         _write_together(checked, width)
 
 

@@ -7,11 +7,13 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from pathlib import Path
 
 from sniff.analysis.plain import plain
 from sniff.bus.offline import survey
-from sniff.cli import arguments, json_output, tables
+from sniff.cli import USAGE, Failure, arguments, json_output, tables
 from sniff.cli.progress import Watched
+from sniff.engine.capture import Capture
 from sniff.engine.session import Session
 from sniff.taps.frames import TapEar
 from sniff.taps.matching import matched
@@ -20,8 +22,9 @@ from sniff.taps.verdict import Fault, faults, traffic
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Options of `taps`."""
-    parser.add_argument("first", metavar="A", help="capture at the first tap")
-    parser.add_argument("second", metavar="B", help="capture at the second tap, on the same clock")
+    parser.add_argument(
+        "words", nargs="+", metavar="A B", help="two captures on one clock; or one capture and two buses in it"
+    )
     arguments.add_line(parser)
     arguments.add_reference(parser)
     style = parser.add_mutually_exclusive_group()
@@ -35,8 +38,8 @@ def run(args: argparse.Namespace) -> int:
     from sniff.taps import words
 
     heard, doubts = [], []
-    for path in (args.first, args.second):
-        capture = arguments.open_capture(path)
+    taps = _taps(args.words)
+    for path, capture in taps:
         session = arguments.settings_of(args, capture.session, path)
         ear = TapEar()
         survey(Watched(capture), session, ear, reference=args.reference)
@@ -51,8 +54,25 @@ def run(args: argparse.Namespace) -> int:
         for fault in found:
             print(json_output.dumps(words.as_value(fault)))
     if args.style == "text":
-        _say(found, bool(senders), doubt, args.first, args.second)
+        _say(found, bool(senders), doubt, taps[0][0], taps[1][0])
     return 1 if found else 0
+
+
+def _taps(words: Sequence[str]) -> list[tuple[str, Capture]]:
+    """Two captures by name, or two buses of one; ends with exit code 2 for anything else."""
+    path, *names = words
+    if len(names) == 1 and Path(names[0]).exists():
+        return [(each, arguments.open_capture(each)) for each in words]
+    buses = arguments.open_buses(path)
+    by_name = {capture.session.bus: (label, capture) for label, capture in buses}
+    wanted = names or list(by_name)
+    missing = [name for name in wanted if name not in by_name]
+    if missing:
+        there = ", ".join(by_name)
+        raise Failure(f"{missing[0]}: no such file, and no such bus in {path}; there is {there}", USAGE)
+    if len(wanted) != 2:
+        raise Failure(f"two taps are compared: {path} has {', '.join(by_name)}; name two", USAGE)
+    return [by_name[name] for name in wanted]
 
 
 def _say(found: Sequence[Fault], heard: bool, doubt: int, first: str, second: str) -> None:

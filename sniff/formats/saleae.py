@@ -38,7 +38,9 @@ LATEST = float(1 << 33)
 def is_digital_csv(lines: list[str]) -> bool:
     """Whether the first lines of a text are a table of levels over time."""
     rows = [line for line in lines if line.strip()]
-    if len(rows) < 2 or not rows[0].strip().strip('"').lower().startswith("time") or heading_of(rows[0], ",", rows[1:]) is not None:
+    if len(rows) < 2 or not rows[0].strip().strip('"').lower().startswith("time"):
+        return False
+    if heading_of(rows[0], ",", rows[1:]) is not None:
         return False
     names, first = rows[0].split(","), rows[1].split(",")
     return len(names) == len(first) >= 2 and all(value.strip() in ("0", "1") for value in first[1:])

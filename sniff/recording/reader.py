@@ -22,6 +22,7 @@ from sniff.engine.blocks import Block, blocks_of, plain_reads
 from sniff.engine.capture import CaptureError
 from sniff.engine.session import Completeness, Item, LineEvent, LineEventKind, Session, SettingsChange, settings_change
 from sniff.formats.files import explain, open_capture
+from sniff.formats.several_buses import SeveralBuses
 from sniff.formats.text import iso
 from sniff.recording import scan
 from sniff.recording.batch import Batch, Joiner, line_event
@@ -46,9 +47,12 @@ MOST_PROFILE = 1 << 20
 MOST_PROFILES = 64
 
 
-def read(path: str | Path) -> McapCapture:
-    """Open a recording. Raises CaptureError."""
-    return McapCapture(Path(path))
+def read(path: str | Path) -> McapCapture | SeveralBuses:
+    """Open a recording, of one bus or of several. Raises CaptureError."""
+    first = McapCapture(Path(path))
+    if len(first.sessions) < 2:
+        return first
+    return SeveralBuses(first.path, [first, *(McapCapture(first.path, bus) for bus in range(1, len(first.sessions)))])
 
 
 class McapCapture:

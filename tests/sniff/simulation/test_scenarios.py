@@ -36,7 +36,8 @@ QUICK = {
     "modbus-rtu-busy": 2,
     "mstp": 4,
     "profibus": 4,
-}  # seconds that show enough of a bus with hundreds of frames in each
+}
+"""Seconds that show enough of a bus with hundreds of frames in each."""
 
 
 def sniff(plan: Scenario, seconds: float, tap: TapModel = EXACT) -> tuple[list[Row], list[Transaction]]:
@@ -65,7 +66,7 @@ def readings(plan: Scenario, octets: list[bytes]) -> list[bytes]:
     if plan.protocol == "mstp":  # one filler octet may follow a frame
         return octets + [one + b"\xff" for one in octets]
     if plan.protocol == "profibus":  # a token has no check: two that collide may make a third
-        return octets + [bytes((0xDC, 1, 1)), bytes((0xDC, 2, 2))]
+        return [*octets, bytes((0xDC, 1, 1)), bytes((0xDC, 2, 2))]
     return octets
 
 
