@@ -29,11 +29,16 @@ class SourceSpec:
 
 @dataclass(frozen=True, slots=True)
 class RecordSpec:
-    """Where to record. `rotation`, `keep`: as the recorder takes them ("size:64MB", "time:1h"; parts to keep)."""
+    """Where to record. `rotation`, `keep`: as the recorder takes them ("size:64MB", "time:1h"; parts to keep).
+
+    `before`, `after`: ns round a trigger that are kept, and nothing else is; None: everything is kept.
+    """
 
     path: str
     rotation: str | None = None
     keep: int | None = None
+    before: int | None = None
+    after: int | None = None
 
 
 @dataclass(frozen=True, slots=True)

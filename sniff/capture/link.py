@@ -28,6 +28,7 @@ from sniff.capture.wire import (
     encode_derived,
     encode_item,
     encode_json,
+    encode_trigger,
     gap_event,
     octets_in,
     one_by_one,
@@ -276,6 +277,11 @@ class CaptureLink:
     def found(self, bus: int, line: LineSettings, protocol: str) -> None:
         """Say what a search came to; a SETTINGS event says from where on it holds, and later parts begin with it."""
         self._unsent += encode(Kind.FOUND, bus, str(SettingsChange(line, protocol, found=True)).encode())
+        self._send()
+
+    def trigger(self, bus: int, time: int, text: str) -> None:
+        """Say that a trigger fired: what came round that time (ns) is kept, and a TRIGGER event says why."""
+        self._unsent += encode_trigger(bus, time, text)
         self._send()
 
     def _send(self) -> None:

@@ -17,6 +17,7 @@ from dissectors.line import MS, NS_PER_S, LineSettings
 from sniff.capture.disk_watch import DiskWatch
 from sniff.capture.frame_counter import FrameCounter
 from sniff.capture.outlet import Outlet
+from sniff.capture.trigger_ring import TriggerRing
 from sniff.capture.waiting import Waiting
 from sniff.capture.wire import (
     LOSSY,
@@ -25,6 +26,7 @@ from sniff.capture.wire import (
     Status,
     WireError,
     decode_derived,
+    decode_trigger,
     encode_status,
     encode_tick,
 )
@@ -67,6 +69,7 @@ class _Bus:
     index: int
     source: Source
     recorder: Recorder | None = None
+    ring: TriggerRing | None = None
     fd: int | None = None
     due: int = _FAR
     octets: int = 0
@@ -78,7 +81,8 @@ class CaptureLoop:
     """Runs until somebody says `stop`. `commands`: the connection that the main process sends on, None for none.
 
     `sessions`: of the sources, in their order; where settings are searched for, the first item of a bus says so.
-    `end_at`, `count`: its limits, ns on the clock and frames of all buses. `watched`: whether somebody looks at what
+    `end_at`, `count`: its limits, ns on the clock and frames of all buses. `round_triggers`: ns before and after a
+    trigger that are recorded, and nothing else is. `watched`: whether somebody looks at what
     comes as it comes.
     """
 
@@ -91,6 +95,7 @@ class CaptureLoop:
     priority: str = ""
     end_at: int | None = None
     count: int | None = None
+    round_triggers: tuple[int, int] | None = None
     sessions: list[Session] = field(default_factory=list)
     watched: bool = True
     reason: str | None = None
@@ -107,7 +112,7 @@ class CaptureLoop:
         self._waiting = Waiting()
         recorders: list[Recorder | None] = [*self.recorders] or [None] * len(self.sources)
         self._buses = [
-            _Bus(index, source, recorder)
+            _Bus(index, source, recorder, self._ring(recorder))
             for index, (source, recorder) in enumerate(zip(self.sources, recorders, strict=True))
         ]
         self._splitter = MessageSplitter()
@@ -139,9 +144,15 @@ class CaptureLoop:
         self._beat(self.clock.now())
         return self.reason
 
+    def _ring(self, recorder: Recorder | None) -> TriggerRing | None:
+        return TriggerRing(recorder, *self.round_triggers) if self.round_triggers and recorder is not None else None
+
     def finish(self) -> int:
         """Close the files; a slow disk is waited for, and said. The exit code: LOSSY when not everything is in them."""
         self.closing = True
+        for bus in self._buses:
+            if bus.ring is not None:
+                bus.ring.finish()
         for recorder in self.recorders:
             recorder.finish()
         until = time.monotonic() + CLOSING_PATIENCE
@@ -221,8 +232,10 @@ class CaptureLoop:
             self._due = min(other.due for other in self._buses)
 
     def _keep(self, index: int, item: Item) -> None:
-        recorder = self._buses[index].recorder
-        if recorder is not None:
+        recorder, ring = self._buses[index].recorder, self._buses[index].ring
+        if ring is not None:
+            ring.take(item)
+        elif recorder is not None:
             if isinstance(item, Chunk):
                 recorder.chunk(item)
             else:
@@ -299,7 +312,7 @@ class CaptureLoop:
         octets, dropped = self._buses[index].octets, self.outlet.dropped[index]
         if not self.recorders:
             return Status(index, octets=octets, dropped=dropped, priority=self.priority)
-        recorder = self.recorders[index]
+        recorder, ring = self.recorders[index], self._buses[index].ring
         return Status(
             index,
             "" if recorder.gone else str(recorder.path),
@@ -312,6 +325,7 @@ class CaptureLoop:
             self._watches[index].behind / NS_PER_S,
             recorder.unwritten,
             self.closing,
+            0 if ring is None else ring.omitted,
         )
 
     # -- what the main process says ----------------------------------------------------------------------------
@@ -350,8 +364,13 @@ class CaptureLoop:
             self._unknown.discard(bus)
             self._take(self._buses[bus])
             self._settings(self._buses[bus], replace(change, searching=False, found=True))
+        elif kind == Kind.TRIGGER and bus < len(self._buses):
+            self._fire(bus, *decode_trigger(body))
         elif kind == Kind.DERIVED and bus < len(self.recorders):
             derived = decode_derived(bus, body)
+            ring = self._buses[bus].ring
+            if ring is not None and not ring.keeps(derived.log_time):
+                return
             self.recorders[bus].derived(
                 derived.topic,
                 derived.schema_name,
@@ -369,6 +388,18 @@ class CaptureLoop:
             except (PortError, ValueError) as error:
                 self._keep(bus, LineEvent(self.clock.now(), LineEventKind.REFUSED, refusal(line, str(error))))
             self._take(self._buses[bus])
+
+    def _fire(self, bus: int, time: int, text: str) -> None:
+        """A trigger: of a recording that keeps only what surrounds such, that of all buses; else a mark on its own."""
+        event = LineEvent(self._buses[bus].source.now(), LineEventKind.TRIGGER, text)
+        if self._buses[bus].ring is None:
+            self._keep(bus, event)
+            return
+        self.outlet.item(bus, event)
+        for other in self._buses:
+            if other.ring is not None:
+                said = text if other.index == bus else f"on {self.sessions[bus].bus}: {text}"
+                other.ring.fire(time, said)
 
     def _settings(self, bus: _Bus, change: SettingsChange) -> None:
         """Say in the recording and to the main process what the settings are from here on."""

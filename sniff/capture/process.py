@@ -16,7 +16,7 @@ import stat
 import sys
 from types import FrameType
 
-from sniff.capture.config import CaptureConfig, SourceSpec
+from sniff.capture.config import CaptureConfig, RecordSpec, SourceSpec
 from sniff.capture.loop import CaptureLoop
 from sniff.capture.outlet import Outlet
 from sniff.capture.priority import raise_priority
@@ -86,6 +86,13 @@ def open_recorders(config: CaptureConfig, sessions: list[Session]) -> list[Recor
     return SharedFile(record.path, sessions, rotation, record.keep).recorders()
 
 
+def round_triggers(record: RecordSpec | None) -> tuple[int, int] | None:
+    """What of a recording is kept round a trigger, ns before and after; None where all is."""
+    if record is None or (record.before is None and record.after is None):
+        return None
+    return record.before or 0, record.after or 0
+
+
 def _capture(
     config: CaptureConfig,
     clock: Clock,
@@ -116,6 +123,7 @@ def _capture(
         count=config.count,
         sessions=sessions,
         watched=config.watched,
+        round_triggers=round_triggers(config.record),
     )
     if config.duration is not None:
         loop.end_at = clock.now() + config.duration

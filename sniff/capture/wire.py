@@ -46,6 +46,7 @@ class Kind(IntEnum):
     RECONFIGURE = 34  # text: line settings
     STOP = 35
     FOUND = 36  # text: the settings that a search came to, as in `SettingsChange`
+    TRIGGER = 37  # i64: when, ns; text: on what
 
 
 class Received(NamedTuple):
@@ -78,7 +79,7 @@ class Status:
     from the file, because the disk did not keep up. `priority`: what the system granted. `error`: why nothing is
     written any more, "" while all is well. `behind`: seconds by which the disk is late, 0 while it keeps up.
     `unwritten`: octets that are not in the file yet. `closing`: whether nothing is heard any more, and the rest is
-    being written.
+    being written. `omitted`: octets that no trigger asked for, which were not kept.
     """
 
     bus: int
@@ -92,6 +93,7 @@ class Status:
     behind: float = 0.0
     unwritten: int = 0
     closing: bool = False
+    omitted: int = 0
 
 
 LOSSY = 3
@@ -211,6 +213,18 @@ def encode_derived(derived: Derived) -> bytes:
     metadata = json.dumps(derived.metadata).encode() if derived.metadata else b""
     head = _DERIVED.pack(derived.log_time, derived.publish_time, len(topic), len(schema), len(metadata))
     return encode(Kind.DERIVED, derived.bus, head + topic + schema + metadata + derived.data)
+
+
+def encode_trigger(bus: int, time: int, text: str) -> bytes:
+    """A trigger that fired at some time, ns."""
+    return encode(Kind.TRIGGER, bus, _TICK.pack(time) + text.encode("utf-8", "replace"))
+
+
+def decode_trigger(body: bytes) -> tuple[int, str]:
+    """Its time and text. Raises WireError."""
+    if len(body) < _TICK.size:
+        raise WireError("a trigger without a time")
+    return _TICK.unpack_from(body)[0], body[_TICK.size :].decode("utf-8", "replace")
 
 
 def encode_ended(reason: str, at_end: bool) -> bytes:

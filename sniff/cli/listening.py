@@ -9,7 +9,7 @@ import re
 import sys
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -21,6 +21,7 @@ from sniff.analysis.plain import plain
 from sniff.analysis.summary import Summary
 from sniff.bus.live import LiveBus, LiveItem, LiveTables
 from sniff.bus.router import Router
+from sniff.bus.triggers import Fired, Triggers
 from sniff.capture.config import RecordSpec, SourceSpec
 from sniff.capture.link import CaptureLink
 from sniff.capture.wire import Ended, Status
@@ -31,7 +32,9 @@ from sniff.config import AUTO, FILE, Config, ConfigError, load
 from sniff.engine.capture import CaptureError
 from sniff.engine.engine import Output
 from sniff.engine.session import DEVICES_NOTE, LineEvent, LineEventKind
+from sniff.engine.table import Table
 from sniff.engine.verdict_join import Settled, Settling
+from sniff.filter import Scope
 from sniff.formats.table import suffixes
 from sniff.sources import PortError
 
@@ -211,6 +214,17 @@ def start_link(
         raise Failure(str(error), UNREADABLE) from None
 
 
+def add_triggers(printers: Sequence[Printer], words: Sequence[str]) -> None:
+    """Watch every bus for what `--on` names; ends with exit code 2 for what cannot be understood."""
+    for printer in printers if words else ():
+        live = printer.live
+        try:
+            printer.triggers = Triggers(words, live.dissector, Scope(live.session.started, live.devices))
+        except ValueError as error:
+            live.link.stop()
+            raise Failure(f"--on: {error}", USAGE) from None
+
+
 def refuse_recording(path: str) -> None:
     """Refuse what cannot be a recording before the port is opened. Ends with exit code 2, 3 for a directory."""
     if path == "-":
@@ -230,6 +244,10 @@ def new_recording(bus: str) -> str:
     return str(path)
 
 
+JUDGED_EVERY = 1.0
+"""Seconds between looks at findings for triggers."""
+
+
 class Printer:
     """Frames as lines (or JSON), each with its verdict, as they come; counts them all. `before_saying`: called before
     anything is said on standard error."""
@@ -240,6 +258,8 @@ class Printer:
         self.quiet = quiet
         self.colour = colour
         self.before_saying: Callable[[], None] = lambda: None
+        self.triggers: Triggers | None = None
+        self._judge_at = 0.0
         self._session = live.session
         self._trouble = ""
         self._waited = False
@@ -259,6 +279,8 @@ class Printer:
         if self.live.session is not self._session:
             self._settle()
         for item in items:
+            if self.triggers is not None and isinstance(item, Table | Output):
+                self._fire(self.triggers.see(item))
             if isinstance(item, Output):
                 self._take_output(item)
             elif isinstance(item, LineEvent):
@@ -267,8 +289,15 @@ class Printer:
                 self._say_status(item)
             elif isinstance(item, Ended) and not item.clean:
                 self._say(item.reason)
+        if self.triggers is not None and self.triggers.on_findings and time.monotonic() >= self._judge_at:
+            self._judge_at = time.monotonic() + JUDGED_EVERY
+            self._fire(self.triggers.judge(self.live.model.findings()))
         if not self.quiet:
             sys.stdout.flush()
+
+    def _fire(self, fired: Iterable[Fired]) -> None:
+        for one in fired:
+            self.live.link.trigger(self.live.bus, one.time, one.text)
 
     def _say_status(self, status: Status) -> None:
         if status.error != self._trouble:
@@ -284,6 +313,8 @@ class Printer:
             print(f"sniff485: {plain(event.text)}", file=sys.stderr)  # names the port
         elif event.kind in (LineEventKind.NOTE, LineEventKind.REFUSED):
             self._say(event.text)
+        elif event.kind is LineEventKind.TRIGGER:
+            self._say(f"triggered by {event.text}")
         elif event.kind is not LineEventKind.SETTINGS:  # those of a search are said where it is shown
             self._say(f"{event.kind.value} {event.text}".strip())
 
@@ -455,6 +486,8 @@ def say_recorded(live: LiveBus, where: bool = True, bus: str = "") -> None:
     if ended is not None and ended.unheard:
         what = "the last octets were not looked at, nobody knows how many: this host was too slow for them"
         print(f"sniff485: {what}{'; the recording has them' if live.link.paths else ''}", file=sys.stderr)
+    if status.omitted:
+        print(f"sniff485: {bus}{status.omitted} octets not kept: no trigger asked for them", file=sys.stderr)
     lost = status.lost
     if ended is not None and not ended.clean and status.unwritten:
         lost += status.unwritten

@@ -34,6 +34,15 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--keep", type=arguments.positive, metavar="N", help="remove this recording's files but the N newest"
     )
+    parser.add_argument(
+        "--on",
+        action="append",
+        default=[],
+        metavar="FILTER|CODE",
+        help="a trigger: frames that match, or findings (MB001, MS104); marked in the recording; repeatable",
+    )
+    parser.add_argument("--before", type=arguments.duration, metavar="TIME", help="keep only what surrounds a trigger:")
+    parser.add_argument("--after", type=arguments.duration, metavar="TIME", help="so much before and after it")
     parser.add_argument("-q", "--quiet", action="store_true", help="no progress, no summary")
 
 
@@ -45,10 +54,14 @@ def run(args: argparse.Namespace) -> int:
     listening.refuse_recording(path)
     if args.keep and not args.rotate:
         raise Failure("--keep: of which rotation? say when a new file begins with --rotate size:64MB or time:1h", USAGE)
-    record = RecordSpec(path, args.rotate, args.keep)
+    round_trigger = [None if each is None else int(each * 1e9) for each in (args.before, args.after)]
+    if not args.on and round_trigger != [None, None]:
+        raise Failure("--before, --after: round which trigger? say with --on FILTER or --on CODE", USAGE)
+    record = RecordSpec(path, args.rotate, args.keep, *round_trigger)
     lives = listening.start_all(targets, record, args.duration, args.count, watched=False)
     try:
         printers = [listening.Printer(live, quiet=True) for live in lives]
+        listening.add_triggers(printers, args.on)
         code = listening.run(printers, not args.quiet)
     except KeyboardInterrupt:  # before anybody listened to signals: the capture must not go on
         lives[0].stop()

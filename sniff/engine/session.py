@@ -215,6 +215,8 @@ class LineEventKind(Enum):
     SETTINGS = "settings"  # line settings or protocol changed from here on; `text` as in `SettingsChange`
     ERRORS = "errors"  # errors that the driver counted without saying where; `count` of them, `text` = kind
     NOTE = "note"
+    TRIGGER = "trigger"  # what a trigger fired on; `text` says it
+    OMITTED = "omitted"  # octets that were heard and not kept, since nothing was triggered; `count` of them
     REFUSED = "refused"  # line settings that were asked for and not taken; `text` as `refusal` makes it
 
     @property
@@ -223,7 +225,7 @@ class LineEventKind(Enum):
         return self in _HOLES
 
 
-_HOLES = frozenset((LineEventKind.DROPPED, LineEventKind.UNPLUGGED, LineEventKind.REPLUGGED))
+_HOLES = frozenset((LineEventKind.DROPPED, LineEventKind.UNPLUGGED, LineEventKind.REPLUGGED, LineEventKind.OMITTED))
 
 
 @dataclass(frozen=True, slots=True)

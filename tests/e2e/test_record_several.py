@@ -16,6 +16,7 @@ import pytest
 
 from dissectors.frame import Chunk
 from dissectors.modbus.envelope import seal_rtu
+from sniff.engine.session import LineEvent, LineEventKind
 from sniff.recording.reader import McapCapture
 
 pytest.importorskip("termios")
@@ -161,3 +162,35 @@ def test_all_buses_of_the_configuration(tmp_path: Path, lines: list[Line], recor
     _, errors = rest_of(process)
     assert process.returncode == 0, errors
     assert [McapCapture(tmp_path / "site.mcap", bus).session.bus for bus in (0, 1)] == ["boiler", "roof"]
+
+
+def test_only_what_surrounds_a_trigger_is_kept_of_all_buses(tmp_path: Path, lines: list[Line], record) -> None:
+    path = tmp_path / "site.mcap"
+    refusal = seal_rtu(b"\1\x83\2")
+    asked = ("-s", "19200,8E1", "-p", "modbus-rtu", "--on", "verdict == exception", "--before", "3600", "--after", "1")
+    process = record(*(str(line.link) for line in lines[:2]), *asked)
+    wait_until(lambda: begun(path), "no file")
+    lines[1].send(POLL + ANSWER)
+    lines[0].send(POLL + refusal)
+    wait_until(lambda: octets(path, 0) == lines[0].sent and octets(path, 1) == lines[1].sent, "no trigger fired")
+    process.send_signal(signal.SIGINT)
+    _, errors = rest_of(process)
+    assert process.returncode == 0, errors
+    assert "triggered by verdict == exception: frame " in errors
+    events = [item for bus in (0, 1) for item in McapCapture(path, bus).items() if isinstance(item, LineEvent)]
+    assert [event.text for event in events if event.kind is LineEventKind.TRIGGER] == [
+        "verdict == exception: frame 2",
+        "on boiler: verdict == exception: frame 2",
+    ]
+
+
+def test_without_a_trigger_nothing_is_kept_and_all_is_counted(tmp_path: Path, lines: list[Line], record) -> None:
+    path = tmp_path / "site.mcap"
+    asked = ("-s", "19200,8E1", "-p", "modbus-rtu", "--on", "MB001", "--before", "1", "--count", "2")
+    process = record(str(lines[0].link), *asked)
+    wait_until(lambda: begun(path), "no file")
+    lines[0].send(POLL + ANSWER)
+    _, errors = rest_of(process)
+    assert process.returncode == 0, errors
+    assert octets(path, 0) == b""
+    assert f"{len(lines[0].sent)} octets not kept: no trigger asked for them" in errors
