@@ -179,8 +179,8 @@ def test_only_what_surrounds_a_trigger_is_kept_of_all_buses(tmp_path: Path, line
     assert "triggered by verdict == exception: frame " in errors
     events = [item for bus in (0, 1) for item in McapCapture(path, bus).items() if isinstance(item, LineEvent)]
     assert [event.text for event in events if event.kind is LineEventKind.TRIGGER] == [
-        "verdict == exception: frame 2",
-        "on boiler: verdict == exception: frame 2",
+        "verdict == exception: frame 1",
+        "on boiler: verdict == exception: frame 1",
     ]
 
 
