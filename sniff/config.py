@@ -1,4 +1,4 @@
-"""`sniff485.toml`: buses named once, so that `live boiler-room` knows port, line, protocol and devices.
+"""`sniff485.toml`: buses named once, so that `live boiler-room` knows port, line, protocol and devices; whom to tell.
 
     [bus.boiler-room]
     port = "/dev/ttyUSB0"
@@ -9,6 +9,11 @@
     [bus.boiler-room.devices]
     3 = "teco-e510"
     "*" = "teco-e510"
+
+    [alert]
+    webhook = "https://example.org/hook"     # or command = ["notify", "bus"]: gets JSON on standard input
+    at = "error"                             # from which severity on; default warning
+    every = 600                              # seconds between two about the same finding
 
 The first file found counts: in the working folder or one above it, then the user's configuration folder. Flags win
 over the file.
@@ -27,12 +32,14 @@ from pathlib import Path
 from typing import Any, Final, Literal
 
 from dissectors import registry
+from dissectors.findings import Severity
 from dissectors.line import LineSettings
 
 FILE = "sniff485.toml"
 AUTO: Final = "auto"
 BUS_KEYS = ("port", "line", "protocol", "record", "devices")
-TOP_KEYS = ("bus",)
+ALERT_KEYS = ("command", "webhook", "at", "every")
+TOP_KEYS = ("bus", "alert")
 
 
 class ConfigError(Exception):
@@ -56,11 +63,23 @@ class Bus:
 
 
 @dataclass(frozen=True, slots=True)
+class AlertSettings:
+    """`command`: words, started without a shell; `webhook`: http:// or https://. `least`: severity from which it is
+    told. `every`: seconds between two alerts about the same finding."""
+
+    command: tuple[str, ...] = ()
+    webhook: str = ""
+    least: Severity = Severity.WARNING
+    every: float = 600.0
+
+
+@dataclass(frozen=True, slots=True)
 class Config:
     """All buses by name, and the file they are from (None: there is none)."""
 
     path: Path | None
     buses: Mapping[str, Bus]
+    alert: AlertSettings | None = None
 
 
 def candidates(start: Path) -> list[Path]:
@@ -93,7 +112,9 @@ def parse(path: Path) -> Config:
     reader = _Reader(path, text)
     reader.check_keys(data, TOP_KEYS, "")
     buses = reader.table(data.get("bus", {}), "bus")
-    return Config(path, {name: reader.bus(name, reader.table(entry, f"bus.{name}")) for name, entry in buses.items()})
+    named = {name: reader.bus(name, reader.table(entry, f"bus.{name}")) for name, entry in buses.items()}
+    alert = reader.alert(reader.table(data["alert"], "alert")) if "alert" in data else None
+    return Config(path, named, alert)
 
 
 class _Reader:
@@ -129,6 +150,24 @@ class _Reader:
         if value is not None and not isinstance(value, str):
             raise self.error(key, section, f"expected a text in quotes, not {value!r}")
         return value
+
+    def alert(self, entry: Mapping[str, Any]) -> AlertSettings:
+        self.check_keys(entry, ALERT_KEYS, "alert")
+        command, webhook = entry.get("command", []), self.text(entry, "webhook", "alert") or ""
+        if not isinstance(command, list) or not all(isinstance(word, str) for word in command):
+            raise self.error("command", "alert", 'expected a list of words, such as ["notify-send", "sniff485"]')
+        if not command and not webhook:
+            raise ConfigError(f'{self.path}: [alert]: say whom to tell: command = [...] or webhook = "https://..."')
+        if webhook and not webhook.startswith(("http://", "https://")):
+            raise self.error("webhook", "alert", f"{webhook!r}: expected http:// or https://")
+        levels = {severity.label: severity for severity in Severity}
+        level = self.text(entry, "at", "alert") or Severity.WARNING.label
+        if level not in levels:
+            raise self.error("at", "alert", f"unknown severity {level!r}{nearest(level, tuple(levels))}")
+        every = entry.get("every", 600)
+        if isinstance(every, bool) or not isinstance(every, int | float) or every < 0:
+            raise self.error("every", "alert", f"expected seconds, not {every!r}")
+        return AlertSettings(tuple(command), webhook, levels[level], float(every))
 
     def device(self, devices: Mapping[str, Any], key: str, section: str) -> str:
         """The profile of a station; the key is its address, or "*" for every one."""

@@ -12,6 +12,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from dissectors import registry
 from dissectors.line import LineSettings
@@ -37,6 +38,10 @@ from sniff.engine.verdict_join import Settled, Settling
 from sniff.filter import Scope
 from sniff.formats.table import suffixes
 from sniff.sources import PortError
+
+if TYPE_CHECKING:
+    from sniff.outlets.alerts import Alerts
+    from sniff.outlets.news import NewsDesk
 
 
 @dataclass(frozen=True, slots=True)
@@ -225,6 +230,27 @@ def add_triggers(printers: Sequence[Printer], words: Sequence[str]) -> None:
             raise Failure(f"--on: {error}", USAGE) from None
 
 
+@contextlib.contextmanager
+def alerting(printers: Sequence[Printer]) -> Iterator[None]:
+    """Meanwhile whoever the configuration names is told what is new about the buses."""
+    settings = _configured().alert
+    if settings is None:
+        yield
+        return
+    from sniff.outlets.alerts import Alerts
+    from sniff.outlets.news import NewsDesk
+
+    alerts = Alerts(settings, lambda text: print(f"sniff485: {plain(text)}", file=sys.stderr))
+    for printer in printers:
+        printer.alerts = alerts, NewsDesk(settings.least, int(settings.every * 1e9))
+    try:
+        yield
+    finally:
+        alerts.close()
+        if alerts.dropped:
+            print(f"sniff485: {alerts.dropped} alerts dropped: nobody took them in time", file=sys.stderr)
+
+
 def refuse_recording(path: str) -> None:
     """Refuse what cannot be a recording before the port is opened. Ends with exit code 2, 3 for a directory."""
     if path == "-":
@@ -245,7 +271,7 @@ def new_recording(bus: str) -> str:
 
 
 JUDGED_EVERY = 1.0
-"""Seconds between looks at findings for triggers."""
+"""Seconds between looks at findings, for triggers and alerts."""
 
 
 class Printer:
@@ -259,6 +285,7 @@ class Printer:
         self.colour = colour
         self.before_saying: Callable[[], None] = lambda: None
         self.triggers: Triggers | None = None
+        self.alerts: tuple[Alerts, NewsDesk] | None = None
         self._judge_at = 0.0
         self._session = live.session
         self._trouble = ""
@@ -289,11 +316,21 @@ class Printer:
                 self._say_status(item)
             elif isinstance(item, Ended) and not item.clean:
                 self._say(item.reason)
-        if self.triggers is not None and self.triggers.on_findings and time.monotonic() >= self._judge_at:
+        if (self.triggers is not None or self.alerts is not None) and time.monotonic() >= self._judge_at:
             self._judge_at = time.monotonic() + JUDGED_EVERY
-            self._fire(self.triggers.judge(self.live.model.findings()))
+            self._judge()
         if not self.quiet:
             sys.stdout.flush()
+
+    def _judge(self) -> None:
+        """Look at what the rules have found."""
+        findings = self.live.model.findings()
+        if self.triggers is not None:
+            self._fire(self.triggers.judge(findings))
+        if self.alerts is not None:
+            alerts, desk = self.alerts
+            for news in desk.look(findings, self.live.link.clock.now()):
+                alerts.tell(self.live.session.bus, self.live.session.port, news)
 
     def _fire(self, fired: Iterable[Fired]) -> None:
         for one in fired:

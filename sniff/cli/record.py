@@ -62,7 +62,8 @@ def run(args: argparse.Namespace) -> int:
     try:
         printers = [listening.Printer(live, quiet=True) for live in lives]
         listening.add_triggers(printers, args.on)
-        code = listening.run(printers, not args.quiet)
+        with listening.alerting(printers):
+            code = listening.run(printers, not args.quiet)
     except KeyboardInterrupt:  # before anybody listened to signals: the capture must not go on
         lives[0].stop()
         raise

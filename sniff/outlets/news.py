@@ -1,0 +1,82 @@
+"""What is new about the findings of a bus since the last look: appeared, became graver, is over. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from enum import Enum
+
+from dissectors.findings import Finding, Severity
+
+OVER_AFTER = 600_000_000_000
+"""ns without another occurrence after which a finding is over."""
+
+
+class What(Enum):
+    """What happened to a finding."""
+
+    NEW = "new"
+    WORSE = "worse"
+    GONE = "gone"
+
+
+@dataclass(frozen=True, slots=True)
+class News:
+    """One thing to tell. `held_back`: how many of the same finding were not told since the last one."""
+
+    what: What
+    finding: Finding
+    held_back: int = 0
+
+
+@dataclass(slots=True)
+class _Known:
+    severity: Severity
+    is_over: bool = False
+    told: int | None = None  # ns, when it was told last
+    held_back: int = 0
+
+
+class NewsDesk:
+    """`least`: findings below are nobody's business. `every`: ns between two words about the same finding; what is held
+    back is counted, and told with the next."""
+
+    def __init__(self, least: Severity, every: int) -> None:
+        self._least = least
+        self._every = every
+        self._known: dict[tuple[str, str], _Known] = {}
+
+    def look(self, findings: Iterable[Finding], now: int) -> list[News]:
+        """What is to be told at `now` (ns on the capture's clock)."""
+        told = []
+        for finding in findings:
+            if finding.severity < self._least or finding.cause is not None:
+                continue  # a consequence is told with its cause
+            what = self._what(finding, now)
+            if what is not None:
+                news = self._rationed(what, finding, now)
+                if news is not None:
+                    told.append(news)
+        return told
+
+    def _what(self, finding: Finding, now: int) -> What | None:
+        known = self._known.get(finding.key)
+        over = now - finding.last > OVER_AFTER
+        if known is None:
+            self._known[finding.key] = _Known(finding.severity, over)
+            return None if over else What.NEW
+        was_over, known.is_over = known.is_over, over
+        if over:
+            return None if was_over else What.GONE
+        if was_over:
+            return What.NEW
+        worse, known.severity = finding.severity > known.severity, max(known.severity, finding.severity)
+        return What.WORSE if worse else None
+
+    def _rationed(self, what: What, finding: Finding, now: int) -> News | None:
+        known = self._known[finding.key]
+        if known.told is not None and now - known.told < self._every:
+            known.held_back += 1
+            return None
+        held_back, known.held_back, known.told = known.held_back, 0, now
+        return News(what, finding, held_back)

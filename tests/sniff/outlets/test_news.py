@@ -1,0 +1,50 @@
+"""What is new, worse, gone; not too often, and nothing uncounted."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from dissectors.findings import Finding, Severity
+from sniff.outlets.news import OVER_AFTER, NewsDesk, What
+
+S = 1_000_000_000
+FOUND = Finding("MB001", Severity.WARNING, "station 3", 0, 10 * S, 4, (), "no answer", "", "")
+
+
+def test_new_then_silence_then_worse_then_gone_then_new_again() -> None:
+    desk = NewsDesk(Severity.WARNING, 0)
+    assert [one.what for one in desk.look([FOUND], 11 * S)] == [What.NEW]
+    assert desk.look([FOUND], 12 * S) == []
+    grave = replace(FOUND, severity=Severity.ERROR, last=20 * S)
+    assert [one.what for one in desk.look([grave], 21 * S)] == [What.WORSE]
+    later = 20 * S + OVER_AFTER + 1
+    assert [one.what for one in desk.look([grave], later)] == [What.GONE]
+    assert desk.look([grave], later + S) == []
+    again = replace(grave, last=later + 2 * S)
+    assert [one.what for one in desk.look([again], later + 3 * S)] == [What.NEW]
+
+
+def test_notes_and_consequences_are_nobodys_business() -> None:
+    desk = NewsDesk(Severity.WARNING, 0)
+    assert desk.look([replace(FOUND, severity=Severity.NOTE)], 11 * S) == []
+    assert desk.look([replace(FOUND, cause=("LN003", "bus"))], 11 * S) == []
+
+
+def test_what_is_held_back_is_counted() -> None:
+    desk = NewsDesk(Severity.WARNING, 10**15)
+    assert len(desk.look([FOUND], 11 * S)) == 1
+    over = 10 * S + OVER_AFTER + 1
+    assert desk.look([FOUND], over) == []
+    back = replace(FOUND, last=over + S)
+    assert desk.look([back], over + S) == []
+    other = NewsDesk(Severity.WARNING, 700 * S)
+    other.look([FOUND], 11 * S)
+    other.look([FOUND], over)
+    late = replace(FOUND, last=over + 200 * S)
+    (news,) = other.look([late], over + 200 * S)
+    assert (news.what, news.held_back) == (What.NEW, 1)
+
+
+def test_each_finding_has_its_own_ration() -> None:
+    desk = NewsDesk(Severity.WARNING, 10**15)
+    assert len(desk.look([FOUND, replace(FOUND, subject="station 4")], 11 * S)) == 2
