@@ -251,6 +251,34 @@ def alerting(printers: Sequence[Printer]) -> Iterator[None]:
             print(f"sniff485: {alerts.dropped} alerts dropped: nobody took them in time", file=sys.stderr)
 
 
+@contextlib.contextmanager
+def serving_metrics(printers: Sequence[Printer], port: int | None) -> Iterator[None]:
+    """Meanwhile /metrics is served on the loopback at a port (None: it is not). Ends with exit code 2 where it cannot."""
+    if port is None:
+        yield
+        return
+    from sniff.outlets.metrics import Told, exposition
+    from sniff.outlets.metrics_server import HOST, MetricsServer
+
+    try:
+        server = MetricsServer(port)
+    except OSError as error:
+        printers[0].live.stop()
+        raise Failure(f"--metrics {port}: {error.strerror}", USAGE) from None
+    print(f"sniff485: http://{HOST}:{server.port}/metrics", file=sys.stderr)
+
+    def publish() -> None:
+        server.page = exposition(
+            [Told(each.live.model, each.live.status.lost, each.live.ended is None) for each in printers]
+        )
+
+    printers[0].every_second = publish
+    try:
+        yield
+    finally:
+        server.close()
+
+
 def refuse_recording(path: str) -> None:
     """Refuse what cannot be a recording before the port is opened. Ends with exit code 2, 3 for a directory."""
     if path == "-":
@@ -286,6 +314,7 @@ class Printer:
         self.before_saying: Callable[[], None] = lambda: None
         self.triggers: Triggers | None = None
         self.alerts: tuple[Alerts, NewsDesk] | None = None
+        self.every_second: Callable[[], None] | None = None
         self._judge_at = 0.0
         self._session = live.session
         self._trouble = ""
@@ -316,14 +345,19 @@ class Printer:
                 self._say_status(item)
             elif isinstance(item, Ended) and not item.clean:
                 self._say(item.reason)
-        if (self.triggers is not None or self.alerts is not None) and time.monotonic() >= self._judge_at:
+        asked = self.triggers is not None or self.alerts is not None or self.every_second is not None
+        if asked and time.monotonic() >= self._judge_at:
             self._judge_at = time.monotonic() + JUDGED_EVERY
             self._judge()
         if not self.quiet:
             sys.stdout.flush()
 
     def _judge(self) -> None:
-        """Look at what the rules have found."""
+        """Look at what the rules have found, and tell others how the bus is."""
+        if self.every_second is not None:
+            self.every_second()
+        if self.triggers is None and self.alerts is None:
+            return
         findings = self.live.model.findings()
         if self.triggers is not None:
             self._fire(self.triggers.judge(findings))

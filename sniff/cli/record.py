@@ -43,6 +43,12 @@ def configure(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--before", type=arguments.duration, metavar="TIME", help="keep only what surrounds a trigger:")
     parser.add_argument("--after", type=arguments.duration, metavar="TIME", help="so much before and after it")
+    parser.add_argument(
+        "--metrics",
+        type=arguments.whole,
+        metavar="PORT",
+        help="serve OpenMetrics on the loopback at this port (/metrics; 0: any free one)",
+    )
     parser.add_argument("-q", "--quiet", action="store_true", help="no progress, no summary")
 
 
@@ -62,7 +68,7 @@ def run(args: argparse.Namespace) -> int:
     try:
         printers = [listening.Printer(live, quiet=True) for live in lives]
         listening.add_triggers(printers, args.on)
-        with listening.alerting(printers):
+        with listening.alerting(printers), listening.serving_metrics(printers, args.metrics):
             code = listening.run(printers, not args.quiet)
     except KeyboardInterrupt:  # before anybody listened to signals: the capture must not go on
         lives[0].stop()
