@@ -253,7 +253,7 @@ def alerting(printers: Sequence[Printer]) -> Iterator[None]:
 
 @contextlib.contextmanager
 def serving_metrics(printers: Sequence[Printer], port: int | None) -> Iterator[None]:
-    """Meanwhile /metrics is served on the loopback at a port (None: it is not). Ends with exit code 2 where it cannot."""
+    """Meanwhile /metrics is served on the loopback at a port; None: it is not. Ends with exit code 2 where it can't."""
     if port is None:
         yield
         return

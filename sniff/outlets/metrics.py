@@ -1,6 +1,6 @@
 """OpenMetrics of the buses that are listened to, as text. Pure.
 
-Source: the OpenMetrics specification 1.0: counters end in _total, label values escape \\, " and line ends, # EOF is last.
+Source: the OpenMetrics specification 1.0: counters end in _total, label values escape \\ and ", # EOF is last.
 """
 
 from __future__ import annotations
