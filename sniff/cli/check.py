@@ -118,10 +118,10 @@ def _read(source: str, capture: Capture, args: argparse.Namespace) -> Checked:
 def _listen(port: str, args: argparse.Namespace) -> Checked:
     import time
 
-    from sniff.cli import listening
+    from sniff.cli import listening, targets
 
     args.port = port
-    target = listening.target_of(args)
+    target = targets.target_of(args)
     duration = args.duration or DEFAULT_DURATION
     print(f"sniff485: listening to {port} for {duration:g} s", file=sys.stderr)
     live = listening.start(target.source, None, None, target.devices, target.search)

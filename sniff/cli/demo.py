@@ -9,7 +9,7 @@ import sys
 
 from dissectors import registry
 from sniff.capture.config import RecordSpec, SourceSpec
-from sniff.cli import PORT_TROUBLE, USAGE, Failure, arguments, listening
+from sniff.cli import PORT_TROUBLE, USAGE, Failure, arguments, listening, targets
 from sniff.cli.live import show
 
 DEFAULT_DURATION = 10.0
@@ -45,7 +45,7 @@ def run(args: argparse.Namespace) -> int:
     try:
         with VirtualBus.from_scenario(plan, paused=True) as bus:
             source = SourceSpec(
-                bus.tap(), plan.line, plan.protocol, "demo", listening.notes_of(devices), profiles=devices.documents
+                bus.tap(), plan.line, plan.protocol, "demo", targets.notes_of(devices), profiles=devices.documents
             )
             record = RecordSpec(args.write) if args.write else None
             live = listening.start(source, record, duration, devices)

@@ -8,7 +8,7 @@ import argparse
 
 from sniff.analysis.autodetect import Ending, Outcome, Reading, sureness
 from sniff.analysis.plain import plain
-from sniff.cli import PORT_TROUBLE, arguments, json_output, listening
+from sniff.cli import PORT_TROUBLE, arguments, json_output, listening, targets
 from sniff.cli.searching import TIMEOUT, search, sentence
 from sniff.config import AUTO
 
@@ -35,7 +35,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Search, and say what was found."""
     args.line, args.protocol = args.line or AUTO, args.protocol or AUTO
-    target = listening.target_of(args)
+    target = targets.target_of(args)
     assert target.search is not None
     with listening.start_link([target.source], None) as link:
         outcome = search(link, target.search, args.timeout)

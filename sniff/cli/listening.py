@@ -1,166 +1,31 @@
-"""What `live`, `record` and `demo` share: which bus is meant, how frames are printed as they come, how a run ends."""
+"""What `live`, `record` and `demo` share: how a capture is started, run and ended."""
 
 from __future__ import annotations
 
-import argparse
 import contextlib
-import os
-import re
 import sys
 import time
-from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
-from pathlib import Path
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from dissectors import registry
-from dissectors.line import LineSettings
 from dissectors.profiles import Devices
 from dissectors.words import milliseconds
 from sniff.analysis.plain import plain
-from sniff.analysis.summary import Summary
-from sniff.bus.live import LiveBus, LiveItem, LiveTables
+from sniff.bus.live import LiveBus
 from sniff.bus.router import Router
-from sniff.bus.triggers import Fired, Triggers
 from sniff.capture.config import RecordSpec, SourceSpec
 from sniff.capture.link import CaptureLink
-from sniff.capture.wire import Ended, Status
-from sniff.cli import INTERRUPTED, PORT_TROUBLE, UNREADABLE, USAGE, Failure, arguments, rows, searching
+from sniff.cli import INTERRUPTED, PORT_TROUBLE, UNREADABLE, Failure, searching
 from sniff.cli.interruption import until_interrupted
+from sniff.cli.printing import Printer
 from sniff.cli.searching import Unknowns
-from sniff.config import AUTO, FILE, Config, ConfigError, load
+from sniff.cli.targets import Target
 from sniff.engine.capture import CaptureError
-from sniff.engine.engine import Output
-from sniff.engine.session import DEVICES_NOTE, LineEvent, LineEventKind
-from sniff.engine.table import Table
-from sniff.engine.verdict_join import Settled, Settling
-from sniff.filter import Scope
 from sniff.formats.table import suffixes
 from sniff.sources import PortError
 
 if TYPE_CHECKING:
-    from sniff.outlets.alerts import Alerts
-    from sniff.outlets.news import NewsDesk
-
-
-@dataclass(frozen=True, slots=True)
-class Target:
-    """The bus to listen to, where its recording goes by configuration (None: not said), and who is on it."""
-
-    source: SourceSpec
-    record: str | None = None
-    devices: Devices = field(default_factory=Devices)
-    search: Unknowns | None = None
-    """What is to be found by listening (`auto`); None when everything is given."""
-
-
-def target_of(args: argparse.Namespace) -> Target:
-    """What PORT, -s and -p mean, with the configuration behind them; flags win. Ends with exit code 2."""
-    config = _configured()
-    return _target(args, config, args.port or _only_port(config))
-
-
-def targets_of(args: argparse.Namespace) -> list[Target]:
-    """The same for any number of `args.ports`, or with `args.all` every bus of the configuration; no two buses have one
-    name. Ends with exit code 2."""
-    config = _configured()
-    wanted = list(args.ports)
-    if args.all:
-        if wanted:
-            raise Failure("--all: every configured bus; name no port beside it", USAGE)
-        wanted = [name for name, bus in config.buses.items() if bus.port]
-        if not wanted:
-            raise Failure(f"--all: no bus with a port is configured; name some in {FILE}", USAGE)
-    targets = [_target(args, config, port) for port in wanted or [_only_port(config)]]
-    twice = next((port for port, count in Counter(one.source.spec for one in targets).items() if count > 1), None)
-    if twice is not None:
-        raise Failure(f"{plain(twice)}: named twice; a port is listened to once", USAGE)
-    return _with_names_of_their_own(targets)
-
-
-def _with_names_of_their_own(targets: list[Target]) -> list[Target]:
-    taken: set[str] = set()
-    named = []
-    for target in targets:
-        name, number = target.source.bus, 2
-        while name in taken:
-            name, number = f"{target.source.bus}-{number}", number + 1
-        taken.add(name)
-        named.append(replace(target, source=replace(target.source, bus=name)))
-    return named
-
-
-def _configured() -> Config:
-    try:
-        return load()
-    except ConfigError as error:
-        raise Failure(str(error), USAGE) from None
-
-
-def _target(args: argparse.Namespace, config: Config, wanted: str) -> Target:
-    bus = config.buses.get(wanted)
-    if bus is None:
-        _refuse_unknown(wanted, config)
-    port = (bus.port or wanted) if bus is not None else wanted
-    if not (args.port if "port" in args else args.ports or args.all):
-        print(f"sniff485: no port named: listening to {plain(port)}, the only one there is", file=sys.stderr)
-    configured = args.protocol or (bus.protocol if bus is not None else None)
-    said: LineSettings | str | None = args.line or (bus.line if bus is not None else None)
-    auto = AUTO in (said, configured)
-    line = said if isinstance(said, LineSettings) else None
-    protocol = configured or (AUTO if auto else registry.DEFAULT)
-    search = None
-    if auto:
-        search = Unknowns(line, None if protocol == AUTO else protocol)
-        trying = search.detecting()
-        line, protocol = trying.wanted, trying.protocols[0]
-    if line is None:
-        line = LineSettings.parse(registry.get(protocol).default_line)
-        print(f"sniff485: no line settings given (-s): assuming {line} for {protocol}", file=sys.stderr)
-    name = bus.name if bus is not None else re.sub(r"[^A-Za-z0-9_-]+", "-", _short(port)).strip("-") or "bus"
-    devices = arguments.devices_of(args, bus.devices if bus is not None else None)
-    unknown = search.names if search is not None else ()
-    source = SourceSpec(port, line, protocol, name, notes_of(devices), unknown, devices.documents)
-    return Target(source, bus.record if bus is not None else None, devices, search)
-
-
-def _short(port: str) -> str:
-    """What names a port in the name of a file: the last part of its path, "pts-0" of a pseudo-terminal."""
-    path = Path(port)
-    return f"pts-{path.name}" if path.parent.name == "pts" else path.name
-
-
-def _refuse_unknown(word: str, config: Config) -> None:
-    """End with exit code 2 for a plain word that is neither a file nor a configured bus: it can be no port."""
-    if not re.fullmatch(r"[A-Za-z0-9_-]+", word) or re.fullmatch(r"COM\d+", word, re.IGNORECASE) or Path(word).exists():
-        return
-    device = Path("/dev") / word
-    if device.is_char_device():
-        raise Failure(f"{word}: no such port or configured bus; did you mean {device}?", USAGE)
-    if config.path is None:
-        looked = f"there is no {FILE} in this folder, in one above it, or in the user's configuration"
-    else:
-        looked = f"{config.path} has {', '.join(config.buses) or 'none'}"
-    raise Failure(f"{plain(word)}: no such bus is configured: {looked}", USAGE)
-
-
-def _only_port(config: Config) -> str:
-    """The bus or port that can only be meant when none is named. Ends with exit code 2 where there is a choice."""
-    if len(config.buses) == 1:
-        return next(iter(config.buses))
-    from sniff.sources.ports import list_ports
-
-    there = [*config.buses] or [port.device for port in list_ports()]
-    if len(there) == 1:
-        return there[0]
-    found = f"there are: {', '.join(there)}" if there else "there are no serial ports here; try `sniff485 demo`"
-    raise Failure(f"which port? {found}", USAGE)
-
-
-def notes_of(devices: Devices) -> dict[str, str]:
-    """What a recording says of its devices."""
-    return {DEVICES_NOTE: devices.text()} if devices else {}
+    pass
 
 
 def start(
@@ -217,212 +82,6 @@ def start_link(
         raise Failure(str(error), PORT_TROUBLE) from None
     except CaptureError as error:
         raise Failure(str(error), UNREADABLE) from None
-
-
-def add_triggers(printers: Sequence[Printer], words: Sequence[str]) -> None:
-    """Watch every bus for what `--on` names; ends with exit code 2 for what cannot be understood."""
-    for printer in printers if words else ():
-        live = printer.live
-        try:
-            printer.triggers = Triggers(words, live.dissector, Scope(live.session.started, live.devices))
-        except ValueError as error:
-            live.link.stop()
-            raise Failure(f"--on: {error}", USAGE) from None
-
-
-@contextlib.contextmanager
-def alerting(printers: Sequence[Printer]) -> Iterator[None]:
-    """Meanwhile whoever the configuration names is told what is new about the buses."""
-    settings = _configured().alert
-    if settings is None:
-        yield
-        return
-    from sniff.outlets.alerts import Alerts
-    from sniff.outlets.news import NewsDesk
-
-    alerts = Alerts(settings, lambda text: print(f"sniff485: {plain(text)}", file=sys.stderr))
-    for printer in printers:
-        printer.alerts = alerts, NewsDesk(settings.least, int(settings.every * 1e9))
-    try:
-        yield
-    finally:
-        alerts.close()
-        if alerts.dropped:
-            print(f"sniff485: {alerts.dropped} alerts dropped: nobody took them in time", file=sys.stderr)
-
-
-@contextlib.contextmanager
-def serving_metrics(printers: Sequence[Printer], port: int | None) -> Iterator[None]:
-    """Meanwhile /metrics is served on the loopback at a port; None: it is not. Ends with exit code 2 where it can't."""
-    if port is None:
-        yield
-        return
-    from sniff.outlets.metrics import Told, exposition
-    from sniff.outlets.metrics_server import HOST, MetricsServer
-
-    try:
-        server = MetricsServer(port)
-    except OSError as error:
-        printers[0].live.stop()
-        raise Failure(f"--metrics {port}: {error.strerror}", USAGE) from None
-    print(f"sniff485: http://{HOST}:{server.port}/metrics", file=sys.stderr)
-
-    def publish() -> None:
-        server.page = exposition(
-            [Told(each.live.model, each.live.status.lost, each.live.ended is None) for each in printers]
-        )
-
-    printers[0].every_second = publish
-    try:
-        yield
-    finally:
-        server.close()
-
-
-def refuse_recording(path: str) -> None:
-    """Refuse what cannot be a recording before the port is opened. Ends with exit code 2, 3 for a directory."""
-    if path == "-":
-        raise Failure("-w -: a recording needs a file; `sniff485 live PORT --json` gives frames as they come", USAGE)
-    if path.endswith(("/", os.sep)) or Path(path).is_dir():
-        raise Failure(f"{path}: a directory; name a file in it", UNREADABLE)
-    if not path.lower().endswith(".mcap"):
-        raise Failure(f"{path}: recordings are .mcap; convert it afterwards with `sniff485 convert`", USAGE)
-
-
-def new_recording(bus: str) -> str:
-    """A name in this folder that no file has: sniff485-<bus>-<date>-<time>.mcap."""
-    stem = f"sniff485-{bus}-{time.strftime('%Y%m%d-%H%M%S')}"
-    path, number = Path(f"{stem}.mcap"), 2
-    while path.exists():
-        path, number = Path(f"{stem}-{number}.mcap"), number + 1
-    return str(path)
-
-
-JUDGED_EVERY = 1.0
-"""Seconds between looks at findings, for triggers and alerts."""
-
-
-class Printer:
-    """Frames as lines (or JSON), each with its verdict, as they come; counts them all. `before_saying`: called before
-    anything is said on standard error."""
-
-    def __init__(self, live: LiveBus, as_json: bool = False, quiet: bool = False, colour: bool = False) -> None:
-        self.live = live
-        self.as_json = as_json
-        self.quiet = quiet
-        self.colour = colour
-        self.before_saying: Callable[[], None] = lambda: None
-        self.triggers: Triggers | None = None
-        self.alerts: tuple[Alerts, NewsDesk] | None = None
-        self.every_second: Callable[[], None] | None = None
-        self._judge_at = 0.0
-        self._session = live.session
-        self._trouble = ""
-        self._waited = False
-        self._settling = Settling(live.points)
-
-    @property
-    def summary(self) -> Summary:
-        """What was counted."""
-        return self.live.model.summary
-
-    def poll(self, timeout: float) -> list[LiveItem] | list[LiveTables]:
-        """What has come; waits up to `timeout` seconds."""
-        return self.live.poll_tables(timeout) if self.quiet else self.live.poll(timeout)
-
-    def take(self, items: list[LiveItem] | list[LiveTables]) -> None:
-        """Print what has come."""
-        if self.live.session is not self._session:
-            self._settle()
-        for item in items:
-            if self.triggers is not None and isinstance(item, Table | Output):
-                self._fire(self.triggers.see(item))
-            if isinstance(item, Output):
-                self._take_output(item)
-            elif isinstance(item, LineEvent):
-                self._say_event(item)
-            elif isinstance(item, Status):
-                self._say_status(item)
-            elif isinstance(item, Ended) and not item.clean:
-                self._say(item.reason)
-        asked = self.triggers is not None or self.alerts is not None or self.every_second is not None
-        if asked and time.monotonic() >= self._judge_at:
-            self._judge_at = time.monotonic() + JUDGED_EVERY
-            self._judge()
-        if not self.quiet:
-            sys.stdout.flush()
-
-    def _judge(self) -> None:
-        """Look at what the rules have found, and tell others how the bus is."""
-        if self.every_second is not None:
-            self.every_second()
-        if self.triggers is None and self.alerts is None:
-            return
-        findings = self.live.model.findings()
-        if self.triggers is not None:
-            self._fire(self.triggers.judge(findings))
-        if self.alerts is not None:
-            alerts, desk = self.alerts
-            for news in desk.look(findings, self.live.link.clock.now()):
-                alerts.tell(self.live.session.bus, self.live.session.port, news)
-
-    def _fire(self, fired: Iterable[Fired]) -> None:
-        for one in fired:
-            self.live.link.trigger(self.live.bus, one.time, one.text)
-
-    def _say_status(self, status: Status) -> None:
-        if status.error != self._trouble:
-            self._trouble = status.error
-            self._say(f"recording: {status.error or 'goes on'}")
-        if status.closing and status.unwritten and not self._waited:
-            self._waited = True
-            self._say(waiting_words(status))
-
-    def _say_event(self, event: LineEvent) -> None:
-        if event.kind in (LineEventKind.UNPLUGGED, LineEventKind.REPLUGGED):
-            self.before_saying()
-            print(f"sniff485: {plain(event.text)}", file=sys.stderr)  # names the port
-        elif event.kind in (LineEventKind.NOTE, LineEventKind.REFUSED):
-            self._say(event.text)
-        elif event.kind is LineEventKind.TRIGGER:
-            self._say(f"triggered by {event.text}")
-        elif event.kind is not LineEventKind.SETTINGS:  # those of a search are said where it is shown
-            self._say(f"{event.kind.value} {event.text}".strip())
-
-    def _settle(self) -> None:
-        """A search has ended: go on with what it found."""
-        self._session = self.live.session
-        self._settling = Settling(self.live.points)  # what came before belongs to no transaction
-
-    def finish(self) -> None:
-        """Print what still waits for a verdict."""
-        for settled in self._settling.flush():
-            self._print(settled)
-        sys.stdout.flush()
-
-    def _take_output(self, output: Output) -> None:
-        for settled in self._settling.add(output):
-            self._print(settled)
-
-    def _print(self, settled: Settled) -> None:
-        if self.quiet:
-            return
-        if self.as_json:
-            print(rows.json_line(settled, self.live.dissector, self.live.session))
-        else:
-            print(rows.text_line(settled, self.live.dissector, self.live.session, self.colour))
-
-    def _say(self, text: str) -> None:
-        self.before_saying()
-        print(f"sniff485: {self.live.session.port}: {plain(text)}", file=sys.stderr)
-
-
-def waiting_words(status: Status) -> str:
-    """What is said while a slow disk gets time for what it did not take yet."""
-    return (
-        f"the disk is slow: waiting for the last {status.unwritten} octets to be written; "
-        "end that, and lose them, with Ctrl-C"
-    )
 
 
 def run(printers: Sequence[Printer], progress: bool = True) -> int:

@@ -10,7 +10,7 @@ import sys
 from sniff.analysis.plain import plain
 from sniff.bus.live import LiveBus
 from sniff.capture.config import RecordSpec
-from sniff.cli import UNREADABLE, USAGE, Failure, arguments, listening
+from sniff.cli import UNREADABLE, USAGE, Failure, arguments, listening, printing, targets
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -29,12 +29,12 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Listen and show."""
-    target = listening.target_of(args)
+    target = targets.target_of(args)
     if args.no_record and args.write:
         raise Failure("--no-record and -w contradict each other", USAGE)
-    path = None if args.no_record else args.write or target.record or listening.new_recording(target.source.bus)
+    path = None if args.no_record else args.write or target.record or targets.new_recording(target.source.bus)
     if path:
-        listening.refuse_recording(path)
+        targets.refuse_recording(path)
     live = listening.start(
         target.source, RecordSpec(path) if path else None, args.duration, target.devices, target.search
     )
@@ -49,7 +49,7 @@ def show(live: LiveBus, as_json: bool, as_lines: bool) -> int:
         from sniff.bus.row_source import LiveFeed
         from sniff.tui import run as run_tui
 
-        feed = LiveFeed(live, lambda status: print(f"sniff485: {listening.waiting_words(status)}", file=sys.stderr))
+        feed = LiveFeed(live, lambda status: print(f"sniff485: {printing.waiting_words(status)}", file=sys.stderr))
         run_tui(feed)
         total = feed.store.load.total
         print(
@@ -61,7 +61,7 @@ def show(live: LiveBus, as_json: bool, as_lines: bool) -> int:
             print(f"sniff485: recording: {plain(live.status.error)}", file=sys.stderr)
         listening.say_recorded(live, where=False)
         return UNREADABLE if listening.lost_something(live) else 0
-    printer = listening.Printer(live, as_json=as_json, colour=arguments.colour())
+    printer = printing.Printer(live, as_json=as_json, colour=arguments.colour())
     code = listening.run([printer])
     listening.say_end([printer])
     return code

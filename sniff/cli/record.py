@@ -8,7 +8,7 @@ from __future__ import annotations
 import argparse
 
 from sniff.capture.config import RecordSpec
-from sniff.cli import USAGE, Failure, arguments, listening
+from sniff.cli import USAGE, Failure, arguments, listening, printing, targets, telling
 
 NAMED = 3
 """Buses that the name of a new file names."""
@@ -54,21 +54,21 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Record until the end."""
-    targets = listening.targets_of(args)
-    path = args.write or (targets[0].record if len(targets) == 1 else None)
-    path = path or listening.new_recording("-".join(target.source.bus for target in targets[:NAMED]))
-    listening.refuse_recording(path)
+    buses = targets.targets_of(args)
+    path = args.write or (buses[0].record if len(buses) == 1 else None)
+    path = path or targets.new_recording("-".join(target.source.bus for target in buses[:NAMED]))
+    targets.refuse_recording(path)
     if args.keep and not args.rotate:
         raise Failure("--keep: of which rotation? say when a new file begins with --rotate size:64MB or time:1h", USAGE)
     round_trigger = [None if each is None else int(each * 1e9) for each in (args.before, args.after)]
     if not args.on and round_trigger != [None, None]:
         raise Failure("--before, --after: round which trigger? say with --on FILTER or --on CODE", USAGE)
     record = RecordSpec(path, args.rotate, args.keep, *round_trigger)
-    lives = listening.start_all(targets, record, args.duration, args.count, watched=False)
+    lives = listening.start_all(buses, record, args.duration, args.count, watched=False)
     try:
-        printers = [listening.Printer(live, quiet=True) for live in lives]
-        listening.add_triggers(printers, args.on)
-        with listening.alerting(printers), listening.serving_metrics(printers, args.metrics):
+        printers = [printing.Printer(live, quiet=True) for live in lives]
+        telling.add_triggers(printers, args.on)
+        with telling.alerting(printers), telling.serving_metrics(printers, args.metrics):
             code = listening.run(printers, not args.quiet)
     except KeyboardInterrupt:  # before anybody listened to signals: the capture must not go on
         lives[0].stop()

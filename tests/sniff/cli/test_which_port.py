@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from sniff.cli import Failure, listening
+from sniff.cli import Failure, targets
 
 
 @pytest.fixture
@@ -18,8 +18,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def target(port: str | None) -> listening.Target:
-    return listening.target_of(argparse.Namespace(port=port, line=None, protocol=None, devices=[]))
+def target(port: str | None) -> targets.Target:
+    return targets.target_of(argparse.Namespace(port=port, line=None, protocol=None, devices=[]))
 
 
 def test_a_bus_that_is_not_configured(folder: Path, sniff485: Callable) -> None:
@@ -62,4 +62,4 @@ def test_no_port_at_all_is_a_failure(folder: Path, monkeypatch: pytest.MonkeyPat
 @pytest.mark.parametrize(("port", "name"), [("/dev/pts/0", "pts-0"), ("/dev/ttyUSB0", "ttyUSB0")])
 def test_the_name_of_a_recording_says_the_port(folder: Path, port: str, name: str) -> None:
     assert target(port).source.bus == name
-    assert listening.new_recording(name).startswith(f"sniff485-{name}-")
+    assert targets.new_recording(name).startswith(f"sniff485-{name}-")

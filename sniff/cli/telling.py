@@ -1,0 +1,77 @@
+"""Whom a running capture tells: triggers mark it, alerts and metrics leave it."""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+from sniff.analysis.plain import plain
+from sniff.bus.triggers import Triggers
+from sniff.cli import USAGE, Failure, targets
+from sniff.cli.printing import Printer
+from sniff.filter import Scope
+
+if TYPE_CHECKING:
+    pass
+
+
+def add_triggers(printers: Sequence[Printer], words: Sequence[str]) -> None:
+    """Watch every bus for what `--on` names; ends with exit code 2 for what cannot be understood."""
+    for printer in printers if words else ():
+        live = printer.live
+        try:
+            printer.triggers = Triggers(words, live.dissector, Scope(live.session.started, live.devices))
+        except ValueError as error:
+            live.link.stop()
+            raise Failure(f"--on: {error}", USAGE) from None
+
+
+@contextlib.contextmanager
+def alerting(printers: Sequence[Printer]) -> Iterator[None]:
+    """Meanwhile whoever the configuration names is told what is new about the buses."""
+    settings = targets.configured().alert
+    if settings is None:
+        yield
+        return
+    from sniff.outlets.alerts import Alerts
+    from sniff.outlets.news import NewsDesk
+
+    alerts = Alerts(settings, lambda text: print(f"sniff485: {plain(text)}", file=sys.stderr))
+    for printer in printers:
+        printer.alerts = alerts, NewsDesk(settings.least, int(settings.every * 1e9))
+    try:
+        yield
+    finally:
+        alerts.close()
+        if alerts.dropped:
+            print(f"sniff485: {alerts.dropped} alerts dropped: nobody took them in time", file=sys.stderr)
+
+
+@contextlib.contextmanager
+def serving_metrics(printers: Sequence[Printer], port: int | None) -> Iterator[None]:
+    """Meanwhile /metrics is served on the loopback at a port; None: it is not. Ends with exit code 2 where it can't."""
+    if port is None:
+        yield
+        return
+    from sniff.outlets.metrics import Told, exposition
+    from sniff.outlets.metrics_server import HOST, MetricsServer
+
+    try:
+        server = MetricsServer(port)
+    except OSError as error:
+        printers[0].live.stop()
+        raise Failure(f"--metrics {port}: {error.strerror}", USAGE) from None
+    print(f"sniff485: http://{HOST}:{server.port}/metrics", file=sys.stderr)
+
+    def publish() -> None:
+        server.page = exposition(
+            [Told(each.live.model, each.live.status.lost, each.live.ended is None) for each in printers]
+        )
+
+    printers[0].every_second = publish
+    try:
+        yield
+    finally:
+        server.close()
