@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import Enum
 
@@ -10,7 +11,7 @@ from sniff.formats.log_clock import Stamp, stamp_of
 from sniff.formats.log_octets import PAIRS_ONLY, Run, numbers_in, octets_in
 from sniff.formats.log_shapes import COLOURS, REMARK, STAMP, WAYS, Role, shape_of
 
-LONGEST = 1 << 16
+LONGEST = 1 << 13
 """Characters of a line that are looked at; a frame of a field bus is far shorter."""
 
 MOST_STAMPS = 3
@@ -105,6 +106,17 @@ def line_of(text: str, base: int = PAIRS_ONLY, rows: bool = True) -> Line:
         Kind.OCTETS, stamp, way, run.octets, shape.tool, False, Role.DATA, shape.tool, run.spelling,
         samples=samples, cut=bool(groups.get("cut")),
     )  # fmt: skip
+
+
+def pieces(text: str) -> Iterator[str]:
+    """A line, in pieces that go on in one another where it is longer than is looked at (a whole capture on one)."""
+    text = text if len(text) < LONGEST else _SPACES.sub("   ", text)
+    while len(text) > LONGEST - 2:
+        cut = text.rfind(" ", 1, LONGEST - 2)
+        cut = cut if cut > 0 else max(text.rfind(",", 1, LONGEST - 2) + 1, 0) or (LONGEST - 2) // 2 * 2
+        yield f"{text[:cut]} \\"
+        text = text[cut:]
+    yield text
 
 
 def numbers_of(text: str) -> tuple[str, ...]:
