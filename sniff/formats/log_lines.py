@@ -31,6 +31,7 @@ _ROW = re.compile(
 )
 _OCTET = re.compile(r"[0-9A-Fa-f]{1,2}")
 _COLUMN = re.compile(r"\s{2,}|\t|\s*[|>]")
+_LAST_DIGITS = re.compile(r"(?<![0-9A-Fa-f])[0-9A-Fa-f]+\Z")
 _PAIRS = re.compile(r"[0-9A-Fa-f]{2}(?:[ -][0-9A-Fa-f]{2})*")
 _WORDS_OF_16 = re.compile(r"(?:[0-9A-Fa-f]{4} )*(?:[0-9A-Fa-f]{4}|[0-9A-Fa-f]{2})")
 
@@ -112,8 +113,11 @@ def pieces(text: str) -> Iterator[str]:
     """A line, in pieces that go on in one another where it is longer than is looked at (a whole capture on one)."""
     text = text if len(text) < LONGEST else _SPACES.sub("   ", text)
     while len(text) > LONGEST - 2:
-        cut = text.rfind(" ", 1, LONGEST - 2)
-        cut = cut if cut > 0 else max(text.rfind(",", 1, LONGEST - 2) + 1, 0) or (LONGEST - 2) // 2 * 2
+        cut = max(text.rfind(" ", LONGEST // 2, LONGEST - 2), text.rfind(",", LONGEST // 2, LONGEST - 2) + 1)
+        if cut <= 0:  # digits without space, in pairs from where they begin
+            digits = _LAST_DIGITS.search(text, 0, LONGEST - 2)
+            begin = digits.start() if digits is not None else 0
+            cut = begin + (LONGEST - 2 - begin) // 2 * 2
         yield f"{text[:cut]} \\"
         text = text[cut:]
     yield text
