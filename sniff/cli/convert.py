@@ -1,15 +1,18 @@
-"""The suffix of OUT chooses the format. What a format cannot keep is said. An .mcap also holds the values of devices
-that have a profile (-d), each point on a channel of its own.
+"""The suffix of OUT chooses the format; .csv and .parquet are tables of frames. What a format cannot keep is said. An
+.mcap also holds the values of devices that have a profile (-d), each point on a channel of its own.
 """
 
 from __future__ import annotations
 
 import argparse
+import sys
 
+from dissectors.findings import counted
 from dissectors.profiles import Devices
 from sniff.analysis.judging import Judging
+from sniff.analysis.plain import plain
 from sniff.bus.offline import survey
-from sniff.cli import arguments, writing
+from sniff.cli import USAGE, Failure, arguments, frame_table, writing
 from sniff.cli.progress import Watched
 from sniff.devices import with_devices
 from sniff.engine.capture import Capture
@@ -40,6 +43,13 @@ def run(args: argparse.Namespace) -> int:
     """Read, write, say what was lost."""
     capture = arguments.open_capture(args.source)
     session = arguments.settings_of(args, capture.session, args.source)
+    if frame_table.wanted(args.output):
+        if args.link_type is not None:
+            raise Failure(f"{args.output}: a table of frames has no --link-type", USAGE)
+        count = frame_table.write(args, capture, session, arguments.noted_devices(args, session))
+        print(f"{plain(args.output)}: {counted(count, 'row')}, frames and what was between them", file=sys.stderr)
+        writing.say_incomplete(args.source, capture)
+        return 0
     options = {"link-type": str(args.link_type)} if args.link_type is not None else None
     devices = arguments.noted_devices(args, session)
     session = with_devices(session, devices)
