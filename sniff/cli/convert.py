@@ -55,7 +55,7 @@ def run(args: argparse.Namespace) -> int:
     session = with_devices(session, devices)
     values = devices if args.output.lower().endswith(".mcap") else None
     notes = _evidence(capture, session, devices, args.reference) if args.output.lower().endswith(".pcapng") else None
-    writing.write(args, session, capture, [args.source], options, devices=values, notes=notes)
+    writing.write(args, session, writing.with_comments(capture), [args.source], options, devices=values, notes=notes)
     writing.say_incomplete(args.source, capture)
     return 0
 

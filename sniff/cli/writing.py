@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import heapq
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
@@ -157,6 +158,14 @@ def _write_items(
         for taker in takers:
             taker.add(output)
             taker.close()
+
+
+def with_comments(capture: Capture) -> Source:
+    """A capture to be written, with what people wrote into it where it can tell (a text capture)."""
+    comments = getattr(capture, "comments", None)
+    if comments is None or next(comments(), None) is None:
+        return capture
+    return Items(heapq.merge(capture.items(), comments(), key=lambda item: item.time))
 
 
 class Items:

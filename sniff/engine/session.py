@@ -210,6 +210,7 @@ class LineEventKind(Enum):
     SETTINGS = "settings"  # line settings or protocol changed from here on; `text` as in `SettingsChange`
     ERRORS = "errors"  # errors that the driver counted without saying where; `count` of them, `text` = kind
     NOTE = "note"
+    COMMENT = "comment"  # what a person wrote into a text capture; says nothing of the line
     REFUSED = "refused"  # line settings that were asked for and not taken; `text` as `refusal` makes it
 
     @property
