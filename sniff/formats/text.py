@@ -40,7 +40,17 @@ from typing import TYPE_CHECKING, BinaryIO
 from dissectors.frame import Chunk
 from dissectors.line import MS, LineSettings
 from sniff.engine.capture import CaptureError
-from sniff.engine.session import DEVICES_NOTE, Completeness, Item, LineEvent, LineEventKind, Session, settings_change
+from sniff.engine.session import (
+    ASSUMED,
+    DEVICES_NOTE,
+    PROTOCOL_NOTE,
+    Completeness,
+    Item,
+    LineEvent,
+    LineEventKind,
+    Session,
+    settings_change,
+)
 from sniff.formats.files import NewFile, explain, open_capture
 from sniff.formats.text_line import DEVICE, EPOCH, HEADER, LATEST, MAGIC, MARKS, VERSION, Line, is_device
 
@@ -147,6 +157,8 @@ class TextCapture:
             elif not stripped.startswith("#!"):
                 _take(record, reading.header())
         self._speed = LineSettings.parse(record["line"]) if "line" in record else None
+        if "protocol" not in record:
+            record.setdefault(f"note_{PROTOCOL_NOTE}", ASSUMED)
         return Session.from_metadata(record)
 
 
