@@ -5,20 +5,20 @@
 from __future__ import annotations
 
 import argparse
-import sys
 
-from dissectors.findings import counted
 from dissectors.profiles import Devices
 from sniff.analysis.judging import Judging
-from sniff.analysis.plain import plain
 from sniff.bus.offline import survey
-from sniff.cli import USAGE, Failure, arguments, frame_table, writing
+from sniff.cli import arguments, writing
 from sniff.cli.progress import Watched
 from sniff.devices import with_devices
 from sniff.engine.capture import Capture
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import Session
 from sniff.formats.linktypes import held_by_protocols
+
+TABLES = (".csv", ".parquet")
+"""Suffixes of tables of frames."""
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -43,11 +43,10 @@ def run(args: argparse.Namespace) -> int:
     """Read, write, say what was lost."""
     capture = arguments.open_capture(args.source)
     session = arguments.settings_of(args, capture.session, args.source)
-    if frame_table.wanted(args.output):
-        if args.link_type is not None:
-            raise Failure(f"{args.output}: a table of frames has no --link-type", USAGE)
-        count = frame_table.write(args, capture, session, arguments.noted_devices(args, session))
-        print(f"{plain(args.output)}: {counted(count, 'row')}, frames and what was between them", file=sys.stderr)
+    if args.output.lower().endswith(TABLES):
+        from sniff.cli import frame_table
+
+        frame_table.write(args, capture, session, arguments.noted_devices(args, session))
         writing.say_incomplete(args.source, capture)
         return 0
     options = {"link-type": str(args.link_type)} if args.link_type is not None else None
@@ -55,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
     session = with_devices(session, devices)
     values = devices if args.output.lower().endswith(".mcap") else None
     notes = _evidence(capture, session, devices, args.reference) if args.output.lower().endswith(".pcapng") else None
-    writing.write(args, session, writing.with_comments(capture), [args.source], options, devices=values, notes=notes)
+    writing.write(args, session, capture, [args.source], options, devices=values, notes=notes)
     writing.say_incomplete(args.source, capture)
     return 0
 

@@ -5,11 +5,15 @@ from __future__ import annotations
 import argparse
 import csv
 import io
+import sys
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+from dissectors.findings import counted
 from dissectors.profiles import Devices
+from sniff.analysis.filtering import FilterError, compile_filter
+from sniff.analysis.plain import plain
 from sniff.bus.offline import settled, settled_in_bulk
 from sniff.cli import UNREADABLE, USAGE, Failure, rows, writing
 from sniff.cli.progress import Watched
@@ -20,16 +24,11 @@ from sniff.engine.session import Session
 from sniff.formats import parquet
 from sniff.formats.files import NewFile
 
-SUFFIXES = (".csv", ".parquet")
 
-
-def wanted(path: str) -> bool:
-    """Whether a file to write is such a table."""
-    return path.lower().endswith(SUFFIXES)
-
-
-def write(args: argparse.Namespace, capture: Capture, session: Session, devices: Devices) -> int:
-    """Write the frames of a capture to `args.output`; gives how many rows. Ends with exit code 2 or 3."""
+def write(args: argparse.Namespace, capture: Capture, session: Session, devices: Devices) -> None:
+    """Write the frames of a capture to `args.output` and say how many rows. Ends with exit code 2 or 3."""
+    if args.link_type is not None:
+        raise Failure(f"{args.output}: a table of frames has no --link-type", USAGE)
     target = Path(args.output)
     writing.refuse_to_overwrite(target, [args.source], args.force)
     is_parquet = target.name.lower().endswith(".parquet")
@@ -43,7 +42,7 @@ def write(args: argparse.Namespace, capture: Capture, session: Session, devices:
                 count += 1
     except CaptureError as error:
         raise Failure(str(error), UNREADABLE) from None
-    return count
+    print(f"{plain(target)}: {counted(count, 'row')}, frames and what was between them", file=sys.stderr)
 
 
 def _cells(
@@ -52,10 +51,14 @@ def _cells(
     """A row a frame. `typed`: as values of a table; else as text."""
     dissector, watched = dissector_for(session), Watched(capture)
     known = devices or None
+    try:
+        wanted = compile_filter(getattr(args, "filter", ""), dissector)
+    except FilterError as error:
+        raise Failure(f"filter {args.filter!r}: {error}", USAGE) from None
     if args.reference:
-        found = settled(watched.items(), session, known)
+        found = settled(watched.items(), session, known, wanted)
     else:
-        found = settled_in_bulk(watched, session, known)
+        found = settled_in_bulk(watched, session, known, wanted)
     for item in found:
         if typed:
             yield rows.typed(item, dissector, session)

@@ -55,7 +55,7 @@ def write(
     target = Path(args.output)
     refuse_to_overwrite(target, sources, args.force)
     counts = _Counts()
-    watched = Watched(source)
+    watched = Watched(with_comments(source))
     try:
         with create(target, session, options, notes) as writer:
             takers: list[_Frames | _Values] = [_Frames(writer, session)] if with_frames else []
@@ -160,8 +160,8 @@ def _write_items(
             taker.close()
 
 
-def with_comments(capture: Capture) -> Source:
-    """A capture to be written, with what people wrote into it where it can tell (a text capture)."""
+def with_comments(capture: Source) -> Source:
+    """What is to be written, with what people wrote into it where it can tell (a text capture)."""
     comments = getattr(capture, "comments", None)
     if comments is None or next(comments(), None) is None:
         return capture
