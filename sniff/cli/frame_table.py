@@ -12,7 +12,6 @@ from typing import Any
 
 from dissectors.findings import counted
 from dissectors.profiles import Devices
-from sniff.analysis.filtering import FilterError, compile_filter
 from sniff.analysis.plain import plain
 from sniff.bus.offline import settled, settled_in_bulk
 from sniff.cli import UNREADABLE, USAGE, Failure, rows, writing
@@ -29,6 +28,8 @@ def write(args: argparse.Namespace, capture: Capture, session: Session, devices:
     """Write the frames of a capture to `args.output` and say how many rows. Ends with exit code 2 or 3."""
     if args.link_type is not None:
         raise Failure(f"{args.output}: a table of frames has no --link-type", USAGE)
+    if getattr(args, "filter", ""):
+        raise Failure(f"{args.output}: a table of all frames; `sniff485 show --csv -Y …` gives some of them", USAGE)
     target = Path(args.output)
     writing.refuse_to_overwrite(target, [args.source], args.force)
     is_parquet = target.name.lower().endswith(".parquet")
@@ -51,14 +52,10 @@ def _cells(
     """A row a frame. `typed`: as values of a table; else as text."""
     dissector, watched = dissector_for(session), Watched(capture)
     known = devices or None
-    try:
-        wanted = compile_filter(getattr(args, "filter", ""), dissector)
-    except FilterError as error:
-        raise Failure(f"filter {args.filter!r}: {error}", USAGE) from None
     if args.reference:
-        found = settled(watched.items(), session, known, wanted)
+        found = settled(watched.items(), session, known)
     else:
-        found = settled_in_bulk(watched, session, known, wanted)
+        found = settled_in_bulk(watched, session, known)
     for item in found:
         if typed:
             yield rows.typed(item, dissector, session)
