@@ -18,6 +18,7 @@ from dissectors.line import LineSettings
 from dissectors.profiles import Devices
 from sniff import devices as profiles
 from sniff.analysis.points import PointReader
+from sniff.analysis.told_protocol import detected
 from sniff.bus.columns import Column, Columns, Form, TableColumns
 from sniff.bus.sample_row import COLUMNS, sample_row
 from sniff.engine.bulk import tables
@@ -46,7 +47,7 @@ def read(
     for words that mean nothing.
     """
     capture = open_capture(path)
-    session = with_settings(capture.session, protocol, LineSettings.parse(line) if line is not None else None)
+    session = with_settings(detected(capture.session), protocol, LineSettings.parse(line) if line is not None else None)
     dissector_for(session)
     words = (devices,) if isinstance(devices, str) else tuple(devices)
     said = profiles.devices(dict(map(profiles.assignment, words)))

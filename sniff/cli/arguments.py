@@ -231,7 +231,7 @@ def say_assumed(session: Session, path: str, way_out: str = "") -> None:
     told = session.notes.get(PROTOCOL_NOTE)
     if told is not None:
         title = registry.get(session.protocol).title
-        print(f"sniff485: no protocol in {plain(path)}: reading it as {title} ({plain(told)})", file=sys.stderr)
+        print(f"sniff485: {plain(path)}: reading it as {title} ({plain(told)}); -p names another", file=sys.stderr)
     if session.line_is_assumed:
         said = f"no line settings in {plain(path)}: assuming {session.line} for {session.protocol}{way_out}"
         print(f"sniff485: {said}", file=sys.stderr)

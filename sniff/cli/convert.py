@@ -1,5 +1,5 @@
-"""The suffix of OUT chooses the format. What a format cannot keep is said. An .mcap also holds the values of devices
-that have a profile (-d), each point on a channel of its own.
+"""The suffix of OUT chooses the format; .csv and .parquet are tables of frames. What a format cannot keep is said. An
+.mcap also holds the values of devices that have a profile (-d), each point on a channel of its own.
 """
 
 from __future__ import annotations
@@ -16,6 +16,9 @@ from sniff.engine.capture import Capture
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import Session
 from sniff.formats.linktypes import held_by_protocols
+
+TABLES = (".csv", ".parquet")
+"""Suffixes of tables of frames."""
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -42,6 +45,12 @@ def run(args: argparse.Namespace) -> int:
     """Read, write, say what was lost."""
     capture = arguments.open_capture(args.source)
     session = arguments.settings_of(args, capture.session, args.source)
+    if args.output.lower().endswith(TABLES):
+        from sniff.cli import frame_table
+
+        frame_table.write(args, capture, session, arguments.noted_devices(args, session))
+        writing.say_incomplete(args.source, capture)
+        return 0
     options = {"link-type": str(args.link_type)} if args.link_type is not None else None
     devices = arguments.noted_devices(args, session)
     session = with_devices(session, devices)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import heapq
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
@@ -56,7 +57,7 @@ def write(
     target = Path(args.output)
     refuse_to_overwrite(target, sources, args.force)
     counts = _Counts()
-    watched = Watched(source)
+    watched = Watched(with_comments(source))
     try:
         with create(target, session, options, notes) as writer:
             takers: list[_Frames | _Values] = [_Frames(writer, session)] if with_frames else []
@@ -160,6 +161,14 @@ def _write_items(
         for taker in takers:
             taker.add(output)
             taker.close()
+
+
+def with_comments(capture: Source) -> Source:
+    """What is to be written, with what people wrote into it where it can tell (a text capture)."""
+    comments = getattr(capture, "comments", None)
+    if comments is None or next(comments(), None) is None:
+        return capture
+    return Items(heapq.merge(capture.items(), comments(), key=lambda item: item.time))
 
 
 class Items:

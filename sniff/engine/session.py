@@ -213,6 +213,7 @@ class LineEventKind(Enum):
     DROPPED = "dropped"  # octets that this host lost; `count` says how many, -1 unknown
     CLOCK = "clock"  # wall clock stepped against the monotonic clock; `count` = new offset, ns
     SETTINGS = "settings"  # line settings or protocol changed from here on; `text` as in `SettingsChange`
+    COMMENT = "comment"  # what a person wrote into a text capture; says nothing of the line
     ERRORS = "errors"  # errors that the driver counted without saying where; `count` of them, `text` = kind
     NOTE = "note"
     TRIGGER = "trigger"  # what a trigger fired on; `text` says it

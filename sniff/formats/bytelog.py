@@ -30,8 +30,8 @@ from sniff.engine.session import Adapter, Completeness, Item, LineEvent, Session
 from sniff.formats.contents import is_utf16
 from sniff.formats.files import explain, open_capture
 from sniff.formats.log_assembly import Assembly
-from sniff.formats.log_lines import Kind, line_of
-from sniff.formats.log_plan import LOOKED_AT, Plan, plan_of
+from sniff.formats.log_lines import Kind, line_of, pieces
+from sniff.formats.log_plan import LOOKED_AT, LOOKED_AT_CHARACTERS, Plan, plan_of
 from sniff.formats.log_shapes import REMARK
 from sniff.formats.octet_table import Table, delimiter_of, heading_of
 from sniff.formats.records import FOREIGN_LATENCY, foreign_session
@@ -66,7 +66,7 @@ class ByteLog:
     def __init__(self, path: Path) -> None:
         self.path = path
         self._counts = _Counts()
-        lines = list(islice(self._lines(), LOOKED_AT))
+        lines = list(_first(self._lines()))
         self._heading = _heading(lines)
         self._plan: Plan | None = None
         if self._heading is None:
@@ -147,7 +147,8 @@ class ByteLog:
                     return
                 while line := stream.readline(LONGEST_LINE):
                     text = line.decode("utf-8", "replace").rstrip("\r\n").removeprefix("\ufeff")
-                    yield from text.split("\r")
+                    for part in text.split("\r"):
+                        yield from pieces(part)
             except OSError as error:
                 raise explain(self.path, error) from None
 
@@ -232,6 +233,16 @@ def _utf16_lines(stream: object, start: bytes) -> Iterator[str]:
         rest = rest[-LONGEST_LINE:]
     if rest:
         yield rest
+
+
+def _first(lines: Iterator[str]) -> Iterator[str]:
+    """The lines that tell what a log is."""
+    left = LOOKED_AT_CHARACTERS
+    for line in islice(lines, LOOKED_AT):
+        yield line
+        left -= len(line)
+        if left < 0:
+            return
 
 
 def _first_written(lines: list[str]) -> str:

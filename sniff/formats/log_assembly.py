@@ -108,6 +108,10 @@ class Assembly:
             self._begin(line, line.way)
         self._goes_on = line.goes_on
         self._recent = (self._recent + line.octets)[-WINDOW:]
+        for way, octets in line.more:
+            yield from self._flush()
+            self._begin(replace(line, octets=octets, samples=None), way)
+            self._recent = (self._recent + octets)[-WINDOW:]
         if len(self._held) >= LONGEST:
             yield from self._flush()
             self._glued = True

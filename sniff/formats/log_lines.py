@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import Enum
 
@@ -10,8 +11,12 @@ from sniff.formats.log_clock import Stamp, stamp_of
 from sniff.formats.log_octets import PAIRS_ONLY, Run, numbers_in, octets_in
 from sniff.formats.log_shapes import COLOURS, REMARK, STAMP, WAYS, Role, shape_of
 
-LONGEST = 1 << 16
+LONGEST = 1 << 13
 """Characters of a line that are looked at; a frame of a field bus is far shorter."""
+
+MOST_MORE = 8
+"""Reads that one line tells."""
+_BETWEEN = 60
 
 MOST_STAMPS = 3
 """Times in a line that are taken out of it; a program's log around another's has two."""
@@ -30,6 +35,7 @@ _ROW = re.compile(
 )
 _OCTET = re.compile(r"[0-9A-Fa-f]{1,2}")
 _COLUMN = re.compile(r"\s{2,}|\t|\s*[|>]")
+_LAST_DIGITS = re.compile(r"(?<![0-9A-Fa-f])[0-9A-Fa-f]+\Z")
 _PAIRS = re.compile(r"[0-9A-Fa-f]{2}(?:[ -][0-9A-Fa-f]{2})*")
 _WORDS_OF_16 = re.compile(r"(?:[0-9A-Fa-f]{4} )*(?:[0-9A-Fa-f]{4}|[0-9A-Fa-f]{2})")
 
@@ -64,6 +70,8 @@ class Line:
     offset: str = ""
     samples: tuple[int, int] | None = None
     cut: bool = False
+    more: tuple[tuple[str, bytes], ...] = ()
+    """Way and octets of what stands behind on the same line, as the answer beside its request."""
     goes_on: bool = False
     """Whether it ends as a line that another continues."""
 
@@ -89,6 +97,8 @@ def line_of(text: str, base: int = PAIRS_ONLY, rows: bool = True) -> Line:
     shape, match = known
     groups = match.groupdict()
     way = groups.get("way") or ""
+    if shape.role is Role.HEADING and (found := octets_in(text, base)) is not None and len(found.octets) > 2:
+        return Line(Kind.OCTETS, stamp, way, found.octets, shape.tool, False, Role.DATA, shape.tool, found.spelling)
     if shape.role is not Role.DATA:
         return Line(Kind.SHAPE, stamp, way, role=shape.role, tool=shape.tool)
     told = groups.get("octets")
@@ -103,8 +113,22 @@ def line_of(text: str, base: int = PAIRS_ONLY, rows: bool = True) -> Line:
         way = _way(text[: run.begin])
     return Line(
         Kind.OCTETS, stamp, way, run.octets, shape.tool, False, Role.DATA, shape.tool, run.spelling,
-        samples=samples, cut=bool(groups.get("cut")),
+        samples=samples, cut=bool(groups.get("cut")), more=_more(text, run, base) if told is None else (),
     )  # fmt: skip
+
+
+def pieces(text: str) -> Iterator[str]:
+    """A line, in pieces that go on in one another where it is longer than is looked at (a whole capture on one)."""
+    text = text if len(text) < LONGEST else _SPACES.sub("   ", text)
+    while len(text) > LONGEST - 2:
+        cut = max(text.rfind(" ", LONGEST // 2, LONGEST - 2), text.rfind(",", LONGEST // 2, LONGEST - 2) + 1)
+        if cut <= 0:  # digits without space, in pairs from where they begin
+            digits = _LAST_DIGITS.search(text, 0, LONGEST - 2)
+            begin = digits.start() if digits is not None else 0
+            cut = begin + (LONGEST - 2 - begin) // 2 * 2
+        yield f"{text[:cut]} \\"
+        text = text[cut:]
+    yield text
 
 
 def numbers_of(text: str) -> tuple[str, ...]:
@@ -127,8 +151,24 @@ def _general(text: str, stamp: Stamp | None, base: int) -> Line:
     goes_on = text.rstrip().endswith((",", "\\"))
     return Line(
         Kind.OCTETS, stamp, way, run.octets, label if not bare else "", bare, None, "", run.spelling,
-        goes_on=goes_on,
+        goes_on=goes_on, more=_more(text, run, base),
     )  # fmt: skip
+
+
+def _more(text: str, run: Run, base: int) -> tuple[tuple[str, bytes], ...]:
+    """What stands behind the octets of a line, written as they are, after a direction of its own."""
+    found: list[tuple[str, bytes]] = []
+    rest = text[run.end :]
+    while len(found) < MOST_MORE:
+        way = WAYS.search(rest[:_BETWEEN])
+        after = octets_in(rest[way.end() :], base) if way is not None else None
+        if way is None or after is None or after.spelling != run.spelling or len(after.octets) < 3:
+            break
+        if after.begin > _BETWEEN:
+            break
+        found.append((way[0].lower(), after.octets))
+        rest = rest[way.end() + after.end :]
+    return tuple(found)
 
 
 def _way(lead: str) -> str:

@@ -10,6 +10,9 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass
 
+SURELY = 4
+"""Octets in a run that are no number of the line, no time and no length."""
+
 PAIRS_ONLY = 0
 """No base: numbers are no octets."""
 
@@ -112,6 +115,14 @@ def _frame_of_characters(text: str) -> bytes:
     raise ValueError("no frame")
 
 
+def _signed(text: str) -> bytes:
+    """Numbers of −128 to 127, as Java has octets; up to 255 where others have them."""
+    numbers = [int(number) for number in re.findall(r"-?\d+", text)]
+    if not all(-128 <= number <= 255 for number in numbers):
+        raise ValueError("no octets")
+    return bytes(number & 0xFF for number in numbers)
+
+
 def _controls(text: str) -> bytes:
     """Characters, and names in angle brackets for those that are none: `<SOH><ETX>A`."""
     found = bytearray()
@@ -141,6 +152,9 @@ SPELLINGS: tuple[Spelling, ...] = (
              after=""),
     Spelling("names of controls", rf"[!-;=?-~]*{_CONTROL}", r"", _controls, 2, after="[!-;=?-~]*",
              before=r"(?:(?<=\s)|^)"),
+    Spelling("bits", r"[01]{8}", r"[ ,;]{1,2}", _by(r"[01]{8}", 2), 3),
+    Spelling("signed numbers", r"[\[{(](?=[^\]})]{0,4000}-\d)-?\d{1,3}(?:, ?-?\d{1,3}){1,4096}[\]})]", None,
+             _signed, 1, before="", after=""),
     Spelling("binary", r"0b[01]{8}(?: ?\(0[xX][0-9A-Fa-f]{1,2}\))?", _SEPARATOR, _by(r"0b([01]{8})", 2), 1),
     Spelling("0x and digits", r"0[xX][0-9A-Fa-f]{1,2}(?![0-9A-Za-z])", r"['\"]?[ ]?[,;:/|]?[ \t]{0,2}['\"]?",
              _by(r"0[xX]([0-9A-Fa-f]{1,2})", 16), 2),
@@ -193,6 +207,8 @@ def _digits(line: str, base: int) -> Run | None:
         run = _numbers(match, tokens, base) if len(tokens) > 1 else None
         if run is not None and (best is None or len(run.octets) > len(best.octets)):
             best = run
+            if len(run.octets) >= SURELY:
+                break  # what stands behind is another frame, or the same in characters
     return best
 
 
@@ -209,18 +225,17 @@ def _numbers(match: re.Match[str], tokens: list[str], base: int) -> Run | None:
 
 
 def _words(line: str) -> Run | None:
+    best: Run | None = None
     for match in _WORDS.finditer(line):
         digits = match[0].replace(" ", "")
         if len(digits) == len(match[0].split()) * 2 and " " in match[0]:
             continue  # pairs, of which one was cut
         alone = match.end() == len(line.rstrip())
-        if (
-            len(digits) >= 12
-            or (len(digits) >= 8 and alone and line[match.start() - 1] == " ")
-            or (len(digits) >= 4 and alone and (match.start() == 0 or line[match.start() - 1] in "#:="))
-        ):
-            return Run(match.start(), match.end(), bytes.fromhex(digits), "digits without space")
-    return None
+        before = line[match.start() - 1] if match.start() else ""
+        enough = 12 if not alone else 8 if before == " " else 4 if before in "#:=" else 12
+        if len(digits) >= enough and (best is None or len(digits) > 2 * len(best.octets)):
+            best = Run(match.start(), match.end(), bytes.fromhex(digits), "digits without space")
+    return best
 
 
 _ALONE = re.compile(rf"(?:^|.*[\s:>\]|#,-])(?P<octet>(?:0[xX])?{_H2})\s*(?:\(\S{{1,6}}\)|'.'|\".\"|[|;].*)?\s*")

@@ -19,6 +19,9 @@ from sniff.formats.log_shapes import Role
 LOOKED_AT = 2000
 """Lines of a log that are looked at."""
 
+LOOKED_AT_CHARACTERS = 200_000
+"""Characters of them."""
+
 WINDOW = 2048
 """Octets within which a line that repeats others is looked for."""
 

@@ -55,7 +55,7 @@ SHAPES: tuple[Shape, ...] = (
     _shape("candump", rf"^\s*\({_S}\)\s+\w+\s+(?:[0-9A-Fa-f]+(?:#|\s+\[\d+\]\s+))?(?P<octets>.+)"),
     _shape("strace", r"\b(?P<way>p?(?:read|write)(?:64|v)?|recv\w*|send\w*)\(\d+(?:<[^>]*>)?, "
                      r"(?P<octets>\"(?:[^\"\\]|\\.)*\")(?P<cut>\.\.\.)?.*\)\s*=\s*\d+"),
-    _shape("strace", r"^[\d\s\0]*(?:\w+\(.*\)?\s*=\s*-?\d|<\.\.\. |--- SIG|\+\+\+ )", Role.NOTHING),
+    _shape("strace", r"^(?:[\d\s\0]*\s)?(?:[a-z]\w{0,30}\(.*\)?\s*=\s*-?\d|<\.\.\. |--- SIG|\+\+\+ )", Role.NOTHING),
     _shape("interceptty", rf"^(?P<way>[<>])\s+0x(?P<octets>{_H})\s+\(.{{1,6}}\)"),
     _shape("socat", rf"^(?P<way>[<>]) {_S} +length=\d+ from=\d+ to=\d+", Role.HEADING),
     _shape("socat", r"^--$", Role.NOTHING),

@@ -34,7 +34,7 @@ OCTET = (
     "raw",
     "message",
 )
-ANALYSER = re.compile(r".*\b(?:uart|rs-?485|rs-?232|async serial|modbus|serial)\b.*")
+ANALYSER = re.compile(r".*\b(?:uart|rs-?485|rs-?232|async serial|serial)\b.*")
 """A column that is named for its decoder, when no other holds octets."""
 BEGIN = ("t_start_s", "start", "start_s", "begin", "start_time", "start time")
 END = ("t_end_s", "end", "end_s", "time", "time_s", "timestamp", "t", "date", "datetime", "date/time", "date time")

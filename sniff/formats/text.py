@@ -40,7 +40,17 @@ from typing import TYPE_CHECKING, BinaryIO
 from dissectors.frame import Chunk
 from dissectors.line import MS, LineSettings
 from sniff.engine.capture import CaptureError
-from sniff.engine.session import DEVICES_NOTE, Completeness, Item, LineEvent, Session, settings_change
+from sniff.engine.session import (
+    ASSUMED,
+    DEVICES_NOTE,
+    PROTOCOL_NOTE,
+    Completeness,
+    Item,
+    LineEvent,
+    LineEventKind,
+    Session,
+    settings_change,
+)
 from sniff.formats.files import NewFile, explain, open_capture
 from sniff.formats.text_line import DEVICE, EPOCH, HEADER, LATEST, MAGIC, MARKS, VERSION, Line, is_device
 
@@ -108,6 +118,28 @@ class TextCapture:
 
         return blocks_of(self.items())
 
+    def comments(self) -> Iterator[LineEvent]:
+        """What was written for people, as events at the chunk that they stand beside or behind; up to a bad line."""
+        line, last, is_header = self._speed, self.session.started, True
+        for number, text in enumerate(self._lines, 1):
+            reading = Line(self.name, number, text)
+            stripped = text.strip()
+            said = ""
+            try:
+                if stripped.startswith("#!"):
+                    if not stripped.startswith(MAGIC):
+                        line = _changed(line, reading.event(last))
+                elif stripped.startswith("#"):
+                    said = "" if is_header and reading.header() else stripped
+                elif stripped:
+                    is_header = False
+                    last = reading.chunk(last, line).time
+                    said = text[reading.at :].strip()
+            except CaptureError:
+                return
+            if said := said.removeprefix("#").strip():
+                yield LineEvent(last, LineEventKind.COMMENT, said)
+
     def completeness(self) -> Completeness:
         """Always whole: a text capture that was cut has a bad line or cannot be told from a shorter one."""
         return Completeness(True)
@@ -125,6 +157,8 @@ class TextCapture:
             elif not stripped.startswith("#!"):
                 _take(record, reading.header())
         self._speed = LineSettings.parse(record["line"]) if "line" in record else None
+        if "protocol" not in record:
+            record.setdefault(f"note_{PROTOCOL_NOTE}", ASSUMED)
         return Session.from_metadata(record)
 
 
@@ -182,6 +216,7 @@ class TextWriter:
         self._last = readable_time(session.started)
         self._not_kept = 0
         self._moved = 0
+        self._in_header = True
         self.losses: list[str] = []
         self._put(header_lines(session))
 
@@ -189,8 +224,10 @@ class TextWriter:
         """Add a chunk or line event. An empty chunk says nothing and is not written. Raises CaptureError."""
         self._moved += readable_time(item.time) != item.time
         if isinstance(item, LineEvent):
-            self._put([event_line(item, self._last)])
+            is_comment = item.kind is LineEventKind.COMMENT and is_plain_comment(item.text, self._in_header)
+            self._put([f"# {item.text}" if is_comment else event_line(item, self._last)])
         elif item.octets:
+            self._in_header = False
             lines = list(chunk_lines(item, self._last))
             self._not_kept += len(lines) - 1
             self._put(lines)
@@ -277,6 +314,16 @@ def event_line(event: LineEvent, last: int) -> str:
     if text:
         shown = f" {json.dumps(text)}" if text.startswith("count=") else f" {_quoted(text)}"
     return f"#! {_delay(readable_time(event.time) - last)} {event.kind.value}{count}{shown}"
+
+
+def is_plain_comment(text: str, in_header: bool) -> bool:
+    """Whether a comment can stand in a file as it is, and would not be read as something else."""
+    return (
+        text.isprintable()
+        and text == text.strip()
+        and not text.startswith(("!", "#"))
+        and not (in_header and ":" in text)
+    )
 
 
 def readable_time(time: int) -> int:

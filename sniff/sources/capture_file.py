@@ -9,6 +9,7 @@ from dissectors.line import LineSettings
 from sniff.engine.capture import CaptureError
 from sniff.engine.session import Adapter, Item, LineEvent, LineEventKind, Session
 from sniff.formats import read
+from sniff.formats.table import suffixes
 from sniff.sources import PortError
 from sniff.sources.clock import Clock
 
@@ -31,7 +32,8 @@ class CaptureFileSource:
             self._items: Iterator[Item] = capture.items()
             self._next = next(self._items, None)
         except (CaptureError, OSError) as error:
-            raise PortError(str(error)) from error
+            named = path.lower().endswith(suffixes())
+            raise PortError(str(error) if named else f"{path}: a file, not a serial port; {error}") from error
         self.session: Session = capture.session
         self._clock = clock
         self._speed = speed

@@ -14,6 +14,7 @@ from dissectors.profiles import Devices
 from dissectors.tracker import Transaction
 from sniff.analysis.points import Point
 from sniff.analysis.summary import Summary
+from sniff.analysis.told_protocol import detected
 from sniff.bus.model import BusModel
 from sniff.bus.offline import survey
 from sniff.devices import noted, noted_devices
@@ -62,7 +63,7 @@ def read_capture(path: str | Path, said: Devices | None = None) -> CaptureReadin
     """Read a capture whole. `said`: devices, before those that it names. Raises CaptureError, UnknownProtocol."""
     place = Path(path)
     capture = read(place)
-    session = capture.session
+    session = capture.session = detected(capture.session)
     dissector = dissector_for(session)
     known, unknown = noted(session)
     devices = (said or Devices()).over(noted_devices(session))

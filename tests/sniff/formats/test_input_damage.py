@@ -104,13 +104,14 @@ def test_a_text_capture_with_any_octet_changed(change: str) -> None:
 def test_frames_up_to_the_damage_are_shown(tmp_path: Path, sniff485: Callable[..., Any]) -> None:
     """Also the last one, which waits for its answer when the damage comes."""
     path = tmp_path / "a.cap.txt"
-    path.write_text("# line: 19200,8E1\n+0 01 03 00 00 00 02 C4 0B\n+8 01 03 04 00 D7 00 1A CB C0\n")
+    begin = "# line: 19200,8E1\n# protocol: modbus-rtu\n"
+    path.write_text(f"{begin}+0 01 03 00 00 00 02 C4 0B\n+8 01 03 04 00 D7 00 1A CB C0\n")
     with path.open("a") as stream:
         stream.write("+50 02 03 00 00 00 02 C4 38\n+90 01 0")
     code, out, err = sniff485("show", path)
     assert code == 3
     assert [line.split()[3] for line in out.splitlines()] == ["1", "1", "2"]
-    assert err.startswith(f"sniff485: {path}:5:8: expected pairs of hexadecimal digits")
+    assert err.startswith(f"sniff485: {path}:6:8: expected pairs of hexadecimal digits")
 
 
 def test_the_terminal_ui_gets_the_rows_before_the_damage(tmp_path: Path) -> None:

@@ -193,7 +193,8 @@ CANONICAL = r"""#!sniff-capture 1
 
 
 def test_devices_have_lines_of_their_own() -> None:
-    text = "# device: 3=teco-e510\n#device:  0x10=acme_7 , *=teco-f510\n# note devices: 9=old\n# note site: a\n+0 01\n"
+    text = "# protocol: modbus-rtu\n"
+    text += "# device: 3=teco-e510\n#device:  0x10=acme_7 , *=teco-f510\n# note devices: 9=old\n# note site: a\n+0 01\n"
     session = parse(text).session
     assert session.notes == {"devices": "3=teco-e510,0x10=acme_7,*=teco-f510,9=old", "site": "a"}
     lines = render(session, []).splitlines()
