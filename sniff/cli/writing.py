@@ -17,6 +17,7 @@ from sniff.bus.capture_writer import create
 from sniff.bus.offline import Source
 from sniff.cli import UNREADABLE, USAGE, Failure
 from sniff.cli.progress import Watched
+from sniff.devices import noted_devices
 from sniff.engine.capture import BlockWriter, Capture, CaptureError, CaptureWriter
 from sniff.engine.engine import Output
 from sniff.engine.follow_settings import dissector_for, engine_for
@@ -26,6 +27,7 @@ from sniff.formats.parquet import Kind, ParquetWriter
 
 if TYPE_CHECKING:
     from sniff.analysis.points import Sample
+    from sniff.bus.derived_topics import DerivedMessage
     from sniff.engine.blocks import Block
     from sniff.engine.table import Table
 
@@ -48,7 +50,8 @@ def write(
 ) -> int:
     """Write a capture to `args.output`; say on standard error what it holds and what it lost. Gives the octets.
 
-    `with_frames`: with what the engine finds in them, on /frames. `devices`: with their values, on /values.
+    An .mcap gets what a live recording has: /values, /bus, /nodes and /findings. `with_frames`: what the engine finds
+    in the octets too, on /frames. `devices`: those whose values are written, each of them.
     `notes`: by row number, for the comments of packets where OUT has such. Ends with exit code 2 when OUT is there.
     """
     target = Path(args.output)
@@ -57,9 +60,11 @@ def write(
     watched = Watched(source)
     try:
         with create(target, session, options, notes) as writer:
-            takers: list[_Frames | _Values] = [_Frames(writer, session)] if with_frames else []
+            takers: list[_Frames | _Values | _Topics] = [_Frames(writer, session)] if with_frames else []
             if devices:
                 takers.append(_Values(writer, session, devices))
+            if _is_recording(writer) and not session.unknown:
+                takers.append(_Topics(writer, session, devices or noted_devices(session), with_values=not devices))
             if isinstance(writer, BlockWriter) and not args.reference:
                 _write_blocks(writer, watched.blocks(), session, takers, counts)
             else:
@@ -111,7 +116,7 @@ def _write_blocks(
     writer: CaptureWriter,
     blocks: Iterator[Block | LineEvent],
     session: Session,
-    takers: Sequence[_Frames | _Values],
+    takers: Sequence[_Frames | _Values | _Topics],
     counts: _Counts,
 ) -> None:
     from sniff.engine.bulk import BulkEngine
@@ -129,17 +134,20 @@ def _write_blocks(
             table = engine.take(item)
             for taker in takers:
                 taker.add_table(table)
+                if isinstance(item, LineEvent):
+                    taker.add_line_event(item)
     if engine is not None:
         table = engine.close()
         for taker in takers:
             taker.add_table(table)
+            taker.close()
 
 
 def _write_items(
     writer: CaptureWriter,
     items: Iterator[Item],
     session: Session,
-    takers: Sequence[_Frames | _Values],
+    takers: Sequence[_Frames | _Values | _Topics],
     counts: _Counts,
 ) -> None:
     engine = engine_for(session) if takers else None
@@ -152,6 +160,8 @@ def _write_items(
             output = engine.take(item)
             for taker in takers:
                 taker.add(output)
+                if isinstance(item, LineEvent):
+                    taker.add_line_event(item)
     if engine is not None:
         output = engine.close()
         for taker in takers:
@@ -174,6 +184,13 @@ class Items:
         from sniff.engine.blocks import blocks_of
 
         return blocks_of(self._items)
+
+
+def _is_recording(writer: object) -> bool:
+    """Whether it takes what is derived."""
+    from sniff.recording.writer import McapWriter
+
+    return isinstance(writer, McapWriter)
 
 
 class _Frames:
@@ -205,6 +222,9 @@ class _Frames:
             self._put(message)
         self._octets += len(table.octets)
 
+    def add_line_event(self, event: LineEvent) -> None:
+        """Nothing of it is kept here."""
+
     def close(self) -> None:
         self._count = 0
         self._put(self._log.take())
@@ -212,6 +232,40 @@ class _Frames:
     def _put(self, message: tuple[int, int, bytes] | None) -> None:
         if message is not None:
             self._writer.derived(self._topic, self._schema, *message)
+
+
+class _Topics:
+    """Writes what a live recording has: /bus, /nodes, /findings, and values unless others do."""
+
+    def __init__(self, writer: object, session: Session, devices: Devices, with_values: bool) -> None:
+        from sniff.bus.offline_topics import OfflineTopics
+        from sniff.recording.writer import McapWriter
+
+        assert isinstance(writer, McapWriter)
+        self._writer = writer
+        self._topics = OfflineTopics(session, devices, with_values)
+        self._protocol = session.protocol
+        self._next = 1
+
+    def add(self, output: Output) -> None:
+        from sniff.engine.table import Table
+
+        first = output.rows[0].no if output.rows else self._next
+        self._next = first + len(output.rows)
+        self.add_table(Table.of_outputs(self._protocol, first, [output]))
+
+    def add_table(self, table: Table) -> None:
+        self._put(self._topics.add_table(table))
+
+    def add_line_event(self, event: LineEvent) -> None:
+        self._topics.add_line_event(event)
+
+    def close(self) -> None:
+        self._put(self._topics.close())
+
+    def _put(self, messages: Iterable[DerivedMessage]) -> None:
+        for one in messages:
+            self._writer.derived(one.topic, one.schema, one.log_time, one.publish_time, one.data, one.metadata)
 
 
 class _Values:
@@ -234,6 +288,9 @@ class _Values:
         from sniff.analysis.table_points import samples_of
 
         self._put(samples_of(self._points, table).in_order())
+
+    def add_line_event(self, event: LineEvent) -> None:
+        """Nothing of it is kept here."""
 
     def close(self) -> None:
         """Nothing is held."""
