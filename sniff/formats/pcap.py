@@ -11,11 +11,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
 from dissectors.frame import Chunk
-from sniff.engine.capture import CaptureError
+from sniff.engine.capture import Capture, CaptureError
 from sniff.engine.session import Completeness, Item, LineEvent, Session
 from sniff.formats.files import NewFile, open_capture
 from sniff.formats.linktypes import LINK_TYPES, OWN, USER1
 from sniff.formats.linktypes import protocol_of as protocol_of_link
+from sniff.formats.network import NETWORK
 from sniff.formats.records import Record, foreign_session, items_of, protocol_of
 
 if TYPE_CHECKING:
@@ -34,9 +35,14 @@ LONGEST = 262_144
 """A longer record is damage: no field bus has frames of that size."""
 
 
-def read(path: Path) -> PcapCapture:
-    """Open a pcap file. Raises CaptureError."""
-    return PcapCapture(path)
+def read(path: Path) -> Capture:
+    """Open a pcap file; the buses in it where it is one of a network. Raises CaptureError."""
+    capture = PcapCapture(path)
+    if capture.link_type in NETWORK:
+        from sniff.formats import network_capture
+
+        return network_capture.read(capture)
+    return capture
 
 
 class PcapCapture:
@@ -47,8 +53,8 @@ class PcapCapture:
         with open_capture(path) as stream:
             header = stream.read(FILE_HEADER)
             self._order, self._tick = self._check(header)
-            self._link_type = struct.unpack_from(self._order + "I", header, 20)[0] & 0x0FFFFFFF
-            if self._link_type not in LINK_TYPES:
+            self._link_type: int = struct.unpack_from(self._order + "I", header, 20)[0] & 0x0FFFFFFF
+            if self._link_type not in LINK_TYPES and self._link_type not in NETWORK:
                 known = ", ".join(map(str, sorted(LINK_TYPES)))
                 raise CaptureError(
                     f"{path}: link type {self._link_type}{_NAMES.get(self._link_type, '')} holds no serial frames; "
@@ -66,6 +72,17 @@ class PcapCapture:
         if len(header) < FILE_HEADER:
             raise CaptureError(f"{self.path}: pcap file cut inside its header, at octet {len(header)}")
         return MAGICS[magic]
+
+    @property
+    def link_type(self) -> int:
+        """What the records are."""
+        return self._link_type
+
+    def records(self) -> Iterator[Record]:
+        """All records, as far as the file is whole. Raises CaptureError."""
+        with open_capture(self.path) as stream:
+            stream.seek(FILE_HEADER)
+            yield from self._records(stream)
 
     def items(self) -> Iterator[Item]:
         """Chunks in the order of the file."""
