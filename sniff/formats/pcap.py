@@ -14,7 +14,7 @@ from dissectors.frame import Chunk
 from sniff.engine.capture import Capture, CaptureError
 from sniff.engine.session import Completeness, Item, LineEvent, Session
 from sniff.formats.files import NewFile, open_capture
-from sniff.formats.linktypes import LINK_TYPES, OWN, USER1
+from sniff.formats.linktypes import LINK_TYPES, OWN, USER1, USERS
 from sniff.formats.linktypes import protocol_of as protocol_of_link
 from sniff.formats.network import NETWORK
 from sniff.formats.records import Record, foreign_session, items_of, protocol_of
@@ -55,10 +55,10 @@ class PcapCapture:
             self._order, self._tick = self._check(header)
             self._link_type: int = struct.unpack_from(self._order + "I", header, 20)[0] & 0x0FFFFFFF
             if self._link_type not in LINK_TYPES and self._link_type not in NETWORK:
-                known = ", ".join(map(str, sorted(LINK_TYPES)))
+                known = ", ".join(map(str, sorted(set(LINK_TYPES) - set(USERS)))) + f", {USERS[0]} to {USERS[-1]}"
                 raise CaptureError(
                     f"{path}: link type {self._link_type}{_NAMES.get(self._link_type, '')} holds no serial frames; "
-                    f"this program reads {known}"
+                    f"this program reads {known} and networks"
                 )
             first = next(self._records(stream), None)
         protocol = protocol_of(first) if first is not None else protocol_of_link(self._link_type)

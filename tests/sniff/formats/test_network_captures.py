@@ -183,3 +183,14 @@ def test_frames_in_ethernet_snap(tmp_path: Path) -> None:
     assert capture.session.protocol == "mstp"
     assert _octets(capture) == _octets(read(folder / "derived_linktype165.pcap"))
     assert "68 of UDP port 47808 (BACnet/IP)" in capture.completeness().text
+
+
+@pytest.mark.parametrize("link_type", [147, 148, 149, 155, 162])
+@pytest.mark.parametrize("write", [as_pcap, as_pcapng])
+def test_bare_frames_of_any_user_link_type(tmp_path: Path, write: Callable[..., Path], link_type: int) -> None:
+    frames = [_sealed(1, 3, 0, at, 0, 1) for at in range(40)]
+    packets = [(START + at * 50 * MS, frame) for at, frame in enumerate(frames)]
+    capture = read(write(tmp_path / "x.pcap", packets, link_type))
+    assert _octets(capture) == b"".join(frames)
+    held = b"".join(block.reads.octets.tobytes() for block in capture.blocks())  # type: ignore[union-attr]
+    assert held == b"".join(frames)
