@@ -8,8 +8,9 @@ import argparse
 
 from dissectors.profiles import Devices
 from sniff.analysis.judging import Judging
+from sniff.bus.capture_writer import MICROSECONDS
 from sniff.bus.offline import survey
-from sniff.cli import arguments, writing
+from sniff.cli import USAGE, Failure, arguments, writing
 from sniff.cli.progress import Watched
 from sniff.devices import with_devices
 from sniff.engine.capture import Capture
@@ -34,6 +35,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "DLT_USER entry), 250 RTAC serial with line errors (needs Decode As). "
         f"What can hold what, the default first: {held_by_protocols()}",
     )
+    parser.add_argument(
+        "--microseconds", action="store_true", help=".pcap: times in µs, for programs that know no ns (mstpcap)"
+    )
     parser.add_argument("-f", "--force", action="store_true", help="overwrite OUT")
 
 
@@ -41,12 +45,16 @@ def run(args: argparse.Namespace) -> int:
     """Read, write, say what was lost."""
     capture = arguments.open_capture(args.source)
     session = arguments.settings_of(args, capture.session, args.source)
-    options = {"link-type": str(args.link_type)} if args.link_type is not None else None
+    options = {"link-type": str(args.link_type)} if args.link_type is not None else {}
+    if args.microseconds:
+        if not args.output.lower().endswith((".pcap", ".cap")):
+            raise Failure(f"{args.output}: --microseconds is for .pcap", USAGE)
+        options[MICROSECONDS] = "yes"
     devices = arguments.noted_devices(args, session)
     session = with_devices(session, devices)
     values = devices if args.output.lower().endswith(".mcap") else None
     notes = _evidence(capture, session, devices, args.reference) if args.output.lower().endswith(".pcapng") else None
-    writing.write(args, session, capture, [args.source], options, devices=values, notes=notes)
+    writing.write(args, session, capture, [args.source], options or None, devices=values, notes=notes)
     writing.say_incomplete(args.source, capture)
     return 0
 

@@ -1,4 +1,5 @@
-"""Classic pcap: both byte orders, microseconds and nanoseconds. We write nanoseconds, little-endian.
+"""Classic pcap: both byte orders, microseconds and nanoseconds. We write nanoseconds, or
+microseconds where they are wanted, little-endian.
 
 It keeps frames and their ends. It keeps neither line settings nor adapter, nor octets that are no whole frame.
 """
@@ -140,22 +141,26 @@ class PcapCapture:
             yield Record(seconds * 1_000_000_000 + ticks * self._tick, self._link_type, data)
 
 
-def create(path: Path, session: Session, link_type: int, live: bool = False) -> PcapWriter:
+def create(path: Path, session: Session, link_type: int, live: bool = False, microseconds: bool = False) -> PcapWriter:
     """Create a pcap file of one link type. Raises CaptureError."""
-    return PcapWriter(path, link_type, live)
+    return PcapWriter(path, link_type, live, microseconds)
 
 
 class PcapWriter:
-    """Writes the records of one link type; `losses` says what the format could not keep. `live`: pushed through."""
+    """Writes the records of one link type; `losses` says what the format could not keep. `live`: pushed through.
+    `microseconds`: times as old readers want them, rounded down.
+    """
 
-    def __init__(self, path: Path, link_type: int, live: bool = False) -> None:
+    def __init__(self, path: Path, link_type: int, live: bool = False, microseconds: bool = False) -> None:
         self.losses: list[str] = [
             "pcap keeps no line settings, adapter, line errors or read limits; .pcapng keeps more"
         ]
         self._live = live
         self._left_out = 0
         self._file = NewFile(path)
-        self._file.write(struct.pack("<IHHiIII", 0xA1B23C4D, 2, 4, 0, 0, LONGEST, link_type))
+        self._tick = 1000 if microseconds else 1
+        magic = 0xA1B2C3D4 if microseconds else 0xA1B23C4D
+        self._file.write(struct.pack("<IHHiIII", magic, 2, 4, 0, 0, LONGEST, link_type))
 
     def put(self, records: Iterable[Record]) -> None:
         """Add records."""
@@ -183,4 +188,4 @@ class PcapWriter:
             return
         seconds, rest = divmod(max(0, record.time), 1_000_000_000)
         size = len(record.data)
-        self._file.write(struct.pack("<IIII", seconds & 0xFFFFFFFF, rest, size, size) + record.data)
+        self._file.write(struct.pack("<IIII", seconds & 0xFFFFFFFF, rest // self._tick, size, size) + record.data)
