@@ -144,7 +144,7 @@ LINK_TYPES: dict[int, LinkType] = {
     RTAC: LinkType(RTAC, _read_rtac, _write_rtac),
     EXPORTED: LinkType(EXPORTED, _read_exported, _write_exported),
 }
-ANYBODYS = frozenset((*USERS, EXPORTED))
+ANYBODYS = frozenset((*USERS, RTAC, EXPORTED))
 """Link types that do not name a protocol."""
 
 

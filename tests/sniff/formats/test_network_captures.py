@@ -15,6 +15,7 @@ from sniff.cli import main
 from sniff.engine.capture import Capture, CaptureError
 from sniff.engine.session import LineEvent
 from sniff.formats import read
+from sniff.formats.linktypes import rtac_record
 from sniff.formats.several_buses import SeveralBuses
 from sniff.formats.telnet import Telnet
 from tests.captures_shared import CAPTURES
@@ -194,3 +195,11 @@ def test_bare_frames_of_any_user_link_type(tmp_path: Path, write: Callable[..., 
     assert _octets(capture) == b"".join(frames)
     held = b"".join(block.reads.octets.tobytes() for block in capture.blocks())  # type: ignore[union-attr]
     assert held == b"".join(frames)
+
+
+def test_any_protocol_may_lie_in_rtac_records(tmp_path: Path) -> None:
+    token = bytes.fromhex("55ff000172000084")
+    records = [(START + at * 20 * MS, rtac_record(at * 20 * MS, 1 + at % 2, token)) for at in range(40)]
+    path = as_pcap(tmp_path / "x.pcap", records, 250)
+    assert _octets(read(path)) == token * 40
+    assert main(["show", str(path), "-p", "mstp", "--json"]) == 0
