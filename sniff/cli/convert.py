@@ -35,9 +35,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "DLT_USER entry), 250 RTAC serial with line errors (needs Decode As). "
         f"What can hold what, the default first: {held_by_protocols()}",
     )
-    parser.add_argument(
-        "--microseconds", action="store_true", help=".pcap: times in µs, for programs that know no ns (mstpcap)"
-    )
+    parser.add_argument("--microseconds", action="store_true", help=".pcap: times in µs, for programs that know no ns")
     parser.add_argument("-f", "--force", action="store_true", help="overwrite OUT")
 
 
