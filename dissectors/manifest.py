@@ -41,12 +41,19 @@ class PacketFile:
     `link_types`: those that may hold them (https://www.tcpdump.org/linktypes.html), the one written first.
     `pdu_name`: the Wireshark dissector for link type 252 (exported PDU); empty where there is none.
     `least`: octets that it needs; `longer`: whether it takes damaged frames that are longer than they should be.
+    `snap`: organisation and protocol (5 octets) of Ethernet SNAP frames that hold one each, behind `snap_header`
+    octets; `snap_before`: what is left out there of its begin. `ports`: of TCP and UDP that its relatives on networks
+    use, with what those are called.
     """
 
     link_types: tuple[int, ...]
     pdu_name: str = ""
     least: int = 4
     longer: bool = False
+    snap: bytes = b""
+    snap_header: int = 0
+    snap_before: bytes = b""
+    ports: tuple[tuple[int, str], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

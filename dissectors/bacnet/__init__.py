@@ -84,7 +84,16 @@ MSTP = Dissector(
     readings=readings,
     reading_columns=reading_columns,
     questions=questions,
-    packet_file=PacketFile((165, 252), "mstp", least=8, longer=True),
+    packet_file=PacketFile(
+        (165, 252),
+        "mstp",
+        least=8,
+        longer=True,
+        snap=b"\x00\x10\x90\x00\x01",  # Cimetrics U+4: two octets of time and one more before the frame
+        snap_header=3,
+        snap_before=b"\x55\xff",
+        ports=((47808, "BACnet/IP"),),
+    ),
     renamer=MstpRenamer,
     makers={"mstp": frame},
     kernel=kernel,

@@ -1,9 +1,12 @@
-"""MS/TP frames under other names: MAC addresses, device instances and network addresses renumbered, texts blanked.
+"""MS/TP frames under other names: MAC addresses, device instances and network addresses renumbered; texts and what is
+in files blanked. A range of instances that is asked for becomes that of the one device in it, or all.
 
 The data of extended (COBS) frames is blanked whole: it would not keep its length.
 """
 
 from __future__ import annotations
+
+import re
 
 from dissectors.bacnet import apdu as apdus
 from dissectors.bacnet import npdu as npdus
@@ -13,8 +16,16 @@ from dissectors.checksums import crc8_mstp, crc16_x25
 from dissectors.frame import Frame
 from dissectors.pseudonyms import BLANK, Pseudonyms, inflicted, without_text
 
-CHARACTER_STRING, OBJECT_IDENTIFIER = 7, 12
+OCTET_STRING, CHARACTER_STRING, OBJECT_IDENTIFIER = 6, 7, 12
 DEVICE = 8
+UNCONFIRMED, WHO_HAS, WHO_IS = 1, 7, 8
+LOW, HIGH = 0, 1
+"""Context tags of the range of instances in Who-Is and Who-Has (clauses 16.9 and 16.10)."""
+MOST_INSTANCE = 4_194_303
+LONGEST_NUMBER = 4
+"""Octets; what is longer behind a context tag is no number, and may be a text in any code."""
+
+_WIDE = re.compile(rb"(?:\x00[ -~]){4,}\x00?|(?:[ -~]\x00){4,}")  # two octets a character
 
 
 class MstpRenamer:
@@ -67,25 +78,59 @@ class MstpRenamer:
         apdu = apdus.decode(body)
         if apdu is None or apdu.error is not None or apdu.segmented:
             begin = apdu.body if apdu is not None and apdu.error is None else 0
-            return body[:begin] + without_text(body[begin:])
+            return body[:begin] + _without_any_text(body[begin:])
+        asks_range = apdu.type == UNCONFIRMED and apdu.service in (WHO_HAS, WHO_IS)
         result = bytearray(body)
+        ends: list[tuple[int, int]] = []
         at = apdu.body
         while at < len(body):
             tag = header_at(body, at)
             if isinstance(tag, str):
-                result[at:] = without_text(body[at:])
+                result[at:] = _without_any_text(body[at:])
                 break
             if tag.kind == "primitive":
                 context = bool(body[at] & 8)
-                result[tag.begin : tag.end] = self._content(tag.number, context, body[tag.begin : tag.end])
+                content = body[tag.begin : tag.end]
+                if asks_range and context and tag.number in (LOW, HIGH):
+                    ends.append((tag.begin, tag.end))
+                else:
+                    result[tag.begin : tag.end] = self._content(tag.number, context, content)
             at = max(tag.end, at + 1)
+        self._rename_range(result, ends)
         return bytes(result)
 
+    def _rename_range(self, body: bytearray, ends: list[tuple[int, int]]) -> None:
+        """Low and high limit of the instances that are asked for, where they stand."""
+        values = [int.from_bytes(body[begin:end], "big") for begin, end in ends]
+        is_one = len(values) == 2 and values[0] == values[1]
+        for place, (begin, end) in enumerate(ends):
+            most = min(MOST_INSTANCE, (1 << 8 * (end - begin)) - 1)
+            value = self.devices.of(values[place]) if is_one else most * (place > 0)
+            body[begin:end] = min(value, most).to_bytes(end - begin, "big")
+
     def _content(self, number: int, context: bool, content: bytes) -> bytes:
-        if not context and number == CHARACTER_STRING and content:
+        if not context and number == OCTET_STRING:
+            return bytes([BLANK]) * len(content)
+        if content and ((not context and number == CHARACTER_STRING) or (context and _may_be_text(content))):
             return content[:1] + bytes([BLANK]) * (len(content) - 1)
         value = int.from_bytes(content, "big")
         is_object = (not context and number == OBJECT_IDENTIFIER) or context
         if is_object and len(content) == 4 and value >> 22 == DEVICE:
             return (DEVICE << 22 | self.devices.of(value & 0x3FFFFF)).to_bytes(4, "big")
-        return without_text(content) if context else content
+        return content
+
+
+def _may_be_text(content: bytes) -> bool:
+    """Whether what stands behind a context tag may be a text: nothing there says what it is."""
+    if len(content) > LONGEST_NUMBER:
+        return True
+    return content[0] == 0 and len(content) > 1 and all(32 <= octet < 127 for octet in content[1:])
+
+
+def _without_any_text(octets: bytes) -> bytes:
+    """Runs of printable octets blanked, those of two octets a character too."""
+    narrow = without_text(octets)
+    return _WIDE.sub(lambda found: found[0].translate(_BLANKED), narrow)
+
+
+_BLANKED = bytes([0, *[BLANK] * 255])

@@ -74,7 +74,7 @@ RTU = Dissector(
     default_line="19200,8E1",
     field_prefixes=("mbrtu.", "modbus."),
     bits=rtu_bits,
-    packet_file=PacketFile((252, 147, 250), "mbrtu"),
+    packet_file=PacketFile((252, 147, 250), "mbrtu", ports=((502, "Modbus TCP"),)),
     renamer=RtuRenamer,
     makers={RTU_NAME: make_rtu},
     scenarios=on_first_use("dissectors.modbus.scenario:rtu_scenarios"),

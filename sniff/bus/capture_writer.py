@@ -9,9 +9,12 @@ from sniff import formats
 from sniff.bus.packet_records import RecordMaker
 from sniff.engine.capture import CaptureError, CaptureWriter
 from sniff.engine.session import Item, Session
-from sniff.formats import pcapng
+from sniff.formats import pcap, pcapng
 from sniff.formats.linktypes import link_type_for
 from sniff.formats.records import FrameFile
+
+MICROSECONDS = "microseconds"
+"""Option of .pcap: times as readers that know no nanoseconds want them."""
 
 
 def create(
@@ -24,9 +27,12 @@ def create(
     number, are said in the comments of packets where the format has such. Raises CaptureError."""
     if formats.keeps_frames(path):
         link_type = _link_type(path, session, (options or {}).get("link-type"))
-        return FrameWriter(
-            formats.create_of_frames(path, session, link_type), RecordMaker(session, link_type, notes=notes)
+        file = (
+            pcap.create(Path(path), session, link_type, microseconds=True)
+            if options is not None and MICROSECONDS in options
+            else formats.create_of_frames(path, session, link_type)
         )
+        return FrameWriter(file, RecordMaker(session, link_type, notes=notes))
     if options:
         raise CaptureError(f"{path}: this format has no option {', '.join(options)}")
     return formats.create_of_items(path, session)

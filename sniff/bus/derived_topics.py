@@ -25,6 +25,8 @@ from sniff.engine.table import Table
 WINDOW = NS_PER_S
 JUDGED_EVERY = 5
 """Windows between two looks at the findings."""
+NODES_A_SECOND, NODES_AT_ONCE = 0.5, 600
+"""Messages of stations: in the long run, and at once."""
 
 BUS, NODE, LOG = "sniff485.Bus", "sniff485.Node", "foxglove.Log"
 """Schema records, of `sniff.recording.topics`."""
@@ -55,8 +57,10 @@ class DerivedMessage:
 class BusChannels:
     """Messages of one bus, of what its model knows; `due` gives what is to be written by then."""
 
-    def __init__(self, model: BusModel) -> None:
+    def __init__(self, model: BusModel, judged_every: int = JUDGED_EVERY) -> None:
+        """`judged_every`: windows between two looks at the findings; 0: only when asked."""
         self._model = model
+        self._judged_every = judged_every
         session, ring = model.session, model.dissector.ring
         self._session = session
         self._bus = re.sub(r"[^A-Za-z0-9_.-]+", "-", session.bus).strip("-") or "bus"
@@ -92,19 +96,19 @@ class BusChannels:
         self._begin, self._window = now, Summary(self._session.line)
         self._windows += 1
         messages = [*self._of_window(begin, now, window, has_turn)]
-        if self._windows % JUDGED_EVERY == 0:
+        if self._judged_every and self._windows % self._judged_every == 0:
             messages += self.findings(now)
         return messages
 
-    def findings(self, now: int) -> list[DerivedMessage]:
-        """Findings that are new, or graver than they were said to be."""
+    def findings(self, now: int | None = None) -> list[DerivedMessage]:
+        """Findings that are new, or graver than they were said to be. `now`: ns; else when each was last seen."""
         messages = []
         for finding in self._model.findings():
             key = finding.code, finding.subject
             before = self._said.get(key)
             if before is None or finding.severity > before:
                 self._said[key] = finding.severity
-                messages.append(_log(finding, self._bus, now))
+                messages.append(_log(finding, self._bus, finding.last if now is None else now))
         return messages
 
     def _of_window(

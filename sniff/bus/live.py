@@ -19,7 +19,7 @@ from dissectors.profiles import Devices
 from sniff.analysis.autodetect import Detecting
 from sniff.analysis.points import PointReader
 from sniff.bus.autodetect import Progress, Search
-from sniff.bus.derived_topics import BusChannels, DerivedMessage
+from sniff.bus.derived_topics import NODES_A_SECOND, NODES_AT_ONCE, BusChannels, DerivedMessage
 from sniff.bus.model import BusModel
 from sniff.bus.recorded_values import RecordedValues
 from sniff.bus.router import Router, octets_of
@@ -44,9 +44,6 @@ PIECE = 8192
 
 UNWATCHED = NS_PER_S // 2
 """ns that reads are gathered for where nobody looks at single rows: so much at once costs a tenth a frame."""
-
-NODES_A_SECOND, NODES_AT_ONCE = 0.5, 600
-"""What goes back into the recording of the numbers of stations: `sniff/bus/thinning.py`."""
 
 LiveItem = Output | LineEvent | Status | Ended
 LiveTables = Table | Output | LineEvent | Status | Ended

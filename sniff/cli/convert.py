@@ -8,8 +8,9 @@ import argparse
 
 from dissectors.profiles import Devices
 from sniff.analysis.judging import Judging
+from sniff.bus.capture_writer import MICROSECONDS
 from sniff.bus.offline import survey
-from sniff.cli import arguments, filtering, writing
+from sniff.cli import USAGE, Failure, arguments, filtering, writing
 from sniff.cli.progress import Watched
 from sniff.devices import with_devices
 from sniff.engine.capture import Capture
@@ -38,6 +39,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "DLT_USER entry), 250 RTAC serial with line errors (needs Decode As). "
         f"What can hold what, the default first: {held_by_protocols()}",
     )
+    parser.add_argument("--microseconds", action="store_true", help=".pcap: times in µs, for programs that know no ns")
     parser.add_argument("-f", "--force", action="store_true", help="overwrite OUT")
 
 
@@ -51,13 +53,17 @@ def run(args: argparse.Namespace) -> int:
         frame_table.write(args, capture, session, arguments.noted_devices(args, session))
         writing.say_incomplete(args.source, capture)
         return 0
-    options = {"link-type": str(args.link_type)} if args.link_type is not None else None
+    options = {"link-type": str(args.link_type)} if args.link_type is not None else {}
+    if args.microseconds:
+        if not args.output.lower().endswith((".pcap", ".cap")):
+            raise Failure(f"{args.output}: --microseconds is for .pcap", USAGE)
+        options[MICROSECONDS] = "yes"
     devices = arguments.noted_devices(args, session)
     session = with_devices(session, devices)
     noted = args.output.lower().endswith(".pcapng") and not args.filter  # of a part the rows have other numbers
     notes = _evidence(capture, session, devices, args.reference) if noted else None
     source = filtering.sifted(args, capture, session, devices)
-    writing.write(args, session, source, [args.source], options, devices=devices, notes=notes)
+    writing.write(args, session, source, [args.source], options or None, devices=devices, notes=notes)
     writing.say_incomplete(args.source, capture)
     return 0
 

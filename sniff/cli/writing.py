@@ -28,6 +28,7 @@ from sniff.formats.parquet import Kind, ParquetWriter
 
 if TYPE_CHECKING:
     from sniff.analysis.points import Sample
+    from sniff.bus.derived_topics import DerivedMessage
     from sniff.engine.blocks import Block
     from sniff.engine.table import Table
 
@@ -50,8 +51,8 @@ def write(
 ) -> int:
     """Write a capture to `args.output`; say on standard error what it holds and what it lost. Gives the octets.
 
-    `with_frames`: with what the engine finds in them, on /frames. `devices`: whose values a recording gets on /values;
-    None: those that the session names.
+    An .mcap gets what a live recording has: /values, /bus, /nodes and /findings. `with_frames`: what the engine finds
+    in the octets too, on /frames. `devices`: whose values are written, each of them; None: those that the session names.
     `notes`: by row number, for the comments of packets where OUT has such. Ends with exit code 2 when OUT is there.
     """
     target = Path(args.output)
@@ -60,10 +61,13 @@ def write(
     watched = Watched(with_comments(source))
     try:
         with create(target, session, options, notes) as writer:
-            takers: list[_Frames | _Values] = [_Frames(writer, session)] if with_frames else []
+            takers: list[_Frames | _Values | _Topics] = [_Frames(writer, session)] if with_frames else []
             known = noted_devices(session) if devices is None else devices
-            if known and target.name.lower().endswith(".mcap"):  # no other format holds values
-                takers.append(_Values(writer, session, known))
+            if _is_recording(writer):
+                if known:
+                    takers.append(_Values(writer, session, known))
+                if not session.unknown:
+                    takers.append(_Topics(writer, session, known, with_values=not known))
             if isinstance(writer, BlockWriter) and not args.reference:
                 _write_blocks(writer, watched.blocks(), session, takers, counts)
             else:
@@ -115,7 +119,7 @@ def _write_blocks(
     writer: CaptureWriter,
     blocks: Iterator[Block | LineEvent],
     session: Session,
-    takers: Sequence[_Frames | _Values],
+    takers: Sequence[_Frames | _Values | _Topics],
     counts: _Counts,
 ) -> None:
     from sniff.engine.bulk import BulkEngine
@@ -133,17 +137,20 @@ def _write_blocks(
             table = engine.take(item)
             for taker in takers:
                 taker.add_table(table)
+                if isinstance(item, LineEvent):
+                    taker.add_line_event(item)
     if engine is not None:
         table = engine.close()
         for taker in takers:
             taker.add_table(table)
+            taker.close()
 
 
 def _write_items(
     writer: CaptureWriter,
     items: Iterator[Item],
     session: Session,
-    takers: Sequence[_Frames | _Values],
+    takers: Sequence[_Frames | _Values | _Topics],
     counts: _Counts,
 ) -> None:
     engine = engine_for(session) if takers else None
@@ -156,6 +163,8 @@ def _write_items(
             output = engine.take(item)
             for taker in takers:
                 taker.add(output)
+                if isinstance(item, LineEvent):
+                    taker.add_line_event(item)
     if engine is not None:
         output = engine.close()
         for taker in takers:
@@ -188,6 +197,13 @@ class Items:
         return blocks_of(self._items)
 
 
+def _is_recording(writer: object) -> bool:
+    """Whether it takes what is derived."""
+    from sniff.recording.writer import McapWriter
+
+    return isinstance(writer, McapWriter)
+
+
 class _Frames:
     """Writes what the engine finds to /frames."""
 
@@ -217,6 +233,9 @@ class _Frames:
             self._put(message)
         self._octets += len(table.octets)
 
+    def add_line_event(self, event: LineEvent) -> None:
+        """Nothing of it is kept here."""
+
     def close(self) -> None:
         self._count = 0
         self._put(self._log.take())
@@ -224,6 +243,40 @@ class _Frames:
     def _put(self, message: tuple[int, int, bytes] | None) -> None:
         if message is not None:
             self._writer.derived(self._topic, self._schema, *message)
+
+
+class _Topics:
+    """Writes what a live recording has: /bus, /nodes, /findings, and values unless others do."""
+
+    def __init__(self, writer: object, session: Session, devices: Devices, with_values: bool) -> None:
+        from sniff.bus.offline_topics import OfflineTopics
+        from sniff.recording.writer import McapWriter
+
+        assert isinstance(writer, McapWriter)
+        self._writer = writer
+        self._topics = OfflineTopics(session, devices, with_values)
+        self._protocol = session.protocol
+        self._next = 1
+
+    def add(self, output: Output) -> None:
+        from sniff.engine.table import Table
+
+        first = output.rows[0].no if output.rows else self._next
+        self._next = first + len(output.rows)
+        self.add_table(Table.of_outputs(self._protocol, first, [output]))
+
+    def add_table(self, table: Table) -> None:
+        self._put(self._topics.add_table(table))
+
+    def add_line_event(self, event: LineEvent) -> None:
+        self._topics.add_line_event(event)
+
+    def close(self) -> None:
+        self._put(self._topics.close())
+
+    def _put(self, messages: Iterable[DerivedMessage]) -> None:
+        for one in messages:
+            self._writer.derived(one.topic, one.schema, one.log_time, one.publish_time, one.data, one.metadata)
 
 
 class _Values:
@@ -246,6 +299,9 @@ class _Values:
         from sniff.analysis.table_points import samples_of
 
         self._put(samples_of(self._points, table).in_order())
+
+    def add_line_event(self, event: LineEvent) -> None:
+        """Nothing of it is kept here."""
 
     def close(self) -> None:
         """Nothing is held."""

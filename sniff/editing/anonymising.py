@@ -37,7 +37,7 @@ ERROR_NAMES = frozenset(("parity", "framing", "break", "overrun", "buffer overru
 
 def anonymous_session(session: Session) -> Session:
     """The session without the names of ports, devices and places."""
-    adapter = replace(session.adapter, serial_number="")
+    adapter = replace(session.adapter, serial_number="", detail="")  # which may name channels and hosts
     return replace(session, port="anonymised", bus="bus", adapter=adapter, notes=_renamed_devices(session), profiles={})
 
 

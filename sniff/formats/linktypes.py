@@ -4,7 +4,8 @@
 147  User 0: the bare frame; Wireshark needs a DLT_USER entry.
 250  RTAC Serial: a 12-octet header with an event, then the frame; line errors are events without octets.
 252  Exported PDU: tags that name the dissector and synthetic addresses, then the frame; no set-up.
-148  User 1: here, octets that are no frame (noise, damaged pieces), so that a file keeps every octet.
+148  User 1: in our files, octets that are no frame (noise, damaged pieces), so that a file keeps every octet.
+149 … 162  User 2 … 15: others' bare frames; read only.
 """
 
 from __future__ import annotations
@@ -19,6 +20,8 @@ from dissectors.frame import Frame, LineError, Role
 from dissectors.manifest import Dissector, PacketFile
 
 OWN, USER0, USER1, RTAC, EXPORTED = 165, 147, 148, 250, 252
+USERS = range(USER0, 163)
+"""User 0 … 15, which serial capture programs let one choose from (WiresharkSerialAdapter)."""
 
 RTAC_HEADER = struct.Struct(">IIBBH")
 RTAC_TX_START, RTAC_RX_START = 1, 2
@@ -137,12 +140,11 @@ def _write_exported(frame: Frame, role: Role, station: int | None, _time: int) -
 
 LINK_TYPES: dict[int, LinkType] = {
     OWN: LinkType(OWN, _plain, _write_plain),
-    USER0: LinkType(USER0, _plain, _write_plain),
-    USER1: LinkType(USER1, _plain, _write_plain),
+    **{number: LinkType(number, _plain, _write_plain) for number in USERS},
     RTAC: LinkType(RTAC, _read_rtac, _write_rtac),
     EXPORTED: LinkType(EXPORTED, _read_exported, _write_exported),
 }
-ANYBODYS = frozenset((USER0, USER1, EXPORTED))
+ANYBODYS = frozenset((*USERS, RTAC, EXPORTED))
 """Link types that do not name a protocol."""
 
 

@@ -18,8 +18,7 @@ from sniff.formats.linktypes import (
     RTAC,
     RTAC_HEADER,
     RTAC_LOST,
-    USER0,
-    USER1,
+    USERS,
     exported_header,
     protocol_of,
 )
@@ -33,7 +32,7 @@ WINDOW = 1 << 19
 """Octets of a file that are looked at together; more than any record of a pcap file has."""
 LEAST_RUN = 16
 """Fewer records in a row are not worth arrays."""
-BARE = frozenset((OWN, USER0, USER1))
+BARE = frozenset((OWN, *USERS))
 """Link types whose records are the frame and nothing else."""
 
 

@@ -1,4 +1,5 @@
-"""Classic pcap: both byte orders, microseconds and nanoseconds. We write nanoseconds, little-endian.
+"""Classic pcap: both byte orders, microseconds and nanoseconds. We write nanoseconds, or
+microseconds where they are wanted, little-endian.
 
 It keeps frames and their ends. It keeps neither line settings nor adapter, nor octets that are no whole frame.
 """
@@ -11,11 +12,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
 from dissectors.frame import Chunk
-from sniff.engine.capture import CaptureError
+from sniff.engine.capture import Capture, CaptureError
 from sniff.engine.session import Completeness, Item, LineEvent, Session
 from sniff.formats.files import NewFile, open_capture
-from sniff.formats.linktypes import LINK_TYPES, OWN, USER1
+from sniff.formats.linktypes import LINK_TYPES, OWN, USER1, USERS
 from sniff.formats.linktypes import protocol_of as protocol_of_link
+from sniff.formats.network import NETWORK
 from sniff.formats.records import Record, foreign_session, items_of, protocol_of
 
 if TYPE_CHECKING:
@@ -34,9 +36,14 @@ LONGEST = 262_144
 """A longer record is damage: no field bus has frames of that size."""
 
 
-def read(path: Path) -> PcapCapture:
-    """Open a pcap file. Raises CaptureError."""
-    return PcapCapture(path)
+def read(path: Path) -> Capture:
+    """Open a pcap file; the buses in it where it is one of a network. Raises CaptureError."""
+    capture = PcapCapture(path)
+    if capture.link_type in NETWORK:
+        from sniff.formats import network_capture
+
+        return network_capture.read(capture)
+    return capture
 
 
 class PcapCapture:
@@ -47,12 +54,12 @@ class PcapCapture:
         with open_capture(path) as stream:
             header = stream.read(FILE_HEADER)
             self._order, self._tick = self._check(header)
-            self._link_type = struct.unpack_from(self._order + "I", header, 20)[0] & 0x0FFFFFFF
-            if self._link_type not in LINK_TYPES:
-                known = ", ".join(map(str, sorted(LINK_TYPES)))
+            self._link_type: int = struct.unpack_from(self._order + "I", header, 20)[0] & 0x0FFFFFFF
+            if self._link_type not in LINK_TYPES and self._link_type not in NETWORK:
+                known = ", ".join(map(str, sorted(set(LINK_TYPES) - set(USERS)))) + f", {USERS[0]} to {USERS[-1]}"
                 raise CaptureError(
                     f"{path}: link type {self._link_type}{_NAMES.get(self._link_type, '')} holds no serial frames; "
-                    f"this program reads {known}"
+                    f"this program reads {known} and networks"
                 )
             first = next(self._records(stream), None)
         protocol = protocol_of(first) if first is not None else protocol_of_link(self._link_type)
@@ -66,6 +73,17 @@ class PcapCapture:
         if len(header) < FILE_HEADER:
             raise CaptureError(f"{self.path}: pcap file cut inside its header, at octet {len(header)}")
         return MAGICS[magic]
+
+    @property
+    def link_type(self) -> int:
+        """What the records are."""
+        return self._link_type
+
+    def records(self) -> Iterator[Record]:
+        """All records, as far as the file is whole. Raises CaptureError."""
+        with open_capture(self.path) as stream:
+            stream.seek(FILE_HEADER)
+            yield from self._records(stream)
 
     def items(self) -> Iterator[Item]:
         """Chunks in the order of the file."""
@@ -123,22 +141,26 @@ class PcapCapture:
             yield Record(seconds * 1_000_000_000 + ticks * self._tick, self._link_type, data)
 
 
-def create(path: Path, session: Session, link_type: int, live: bool = False) -> PcapWriter:
+def create(path: Path, session: Session, link_type: int, live: bool = False, microseconds: bool = False) -> PcapWriter:
     """Create a pcap file of one link type. Raises CaptureError."""
-    return PcapWriter(path, link_type, live)
+    return PcapWriter(path, link_type, live, microseconds)
 
 
 class PcapWriter:
-    """Writes the records of one link type; `losses` says what the format could not keep. `live`: pushed through."""
+    """Writes the records of one link type; `losses` says what the format could not keep. `live`: pushed through.
+    `microseconds`: times as old readers want them, rounded down.
+    """
 
-    def __init__(self, path: Path, link_type: int, live: bool = False) -> None:
+    def __init__(self, path: Path, link_type: int, live: bool = False, microseconds: bool = False) -> None:
         self.losses: list[str] = [
             "pcap keeps no line settings, adapter, line errors or read limits; .pcapng keeps more"
         ]
         self._live = live
         self._left_out = 0
         self._file = NewFile(path)
-        self._file.write(struct.pack("<IHHiIII", 0xA1B23C4D, 2, 4, 0, 0, LONGEST, link_type))
+        self._tick = 1000 if microseconds else 1
+        magic = 0xA1B2C3D4 if microseconds else 0xA1B23C4D
+        self._file.write(struct.pack("<IHHiIII", magic, 2, 4, 0, 0, LONGEST, link_type))
 
     def put(self, records: Iterable[Record]) -> None:
         """Add records."""
@@ -166,4 +188,4 @@ class PcapWriter:
             return
         seconds, rest = divmod(max(0, record.time), 1_000_000_000)
         size = len(record.data)
-        self._file.write(struct.pack("<IIII", seconds & 0xFFFFFFFF, rest, size, size) + record.data)
+        self._file.write(struct.pack("<IIII", seconds & 0xFFFFFFFF, rest // self._tick, size, size) + record.data)

@@ -14,10 +14,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
 from dissectors.line import LineSettings
-from sniff.engine.capture import CaptureError
+from sniff.engine.capture import Capture, CaptureError
 from sniff.engine.session import Completeness, Item, LineEvent, Session
 from sniff.formats.files import NewFile, open_capture
 from sniff.formats.linktypes import LINK_TYPES, USER1
+from sniff.formats.network import NETWORK
 from sniff.formats.pcapng_interface import Interface
 from sniff.formats.records import Record, SearchMarks, foreign_session, items_of, protocol_of
 
@@ -32,6 +33,8 @@ OPT_END, OPT_COMMENT, OPT_NAME, OPT_FLAGS, OPT_TSRESOL, OPT_TSOFFSET = 0, 1, 2, 
 CRC_ERROR_FLAG = 1 << 24
 LONGEST = 4 * 1024 * 1024
 """A longer block is damage."""
+SEEN_OF_NETWORK = 1000
+"""Packets of a network before any serial frame, from which on it is a capture of a network."""
 LATEST = (1 << 33) * 1_000_000_000
 """ns since the epoch, in the year 2242; a record that says more, or as much before it, is given this time."""
 SESSION_MARK = "sniff485 session: "
@@ -39,9 +42,14 @@ SEARCH_MARK = "sniff485 search: "
 """Begins a comment of a packet that was heard in a search for settings; the line settings tried follow."""
 
 
-def read(path: Path) -> PcapngCapture:
-    """Open a pcapng file. Raises CaptureError."""
-    return PcapngCapture(path)
+def read(path: Path) -> Capture:
+    """Open a pcapng file; the buses in it where it is one of a network. Raises CaptureError."""
+    capture = PcapngCapture(path)
+    if capture.is_of_network:
+        from sniff.formats import network_capture
+
+        return network_capture.read(capture)
+    return capture
 
 
 class PcapngCapture:
@@ -52,8 +60,10 @@ class PcapngCapture:
         self._complete = Completeness(True)
         self._metadata: dict[str, str] = {}
         self._other = 0
+        self._of_network = 0
         with open_capture(path) as stream:
             first = self._first(stream)
+        self._is_without_frames = first is None
         if self._metadata:
             self.session: Session = Session.from_metadata(self._metadata)
         else:
@@ -68,11 +78,24 @@ class PcapngCapture:
         fallback = None
         for record in self._records(stream):
             if record.link_type not in LINK_TYPES:
+                self._of_network += record.link_type in NETWORK
+                if self._of_network >= SEEN_OF_NETWORK and fallback is None and not self._metadata:
+                    return None
                 continue
             if self._metadata or protocol_of(record) is not None:
                 return record
             fallback = fallback or record
         return fallback
+
+    @property
+    def is_of_network(self) -> bool:
+        """Whether what it holds first, and at all in a short file, is a network's."""
+        return self._of_network > 0 and self._is_without_frames
+
+    def records(self) -> Iterator[Record]:
+        """All records, as far as the file is whole. Raises CaptureError."""
+        with open_capture(self.path) as stream:
+            yield from self._records(stream)
 
     def items(self) -> Iterator[Item]:
         """Chunks in the order of the file."""

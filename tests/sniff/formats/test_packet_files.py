@@ -17,6 +17,7 @@ from dissectors.frame import Chunk
 from dissectors.line import LineSettings
 from sniff.bus.capture_writer import create
 from sniff.bus.offline import settled
+from sniff.cli import main
 from sniff.engine.capture import CaptureError
 from sniff.engine.session import Adapter, LineEvent, Session, SettingsChange, settings_change
 from sniff.formats import read
@@ -283,3 +284,15 @@ def test_times_beyond_all_clocks(tmp_path: Path, interface: bytes, ticks: int) -
     for name in ("far.mcap", "far.cap.txt", "far2.pcapng", "far.pcap"):
         assert main(["convert", str(path), str(tmp_path / name)]) == 0
         assert [item.octets for item in read(tmp_path / name).items() if isinstance(item, Chunk)] == [POLL]
+
+
+def test_times_in_microseconds_for_readers_that_know_no_nanoseconds(tmp_path: Path) -> None:
+    source = Path(__file__).parents[3] / "captures/mstp-clean.cap.txt"
+    fine, coarse = tmp_path / "fine.pcap", tmp_path / "coarse.pcap"
+    assert main(["convert", str(source), str(fine)]) == 0
+    assert main(["convert", str(source), str(coarse), "--microseconds"]) == 0
+    assert coarse.read_bytes()[:4] == b"\xd4\xc3\xb2\xa1"
+    one, two = ([item for item in read(path).items() if isinstance(item, Chunk)] for path in (fine, coarse))
+    assert [chunk.octets for chunk in one] == [chunk.octets for chunk in two]
+    assert [chunk.time // 1000 * 1000 for chunk in one] == [chunk.time for chunk in two]
+    assert main(["convert", str(source), str(tmp_path / "x.pcapng"), "--microseconds"]) == 2

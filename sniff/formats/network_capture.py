@@ -1,0 +1,298 @@
+"""Captures of a network: the serial traffic that gateways carry over it, each connection a bus of its own.
+
+Which connections carry a field bus, and which, is told by their octets: the protocol whose good frames say most for it,
+over most of what was said at first. Telnet around them is taken away. Both directions are one bus, in order of time;
+an octet is as late as the network and its buffers made it, which nobody knows.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
+
+from dissectors import registry
+from dissectors.frame import Check, Chunk, Frame
+from dissectors.line import LineSettings, Timing
+from sniff.engine.capture import Capture, CaptureError
+from sniff.engine.session import Adapter, Completeness, Item, LineEvent, LineEventKind, Session
+from sniff.formats import telnet
+from sniff.formats.network import NETWORK, Address, Segment, Snap, carried, shown
+from sniff.formats.records import FOREIGN_LATENCY, Record, foreign_session
+from sniff.formats.several_buses import one_or_several
+from sniff.formats.tcp_stream import TcpStream
+
+if TYPE_CHECKING:
+    from sniff.engine.blocks import Block
+
+SAMPLE = 16_384
+"""Octets of a connection by which it is told."""
+MOST_CONNECTIONS = 4096
+LEAST_BITS, COVERED_LEAST = 14.0, 0.5
+"""Evidence in good frames, and their share of the octets, from which on a connection is a bus."""
+_MOST_BITS = 24.0
+
+Key = tuple[bool, Address, Address]
+"""TCP or not; the lower of two ends; the other."""
+
+
+class RecordFile(Protocol):
+    """A packet file whose records are read one after the other."""
+
+    path: Path
+
+    def records(self) -> Iterator[Record]:
+        """All records, as far as the file is whole. Raises CaptureError."""
+        ...
+
+    def completeness(self) -> Completeness:
+        """Whether it is whole, as far as it was read."""
+        ...
+
+
+@dataclass(slots=True)
+class _Talk:
+    """What is known of a connection after the first look."""
+
+    client: Address
+    server: Address
+    first: int
+    sample: list[Chunk] = field(default_factory=list)
+    octets: int = 0
+    is_telnet: bool = False
+    packets: int = 0
+
+
+def read(file: RecordFile) -> Capture:
+    """The buses in a file. Raises CaptureError, saying what is in it, when there is none."""
+    talks, snaps, others = _look(file)
+    buses: list[Capture] = []
+    passed: Counter[str] = others
+    names = Counter(shown(talk.server) for talk in talks.values())
+    for key, talk in talks.items():
+        protocol = protocol_of(talk.sample)
+        if protocol is None:
+            passed[_named(key)] += talk.packets
+            continue
+        server, client = shown(talk.server), shown(talk.client)
+        name = server if names[server] == 1 else f"{client}-{server}"
+        via = "telnet over TCP" if talk.is_telnet else "TCP" if key[0] else "UDP"
+        buses.append(
+            NetworkBus(file, name, protocol, talk.first, f"{via}, {client} to {server}", _talk_reader(key, talk))
+        )
+    for kind, (protocol, first) in snaps.items():
+        buses.append(NetworkBus(file, f"snap-{kind.hex()}", protocol, first, "Ethernet SNAP", _snap_reader(kind)))
+    if not buses:
+        raise CaptureError(
+            f"{file.path}: a capture of a network in which no connection carries a field bus{_list(passed)}"
+        )
+    for bus in buses:
+        if isinstance(bus, NetworkBus) and passed:
+            bus.beside = f"complete; beside it{_list(passed)}"
+    return one_or_several(file.path, buses)
+
+
+def protocol_of(sample: list[Chunk]) -> str | None:
+    """The protocol whose good frames say most for it; None where none says enough."""
+    octets = sum(len(chunk.octets) for chunk in sample)
+    best: tuple[float, str] | None = None
+    for one in registry.usable():
+        framer = one.framer(Timing(LineSettings.parse(one.default_line), FOREIGN_LATENCY))
+        events = [event for chunk in sample for event in framer.feed(chunk)] + framer.close()
+        good = [event for event in events if isinstance(event, Frame) and _is_good(event)]
+        bits = sum(min(_MOST_BITS, one.bits(frame)) for frame in good)
+        covered = sum(len(frame.octets) for frame in good)
+        if bits >= LEAST_BITS and covered >= COVERED_LEAST * octets and (best is None or bits > best[0]):
+            best = bits, one.name
+    return best[1] if best is not None else None
+
+
+def _is_good(frame: Frame) -> bool:
+    return frame.damage is None and frame.check is Check.GOOD
+
+
+# -- the first look --------------------------------------------------------------------------------------------
+
+
+def _look(file: RecordFile) -> tuple[dict[Key, _Talk], dict[bytes, tuple[str, int]], Counter[str]]:
+    """Connections, kinds of SNAP that hold serial frames, and how many packets of other kinds there are."""
+    talks: dict[Key, _Talk] = {}
+    snaps: dict[bytes, tuple[str, int]] = {}
+    others: Counter[str] = Counter()
+    for record in file.records():
+        found = carried(record.link_type, record.data) if record.link_type in NETWORK else None
+        if isinstance(found, Snap):
+            protocol = _by_snap().get(found.kind)
+            if protocol is not None:
+                snaps.setdefault(found.kind, (protocol, record.time))
+                continue
+        if not isinstance(found, Segment):
+            others["other packets"] += 1
+            continue
+        if not found.payload and not found.begins:
+            continue
+        key = _key(found)
+        talk = talks.get(key)
+        if talk is None:
+            if len(talks) >= MOST_CONNECTIONS:
+                others["packets of further connections"] += 1
+                continue
+            talk = talks[key] = _new_talk(found, record.time)
+        talk.packets += 1
+        if found.payload and talk.octets < SAMPLE:
+            if not talk.octets:
+                talk.is_telnet = key[0] and telnet.begins(found.payload)
+            talk.octets += len(found.payload)
+    for key, sample in _samples(file, talks).items():
+        talks[key].sample = sample
+    return talks, snaps, others
+
+
+def _samples(file: RecordFile, talks: dict[Key, _Talk]) -> dict[Key, list[Chunk]]:
+    """The first octets of each connection, put in order."""
+    readers = {key: _Both(talk.is_telnet) for key, talk in talks.items()}
+    found: dict[Key, list[Chunk]] = {key: [] for key in talks}
+    left = dict.fromkeys(talks, SAMPLE)
+    for record in file.records():
+        segment = carried(record.link_type, record.data) if record.link_type in NETWORK else None
+        if not isinstance(segment, Segment):
+            continue
+        key = _key(segment)
+        if left.get(key, 0) <= 0:
+            continue
+        for item in readers[key].add(record.time, segment):
+            if isinstance(item, Chunk):
+                found[key].append(item)
+                left[key] -= len(item.octets)
+        if not any(count > 0 for count in left.values()):
+            break
+    return found
+
+
+def _new_talk(segment: Segment, time: int) -> _Talk:
+    """Who opens a connection is its client; where that was not seen, the one with the higher port."""
+    ends = segment.source, segment.destination
+    if not segment.begins and ends[0][1] < ends[1][1]:
+        ends = ends[1], ends[0]
+    return _Talk(*ends, time)
+
+
+def _key(segment: Segment) -> Key:
+    low, high = sorted((segment.source, segment.destination))
+    return segment.sequence is not None, low, high
+
+
+def _named(key: Key) -> str:
+    """The kind of a connection that carries no field bus: by a port that is known for something, else the lower."""
+    ports = sorted((key[1][1], key[2][1]))
+    port = next((one for one in ports if one in _by_port()), ports[0])
+    known = _by_port().get(port)
+    return f"{'TCP' if key[0] else 'UDP'} port {port}{f' ({known})' if known else ''}"
+
+
+def _list(passed: Counter[str]) -> str:
+    said = [f"{count} of {name}" if "port" in name else f"{count} {name}" for name, count in passed.most_common(8)]
+    return f": {', '.join(said)} (packets)" if said else ""
+
+
+def _by_snap() -> dict[bytes, str]:
+    held = [(one, one.packet_file) for one in registry.usable()]
+    return {file.snap: one.name for one, file in held if file is not None and file.snap}
+
+
+def _by_port() -> dict[int, str]:
+    held = [one.packet_file for one in registry.usable()]
+    return {port: name for file in held if file is not None for port, name in file.ports}
+
+
+# -- one bus ---------------------------------------------------------------------------------------------------
+
+
+class _Both:
+    """Both directions of a connection."""
+
+    def __init__(self, is_telnet: bool) -> None:
+        self._is_telnet = is_telnet
+        self._streams: dict[Address, TcpStream] = {}
+        self._telnets: dict[Address, telnet.Telnet] = {}
+
+    def add(self, time: int, segment: Segment) -> Iterator[Item]:
+        """What a packet completes."""
+        given: Iterator[bytes | int]
+        if segment.sequence is None:
+            given = iter((segment.payload,))
+        else:
+            given = self._streams.setdefault(segment.source, TcpStream()).add(segment)
+        yield from self._items(time, segment.source, given)
+
+    def close(self, time: int) -> Iterator[Item]:
+        """What waits for packets that were not captured."""
+        for source, stream in self._streams.items():
+            yield from self._items(time, source, stream.close())
+
+    def _items(self, time: int, source: Address, given: Iterator[bytes | int]) -> Iterator[Item]:
+        for one in given:
+            if isinstance(one, int):
+                yield LineEvent(time, LineEventKind.DROPPED, "not captured", one)
+                continue
+            if self._is_telnet:
+                one = self._telnets.setdefault(source, telnet.Telnet()).strip(one)
+            if one:
+                yield Chunk(time, one)
+
+
+Reader = Callable[[Iterator[Record]], Iterator[Item]]
+
+
+def _talk_reader(key: Key, talk: _Talk) -> Reader:
+    def items(records: Iterator[Record]) -> Iterator[Item]:
+        both, time = _Both(talk.is_telnet), talk.first
+        for record in records:
+            segment = carried(record.link_type, record.data) if record.link_type in NETWORK else None
+            if isinstance(segment, Segment) and _key(segment) == key:
+                time = record.time
+                yield from both.add(time, segment)
+        yield from both.close(time)
+
+    return items
+
+
+def _snap_reader(kind: bytes) -> Reader:
+    def items(records: Iterator[Record]) -> Iterator[Item]:
+        held = next(file for one in registry.usable() if (file := one.packet_file) is not None and file.snap == kind)
+        for record in records:
+            found = carried(record.link_type, record.data) if record.link_type in NETWORK else None
+            if isinstance(found, Snap) and found.kind == kind and len(found.payload) > held.snap_header:
+                yield Chunk(record.time, held.snap_before + found.payload[held.snap_header :])
+
+    return items
+
+
+class NetworkBus:
+    """One connection as a bus. A `Capture`. `beside`: what else is in the file, once it is known to be whole."""
+
+    def __init__(self, file: RecordFile, name: str, protocol: str, started: int, via: str, reader: Reader) -> None:
+        self.path = file.path
+        self.beside = "complete"
+        self._file = file
+        self._reader = reader
+        adapter = Adapter("gateway on a network", latency=FOREIGN_LATENCY, latency_from="assumed", detail=via)
+        session = foreign_session(str(file.path), protocol, started, "capture of a network")
+        self.session: Session = replace(session, bus=name, adapter=adapter)
+
+    def items(self) -> Iterator[Item]:
+        """What both ends said, in order of time. Raises CaptureError."""
+        return self._reader(self._file.records())
+
+    def blocks(self) -> Iterator[Block | LineEvent]:
+        """The same as columns. Raises CaptureError."""
+        from sniff.engine.blocks import blocks_of
+
+        return blocks_of(self.items())
+
+    def completeness(self) -> Completeness:
+        """Whether the file is whole, as far as it was read, and what else is in it."""
+        complete = self._file.completeness()
+        return Completeness(True, self.beside) if complete.whole else complete

@@ -1,0 +1,205 @@
+"""Captures of gateways: serial traffic in TCP and UDP, each connection a bus; what is none is said."""
+
+from __future__ import annotations
+
+import contextlib
+import random
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from dissectors.checksums import crc16_modbus, lrc
+from dissectors.frame import Chunk
+from sniff.cli import main
+from sniff.engine.capture import Capture, CaptureError
+from sniff.engine.session import LineEvent
+from sniff.formats import read
+from sniff.formats.linktypes import rtac_record
+from sniff.formats.several_buses import SeveralBuses
+from sniff.formats.telnet import Telnet
+from tests.captures_shared import CAPTURES
+from tests.sniff.formats.packets_made import CLIENT, SERVER, SYN, Packet, as_pcap, as_pcapng, tcp, udp
+
+START, MS = 1_772_359_200_000_000_000, 1_000_000
+
+
+def _sealed(*octets: int) -> bytes:
+    body = bytes(octets)
+    return body + crc16_modbus(body).to_bytes(2, "little")
+
+
+def _line(*octets: int) -> bytes:
+    body = bytes(octets)
+    return b":" + (body + bytes([lrc(body)])).hex().upper().encode() + b"\r\n"
+
+
+def _talk(
+    count: int = 8,
+    server: tuple[bytes, int] = SERVER,
+    client: tuple[bytes, int] = CLIENT,
+    seal: Callable[..., bytes] = _sealed,
+    greeting: bytes = b"",
+) -> tuple[list[Packet], bytes]:
+    """Polls and their answers over a connection; what is said on the bus."""
+    said = b""
+    sent = [100, 0xFFFFFFF0]  # the second wraps around
+    packets = [(START, tcp(client, server, sent[0] - 1, b"", SYN)), (START, tcp(server, client, sent[1] - 1, b"", SYN))]
+    for at in range(count):
+        for side, octets in enumerate((seal(1, 3, 0, at, 0, 1), seal(1, 3, 2, 1, at))):
+            said += octets
+            payload = octets.replace(b"\xff", b"\xff\xff") if greeting else octets
+            payload = (greeting if at == 0 else b"") + payload
+            ends = (client, server) if side == 0 else (server, client)
+            packets.append((START + (at * 100 + 20 * side) * MS, tcp(*ends, sent[side], payload, tagged=at % 2 == 1)))
+            sent[side] += len(payload)
+    return packets, said
+
+
+def _octets(capture: Capture) -> bytes:
+    return b"".join(item.octets for item in capture.items() if isinstance(item, Chunk))
+
+
+@pytest.mark.parametrize("write", [as_pcap, as_pcapng])
+@pytest.mark.parametrize(("seal", "protocol"), [(_sealed, "modbus-rtu"), (_line, "modbus-ascii")])
+def test_serial_frames_over_tcp(
+    tmp_path: Path, write: Callable[..., Path], seal: Callable[..., bytes], protocol: str
+) -> None:
+    packets, said = _talk(seal=seal)
+    capture = read(write(tmp_path / "gateway.pcap", packets))
+    assert capture.session.protocol == protocol
+    assert capture.session.bus == "192.0.2.9:8899"
+    assert "192.0.2.1:40000 to 192.0.2.9:8899" in capture.session.adapter.detail
+    assert _octets(capture) == said
+    assert capture.completeness().whole
+
+
+def test_telnet_around_it_is_taken_away(tmp_path: Path) -> None:
+    packets, said = _talk(30, greeting=b"\xff\xfb\x2c\xff\xfa\x2c\x01\x00\x00\x25\x80\xff\xf0")
+    capture = read(as_pcap(tmp_path / "x.pcap", packets))
+    assert _octets(capture) == said
+    assert "telnet" in capture.session.adapter.detail
+
+
+def test_telnet_cut_anywhere_is_the_same() -> None:
+    stream = b"\xff\xfb\x2c12\xff\xff3\xff\xfa\x2c\x01\xff\xff\x00\xff\xf04\xff\xf15"
+    for cut in range(len(stream)):
+        telnet = Telnet()
+        assert telnet.strip(stream[:cut]) + telnet.strip(stream[cut:]) == b"12\xff345"
+
+
+def test_segments_out_of_order_and_twice_are_put_right(tmp_path: Path) -> None:
+    packets, said = _talk()
+    times = [time for time, _ in packets]
+    datas = [data for _, data in packets]
+    for first, second in ((2, 4), (6, 8)):  # two of the client
+        datas[first], datas[second] = datas[second], datas[first]
+    datas.insert(7, datas[3])
+    times.insert(7, times[6])
+    heard = _octets(read(as_pcap(tmp_path / "x.pcap", list(zip(times, datas, strict=True)))))
+    assert sorted(heard) == sorted(said)
+
+
+def test_a_segment_that_was_not_captured_is_a_hole(tmp_path: Path) -> None:
+    packets, said = _talk(100)
+    del packets[20]
+    capture = read(as_pcap(tmp_path / "x.pcap", packets))
+    events = [item for item in capture.items() if isinstance(item, LineEvent)]
+    assert [event.count for event in events] == [8]
+    assert len(_octets(capture)) == len(said) - 8
+
+
+def test_each_connection_is_a_bus(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    one, said = _talk()
+    other, _ = _talk(5, server=(SERVER[0], 4001), seal=_line)
+    again, _ = _talk(3, client=(CLIENT[0], 40001))
+    web = [(START, tcp(CLIENT, (SERVER[0], 80), 1, b"GET / HTTP/1.1\r\n\r\n"))]
+    path = as_pcapng(tmp_path / "site.pcapng", sorted([*one, *other, *again, *web], key=lambda packet: packet[0]))
+    capture = read(path)
+    assert isinstance(capture, SeveralBuses)
+    assert len(capture.buses) == 3
+    assert "192.0.2.9:4001" in capture.names
+    assert "192.0.2.1:40001-192.0.2.9:8899" in capture.names
+    assert main(["show", str(path), "--bus", "192.0.2.1:40000-192.0.2.9:8899", "--json"]) == 0
+    assert capsys.readouterr().out.count('"ok": true') == 16
+    assert "TCP port 80" in capture.completeness().text
+    assert _octets(capture.buses[0]) == said
+
+
+def test_datagrams_are_read_too(tmp_path: Path) -> None:
+    packets = []
+    for at in range(6):
+        packets.append((START + at * 100 * MS, udp(CLIENT, SERVER, _sealed(1, 3, 0, at, 0, 1))))
+        packets.append((START + (at * 100 + 9) * MS, udp(SERVER, CLIENT, _sealed(1, 3, 2, 0, at))))
+    assert len(_octets(read(as_pcap(tmp_path / "x.pcap", packets)))) == 6 * 15
+
+
+@pytest.mark.parametrize("write", [as_pcap, as_pcapng])
+def test_a_network_without_any_is_said(tmp_path: Path, write: Callable[..., Path]) -> None:
+    packets = [
+        (START, tcp(CLIENT, (SERVER[0], 443), 1, random.Random(1).randbytes(900))),
+        (START, udp(CLIENT, (SERVER[0], 47808), b"\x81\x0a\x00\x08\x01\x20\xff\xff")),
+        (START, tcp(CLIENT, (SERVER[0], 502), 1, bytes.fromhex("000100000006010300000002"))),
+    ]
+    path = write(tmp_path / "x.pcap", packets)
+    with pytest.raises(CaptureError) as refused:
+        read(path)
+    for words in (
+        "no connection carries a field bus",
+        "TCP port 443",
+        "UDP port 47808 (BACnet/IP)",
+        "502 (Modbus TCP)",
+    ):
+        assert words in str(refused.value)
+    assert main(["check", str(path)]) == 3
+
+
+def test_cut_and_mutated_files_are_read_or_refused(tmp_path: Path) -> None:
+    packets, _ = _talk(6)
+    some = random.Random(2)
+    for write in (as_pcap, as_pcapng):
+        path = write(tmp_path / "x.pcap", packets)
+        whole = path.read_bytes()
+        broken = [whole[:cut] for cut in range(0, len(whole), 7)]
+        for _ in range(200):
+            mutated = bytearray(whole)
+            for _ in range(some.choice((1, 4, 40))):
+                mutated[some.randrange(24, len(mutated))] = some.randrange(256)
+            broken.append(bytes(mutated))
+        for octets in broken:
+            path.write_bytes(octets)
+            with contextlib.suppress(CaptureError):
+                capture = read(path)
+                for bus in capture.buses if isinstance(capture, SeveralBuses) else (capture,):
+                    for _ in bus.items():
+                        pass
+                    bus.completeness()
+
+
+def test_frames_in_ethernet_snap(tmp_path: Path) -> None:
+    folder = CAPTURES / "mstp-cimetrics-snap-mixed"
+    if not folder.is_dir():
+        pytest.skip("the shared captures are not here")
+    capture = read(folder / "BACnet-MSTP-SNAP-Mixed.cap")
+    assert capture.session.protocol == "mstp"
+    assert _octets(capture) == _octets(read(folder / "derived_linktype165.pcap"))
+    assert "68 of UDP port 47808 (BACnet/IP)" in capture.completeness().text
+
+
+@pytest.mark.parametrize("link_type", [147, 148, 149, 155, 162])
+@pytest.mark.parametrize("write", [as_pcap, as_pcapng])
+def test_bare_frames_of_any_user_link_type(tmp_path: Path, write: Callable[..., Path], link_type: int) -> None:
+    frames = [_sealed(1, 3, 0, at, 0, 1) for at in range(40)]
+    packets = [(START + at * 50 * MS, frame) for at, frame in enumerate(frames)]
+    capture = read(write(tmp_path / "x.pcap", packets, link_type))
+    assert _octets(capture) == b"".join(frames)
+    held = b"".join(block.reads.octets.tobytes() for block in capture.blocks())  # type: ignore[union-attr]
+    assert held == b"".join(frames)
+
+
+def test_any_protocol_may_lie_in_rtac_records(tmp_path: Path) -> None:
+    token = bytes.fromhex("55ff000172000084")
+    records = [(START + at * 20 * MS, rtac_record(at * 20 * MS, 1 + at % 2, token)) for at in range(40)]
+    path = as_pcap(tmp_path / "x.pcap", records, 250)
+    assert _octets(read(path)) == token * 40
+    assert main(["show", str(path), "-p", "mstp", "--json"]) == 0
