@@ -52,7 +52,7 @@ def write(
     """Write a capture to `args.output`; say on standard error what it holds and what it lost. Gives the octets.
 
     An .mcap gets what a live recording has: /values, /bus, /nodes and /findings. `with_frames`: what the engine finds
-    in the octets too, on /frames. `devices`: whose values are written, each of them; None: those that the session names.
+    in the octets too, on /frames. `devices`: whose values are written, each of them; None: those of the session.
     `notes`: by row number, for the comments of packets where OUT has such. Ends with exit code 2 when OUT is there.
     """
     target = Path(args.output)
