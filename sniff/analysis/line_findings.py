@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from dissectors.findings import Finding, Severity, Tally, counted, found, times
 from dissectors.frame import Chunk, Damage, Event, Frame, LineError, Noise, Place, Reason, Role
-from dissectors.line import NS_PER_S
+from dissectors.line import MS, NS_PER_S
 from dissectors.tracker import Transaction, Verdict
 from dissectors.words import milliseconds
 from sniff.analysis.judgement import Heard, Judgement
@@ -34,7 +34,7 @@ MOST_RESTS = 16
 COUNTED_OCTETS = 4096
 """Of longer rows the octets are not counted by value."""
 
-READ_LATE = 1_000_000
+READ_LATE = MS
 """ns of slack over the adapter's latency that prove a late read (`sniff.engine.late_reads`)."""
 
 _WHO_SPEAKS_IT = "which device still speaks the other protocol: its protocol setting; it does not belong on this line"
