@@ -64,7 +64,8 @@ class Finding:
     what was seen; `means`: what it is consistent with; `next`: what to check next. Plain sentences, no control
     characters. `cause`: code and subject of the finding that most likely explains this one; a face shows this one
     under it. `stated`: the value behind the words, where whoever found it had one. `stations`: of what is found about
-    the bus, the stations that it concerns; empty: everybody.
+    the bus, the stations that it concerns; empty: everybody. `is_once`: it is said once of a capture and its count is
+    no number of times.
     """
 
     code: str
@@ -80,6 +81,7 @@ class Finding:
     cause: tuple[str, str] | None = None
     stated: Subject | None = None
     stations: tuple[int, ...] = ()
+    is_once: bool = False
 
     @property
     def about(self) -> Subject:
@@ -94,12 +96,13 @@ class Finding:
     def merge(self, other: Finding) -> Finding:
         """What one rule found about one subject in two captures of a bus: counts add up, times span both.
 
-        Words and evidence are those of the graver one, of the more frequent one where both are as grave: frames are
-        numbered by capture. Raises ValueError for findings of two things.
+        Words and evidence are those of the graver one, of this one where both are as grave: frames are numbered by
+        capture, and of many it must not matter which are put together first. Raises ValueError for findings of two
+        things.
         """
         if (self.code, self.subject) != (other.code, other.subject):
             raise ValueError(f"{self.code} {self.subject} and {other.code} {other.subject} are two things")
-        told = max(self, other, key=lambda finding: (finding.severity, finding.count))
+        told = max(self, other, key=lambda finding: finding.severity)
         count = self.count + other.count
         return replace(told, count=count, first=min(self.first, other.first), last=max(self.last, other.last))
 
@@ -264,13 +267,13 @@ def found(
     *,
     first: int = 0,
     last: int = 0,
-    count: int = 1,
+    count: int | None = None,
     evidence: tuple[int, ...] = (),
     severity: Severity | None = None,
 ) -> Finding:
     """A finding of a rule, with the rule's own words for cause and next step; evidence is cut to EVIDENCE_MAX.
 
-    `subject`: a `Subject`, or the words that are its `str()`.
+    `subject`: a `Subject`, or the words that are its `str()`. `count`: None for what is said once of a capture.
     """
     return Finding(
         code=rule.code,
@@ -278,7 +281,8 @@ def found(
         subject=str(subject),
         first=first,
         last=max(first, last),
-        count=count,
+        count=1 if count is None else count,
+        is_once=count is None,
         evidence=evidence[:EVIDENCE_MAX],
         seen=seen,
         means=rule.means,

@@ -19,7 +19,6 @@ from dissectors.line import Timing
 from dissectors.row_columns import RowColumns
 from dissectors.tracker import PASSING, Placement, Transaction, Verdict
 
-_MS = 1_000_000
 LATE_SHARE = 0.01
 """Share of slow uses of the token from which on a station is named."""
 

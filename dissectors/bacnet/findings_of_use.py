@@ -9,19 +9,19 @@ from dissectors.bacnet.ring import Ring, What
 from dissectors.bacnet.ring_questions import T_GO_ON
 from dissectors.bacnet.ring_remarks import Remark, listed, milliseconds, of, plain
 from dissectors.findings import Severity, counted, times
+from dissectors.line import NS_PER_S
 
 POLLS_SHARE = 0.1
 LEAST_POLLS = 20
 SLOW_POLLS_LEAST = 5
 HASTY_LEAST = 3
-_S = 1_000_000_000
 
-SLOW_ROUND = 2 * _S
+SLOW_ROUND = 2 * NS_PER_S
 LEAST_ROUNDS = 20
 HOG_SHARE = 0.5
 HOG_FRAMES = 8
-LEAST_WATCHED = 10 * _S
-STORM_LEAST = 10 * _S
+LEAST_WATCHED = 10 * NS_PER_S
+STORM_LEAST = 10 * NS_PER_S
 """A storm lasts at least so long: a search for all devices is over sooner."""
 
 STORM_OF_ONE = 0.8
@@ -152,7 +152,7 @@ def _storm(ring: Ring) -> Iterable[Remark]:
     most = max(sent, key=lambda mac: sent[mac])
     alone = sent[most] >= STORM_OF_ONE * total
     who = f"{sent[most]} of them by MAC {most}" if alone else f"most by MAC {listed(sorted(sent))}"
-    lasted = (together.last - together.first) / _S
+    lasted = (together.last - together.first) / NS_PER_S
     seen = f"{counted(total, 'broadcast')}, {who}; over 20 a second for at least {lasted:.0f} s"
     yield of("MS602", most if alone else None, seen, together)
 

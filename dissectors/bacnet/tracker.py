@@ -28,21 +28,13 @@ from dissectors.bacnet.apdu import NEGATIVE_ACK, Apdu, PduType
 from dissectors.bacnet.exchange import Exchange, Key, mirrored, read, trails
 from dissectors.bacnet.frame_types import EXPECTING, FrameType, total
 from dissectors.bacnet.header import is_whole_header
-from dissectors.bacnet.limits import BROADCAST, MAX_ENCODED, MS, T_NO_TOKEN, T_USAGE_DELAY, TURNAROUND_BITS
+from dissectors.bacnet.limits import BROADCAST, MAX_ENCODED, MS, T_USAGE_DELAY, TURNAROUND_BITS
+from dissectors.bacnet.open_exchanges import OpenExchanges
 from dissectors.bacnet.segmentation import Reassembler
 from dissectors.bacnet.turn import Turn
 from dissectors.frame import Assembly, Event, Frame, Header, Noise, Role
 from dissectors.line import Timing
 from dissectors.tracker import Placement, Tracked, Transaction, Verdict
-
-POSTPONED_FOR = 10_000 * MS
-"""How long a postponed answer may come (APDU timeouts are 3 s and more)."""
-
-SEGMENTS_FOR = 30_000 * MS
-"""How long a further segment may come: it is sent again several times when its acknowledgement was lost."""
-
-REMEMBERED = 256
-"""Exchanges of the past that late and double answers are known by."""
 
 TWICE_WITHIN = 2_000 * MS
 LATE_WITHIN = 60_000 * MS
@@ -76,17 +68,14 @@ class Standing:
     reassembler: Reassembler
 
 
-class MstpTracker:
+class MstpTracker(OpenExchanges):
     """The tracker of one MS/TP bus; `dissectors.tracker` has the contract."""
 
     def __init__(self, timing: Timing) -> None:
+        super().__init__()
         self._latency = timing.latency
         self._under_way = 2 * timing.latency + total(MAX_ENCODED) * timing.char
         self._turnaround = timing.line.bits(TURNAROUND_BITS)
-        self._next = 1
-        self._waiting: Exchange | None = None  # holds the bus: an answer must come now
-        self._postponed: OrderedDict[Key, Exchange] = OrderedDict()
-        self._past: OrderedDict[Key, tuple[Exchange, Verdict, int]] = OrderedDict()
         self._previous: tuple[Frame, int] | None = None  # the frame before, and its transaction
         self._turn = Turn(timing)
         self._clock: int | None = None
@@ -109,73 +98,6 @@ class MstpTracker:
     def advance(self, now: int) -> tuple[Transaction, ...]:
         """Say that nothing came up to `now`; a frame may be under way that began its own length earlier."""
         return tuple(self._expire(now - self._under_way))
-
-    def close(self) -> tuple[Transaction, ...]:
-        """End of capture: what is open could still have been answered."""
-        closed = []
-        if self._waiting is not None:
-            closed.append(self._waiting.close(Verdict.OPEN))
-        closed += [exchange.close(exchange.becomes or Verdict.OPEN) for exchange in self._postponed.values()]
-        self._waiting = None
-        self._postponed.clear()
-        return tuple(sorted(closed, key=lambda transaction: transaction.id))
-
-    # What time alone ends
-
-    def _expire(self, now: int) -> list[Transaction]:
-        """What is over by `now`, in the order in which its time was up: whoever asks in between gets the same order."""
-        closed: list[Transaction] = []
-        waiting = self._waiting
-        over = [
-            (exchange.last + (SEGMENTS_FOR if exchange.segmented else POSTPONED_FOR), key)
-            for key, exchange in self._postponed.items()
-            if now - exchange.last >= (SEGMENTS_FOR if exchange.segmented else POSTPONED_FOR)
-        ]
-        until = None if waiting is None or now - waiting.last < T_NO_TOKEN else waiting.last + T_NO_TOKEN
-        if len(over) > 1:
-            over.sort(key=lambda one: one[0])
-        for due, key in over:
-            if until is not None and waiting is not None and until <= due:
-                self._let_go(waiting, closed)
-                until = None
-            if key in self._postponed:
-                closed.append(self._stop(self._postponed.pop(key)))
-        if until is not None and waiting is not None:
-            self._let_go(waiting, closed)
-        return closed
-
-    def _let_go(self, waiting: Exchange, closed: list[Transaction]) -> None:
-        """No answer came at once: that is no answer, but to a segment that more follow it is nothing yet."""
-        if waiting.more_follows and waiting.key is not None:
-            self._waiting = None
-            self._keep(waiting, closed)
-        else:
-            closed.append(self._give_up(waiting))
-
-    def _give_up(self, waiting: Exchange) -> Transaction:
-        """Nobody answered what held the bus."""
-        self._waiting = None
-        if waiting.damaged:
-            return self._end(waiting, Verdict.DAMAGED_REQUEST)
-        silent = waiting.may_be_silent or waiting.unconfirmed
-        return self._end(waiting, Verdict.DATA if silent else Verdict.NO_RESPONSE)
-
-    def _end(self, exchange: Exchange, verdict: Verdict) -> Transaction:
-        self._remember(exchange, verdict)
-        return exchange.close(verdict)
-
-    def _stop(self, exchange: Exchange) -> Transaction:
-        """Nobody went on with what was postponed, or with segments."""
-        transaction = exchange.stopped()
-        self._remember(exchange, transaction.verdict)
-        return transaction
-
-    def _remember(self, exchange: Exchange, verdict: Verdict) -> None:
-        if exchange.key is not None:
-            self._past[exchange.key] = (exchange, verdict, exchange.last)
-            self._past.move_to_end(exchange.key)
-            while len(self._past) > REMEMBERED:
-                self._past.popitem(last=False)
 
     # Where a frame belongs
 
@@ -279,16 +201,6 @@ class MstpTracker:
         self._waiting, damaged.of = None, begun.id
         closed.append(damaged.close(Verdict.DATA if arrived else Verdict.DAMAGED_REQUEST))
         return True
-
-    def _keep(self, exchange: Exchange, closed: list[Transaction]) -> None:
-        assert exchange.key is not None
-        older = self._postponed.pop(exchange.key, None)
-        if older is not None and older is not exchange:
-            closed.append(older.stopped())
-        self._postponed[exchange.key] = exchange
-        while len(self._postponed) > REMEMBERED:
-            _, oldest = self._postponed.popitem(last=False)
-            closed.append(self._stop(oldest))
 
     def _data(self, no: int, frame: Frame, header: Header, closed: list[Transaction]) -> Placement:
         """Data that answer nothing that holds the bus."""
@@ -543,25 +455,6 @@ class MstpTracker:
             )
         )
         return self._at(no, exchange.id, header)
-
-    def _open(self, no: int, frame: Frame, header: Header, key: Key | None = None) -> Exchange:
-        source = -1 if header.source is None else header.source
-        destination = -1 if header.destination is None else header.destination
-        exchange = Exchange(
-            self._next,
-            no,
-            header.kind,
-            source,
-            destination,
-            frame.start,
-            frame.end,
-            frame.slack,
-            frame.octets,
-            key,
-            last=frame.end,
-        )
-        self._next += 1
-        return exchange
 
     def _at(self, no: int, tx: int, header: Header, role: Role | None = None) -> Placement:
         return Placement(no, tx, header.role if role is None else role, header.source, header.destination)

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 from dissectors.frame import Check, Chunk, Damage, Event, Found, Frame, LineError, Noise, Place, Reason
 from dissectors.framer import OctetWindow, Taken
-from dissectors.line import Timing
+from dissectors.line import NS_PER_S, Timing
 from dissectors.n2.commands import Command, expected_length, parse_command
 from dissectors.n2.envelope import COMMAND, CR, NOT_TEXT, is_good, judge
 from dissectors.n2.stretch import SHORTEST, Before, Piece, Stretch, good_whole
@@ -34,7 +34,7 @@ MAX_LENGTH = 256
 SILENCE = 100_000_000
 """ns of proved silence that end a frame without CR."""
 
-FOREIGN_SILENCE = 1_000_000_000
+FOREIGN_SILENCE = NS_PER_S
 """The same after a `:`, which begins a Modbus ASCII line: there 1 s between characters is allowed."""
 
 _LF = 0x0A

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from dissectors import registry
-from dissectors.findings import Finding, Rule, WordsExceptions, with_consequences
+from dissectors.findings import Finding, Rule, WordsExceptions
 from dissectors.frame import Noise, Place, Reason
 from dissectors.manifest import Dissector
 from dissectors.profiles import Devices
@@ -15,8 +15,8 @@ from dissectors.row_columns import JudgesColumns, in_turn
 from dissectors.token_ring import WatchesRing
 from dissectors.tracker import Transaction, Verdict
 from sniff.analysis.bulk_line_findings import BulkLineFindings
+from sniff.analysis.judgement import Judgement
 from sniff.analysis.line_rules import LINE_RULES
-from sniff.analysis.plain import plain
 from sniff.analysis.profile_findings import PROFILE_RULES, ProfileFindings
 from sniff.engine.engine import Output
 from sniff.engine.session import LineEvent, LineEventKind, Session, settings_change
@@ -31,7 +31,7 @@ _DOUBTFUL = frozenset(
 
 
 class Judging:
-    """Fed what the engine gives; `findings` may be asked at any time."""
+    """Fed what the engine gives; `findings` may be asked at any time. What merges of it is its `judgement`."""
 
     def __init__(self, session: Session, dissector: Dissector, devices: Devices | None = None) -> None:
         self.judge = dissector.judge(session.timing) if dissector.judge is not None else None
@@ -149,29 +149,14 @@ class Judging:
 
     def findings(self) -> tuple[Finding, ...]:
         """All findings so far, the gravest first. Where hardly anything is a frame, the line speaks alone."""
-        made = [*self.line.findings()]
-        if self.judge is not None and not self.line.rubbish:
-            made += self.judge.findings()
-        if self.devices is not None and not self.line.rubbish:
-            made += self.devices.findings()
-        return tuple(
-            sorted(
-                map(_harmless, with_consequences(made, self._rules)),
-                key=lambda finding: (-finding.severity, finding.first, finding.code, finding.subject),
-            )
-        )
+        return self.judgement().findings(self._rules)
 
-
-def _harmless(finding: Finding) -> Finding:
-    """The same finding; what its words quote from a file or an adapter may be hostile."""
-    return replace(
-        finding,
-        subject=plain(finding.subject),
-        seen=plain(finding.seen),
-        means=plain(finding.means),
-        next=plain(finding.next),
-        cause=None if finding.cause is None else (finding.cause[0], plain(finding.cause[1])),
-    )
+    def judgement(self) -> Judgement:
+        """What was found so far, as a value that merges with that of the part that follows."""
+        judged = self.line.judgement()
+        made = (*(self.judge.findings() if self.judge is not None else ()),)
+        made += self.devices.findings() if self.devices is not None else ()
+        return replace(judged, bus=made)
 
 
 def rules_of(dissector: Dissector) -> Mapping[str, Rule]:

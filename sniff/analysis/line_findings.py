@@ -10,9 +10,10 @@ from typing import NamedTuple
 
 from dissectors.findings import Finding, Severity, Tally, counted, found, times
 from dissectors.frame import Chunk, Damage, Event, Frame, LineError, Noise, Place, Reason, Role
-from dissectors.line import NS_PER_S
+from dissectors.line import MS, NS_PER_S
 from dissectors.tracker import Transaction, Verdict
 from dissectors.words import milliseconds
+from sniff.analysis.judgement import Heard, Judgement
 from sniff.analysis.line_rules import LINE_RULES as RULES
 from sniff.analysis.line_use import LineUse
 from sniff.analysis.other_settings import SAMPLE_OCTETS, Fit, other_protocol, what_fits
@@ -27,19 +28,14 @@ from sniff.engine.session import LineEvent, LineEventKind, Session
 STRAY_MOST = 3
 """So many octets that are no frame are stray ones; more are the remains of something."""
 
-RUBBISH_LEAST = 60  # octets before "hardly anything is a frame" is said
 MOST_RESTS = 16
 """Stretches that are no frame and are asked what they may be."""
 
-RUBBISH_TOLD = 40  # the same where it is known what they are
 COUNTED_OCTETS = 4096
 """Of longer rows the octets are not counted by value."""
 
-READ_LATE = 1_000_000
+READ_LATE = MS
 """ns of slack over the adapter's latency that prove a late read (`sniff.engine.late_reads`)."""
-
-PROVED_FRAMES = 20
-"""So many good frames, with 1 in 10 octets in them, prove the settings: what else there is has another cause."""
 
 _WHO_SPEAKS_IT = "which device still speaks the other protocol: its protocol setting; it does not belong on this line"
 
@@ -223,24 +219,25 @@ class LineFindings:
     # ---- judging
 
     @property
-    def rubbish(self) -> bool:
-        """Whether hardly anything is a frame, so that nothing else can be judged."""
-        few = 10 * self._in_frames < 3 * self._octets and 10 * self._good < 3 * self._rows
-        if not few or self._octets < RUBBISH_TOLD or self._are_settings_proved:
-            return False
-        return self._octets >= RUBBISH_LEAST or self._other_settings() is not None
+    def heard(self) -> Heard:
+        """What was on the line so far."""
+        heard = Heard(self._octets, self._in_frames, self._rows, self._good, bool(self._only_heard))
+        return replace(heard, is_told=True) if heard.is_strange and self._other_settings() is not None else heard
 
-    @property
-    def _are_settings_proved(self) -> bool:
-        return self._good >= PROVED_FRAMES and 10 * self._in_frames >= self._octets
+    def judgement(self) -> Judgement:
+        """All findings so far, as a value that merges."""
+        heard, host = self.heard, (self._can_tell(), *self._of_host())
+        if heard.is_nothing:
+            return Judgement(heard, host, (self._whole("LN002", "bus", "not one octet was heard"),))
+        return Judgement(heard, host, (self._rubbish(),) if heard.is_rubbish else (), self._of_line())
 
     def findings(self) -> tuple[Finding, ...]:
         """All findings so far."""
-        made = [self._can_tell(), *self._of_host()]
-        if not self._octets and not self._only_heard:
-            return (*made, self._whole("LN002", "bus", "not one octet was heard"))
-        if self.rubbish:
-            return (*made, self._rubbish())
+        return self.judgement().findings(RULES)
+
+    def _of_line(self) -> tuple[Finding, ...]:
+        """What may be wrong with a line that can be judged."""
+        made: list[Finding] = []
         if self._senders.are_all_struck(self._marked, self._octets) and 10 * self._in_frames >= 8 * self._octets:
             made.append(self._parity_setting())
         else:
@@ -326,7 +323,7 @@ class LineFindings:
             f"{self._marked / self._octets:.0%} of the octets have parity or framing errors, "
             f"yet {self._in_frames / self._octets:.0%} are in good frames"
         )
-        return replace(self._whole("LN004", "bus", words), count=self._marked)
+        return replace(self._whole("LN004", "bus", words), count=self._marked, is_once=False)
 
     def _wrong_octets(self) -> Iterator[Finding]:
         yield from self._senders.wrong_octets(self._note_if)

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from dissectors.columns import FOUNDS, NONE, ROLES, VERDICTS, Times
+from dissectors.line import MS
 from dissectors.manifest import Dissector
 from sniff.cli import rows
 from sniff.engine.column_join import SettledRows
@@ -125,8 +126,8 @@ class RowColumns:
         times = _OF_TRANSACTION[name if name != "latency_ms" else "tx.latency_ms"](closed)[which].tolist()
         pairs = zip(times, has.tolist(), strict=True)
         if name == "latency_ms":
-            return [round(time / 1e6, 6) if there else none for time, there in pairs]
-        return [time / 1e6 if there else none for time, there in pairs]
+            return [round(time / MS, 6) if there else none for time, there in pairs]
+        return [time / MS if there else none for time, there in pairs]
 
 
 def _held(table: Table, places: Sequence[int], name: str, render: Render) -> list[Cell]:

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dissectors.frame import Chunk
+from dissectors.line import NS_PER_S
 from sniff.engine.session import (
     UNKNOWABLE,
     Item,
@@ -44,7 +45,7 @@ FLUSH_AFTER = 900_000_000
 SYNC_AFTER = 8_000_000_000
 """ns between syncs: all is on the disk within 10 s, unless it takes more than 2 s for a sync."""
 
-CHECK_EVERY = 1_000_000_000
+CHECK_EVERY = NS_PER_S
 """ns between looks whether the file is still where it was begun."""
 
 MOST_FLUSHES = 4096

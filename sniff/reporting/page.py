@@ -7,7 +7,9 @@ from collections.abc import Sequence
 from importlib import resources
 from typing import Any
 
+from dissectors.line import MS
 from dissectors.tracker import Verdict
+from dissectors.words import bare_milliseconds
 from sniff.analysis.plain import plain
 from sniff.analysis.wording import station_word
 from sniff.reporting.numbers import Numbers
@@ -96,9 +98,7 @@ def _damage(value: str) -> str:
 
 def _ms(value: float | None) -> str:
     """ms with the precision that is worth reading; a dash for None."""
-    if value is None:
-        return "–"
-    return f"{value:.0f}" if value >= 100 else f"{value:.1f}" if value >= 1 else f"{value:.2f}"
+    return "–" if value is None else bare_milliseconds(round(value * MS))
 
 
 def _number(value: object) -> str:

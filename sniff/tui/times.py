@@ -5,7 +5,7 @@ from __future__ import annotations
 from datetime import datetime
 from enum import Enum
 
-from dissectors.line import NS_PER_S
+from dissectors.line import MS, NS_PER_S
 
 
 class TimeMode(Enum):
@@ -41,7 +41,7 @@ _WORDS = {
 
 def clock(time: int) -> str:
     """Local time of day to the millisecond, "10:00:00.123"; ns since the Unix epoch."""
-    return f"{_local(time):%H:%M:%S}.{time % NS_PER_S // 1_000_000:03d}"
+    return f"{_local(time):%H:%M:%S}.{time % NS_PER_S // MS:03d}"
 
 
 def date_and_clock(time: int) -> str:

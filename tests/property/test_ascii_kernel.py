@@ -22,6 +22,7 @@ from tests.bus_delivery import FTDI_LATENCY, MS, exact, ftdi, laid_out, with_noi
 from tests.property.kernel_equality import assert_equal, cut_anyhow, reads_of
 from tests.property.modbus_adus import ascii_frames
 from tests.property.test_rtu_kernel import _exchange
+from tests.seeds import seeds
 
 EXACT = Timing(LineSettings.parse("9600,8N1"))
 TIMINGS = (
@@ -48,7 +49,7 @@ def bus(dice: random.Random, exchanges: int) -> list[bytes]:
 
 
 @pytest.mark.parametrize("timing", TIMINGS)
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", seeds(3))
 def test_of_a_bus(timing: Timing, seed: int) -> None:
     frames = bus(random.Random(seed), 300)
     for chunks in (exact(laid_out(frames, timing, 3 * MS)), ftdi(laid_out(frames, timing, MS))):

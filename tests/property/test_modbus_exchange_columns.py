@@ -27,6 +27,7 @@ from tests.bench import bulk_rtu
 from tests.bus_delivery import FTDI_LATENCY, MS, ftdi, laid_out
 from tests.property.kernel_equality import events_of, frame_at, reads_of
 from tests.property.modbus_adus import rtu
+from tests.seeds import seeds
 
 EXACT = Timing(LineSettings.parse("19200,8E1"))
 HELD_BACK = replace(EXACT, latency=FTDI_LATENCY)
@@ -271,7 +272,7 @@ def with_dead_station(seed: int, count: int, repeats: int, timeout: int, jitter:
 @pytest.mark.parametrize("timing", TIMINGS, ids=str)
 @pytest.mark.parametrize(("repeats", "timeout", "jitter"), [(1, 200, 5), (3, 300, 2), (2, 60, 40), (3, 1000, 900)])
 def test_of_a_station_that_is_not_there(repeats: int, timeout: int, jitter: int, timing: Timing) -> None:
-    for seed in range(3):
+    for seed in seeds(3):
         frames = with_dead_station(seed, 500, repeats, timeout, jitter)
         by_columns, total = assert_paired_equally(delivered(frames, timing), timing)
         if jitter < 10:
@@ -301,7 +302,7 @@ def delivered(frames: list[tuple[bytes, int]], timing: Timing) -> list[Chunk]:
 
 
 @pytest.mark.parametrize("timing", TIMINGS, ids=str)
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", seeds(4))
 def test_of_clean_buses(seed: int, timing: Timing) -> None:
     by_columns, total = assert_paired_equally(delivered(said(seed, 1200), timing), timing)
     assert by_columns >= 0.6 * total
@@ -309,7 +310,7 @@ def test_of_clean_buses(seed: int, timing: Timing) -> None:
 
 @pytest.mark.parametrize("timing", TIMINGS, ids=str)
 @pytest.mark.parametrize("lost", [0.01, 0.1, 0.4])
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", seeds(4))
 def test_of_buses_with_faults(seed: int, lost: float, timing: Timing) -> None:
     for spread in (1, 6, 60):
         assert_paired_equally(delivered(said(seed, 600, lost=lost, spread=spread), timing), timing)

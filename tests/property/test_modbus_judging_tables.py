@@ -15,10 +15,11 @@ from sniff.engine.table import Table
 from tests.property.judge_memory import memory
 from tests.property.modbus_buses import TROUBLES, bus
 from tests.property.test_judging_tables import cut
+from tests.seeds import seeds
 
 
 @pytest.mark.parametrize("is_ascii", [False, True], ids=["rtu", "ascii"])
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", seeds(12, 5))
 def test_what_is_remembered_is_the_same_wherever_tables_are_cut(seed: int, is_ascii: bool) -> None:
     session, reads = bus(seed, is_ascii, exchanges=500)
     made = [one for one in tables([Block(reads)], session) if isinstance(one, Table)]

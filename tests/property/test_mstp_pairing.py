@@ -16,6 +16,7 @@ from dissectors.line import Timing
 from tests.bench import bulk_mstp
 from tests.property import mstp_buses as buses
 from tests.property.pairing_equality import assert_paired_alike
+from tests.seeds import seeds
 
 MS = buses.MS
 LATENCIES = (0, 16 * MS)
@@ -56,7 +57,7 @@ def test_a_request_is_forgotten_behind_many_others() -> None:
     assert by_columns > 0.98 * total
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", seeds(40, 12))
 def test_any_conversation(seed: int) -> None:
     """Few stations and invoke ids that say anything, so that repeats and late answers abound."""
     dice = random.Random(seed)
@@ -73,7 +74,7 @@ def test_blocks_that_are_no_longer_kept(monkeypatch: pytest.MonkeyPatch) -> None
         assert_paired_alike(one, timing, random.Random(seed), block=40)
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", seeds(12, 4))
 def test_frames_of_late_reads(seed: int) -> None:
     """Each frame has a slack of its own."""
     dice = random.Random(seed)

@@ -15,9 +15,10 @@ from sniff.engine.table import Table
 from tests.property.judge_memory import memory
 from tests.property.n2_buses import TROUBLES, bus
 from tests.property.test_judging_tables import cut
+from tests.seeds import seeds
 
 
-@pytest.mark.parametrize("seed", range(16))
+@pytest.mark.parametrize("seed", seeds(16, 6))
 def test_what_is_remembered_is_the_same_wherever_tables_are_cut(seed: int) -> None:
     session, reads = bus(seed, exchanges=500)
     made = [one for one in tables([Block(reads)], session) if isinstance(one, Table)]

@@ -17,6 +17,7 @@ from sniff.engine.bulk import tables
 from sniff.engine.engine import Output, Row
 from sniff.engine.session import Adapter, Session
 from sniff.engine.table import Table
+from tests.seeds import seeds
 
 MS = 1_000_000
 LINE = LineSettings.parse("9600,8N1")
@@ -83,7 +84,7 @@ def by_rows(chunks: Sequence[Chunk], session: Session) -> tuple[list[Row], list[
 
 
 @pytest.mark.parametrize("trouble", [0.0, 0.02, 0.3])
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", seeds(4, 2))
 def test_exchanges_are_paired_as_the_tracker_pairs_them(seed: int, trouble: float) -> None:
     dice = random.Random(seed)
     session = Session("x", LINE, "n2", adapter=Adapter(latency=dice.choice((0, MS, 17 * MS))))

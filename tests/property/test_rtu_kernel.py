@@ -25,6 +25,7 @@ from tests.bus_delivery import FTDI_LATENCY, MS, ftdi, laid_out, stalled, with_n
 from tests.captures_shared import listed, timed
 from tests.property.kernel_equality import assert_equal, reads_of
 from tests.property.modbus_adus import rtu, rtu_frames
+from tests.seeds import seeds
 
 EXACT = Timing(LineSettings.parse("19200,8E1"))
 FAST = Timing(LineSettings.parse("115200,8N1"))
@@ -243,7 +244,7 @@ _ALL = (1, 2, 3, 4, 5, 6, 15, 16, 23, *_VENDOR)
 _RARE = (3, 7, 8, 11, 12, 17, 20, 22, 24, 43)
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", seeds(3))
 @pytest.mark.parametrize("timing", TIMINGS, ids=str)
 def test_of_disturbed_buses(seed: int, timing: Timing) -> None:
     dice = random.Random(seed)

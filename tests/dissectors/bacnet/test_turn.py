@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Callable
+from functools import cache
 from random import Random
 
 import pytest
@@ -16,7 +17,7 @@ from dissectors.bacnet.simulated import Node, Poller, f510
 from dissectors.bacnet.turn import Turn
 from dissectors.frame import Check, Chunk, Damage, Flaw, Found, Frame, Noise, Role
 from dissectors.line import LineSettings, Timing
-from sniff.simulation.wire import Party, Wire
+from sniff.simulation.wire import Burst, Party, Wire
 from tests.dissectors.bacnet.ring_script import data, poll, rounds, script, spoil, token
 
 LINE = LineSettings(38400)
@@ -57,6 +58,12 @@ def ring() -> list[Node]:
     return [Node(mac, TIMING, made, max_master=31, polls_every=10) for mac, made in applications.items()]
 
 
+@cache
+def _said() -> tuple[Burst, ...]:
+    """Half a minute of a ring."""
+    return tuple(Wire(LINE, [Party(str(node.mac), node) for node in ring()]).run(30 * 10**9))
+
+
 @pytest.mark.parametrize("latency", [0, 17_500_000])
 @pytest.mark.parametrize(
     ("harm", "least"),
@@ -76,12 +83,11 @@ def test_damaged_frames_have_their_sender(harm: Harm, least: float, latency: int
     """Of all that were damaged and left five octets at least; the nodes hear each other well."""
     dice, timing = Random(7), Timing(LINE, latency)
     framer, tracker = MSTP.framer(timing), MSTP.tracker(timing)
-    wire = Wire(LINE, [Party(str(node.mac), node) for node in ring()])
     starts: list[int] = []
     truth: list[tuple[int, bool]] = []
     at = position = no = 0
     right: set[int] = set()
-    for burst in [*wire.run(30 * 10**9), None]:
+    for burst in [*_said(), None]:
         if burst is None:
             events = framer.close()
         else:

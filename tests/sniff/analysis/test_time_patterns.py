@@ -18,6 +18,7 @@ from tests.faults.line_faults import AtTimes, paused
 from tests.faults.line_rule_cases import LINE_RULE_CASES, NO_PATTERN
 from tests.faults.matrix import run
 from tests.faults.stations import Dies
+from tests.seeds import seeds
 
 MS = 1_000_000
 S = 1_000_000_000
@@ -30,7 +31,7 @@ def patterns(case: Case, seed: int = 1) -> set[str]:
 
 
 @pytest.mark.parametrize("case", NO_PATTERN, ids=lambda case: case.name)
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", seeds(3))
 def test_what_has_no_rhythm_is_no_pattern(case: Case, seed: int) -> None:
     assert patterns(case, seed) == set()
 

@@ -1,0 +1,22 @@
+"""With how much a property is tried: all where one searches (`HYPOTHESIS_PROFILE=thorough`), some in the suite."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from typing import TypeVar
+
+T = TypeVar("T")
+
+
+IS_SEARCH = os.environ.get("HYPOTHESIS_PROFILE") == "thorough"
+
+
+def seeds(many: int, usual: int = 1) -> range:
+    """The seeds 0 … of a run: `many` in a search, `usual` in the suite."""
+    return range(many if IS_SEARCH else usual)
+
+
+def some(things: Sequence[T], every: int) -> Sequence[T]:
+    """All of them in a search, every n-th in the suite."""
+    return things if IS_SEARCH else things[::every]
