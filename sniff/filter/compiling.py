@@ -110,6 +110,9 @@ class _Compiler:
         if isinstance(value, Slice):
             expression = self._value(value)
             return leaf(expression, There(), False, f"{expression.words} is there")
+        if isinstance(value, Arithmetic) and value.operator == "&":
+            expression = self._value(value)
+            return leaf(expression, NotZero(), False, f"any bit of {expression.words}")
         column = value.column
         raise FilterError("expected a comparison: this is a value alone", column)
 

@@ -196,6 +196,8 @@ class _Parser:
         while not self._is("}"):
             if items:
                 self._take(",")
+            if self._now.kind == "end":
+                raise FilterError("expected } at the end of the set" if items else "expected a value", self._now.column)
             low = self._value_after("in")
             items.append((low, self._value_after("..") if self._take("..") else None))
         if not items:
