@@ -68,6 +68,11 @@ def compile_filter(text: str, dissector: Dissector, scope: Scope | None = None) 
     return Filter(text, root, frozenset(compiler.names), compiler.begins)
 
 
+def field_of(name: str, dissector: Dissector, scope: Scope | None = None) -> Expression:
+    """What rows have of a name. Raises FilterError."""
+    return _Compiler(dissector, scope or Scope()).field(name)
+
+
 class _Compiler:
     def __init__(self, dissector: Dissector, scope: Scope) -> None:
         self.dissector = dissector
@@ -389,6 +394,10 @@ class _Compiler:
             if not types and name.startswith(one.prefixes):
                 return FieldType(Kind.ANY)
         return None
+
+    def field(self, name: str) -> Expression:
+        """A field by its name."""
+        return self._field(Word(name, 0))
 
     def _field(self, word: Word) -> Expression:
         name = fields.ALIASES.get(word.text, word.text)
