@@ -10,6 +10,12 @@
     3 = "teco-e510"
     "*" = "teco-e510"
 
+    [filters]
+    slow = "latency_ms > 50ms"
+
+    [colours]
+    magenta = "kind contains write"
+
 The first file found counts: in the working folder or one above it, then the user's configuration folder. Flags win
 over the file.
 """
@@ -28,11 +34,13 @@ from typing import Any, Final, Literal
 
 from dissectors import registry
 from dissectors.line import LineSettings
+from sniff.filter import FilterError, compile_filter
 
 FILE = "sniff485.toml"
 AUTO: Final = "auto"
 BUS_KEYS = ("port", "line", "protocol", "record", "devices")
-TOP_KEYS = ("bus",)
+TOP_KEYS = ("bus", "filters", "colours")
+COLOURS = ("red", "green", "yellow", "blue", "magenta", "cyan")
 
 
 class ConfigError(Exception):
@@ -57,10 +65,13 @@ class Bus:
 
 @dataclass(frozen=True, slots=True)
 class Config:
-    """All buses by name, and the file they are from (None: there is none)."""
+    """All buses by name, and the file they are from (None: there is none). `filters`: by name. `colours`: filters by
+    the colour that rows get which they accept; the first that does counts."""
 
     path: Path | None
     buses: Mapping[str, Bus]
+    filters: Mapping[str, str] = field(default_factory=dict)
+    colours: Mapping[str, str] = field(default_factory=dict)
 
 
 def candidates(start: Path) -> list[Path]:
@@ -93,7 +104,10 @@ def parse(path: Path) -> Config:
     reader = _Reader(path, text)
     reader.check_keys(data, TOP_KEYS, "")
     buses = reader.table(data.get("bus", {}), "bus")
-    return Config(path, {name: reader.bus(name, reader.table(entry, f"bus.{name}")) for name, entry in buses.items()})
+    filters, colours = (reader.filters(data.get(name, {}), name) for name in ("filters", "colours"))
+    reader.check_keys(colours, COLOURS, "colours")
+    made = {name: reader.bus(name, reader.table(entry, f"bus.{name}")) for name, entry in buses.items()}
+    return Config(path, made, filters, colours)
 
 
 class _Reader:
@@ -123,6 +137,17 @@ class _Reader:
             {key: self.device(devices, key, f"{section}.devices") for key in devices},
             {key: f"{self.path}:{self.line_of(key, section)}" for key in entry},
         )
+
+    def filters(self, value: Any, section: str) -> dict[str, str]:
+        """Filters by name; each is read, so that a wrong one is found before it is wanted."""
+        entry, found = self.table(value, section), dict[str, str]()
+        for name in entry:
+            found[name] = self.text(entry, name, section) or ""
+            try:
+                compile_filter(found[name], registry.get(registry.DEFAULT))
+            except FilterError as error:
+                raise self.error(name, section, f"{name}: {error}") from None
+        return found
 
     def text(self, entry: Mapping[str, Any], key: str, section: str) -> str | None:
         value = entry.get(key)

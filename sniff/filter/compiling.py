@@ -436,7 +436,7 @@ class _Compiler:
     def _of_protocol(self, name: str, type: FieldType) -> Expression:
         self.names.add(name)
         own = fields.types_of(self.dissector)
-        if name not in own and not (not own and name.startswith(self.dissector.prefixes)):
+        if own and name not in own:
             return Expression(name, type, lambda row, tx: (), nowhere)
         columns = None
         if type.octet is not None:
