@@ -34,7 +34,6 @@ from typing import Any, Final, Literal
 
 from dissectors import registry
 from dissectors.line import LineSettings
-from sniff.filter import FilterError, compile_filter
 
 FILE = "sniff485.toml"
 AUTO: Final = "auto"
@@ -140,6 +139,8 @@ class _Reader:
 
     def filters(self, value: Any, section: str) -> dict[str, str]:
         """Filters by name; each is read, so that a wrong one is found before it is wanted."""
+        from sniff.filter import FilterError, compile_filter  # few configurations have any
+
         entry, found = self.table(value, section), dict[str, str]()
         for name in entry:
             found[name] = self.text(entry, name, section) or ""

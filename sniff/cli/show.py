@@ -23,7 +23,6 @@ from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import Session
 from sniff.engine.verdict_join import Settled, Wanted
 from sniff.filter import Filter
-from sniff.filter.choosing import chosen
 from sniff.formats.parquet import ParquetWriter
 
 if TYPE_CHECKING:
@@ -142,6 +141,7 @@ def _show_in_bulk(
     table: ParquetWriter | None,
 ) -> int | None:
     from sniff.cli.row_columns import RowColumns
+    from sniff.filter.choosing import chosen
 
     made = RowColumns(dissector_for(session), session)
     for settled_rows in settled_columns(Watched(capture), session) if left != 0 else ():
