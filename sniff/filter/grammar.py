@@ -61,7 +61,9 @@ _LEXER = re.compile(
     r'|(?P<text>"(?:[^"\\]|\\.)*")'
     r"|(?P<word>[A-Za-z0-9_](?:[A-Za-z0-9_:]|-(?=[A-Za-z0-9_])|\.(?!\.))*))"
 )
-_PART = re.compile(r"\s*(?:(?P<at>-?\d+)|(?P<first>-?\d+)?:(?P<length>\d+)?|(?P<from>\d+)-(?P<to>\d+))\s*")
+_PART = re.compile(
+    r"\s*(?:(?P<at>-?\d{1,9})|(?P<first>-?\d{1,9})?:(?P<length>\d{1,9})?|(?P<from>\d{1,9})-(?P<to>\d{1,9}))\s*"
+)
 
 Node = Value | Test
 _Reading = Callable[[], Node]
@@ -344,7 +346,7 @@ class _Parser:
         return found if isinstance(found, _TESTS) else Present(found, found.column)
 
 
-_BEFORE_VALUES = frozenset(("contains", "matches", "~", "in", "{", "..", "+", "-", "*", "/", "%", "&"))
+_BEFORE_VALUES = frozenset((",", "contains", "matches", "~", "in", "{", "..", "+", "-", "*", "/", "%", "&"))
 
 
 def _spans(token: _Token) -> tuple[Span, ...]:
