@@ -15,6 +15,12 @@
     at = "error"                             # from which severity on; default warning
     every = 600                              # seconds between two about the same finding
 
+    [filters]
+    slow = "latency_ms > 50ms"
+
+    [colours]
+    magenta = "kind contains write"
+
 The first file found counts: in the working folder or one above it, then the user's configuration folder. Flags win
 over the file.
 """
@@ -39,7 +45,8 @@ FILE = "sniff485.toml"
 AUTO: Final = "auto"
 BUS_KEYS = ("port", "line", "protocol", "record", "devices")
 ALERT_KEYS = ("command", "webhook", "at", "every")
-TOP_KEYS = ("bus", "alert")
+TOP_KEYS = ("bus", "alert", "filters", "colours")
+COLOURS = ("red", "green", "yellow", "blue", "magenta", "cyan")
 
 
 class ConfigError(Exception):
@@ -75,11 +82,14 @@ class AlertSettings:
 
 @dataclass(frozen=True, slots=True)
 class Config:
-    """All buses by name, and the file they are from (None: there is none)."""
+    """All buses by name, and the file they are from (None: there is none). `filters`: by name. `colours`: filters by
+    the colour that rows get which they accept; the first that does counts."""
 
     path: Path | None
     buses: Mapping[str, Bus]
     alert: AlertSettings | None = None
+    filters: Mapping[str, str] = field(default_factory=dict)
+    colours: Mapping[str, str] = field(default_factory=dict)
 
 
 def candidates(start: Path) -> list[Path]:
@@ -114,7 +124,9 @@ def parse(path: Path) -> Config:
     buses = reader.table(data.get("bus", {}), "bus")
     named = {name: reader.bus(name, reader.table(entry, f"bus.{name}")) for name, entry in buses.items()}
     alert = reader.alert(reader.table(data["alert"], "alert")) if "alert" in data else None
-    return Config(path, named, alert)
+    filters, colours = (reader.filters(data.get(name, {}), name) for name in ("filters", "colours"))
+    reader.check_keys(colours, COLOURS, "colours")
+    return Config(path, named, alert, filters, colours)
 
 
 class _Reader:
@@ -144,6 +156,19 @@ class _Reader:
             {key: self.device(devices, key, f"{section}.devices") for key in devices},
             {key: f"{self.path}:{self.line_of(key, section)}" for key in entry},
         )
+
+    def filters(self, value: Any, section: str) -> dict[str, str]:
+        """Filters by name; each is read, so that a wrong one is found before it is wanted."""
+        from sniff.filter import FilterError, compile_filter  # few configurations have any
+
+        entry, found = self.table(value, section), dict[str, str]()
+        for name in entry:
+            found[name] = self.text(entry, name, section) or ""
+            try:
+                compile_filter(found[name], registry.get(registry.DEFAULT))
+            except FilterError as error:
+                raise self.error(name, section, f"{name}: {error}") from None
+        return found
 
     def text(self, entry: Mapping[str, Any], key: str, section: str) -> str | None:
         value = entry.get(key)

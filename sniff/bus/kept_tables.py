@@ -36,11 +36,13 @@ class Part:
 
     `first`: number of its first row, or of the row to come where it has none. `closed_first`: number of its first
     closing. `begin`: of its first row, ns. `ids`: least and greatest of its transactions' ids; `rows_closed`: the last
-    row that they name.
+    row that they name. `verdicts`, `placed_ids`: what a filter remembers of it.
     """
 
     def __init__(self, whole: Table | PackedTable, first: int, closed_first: int) -> None:
         self.whole = whole
+        self.verdicts: tuple[list[Table | PackedTable], Values] | None = None  # of rows, and what they were made of
+        self.placed_ids = (1, 1)
         self.first, self.rows = first, len(whole)
         self.closed_first = closed_first
         if isinstance(whole, PackedTable):

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from typing import TYPE_CHECKING, cast
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +16,7 @@ from sniff.filter import Filter
 
 if TYPE_CHECKING:
     from sniff.engine.table import Table
+    from sniff.filter.columns import Closed
 
 REFUSED, ACCEPTED, DOUBTFUL = 0, 1, 2
 """What is known of a number; who is doubtful has to be looked at."""
@@ -26,6 +28,23 @@ FARTHEST = 8
 WIDEST = 1 << 22
 
 States = npt.NDArray[np.uint8]
+
+
+@dataclass(frozen=True, slots=True)
+class _Verdicts:
+    """Verdicts of rows alone; nobody asks for the rest."""
+
+    verdict: npt.NDArray[Any]
+
+    @property
+    def latency(self) -> npt.NDArray[Any]:
+        """Not asked for."""
+        raise NotImplementedError
+
+    @property
+    def attempt(self) -> npt.NDArray[Any]:
+        """Not asked for."""
+        raise NotImplementedError
 
 
 class RowMasks:
@@ -74,7 +93,7 @@ class RowMasks:
 
     def _states(self, part: Part) -> States:
         view = cast("Table", part.view())
-        closings = None
+        closings: Closed | None = None
         if self._filter.of_closing:
             closings = self._closings(part)
         said = self._filter.masks(view, closings)
@@ -86,11 +105,22 @@ class RowMasks:
             states[may & ~sure] = DOUBTFUL
         return states
 
-    def _closings(self, part: Part) -> Closings | None:
-        """What became of its rows; None where that is not known at once."""
+    def _closings(self, part: Part) -> Closed | None:
+        """What became of its rows; None where that is not known at once. Verdicts are remembered by the part."""
+        known = part.verdicts
+        if known is not None and not self._filter.names & {"latency_ms", "attempt"}:
+            closing = self._kept.closing_parts(*part.placed_ids)
+            if len(known[0]) == len(closing) and all(a is b.whole for a, b in zip(known[0], closing, strict=True)):
+                return _Verdicts(known[1])
         tx = part.column("placed.tx")
         placed = tx[tx > 0]
         least, most = (int(placed.min()), int(placed.max())) if len(placed) else (1, 1)
         if most - least > WIDEST:
             return None
-        return Closings(tx, least, most, [part.closed_column for part in self._kept.closing_parts(least, most)])
+        part.placed_ids = least, most
+        closing = self._kept.closing_parts(least, most)
+        made = Closings(tx, least, most, [one.closed_column for one in closing])
+        if self._filter.names & {"latency_ms", "attempt"}:
+            return made
+        part.verdicts = [one.whole for one in closing], made.verdict.astype(np.int8)
+        return _Verdicts(part.verdicts[1])

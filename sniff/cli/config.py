@@ -37,4 +37,11 @@ def run(args: argparse.Namespace) -> int:
         for key, value in values.items():
             if value is not None:
                 print(f"  {key} = {value!r}  # {bus.origin.get(key, config.path)}")
+    for section, filters in (("filters", config.filters), ("colours", config.colours)):
+        if filters and args.json:
+            print(json_output.dumps({section: dict(filters), "from": str(config.path)}))
+        elif filters:
+            print(f"[{section}]")
+            for name, text in filters.items():
+                print(f"  {name} = {text!r}  # {config.path}")
     return 0

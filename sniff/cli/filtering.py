@@ -9,16 +9,22 @@ from typing import Any
 from dissectors import registry
 from dissectors.field_types import FieldType, Kind
 from dissectors.findings import Finding
+from dissectors.line import MS, NS_PER_S
 from dissectors.manifest import Dissector
 from dissectors.profiles import Devices
+from dissectors.tracker import Transaction
 from sniff.bus.offline import Source, survey
 from sniff.cli import USAGE, Failure
 from sniff.cli.progress import Watched
+from sniff.cli.tables import safe_cell
 from sniff.engine.capture import Capture
+from sniff.engine.engine import Row
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.observer import Observer
 from sniff.engine.session import Session
+from sniff.engine.verdict_join import Wanted
 from sniff.filter import Filter, FilterError, Scope, compile_filter
+from sniff.filter.compiling import field_of
 from sniff.filter.errors import nearest
 from sniff.filter.fields import ALIASES, COLUMN_TYPES, column_type, types_of
 
@@ -110,6 +116,67 @@ def _evidence(capture: Source, session: Session, devices: Devices) -> dict[int, 
         for no in finding.evidence:
             found[no] = found.get(no, frozenset()) | {finding.code}
     return found
+
+
+class FieldCells:
+    """Cells of `-T fields` for names that only filters know: a row's values, with commas between several."""
+
+    def __init__(self, names: Iterable[str], session: Session, devices: Devices) -> None:
+        self._begins: dict[int, int] = {}
+        scope = Scope(session.started, devices, begin_of=self._begins.get)
+        self._expressions = {
+            name: field_of(name, dissector_for(session), scope) for name in names if is_of_filters(name)
+        }
+
+    def noting(self, wanted: Filter) -> Wanted:
+        """The same filter, shown every row of the capture where the time since the row before is asked for."""
+        if "frame.time_delta" not in self._expressions:
+            return wanted
+
+        def noted(row: Row, transaction: Transaction | None) -> bool:
+            self._begins.pop(row.no - 2, None)
+            self._begins[row.no] = row.event.start
+            return wanted(row, transaction)
+
+        return noted
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._expressions
+
+    def __bool__(self) -> bool:
+        return bool(self._expressions)
+
+    def cell(self, name: str, row: Row, transaction: Transaction | None) -> str:
+        """What a row has of a name."""
+        field = self._expressions[name]
+        return ",".join(_cell(value, field.type) for value in field.get(row, transaction))
+
+
+def is_of_filters(name: str) -> bool:
+    """Whether rows of `--json` and fields of dissectors do not have that name, and filters have it."""
+    from sniff.cli.rows import JSON_KEYS
+
+    if name in ("frame.number", "frame.len"):
+        return False
+    return name not in JSON_KEYS and name not in _OF_ROWS and (name in COLUMN_TYPES or name in ALIASES)
+
+
+_OF_ROWS = frozenset(
+    f"tx.{name}" for name in ("id", "verdict", "attempt", "latency_ms", "latency_low_ms", "latency_high_ms")
+)
+"""Names under `tx.` that rows have by themselves."""
+
+
+def _cell(value: object, type: FieldType) -> str:
+    from sniff.cli.rows import iso
+
+    if isinstance(value, bytes):
+        return value.hex()
+    if type.kind is Kind.TIME and isinstance(value, int):
+        return iso(value)
+    if type.kind is Kind.DURATION and isinstance(value, int | float):
+        return f"{value / (MS if type.unit == 'ms' else NS_PER_S):.9f}".rstrip("0").rstrip(".")
+    return str(safe_cell(value)) if isinstance(value, str) else str(value)
 
 
 def check_names(names: Iterable[str]) -> None:

@@ -21,13 +21,13 @@ from sniff.cli.tables import Cell, plain_cell
 from sniff.engine.capture import Capture
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import Session
-from sniff.engine.verdict_join import Settled
+from sniff.engine.verdict_join import Settled, Wanted
 from sniff.filter import Filter
-from sniff.filter.choosing import chosen
 from sniff.formats.parquet import ParquetWriter
 
 if TYPE_CHECKING:
     from dissectors.columns import Times
+    from sniff.cli.filtering import FieldCells
     from sniff.engine.column_join import SettledRows
 
 
@@ -72,15 +72,17 @@ def _show_all(args: argparse.Namespace, table: ParquetWriter | None) -> int:
     left = args.count
     for path, capture in arguments.open_captures(args.files):
         session = arguments.settings_of(args, capture.session, path)
-        dissector = dissector_for(session)
         devices = arguments.noted_devices(args, session)
         wanted = filtering.filter_of(args, capture, session, devices)
         if args.explain:
             print(wanted.explain())
             continue
         spoken = devices if not args.table or "text" in args.names else None
-        if args.reference or spoken or args.tree or args.hex or args.fields:
-            left = _show(args, _settled(args, capture, session, spoken, wanted), session, dissector, left, table)
+        ours = filtering.FieldCells(args.names, session, devices)
+        if args.reference or spoken or ours or args.tree or args.hex or args.fields:
+            left = _show(
+                args, _settled(args, capture, session, spoken, ours.noting(wanted)), session, ours, left, table
+            )
         else:
             left = _show_in_bulk(args, capture, session, wanted, left, table)
         writing.say_incomplete(path, capture)
@@ -90,7 +92,7 @@ def _show_all(args: argparse.Namespace, table: ParquetWriter | None) -> int:
 
 
 def _settled(
-    args: argparse.Namespace, capture: Capture, session: Session, devices: Devices | None, wanted: Filter
+    args: argparse.Namespace, capture: Capture, session: Session, devices: Devices | None, wanted: Wanted
 ) -> Iterator[Settled]:
     watched = Watched(capture, prints=True)
     if args.reference:
@@ -102,11 +104,12 @@ def _show(
     args: argparse.Namespace,
     items: Iterable[Settled],
     session: Session,
-    dissector: Dissector,
+    ours: FieldCells,
     left: int | None,
     table: ParquetWriter | None,
 ) -> int | None:
     colour = arguments.colour()
+    dissector = dissector_for(session)
     writer = csv.writer(sys.stdout, delimiter="," if args.csv else "\t", lineterminator="\n", quoting=csv.QUOTE_MINIMAL)
     for item in items if left != 0 else ():
         left = None if left is None else left - 1
@@ -115,7 +118,7 @@ def _show(
         elif args.csv:
             writer.writerow([plain_cell(value) for value in rows.to_json(item, dissector, session).values()])
         elif args.table:
-            writer.writerow(_cells(item, args.names, dissector, session))
+            writer.writerow(_cells(item, args.names, dissector, session, ours))
         elif args.json:
             print(rows.json_line(item, dissector, session, args.fields))
         else:
@@ -137,6 +140,8 @@ def _show_in_bulk(
     left: int | None,
     table: ParquetWriter | None,
 ) -> int | None:
+    from sniff.filter.choosing import chosen
+
     listed = _listed(args, dissector_for(session), session, table)
     for settled_rows in settled_columns(Watched(capture, prints=True), session) if left != 0 else ():
         places = chosen(settled_rows, wanted)
@@ -178,11 +183,13 @@ def _listed(
     return lambda some, places: standard_streams.write(made.lines(some, places))
 
 
-def _cells(item: Settled, names: list[str], dissector: Dissector, session: Session) -> list[Cell]:
+def _cells(item: Settled, names: list[str], dissector: Dissector, session: Session, ours: FieldCells) -> list[Cell]:
     fields = rows.fields_of(item, dissector)
     if any(name not in fields for name in names):
         fields = {**rows.to_json(item, dissector, session), **fields}
-    return [plain_cell(fields.get(name)) for name in names]
+    return [
+        ours.cell(name, item.row, item.transaction) if name in ours else plain_cell(fields.get(name)) for name in names
+    ]
 
 
 def _tree(item: Settled, dissector: Dissector) -> str:

@@ -31,7 +31,7 @@ class Closed(Protocol):
     """What became of rows: `engine.closings.Closings`, or the same of rows that are settled."""
 
     @property
-    def verdict(self) -> Small:
+    def verdict(self) -> npt.NDArray[Any]:
         """Place in VERDICTS; -1 where nothing is known."""
         ...
 

@@ -68,6 +68,11 @@ def compile_filter(text: str, dissector: Dissector, scope: Scope | None = None) 
     return Filter(text, root, frozenset(compiler.names), compiler.begins)
 
 
+def field_of(name: str, dissector: Dissector, scope: Scope | None = None) -> Expression:
+    """What rows have of a name. Raises FilterError."""
+    return _Compiler(dissector, scope or Scope()).field(name)
+
+
 class _Compiler:
     def __init__(self, dissector: Dissector, scope: Scope) -> None:
         self.dissector = dissector
@@ -110,6 +115,9 @@ class _Compiler:
         if isinstance(value, Slice):
             expression = self._value(value)
             return leaf(expression, There(), False, f"{expression.words} is there")
+        if isinstance(value, Arithmetic) and value.operator == "&":
+            expression = self._value(value)
+            return leaf(expression, NotZero(), False, f"any bit of {expression.words}")
         column = value.column
         raise FilterError("expected a comparison: this is a value alone", column)
 
@@ -387,6 +395,10 @@ class _Compiler:
                 return FieldType(Kind.ANY)
         return None
 
+    def field(self, name: str) -> Expression:
+        """A field by its name."""
+        return self._field(Word(name, 0))
+
     def _field(self, word: Word) -> Expression:
         name = fields.ALIASES.get(word.text, word.text)
         type = self._type(name)
@@ -424,7 +436,7 @@ class _Compiler:
     def _of_protocol(self, name: str, type: FieldType) -> Expression:
         self.names.add(name)
         own = fields.types_of(self.dissector)
-        if name not in own and not (not own and name.startswith(self.dissector.prefixes)):
+        if own and name not in own:
             return Expression(name, type, lambda row, tx: (), nowhere)
         columns = None
         if type.octet is not None:

@@ -312,7 +312,7 @@ def known_names(dissector: Dissector) -> list[str]:
 
 
 def layers(dissector: Dissector) -> dict[str, str]:
-    """Names of what a frame may carry ("modbus", "bacnet"), and how the names of its fields begin."""
+    """Names of what a frame may carry, and how the names of its fields begin."""
     known = {one.name for one in protocols(dissector)}
     prefixes = [prefix for one in protocols(dissector) for prefix in one.prefixes]
     return {prefix[:-1]: prefix for prefix in prefixes if prefix[:-1] not in known}

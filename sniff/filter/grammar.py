@@ -61,7 +61,9 @@ _LEXER = re.compile(
     r'|(?P<text>"(?:[^"\\]|\\.)*")'
     r"|(?P<word>[A-Za-z0-9_](?:[A-Za-z0-9_:]|-(?=[A-Za-z0-9_])|\.(?!\.))*))"
 )
-_PART = re.compile(r"\s*(?:(?P<at>-?\d+)|(?P<first>-?\d+)?:(?P<length>\d+)?|(?P<from>\d+)-(?P<to>\d+))\s*")
+_PART = re.compile(
+    r"\s*(?:(?P<at>-?\d{1,9})|(?P<first>-?\d{1,9})?:(?P<length>\d{1,9})?|(?P<from>\d{1,9})-(?P<to>\d{1,9}))\s*"
+)
 
 Node = Value | Test
 _Reading = Callable[[], Node]
@@ -196,6 +198,8 @@ class _Parser:
         while not self._is("}"):
             if items:
                 self._take(",")
+            if self._now.kind == "end":
+                raise FilterError("expected } at the end of the set" if items else "expected a value", self._now.column)
             low = self._value_after("in")
             items.append((low, self._value_after("..") if self._take("..") else None))
         if not items:
@@ -342,7 +346,7 @@ class _Parser:
         return found if isinstance(found, _TESTS) else Present(found, found.column)
 
 
-_BEFORE_VALUES = frozenset(("contains", "matches", "~", "in", "{", "..", "+", "-", "*", "/", "%", "&"))
+_BEFORE_VALUES = frozenset((",", "contains", "matches", "~", "in", "{", "..", "+", "-", "*", "/", "%", "&"))
 
 
 def _spans(token: _Token) -> tuple[Span, ...]:

@@ -13,6 +13,8 @@ from textual.timer import Timer
 
 from sniff.bus.feed import Feed, FeedStatus
 from sniff.bus.rows import Store
+from sniff.config import ConfigError
+from sniff.config import load as load_config
 from sniff.filter import FilterError
 from sniff.tui.analyzer import Analyzer
 from sniff.tui.header import StatusHeader, why_ended
@@ -90,6 +92,10 @@ class SnifferApp(Analyzer):
 
     def on_mount(self) -> None:
         """Start to poll."""
+        try:
+            self.viewing.colour_rules(load_config().colours)
+        except (ConfigError, FilterError) as error:
+            self.notify(plain(error), severity="error", markup=False)
         self._worker = self.set_interval(WORK_SECONDS, self._work, pause=True)
         self.set_interval(POLL_SECONDS, self.poll)
         self.poll()

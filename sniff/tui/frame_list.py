@@ -81,6 +81,8 @@ class FrameList(StoreList):
         event = row.event
         transaction = self.store.transaction(row)
         style = "doubt" if not isinstance(event, Frame) else "" if event.ok else "bad"
+        if self.viewing.colours and not style:
+            style = self.viewing.colour_of(row, transaction)
         source, destination = self._addresses(row)
         answers = transaction is not None and (transaction.response in (number, None))
         return {

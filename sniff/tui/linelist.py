@@ -19,6 +19,7 @@ from textual.message import Message
 from textual.scroll_view import ScrollView
 from textual.strip import Strip
 
+from sniff.config import COLOURS
 from sniff.tui.analyzer import analyzer
 from sniff.tui.columns import Cell, Column, pieces
 from sniff.tui.index import Index
@@ -46,6 +47,7 @@ class LineList(ScrollView, can_focus=True, inherit_bindings=False):
         "line-list--dim",
         "line-list--linked",
         "line-list--mark",
+        *(f"line-list--{colour}" for colour in COLOURS),
     }
 
     class Moved(Message):

@@ -13,12 +13,29 @@ from textual.message import Message
 from textual.suggester import Suggester
 from textual.widgets import Input, Label
 
+from sniff.filter.completion import Completion
 from sniff.tui.plain import plain
 
 Check = Callable[[str], str]
 """Gives what is wrong with a text, an empty string when nothing is."""
 
+Complete = Callable[[str], Sequence[Completion]]
+"""Gives the ways in which a filter may go on."""
+MOST_OFFERED = 8
+
 _LAST_WORD = re.compile(r"[A-Za-z_][\w.]*$")
+
+
+class FilterSuggester(Suggester):
+    """Completes a filter: the first way to go on (tab or → takes it)."""
+
+    def __init__(self, complete: Complete) -> None:
+        super().__init__(use_cache=False, case_sensitive=True)
+        self.complete = complete
+
+    async def get_suggestion(self, value: str) -> str | None:
+        """The whole text as it may go on, None when nothing fits; only what begins as it was typed."""
+        return next((one.text for one in self.complete(value) if value and one.text.startswith(value)), None)
 
 
 class WordSuggester(Suggester):
@@ -53,6 +70,8 @@ class Prompt(Vertical):
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("escape", "cancel", "cancel", tooltip="leave everything as it was"),
         Binding("tab", "complete", "complete", tooltip="take the completion shown"),
+        Binding("up", "before(-1)", "before", tooltip="what was asked for before", show=False),
+        Binding("down", "before(1)", "before", tooltip="what was asked for after it", show=False),
     ]
 
     class Answered(Message):
@@ -70,18 +89,32 @@ class Prompt(Vertical):
         super().__init__()
         self.purpose = ""
         self._check: Check = lambda text: ""
+        self._complete: Complete | None = None
+        self._before: Sequence[str] = ()
+        self._at = 0
 
     def compose(self) -> ComposeResult:
         """A line to type in and a line that judges it."""
         yield PromptField(compact=True, select_on_focus=False)
         yield Label(id="validity", markup=False)
 
-    def ask(self, purpose: str, text: str, hint: str, check: Check, words: Sequence[str] = ()) -> None:
-        """Open with a text to edit; `hint` is shown while it is empty."""
+    def ask(
+        self,
+        purpose: str,
+        text: str,
+        hint: str,
+        check: Check,
+        words: Sequence[str] = (),
+        complete: Complete | None = None,
+        before: Sequence[str] = (),
+    ) -> None:
+        """Open with a text to edit; `hint` is shown while it is empty. `complete`: ways in which a filter may go on.
+        `before`: what was answered earlier, the latest last."""
         self.purpose = purpose
-        self._check = check
+        self._check, self._complete = check, complete
+        self._before, self._at = before, len(before)
         field = self.query_one(Input)
-        field.suggester = WordSuggester(words) if words else None
+        field.suggester = FilterSuggester(complete) if complete else WordSuggester(words) if words else None
         field.placeholder = hint
         field.value = text
         field.cursor_position = len(text)
@@ -104,9 +137,26 @@ class Prompt(Vertical):
         verdict = f"invalid: {wrong}" if wrong else "valid" if text.strip() else "empty: everything is shown"
         if self.purpose != "filter" and not text.strip():
             verdict = ""
+        if self._complete is not None:
+            verdict = f"{verdict}{self._ways(text)}"
         self.query_one("#validity", Label).update(plain(verdict))
         self.set_class(bool(wrong), "invalid")
         return wrong
+
+    def _ways(self, text: str) -> str:
+        """How it may go on, with how many rows have a value."""
+        assert self._complete is not None
+        ways = self._complete(text)[:MOST_OFFERED] if text else ()
+        offered = [one.word if one.rows is None else f"{one.word} ×{one.rows}" for one in ways]
+        return f"    {'  '.join(offered)}" if offered else ""
+
+    def action_before(self, step: int) -> None:
+        """An earlier answer, or the one after it."""
+        if self._before:
+            self._at = min(max(0, self._at + step), len(self._before))
+            field = self.query_one(Input)
+            field.value = self._before[self._at] if self._at < len(self._before) else ""
+            field.cursor_position = len(field.value)
 
     def on_input_submitted(self, event: Input.Submitted) -> None:
         """Send the answer when it can be read; stay open when not."""

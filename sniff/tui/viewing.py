@@ -3,13 +3,24 @@
 from __future__ import annotations
 
 from bisect import bisect_right, insort
+from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from dissectors.findings import Finding
+from dissectors.tracker import Transaction
 from sniff.bus.row_masks import RowMasks
 from sniff.bus.rows import Store
-from sniff.filter import Filter, Scope, compile_filter
+from sniff.engine.engine import Row
+from sniff.filter import Filter, FilterError, Scope, compile_filter
+from sniff.filter.compiling import field_of
+from sniff.filter.completion import shown_value
 from sniff.tui.times import TimeMode
+
+COUNTED = 2000
+"""Rows around the cursor whose values are counted."""
+MOST_FILTERS = 50
+"""Filters that are remembered."""
 
 
 @dataclass(slots=True)
@@ -26,6 +37,9 @@ class Viewing:
     masks: RowMasks | None = None  # the same for many rows at once, where columns say something of it
     filter_version: int = 0  # changes with the filter, so that lists know when to begin anew
     marks: list[int] = field(default_factory=list)  # row numbers, ascending
+    filters: list[str] = field(default_factory=list)  # that were set, the latest last
+    search: str = ""  # what was looked for last
+    colours: list[tuple[str, Filter]] = field(default_factory=list)  # rows that a filter accepts have its colour
     _frozen: tuple[int, int] | None = None  # last row and last closed transaction that are shown
     _found: tuple[Finding, ...] = ()  # when it was frozen
 
@@ -66,10 +80,34 @@ class Viewing:
         self.masks = RowMasks(self.store.kept, accepts) if accepts is not None and accepts.in_columns else None
         self.filter = text
         self.filter_version += 1
+        if text:
+            self.filters = [*(one for one in self.filters if one != text), text][-MOST_FILTERS:]
 
     def compiled(self, text: str) -> Filter:
         """A filter for these rows. Raises FilterError."""
         return compile_filter(text, self.store.dissector, self._scope(text))
+
+    def colour_rules(self, colours: Mapping[str, str]) -> None:
+        """Take the filters by colour. Raises FilterError."""
+        self.colours = [(colour, self.compiled(text)) for colour, text in colours.items()]
+
+    def colour_of(self, row: Row, transaction: Transaction | None) -> str:
+        """The colour of a row; "" for none."""
+        return next((colour for colour, accepts in self.colours if accepts(row, transaction)), "")
+
+    def counts(self, name: str) -> list[tuple[str, int]]:
+        """Values of a field and how many of the rows around the cursor have each, the most frequent first."""
+        try:
+            field_ = field_of(name, self.store.dissector, self._scope(name))
+        except FilterError:
+            return []
+        first = max(self.store.first_no, self.row - COUNTED // 2)
+        counted: Counter[str] = Counter()
+        for no in range(first, min(first + COUNTED, self.last_row + 1)):
+            row = self.store.by_no(no)
+            if row is not None:
+                counted.update({shown_value(value, field_) for value in field_.get(row, self.store.transaction(row))})
+        return counted.most_common(MOST_FILTERS)
 
     def _scope(self, text: str) -> Scope:
         store = self.store

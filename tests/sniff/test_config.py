@@ -58,3 +58,27 @@ def test_nesting_without_end_is_a_mistake(tmp_path: Path) -> None:
     path.write_text("a = " + "[" * 20_000)
     with pytest.raises(ConfigError, match=r"sniff485\.toml"):
         parse(path)
+
+
+def test_filters_by_name_and_colour(tmp_path: Path) -> None:
+    path = write(tmp_path, '[filters]\nslow = "latency_ms > 50ms"\n\n[colours]\nmagenta = "kind contains write"\n')
+    config = parse(path)
+    assert config.filters == {"slow": "latency_ms > 50ms"}
+    assert config.colours == {"magenta": "kind contains write"}
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        (
+            '[filters]\nslow = "latency > 50"\n',
+            "[filters] slow: unknown name 'latency' (did you mean 'latency_ms'?",
+        ),
+        ('[colours]\nred = "ok == maybe"\n', ":2: [colours] red: ok is true or false"),
+        ('[colours]\nmagneta = "ok"\n', "did you mean 'magenta'?"),
+    ],
+)
+def test_a_wrong_filter_is_named_with_its_place(tmp_path: Path, text: str, expected: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        parse(write(tmp_path, text))
+    assert expected in str(caught.value)

@@ -8,8 +8,9 @@ from typing import ClassVar
 
 from textual.binding import Binding, BindingType
 
+from sniff.config import FILE, ConfigError, load
 from sniff.filter import FilterError
-from sniff.filter.fields import known_names
+from sniff.filter.completion import Completion, completions
 from sniff.tui.analyzer import analyzer
 from sniff.tui.filter_line import FilterLine
 from sniff.tui.index import Index, Known
@@ -33,6 +34,7 @@ class ListingScreen(ViewScreen):
     THINGS: ClassVar[str] = "rows"
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("slash", "filter", "filter", tooltip="filter: show only what an expression accepts"),
+        Binding("F", "saved", "saved", tooltip="a filter of the configuration by its name", show=False),
         Binding("f", "app.follow", "follow", tooltip="follow the newest row, or stay"),
         Binding("t", "app.time", "time", tooltip="time of day, since the first row, or since the row before"),
         Binding("d", "data", "data", tooltip="data only: hide tokens and polls, or show them again", show=False),
@@ -44,6 +46,7 @@ class ListingScreen(ViewScreen):
     def __init__(self) -> None:
         super().__init__()
         self._filter_version = 0
+        self._saved: dict[str, str] = {}
         self._closed_seen = 0  # closed transactions that the index took into account
         self._lines_seen = 0  # and the last line then
 
@@ -126,7 +129,37 @@ class ListingScreen(ViewScreen):
     def action_filter(self) -> None:
         """Ask for a filter."""
         hint = 'addr == 3 && verdict == no-response      kind contains "write"'
-        self.query_one(Prompt).ask("filter", self.viewing.filter, hint, self._wrong, known_names(self.store.dissector))
+        self.query_one(Prompt).ask(
+            "filter", self.viewing.filter, hint, self._wrong, (), self._ways, self.viewing.filters
+        )
+
+    def _ways(self, text: str) -> list[Completion]:
+        return completions(text, self.store.dissector, self.viewing.counts)
+
+    def action_saved(self) -> None:
+        """Ask for a filter of the configuration by its name."""
+        try:
+            self._saved = dict(load().filters)
+        except ConfigError as error:
+            self.notify(str(error), severity="error", markup=False)
+            return
+        if not self._saved:
+            self.notify(f"no filter has a name: write [filters] into {FILE}", timeout=4, markup=False)
+            return
+        hint = "   ".join(f"{name}: {text}" for name, text in self._saved.items())
+        self.query_one(Prompt).ask("saved filter", "", hint, self._not_saved, tuple(self._saved))
+
+    def _not_saved(self, text: str) -> str:
+        if not text.strip() or text.strip() in self._saved:
+            return ""
+        return f"no filter of that name: {', '.join(self._saved)}"
+
+    def on_prompt_answered(self, message: Prompt.Answered) -> None:
+        """Set the filter of that name."""
+        if message.purpose == "saved filter":
+            message.stop()
+            if message.text.strip():
+                analyzer(self).filter(self._saved[message.text.strip()])
 
     def action_data(self) -> None:
         """Hide what only keeps a token-passing bus going, or show it again."""

@@ -43,7 +43,7 @@ def test_validity_is_said_while_typing(look: Any, busy_bus: Any) -> None:
 
 def test_an_invalid_filter_is_not_taken(look: Any, busy_bus: Any) -> None:
     async def script(see: Any) -> None:
-        await filter_by(see, "dst === 1")
+        await filter_by(see, "dst = 1")
         assert see.app.screen.query_one(Prompt).is_open
         assert "invalid: " in see.text()
         assert "column" in see.text()
@@ -210,3 +210,85 @@ def test_data_only_hides_tokens_and_polls(look: Any, make_bus: Any) -> None:
         assert shown(see) == [1, 2, 3, 4, 5, 6]
 
     look(bus.store, script)
+
+
+def test_what_may_come_next_is_offered(look: Any, busy_bus: Any) -> None:
+    """Fields, then operators, then values with how many rows have them."""
+
+    async def script(see: Any) -> None:
+        await see.press("slash")
+        await see.type("dst ")
+        assert "==  !=  <" in see.text()
+        await see.type("== ")
+        assert "1 ×3" in see.text()
+        await see.type("1 ")
+        assert "&&  ||" in see.text()
+        await see.press("enter")
+        assert see.app.viewing.filters == ["dst == 1"]
+        await see.press("escape")
+        await see.press("slash")
+        await see.press("up")
+        assert "dst == 1" in see.text()
+
+    look(busy_bus.store, script)
+
+
+def test_find_next_and_before(look: Any, busy_bus: Any) -> None:
+    async def script(see: Any) -> None:
+        await see.press("home")
+        await see.press("n")
+        await see.type("noise")
+        await see.press("enter")
+        first = see.main.cursor
+        assert "noise" in see.app.store.text(see.app.store.by_no(first))
+        await see.press("home")
+        await see.press("n")
+        assert see.main.cursor == first
+        await see.press("end")
+        await see.press("N")
+        assert see.main.cursor == first
+
+    look(busy_bus.store, script)
+
+
+def test_what_is_shown_is_saved(look: Any, busy_bus: Any, tmp_path: Any) -> None:
+    target = tmp_path / "shown.cap.txt"
+
+    async def script(see: Any) -> None:
+        await filter_by(see, "dst == 1")
+        await see.press("w")
+        await see.type(str(target))
+        await see.press("enter")
+
+    look(busy_bus.store, script)
+    assert sum(line[:1].isdigit() or line[:1] == "+" for line in target.read_text().splitlines()) >= 3
+
+
+def test_what_is_alike_is_shown_with_one_key(look: Any, busy_bus: Any) -> None:
+    async def script(see: Any) -> None:
+        await see.press("home")
+        await see.press("equals_sign")
+        assert see.app.viewing.filter.startswith("kind == read && addr == ")
+
+    look(busy_bus.store, script)
+
+
+def test_saved_filters_by_name_and_colours(look: Any, busy_bus: Any, tmp_path: Any, monkeypatch: Any) -> None:
+    (tmp_path / "sniff485.toml").write_text('[filters]\nfirst = "dst == 1"\n[colours]\nmagenta = "dst == 1"\n')
+    monkeypatch.chdir(tmp_path)
+
+    async def script(see: Any) -> None:
+        await see.press("F")
+        await see.type("frist")
+        await see.press("enter")
+        assert "no filter of that name: first" in see.text()
+        await see.press("escape")
+        await see.press("F")
+        await see.type("first")
+        await see.press("enter")
+        assert shown(see) == [1, 9, 11]
+        store = see.app.store
+        row = store.by_no(1)
+        assert see.app.viewing.colour_of(row, store.transaction(row)) == "magenta"
+
+    look(busy_bus.store, script)

@@ -75,7 +75,7 @@ def test_a_hostile_filter_is_only_text(look: Any, hostile: Store) -> None:
         see.app.filter('text contains "[red]"')
         await see.settle()
         assert 'filter: text contains "[red]"' in see.text()
-        see.app.filter("[red]\x1b")
+        see.app.filter("[red\x1b")
         await see.settle()
         assert all(line.isprintable() for line in see.lines())
         assert any("[" in notice for notice in see.notices())

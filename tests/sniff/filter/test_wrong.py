@@ -1,0 +1,113 @@
+"""What cannot be right is an error with its column, shows no row and ends with exit code 2."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from sniff.cli import main
+
+CAPTURE = str(Path(__file__).parents[3] / "captures" / "rtu-usual-faults.cap.txt")
+
+WRONG = (
+    ("dst = 3", "did you mean ==?"),
+    ("dst == foo", "is a station's address, 'foo' is none"),
+    ('dst > "abc"', "is a station's address"),
+    ("dst == 3ms", "is a station's address"),
+    ("ok == no", "they do not compare"),
+    ("ok == 2", "ok is 0 or 1"),
+    ("ok == maybe", "ok is true or false"),
+    ("ok > 0", "it has no order"),
+    ("kind == tokn", "did you mean 'token'?"),
+    ("kind == 3", "unknown kind '3'"),
+    ("kind > token", "have no order"),
+    ("verdict == lte", "did you mean 'late'?"),
+    ("verdict = late", "did you mean ==?"),
+    ('verdict == "no anser"', 'did you mean "no answer"?'),
+    ("role in {request, tokn}", "did you mean 'token'?"),
+    ("found == splitt", "did you mean 'split'?"),
+    ("damage == crc", "expected one of check"),
+    ("proto == modbus", "unknown proto 'modbus'"),
+    ("modbus.func_cod == 3", "did you mean 'modbus.func_code'?"),
+    ("mstp.sr == 2", "did you mean 'mstp.src'?"),
+    ("mstp.foo == 1", "unknown name 'mstp.foo'"),
+    ("bacapp.instance == 103", "did you mean 'bacapp.instance_number'?"),
+    ("tx.foo == 1", "unknown name 'tx.foo'"),
+    ("dts == 3", "did you mean 'dst'?"),
+    ("foo", "unknown name 'foo'"),
+    ('modbus.func_code == "Read Holding Register"', "did you mean"),
+    ("modbus.func_code == three", "unknown modbus.func_code 'three'"),
+    ('modbus.reference_num == "3"', "write 3 without quotes"),
+    ("modbus.reference_num == abc", "is a number, 'abc' is not"),
+    ("modbus.regval_uint16 contains 3", "contains asks texts and octets"),
+    ("modbus.regval_uint16 matches 3", "matches asks texts and octets"),
+    ("latency_ms > 5mss", "is a duration, '5mss' is none"),
+    ("latency_ms > fast", "is a duration"),
+    ("latency_ms == dst", "they do not compare"),
+    ("frame.time > 5", "is a time, '5' is none"),
+    ('frame.time >= "25:00"', "is a time"),
+    ('frame.time >= "2026-02-30"', "is a time"),
+    ("frame.time + frame.time > 5", "two times have no sum"),
+    ("addr == a", "is a station's address"),
+    ("hex contains 55:f", "compared with octets"),
+    ("hex contains 030", "ends in half an octet"),
+    ('hex contains "zz"', "compared with hex digits"),
+    ("frame.octets == xyz", "compared with octets"),
+    ("frame.octets[2:2 == 03", "did you mean [2:2] with its closing ]?"),
+    ("frame.octets[a] == 03", "unreadable slice"),
+    ("frame.octets[3-1] == 03", "ends before it begins"),
+    ("frame.octets[0:0] == 03", "is empty"),
+    ("dst[0] == 3", "has no octets"),
+    ("dst in 3", "expected { after in"),
+    ("dst in {}", "expected a value in the set"),
+    ("dst in {1..}", "expected a value"),
+    ("dst in {5..1}", "the range ends before it begins"),
+    ("dst in {1, 2", "expected } at the end of the set"),
+    ("dst == ", "expected a value"),
+    ("dst == 3 4", "expected && or ||"),
+    ("(dst == 3", "expected )"),
+    ("dst == 3 &&", "expected a name"),
+    ("&& dst == 3", "expected a name"),
+    ("dst == 3 | src == 2", "did you mean ||?"),
+    ("dst + 1", "a value alone"),
+    ("dst + kind == 3", "takes numbers; kind is a text"),
+    ("lenn(kind) > 3", "unknown function 'lenn'"),
+    ("len(dst) > 3", "takes a text; dst is a station"),
+    ("abs(kind) > 3", "takes a number; kind is a text"),
+    ("len(kind, text) > 3", "takes one value"),
+    ('kind matches "("', "regular expression"),
+    ("3 == 4", "expected a field, not 3"),
+    ("finding == XX001", "unknown finding 'XX001'"),
+    ("line.error == brake", "did you mean 'break'?"),
+    ('kind == "token', 'without its closing "'),
+    ("dst == 3 # x", "unexpected '#'"),
+    ("error == 5", 'write "5" in quotes'),
+)
+
+
+@pytest.mark.parametrize(("text", "said"), WRONG)
+def test_it_says_what_is_wrong(text: str, said: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["show", CAPTURE, "-Y", text]) == 2
+    shown = capsys.readouterr()
+    assert shown.out == ""
+    assert said in shown.err
+    assert " at column " in shown.err
+
+
+@pytest.mark.parametrize("command", ["info", "stats", "check", "points", "diff", "snapshot", "show"])
+def test_it_is_wrong_everywhere(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    files = [CAPTURE, CAPTURE] if command == "diff" else [CAPTURE]
+    assert main([command, *files, "-Y", "dts == 3"]) == 2
+    assert "did you mean 'dst'?" in capsys.readouterr().err
+
+
+def test_many_are_wrong() -> None:
+    assert len(WRONG) >= 60
+
+
+def test_fields_go_with_their_table(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["show", CAPTURE, "-e", "kind"]) == 2
+    assert "-T fields" in capsys.readouterr().err
+    assert main(["show", CAPTURE, "-T", "fields", "-e", "modbus.func_cod"]) == 2
+    assert "did you mean 'modbus.func_code'?" in capsys.readouterr().err
