@@ -16,7 +16,7 @@ from dissectors.bacnet.ring_observer import RingObserver
 from dissectors.bacnet.ring_window import ring_window
 from dissectors.bacnet.rules import RULES
 from dissectors.bacnet.segmentation import Reassembler
-from dissectors.bacnet.summary import text
+from dissectors.bacnet.summary import meant, text
 from dissectors.bacnet.tracker import MstpTracker
 from dissectors.frame import Frame
 from dissectors.manifest import Dissector, PacketFile, on_first_use
@@ -65,6 +65,7 @@ MSTP = Dissector(
     peek=peek,
     tracker=MstpTracker,
     text=text,
+    meant=meant,
     fields=fields,
     packet=packet,
     default_line="38400,8N1",

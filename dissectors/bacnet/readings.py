@@ -129,7 +129,7 @@ def _reading(
     raw, shown = _shown(value)
     if shown is None:
         return None
-    return Reading(space, int(number), raw, shown, how, part, station=station)
+    return Reading(space, int(number), raw, shown, how, part, station=station, words=_words(value, shown))
 
 
 def _shown(value: Any) -> tuple[int | None, int | float | str | None]:
@@ -147,6 +147,15 @@ def _shown(value: Any) -> tuple[int | None, int | float | str | None]:
     if isinstance(value, BitString | ObjectId | Date | Time):
         return None, show(value)
     return None, None
+
+
+def _words(value: Any, shown: int | float | str) -> str:
+    """The value as the standard names it: "hertz", "2024-04-05 Thursday (it is a Friday)"; empty for plain numbers and
+    for texts of the device."""
+    if isinstance(value, Enumerated):
+        words = show(value)
+        return "" if words.endswith(str(value.value)) else words
+    return shown if isinstance(shown, str) and not isinstance(value, str) else ""
 
 
 def _shortest(value: float) -> float:

@@ -10,10 +10,11 @@ from dissectors.modbus.envelope import ASCII_NAME, RTU_NAME, make_ascii, make_rt
 from dissectors.modbus.fields import fields
 from dissectors.modbus.framing import RtuFramer
 from dissectors.modbus.header import peek_ascii, peek_rtu
+from dissectors.modbus.places import place, spans
 from dissectors.modbus.readings import readings, refusal
 from dissectors.modbus.renamer import AsciiRenamer, RtuRenamer
 from dissectors.modbus.rules import RULES
-from dissectors.modbus.text import text
+from dissectors.modbus.text import meant, text
 from dissectors.modbus.tracker import ModbusTracker
 
 __all__ = [
@@ -62,6 +63,9 @@ RTU = Dissector(
     peek=peek_rtu,
     tracker=ModbusTracker,
     text=text,
+    meant=meant,
+    place=place,
+    spans=spans,
     fields=fields,
     packet=packet,
     default_line="19200,8E1",
@@ -88,6 +92,9 @@ ASCII = Dissector(
     peek=peek_ascii,
     tracker=ascii_tracker,
     text=text,
+    meant=meant,
+    place=place,
+    spans=spans,
     fields=fields,
     packet=packet,
     default_line="19200,7E1",

@@ -13,7 +13,7 @@ from dissectors.n2.interpretation import Interpretation, interpret
 from dissectors.n2.readings import readings, refusal
 from dissectors.n2.renamer import N2Renamer
 from dissectors.n2.rules import RULES
-from dissectors.n2.text import text
+from dissectors.n2.text import meant, text
 from dissectors.n2.tracker import N2Tracker
 
 __all__ = [
@@ -51,6 +51,7 @@ N2 = Dissector(
     peek=peek,
     tracker=N2Tracker,
     text=text,
+    meant=meant,
     fields=fields,
     packet=packet,
     default_line="9600,8N1",

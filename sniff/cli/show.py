@@ -76,8 +76,9 @@ def _show_all(args: argparse.Namespace, table: ParquetWriter | None) -> int:
         dissector = dissector_for(session)
         devices = arguments.noted_devices(args, session)
         wanted = _filter(args, dissector)
-        spoken = devices if not args.table or "text" in args.names else None
-        if args.reference or spoken or args.tree or args.hex or args.fields:
+        named = args.tree or args.fields  # then every register is named, with a profile or without
+        spoken = devices if named or (devices and (not args.table or "text" in args.names)) else None
+        if args.reference or spoken or named or args.hex:
             left = _show(args, _settled(args, capture, session, spoken, wanted), session, dissector, left, table)
         else:
             left = _show_in_bulk(args, capture, session, wanted, left, table)
@@ -214,7 +215,7 @@ def _cell(value: object) -> str:
 
 
 def _tree(item: Settled, dissector: Dissector) -> str:
-    return "\n".join(_tree_lines(tree_of(dissector, item.row, item.transaction, rows.iso), "        "))
+    return "\n".join(_tree_lines(tree_of(dissector, item.row, item.transaction, rows.iso, item.meaning), "        "))
 
 
 def _tree_lines(fields: Iterable[Field], indent: str) -> Iterator[str]:
