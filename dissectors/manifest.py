@@ -18,7 +18,7 @@ from dissectors.framer import Framer
 from dissectors.line import Timing
 from dissectors.meaning import Meaning, PlaceName, Spans, plain_place
 from dissectors.pseudonyms import Renamer
-from dissectors.readings import Readings, Refusal
+from dissectors.readings import Asks, Readings, Refusal
 from dissectors.token_ring import TokenRing
 from dissectors.tracker import Tracker
 
@@ -62,7 +62,7 @@ class Dissector:
 
     `meant(frame, header, role, meaning)`: the same line with what the frame means to its device before the raw numbers;
     ask `line`, which does without where there is none. `place`: the place of a reading in words. `spans`: the octets of
-    readings in their frame.
+    readings in their frame. `asks`: the places that a request reads.
 
     `default_line`: what such a bus normally runs ("19200,8E1").
     `field_prefixes`: how the names in `fields` begin ("modbus."), so that filters know them; the protocol's name and a
@@ -92,6 +92,7 @@ class Dissector:
     meant: Callable[[Frame, Header, Role, Meaning], str] | None = None
     place: PlaceName = plain_place
     spans: Spans | None = None
+    asks: Asks | None = None
     default_line: str = "9600,8N1"
     field_prefixes: tuple[str, ...] = ()
     noun: str = "station"

@@ -60,7 +60,8 @@ class Meaning:
     """What is known of a frame besides its octets.
 
     `station`: whose values they are, None for all stations; `request`: what it answers, None where it is no answer or
-    nobody heard the question. `refused`: the maker's words for the exception code that it carries.
+    nobody heard the question. `refused`: the maker's words for the exception code that it carries. `asked`: the places
+    that a request reads.
     """
 
     station: int | None
@@ -68,6 +69,7 @@ class Meaning:
     readings: tuple[Reading, ...] = ()
     refused: str = ""
     request: Frame | None = None
+    asked: tuple[Reading, ...] = ()
 
     @property
     def who(self) -> str:
@@ -80,7 +82,29 @@ class Meaning:
         """What it says in one line: "status running, forward; output current 12.3 A"; empty without a profile."""
         if self.profile is None:
             return ""
-        return self.refused or say(self.profile, self.readings)
+        return self.refused or say(self.profile, self.readings) or self._question()
+
+    def _question(self) -> str:
+        """ "read status, fault, output frequency"; what the profile does not know is left out."""
+        if self.profile is None:
+            return ""
+        titles: list[str] = []
+        for one in self.asked:
+            entry = self.profile.at(one.space, one.address)
+            if entry is not None and not entry.reserved:
+                part = f" {one.part.replace('.', ' ')}" if one.part else ""
+                titles.append(said_title(entry).partition(";")[0] + part)
+        return f"read {', '.join(dict.fromkeys(titles))}" if titles else ""
+
+    def questions(self, place: PlaceName) -> Iterator[tuple[str, str]]:
+        """The places that are asked for, each with what is there."""
+        profile = self.profile
+        for one in self.asked:
+            entry = profile.at(one.space, one.address) if profile is not None else None
+            offset = 0 if profile is None else profile.address_offset
+            where = place(one, entry.number if entry is not None else "", offset)
+            title = "" if entry is None else "reserved" if entry.reserved else said_title(entry)
+            yield where, title
 
     @property
     def about(self) -> str:

@@ -46,5 +46,8 @@ Readings = Callable[[Frame | None, Frame | None], tuple[Reading, ...]]
 """(request, response) → readings; total. Without the response: what the request itself tells (a write, a report);
 with it, what is confirmed: nothing after an exception."""
 
+Asks = Callable[[Frame], tuple[Reading, ...]]
+"""frame → the places that it asks for, as readings without a value (`Dissector.asks`); total."""
+
 Refusal = Callable[[Frame], tuple[str, int] | None]
 """frame → the family of its codes ("modbus", "n2") and the code, when it refuses a request (`Dissector.refusal`)."""

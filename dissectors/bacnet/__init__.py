@@ -9,7 +9,7 @@ from dissectors.bacnet.fields import fields
 from dissectors.bacnet.findings import MstpFindings, judge
 from dissectors.bacnet.framing import MstpFramer
 from dissectors.bacnet.header import peek
-from dissectors.bacnet.readings import readings
+from dissectors.bacnet.readings import asks, readings
 from dissectors.bacnet.renamer import MstpRenamer
 from dissectors.bacnet.ring import Ring
 from dissectors.bacnet.ring_observer import RingObserver
@@ -66,6 +66,7 @@ MSTP = Dissector(
     tracker=MstpTracker,
     text=text,
     meant=meant,
+    asks=asks,
     fields=fields,
     packet=packet,
     default_line="38400,8N1",

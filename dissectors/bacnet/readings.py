@@ -40,6 +40,39 @@ def readings(request: Frame | None, response: Frame | None) -> tuple[Reading, ..
     return ()
 
 
+def asks(frame: Frame) -> tuple[Reading, ...]:
+    """See `dissectors.readings.Asks`."""
+    message = messages.read(frame) if frame.ok and len(frame.octets) > HEADER else None
+    spoken = message.spoken() if message is not None else None
+    if message is None or spoken is None or spoken[0].type != PduType.CONFIRMED_REQUEST:
+        return ()
+    apdu, parameters = spoken
+    if apdu.service not in (_READ, _READ_MULTIPLE):
+        return ()
+    decoded = messages.decode_parameters(apdu, parameters)
+    if decoded is None or decoded.error is not None:
+        return ()
+    return tuple(_asked(decoded.record, message.destination))
+
+
+def _asked(record: Record, station: int) -> Iterator[Reading]:
+    specs = record.get("list-of-read-access-specs")
+    if specs is None:
+        pairs = [(record.get("object-identifier"), record)]
+    else:
+        pairs = [(spec["object-identifier"], one) for spec in specs for one in spec["list-of-property-references"]]
+    for thing, one in pairs:
+        if isinstance(thing, ObjectId):
+            space, _, number = str(thing).partition(",")
+            part = _part_of(one, one.get("property-array-index"))
+            yield Reading(space, int(number), None, "", How.READ, part, station=station)
+
+
+def _part_of(record: Record, index: int | None) -> str:
+    which = record["property-identifier"]
+    return "" if which.value == _PRESENT_VALUE else str(which) + (f".{index}" if index is not None else "")
+
+
 def _told(message: Message) -> Iterator[Reading]:
     """What one frame tells by itself; total: a parameter that is not there ends it."""
     spoken = message.spoken()
@@ -124,8 +157,7 @@ def _reading(
     thing: ObjectId, record: Record, index: int | None, value: Any, how: How, station: int | None
 ) -> Reading | None:
     space, _, number = str(thing).partition(",")
-    which = record["property-identifier"]
-    part = "" if which.value == _PRESENT_VALUE else str(which) + (f".{index}" if index is not None else "")
+    part = _part_of(record, index)
     raw, shown = _shown(value)
     if shown is None:
         return None

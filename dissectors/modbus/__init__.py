@@ -11,7 +11,7 @@ from dissectors.modbus.fields import fields
 from dissectors.modbus.framing import RtuFramer
 from dissectors.modbus.header import peek_ascii, peek_rtu
 from dissectors.modbus.places import place, spans
-from dissectors.modbus.readings import readings, refusal
+from dissectors.modbus.readings import asks, readings, refusal
 from dissectors.modbus.renamer import AsciiRenamer, RtuRenamer
 from dissectors.modbus.rules import RULES
 from dissectors.modbus.text import meant, text
@@ -64,6 +64,7 @@ RTU = Dissector(
     tracker=ModbusTracker,
     text=text,
     meant=meant,
+    asks=asks,
     place=place,
     spans=spans,
     fields=fields,
@@ -93,6 +94,7 @@ ASCII = Dissector(
     tracker=ascii_tracker,
     text=text,
     meant=meant,
+    asks=asks,
     place=place,
     spans=spans,
     fields=fields,

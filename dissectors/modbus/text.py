@@ -44,7 +44,7 @@ def _line(frame: Frame, header: Header, role: Role, meaning: Meaning | None) -> 
     if said and code & EXCEPTION_BIT and code not in NO_EXCEPTIONS and len(octets) > 2:
         words = f"exception: {said} (code {octets[2]:02X}, {_asked(code)})"  # the maker's words, not the standard's
     elif said:
-        words = f"{said} — {words}"
+        words = f"{said} — {words.removeprefix('read ')}" if said.startswith("read ") else f"{said} — {words}"
     if role is Role.BROADCAST:
         words = f"broadcast: {words}"
     if frame.repair is not None and header.error:

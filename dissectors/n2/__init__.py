@@ -10,7 +10,7 @@ from dissectors.n2.findings import N2Findings
 from dissectors.n2.framing import N2Framer
 from dissectors.n2.header import peek
 from dissectors.n2.interpretation import Interpretation, interpret
-from dissectors.n2.readings import readings, refusal
+from dissectors.n2.readings import asks, readings, refusal
 from dissectors.n2.renamer import N2Renamer
 from dissectors.n2.rules import RULES
 from dissectors.n2.text import meant, text
@@ -52,6 +52,7 @@ N2 = Dissector(
     tracker=N2Tracker,
     text=text,
     meant=meant,
+    asks=asks,
     fields=fields,
     packet=packet,
     default_line="9600,8N1",

@@ -38,6 +38,17 @@ def readings(request: Frame | None, response: Frame | None) -> tuple[Reading, ..
     return tuple(map(_change, told.records))
 
 
+def asks(frame: Frame) -> tuple[Reading, ...]:
+    """See `dissectors.readings.Asks`."""
+    if not frame.ok or frame.octets[:1] != b">":
+        return ()
+    command = parse_command(frame.octets)
+    if command.type.kind != "read-attribute" or command.region is None or command.object is None:
+        return ()
+    part = _part(command.region, command.attribute)
+    return (Reading(region_name(command.region), command.object, None, "", How.READ, part),)
+
+
 def refusal(frame: Frame) -> tuple[str, int] | None:
     """The error code after N, 10 whether it came as 10 or 0A; None of any other frame."""
     code = error_code(frame.octets) if frame.octets[:1] == b"N" else ""

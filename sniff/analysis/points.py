@@ -16,7 +16,7 @@ from dissectors.manifest import Dissector
 from dissectors.meaning import Meaning
 from dissectors.profiles import Devices, Entry
 from dissectors.profiles.decoding import Quality, Value, decode
-from dissectors.readings import How
+from dissectors.readings import How, Reading
 from dissectors.tracker import Transaction, Verdict
 from sniff.engine.engine import Output, Row
 
@@ -185,13 +185,16 @@ def meaning_of(dissector: Dissector, devices: Devices, row: Row, request: Frame 
     else:
         station, readings, request = placement.destination, take(event, None), None
         station = None if placement.role is Role.BROADCAST else station
-    if readings and readings[0].station is not None:
-        station = readings[0].station
+    asked: tuple[Reading, ...] = ()
+    if not readings and placement.role is Role.REQUEST and dissector.asks is not None:
+        asked = dissector.asks(event)
+    for one in (*readings[:1], *asked[:1]):
+        station = station if one.station is None else one.station
     profile = devices.at(station)
     refusal = dissector.refusal
     refused = refusal(event) if profile is not None and refusal is not None and not readings else None
     words = profile.exception(*refused) if profile is not None and refused is not None else ""
-    return Meaning(station, profile, readings, words, request)
+    return Meaning(station, profile, readings, words, request, asked)
 
 
 @dataclass(slots=True)

@@ -49,6 +49,9 @@ def values_of(dissector: Dissector, frame: Frame, meaning: Meaning) -> tuple[Fie
         begin, end = span or (None, None)
         parts = tuple(Field(plain(name), plain(text), begin, end) for name, text in item.parts)
         lines.append(Field(plain(item.name), plain(item.text), begin, end, parts))
+    if not lines and meaning.asked:
+        asked = tuple(Field(plain(where), plain(title)) for where, title in meaning.questions(dissector.place))
+        return (Field(plain(meaning.who), f"is asked for {len(asked)}", None, None, asked),)
     if not lines:
         return ()
     count = f"{len(lines)} value{'s' if len(lines) != 1 else ''}"
