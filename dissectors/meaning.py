@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from dissectors.frame import Frame
 from dissectors.profiles.decoding import NO_BITS, Value, decode, number, said_title, say
 from dissectors.profiles.model import Entry, Profile
+from dissectors.profiles.properties import due_property
 from dissectors.readings import Reading
 
 Span = tuple[int, int]
@@ -93,7 +94,8 @@ class Meaning:
             entry = self.profile.at(one.space, one.address)
             if entry is not None and not entry.reserved:
                 part = f" {one.part.replace('.', ' ')}" if one.part else ""
-                titles.append(said_title(entry).partition(";")[0] + part)
+                lacks = " (this device has none)" if self.profile.lacks(one.space, one.part) else ""
+                titles.append(said_title(entry).partition(";")[0] + part + lacks)
         return f"read {', '.join(dict.fromkeys(titles))}" if titles else ""
 
     def questions(self, place: PlaceName) -> Iterator[tuple[str, str]]:
@@ -102,9 +104,11 @@ class Meaning:
         for one in self.asked:
             entry = profile.at(one.space, one.address) if profile is not None else None
             offset = 0 if profile is None else profile.address_offset
-            where = place(one, entry.number if entry is not None else "", offset)
-            title = "" if entry is None else "reserved" if entry.reserved else said_title(entry)
-            yield where, title
+            kept = profile is not None and profile.is_reserved(one.space, one.address)
+            where = place(one, _number(entry, one, offset, kept), offset)
+            title = "reserved" if kept else "" if entry is None else _titled(entry)
+            lacks = profile is not None and profile.lacks(one.space, one.part)
+            yield where, f"{title}; this device has no {one.part}" if lacks else title
 
     @property
     def about(self) -> str:
@@ -128,14 +132,17 @@ class Meaning:
         profile = self.profile
         entry = profile.at(reading.space, reading.address) if profile is not None else None
         offset = 0 if profile is None else profile.address_offset
-        where = place(reading, entry.number if entry is not None else "", offset)
+        kept = profile is not None and profile.is_reserved(reading.space, reading.address)
+        where = place(reading, _number(entry, reading, offset, kept), offset)
         raw = number(reading.value)
         if reading.words:
             raw = reading.words + (f" ({raw})" if reading.raw is not None else "")
         if entry is None:
-            return Item(reading, where, "", raw, values[0] if values else None)
+            return Item(reading, where, "reserved" if kept else "", raw, values[0] if values else None)
         if reading.part:
-            return Item(reading, where, said_title(entry), raw, values[0] if values else None)
+            due = due_property(entry, reading)
+            text = raw if due is None else f"{raw}; the manual has {due}"
+            return Item(reading, where, _titled(entry), text, values[0] if values else None)
         if entry.reserved:
             return Item(reading, where, "reserved", raw)
         if not values:  # the first register of the number stands for all of it
@@ -143,9 +150,22 @@ class Meaning:
             return Item(reading, where, said_title(word), raw)
         value, *bits = values
         doubt = " (?)" if entry.doubt or not reading.sure else ""
-        return Item(
-            reading, where, said_title(value.entry or entry), _text(value, raw) + doubt, value, _parts(entry, bits)
-        )
+        titled = _titled(value.entry or entry)
+        return Item(reading, where, titled, _text(value, raw) + doubt, value, _parts(entry, bits))
+
+
+def _number(entry: Entry | None, reading: Reading, offset: int, kept: bool) -> str:
+    """The manual's number of a place; where it has no entry, as its registers are counted."""
+    if entry is None:
+        return f"{reading.address - offset:04X}h" if offset or kept else ""
+    multiple = entry.kind.registers > 1 and reading.address != entry.address
+    return f"{reading.address - offset:04X}h" if multiple else entry.number
+
+
+def _titled(entry: Entry) -> str:
+    """What an entry is called, and in quotes what the device itself calls it, which an operator's client shows."""
+    title = said_title(entry)
+    return f'{title} "{entry.label}"' if entry.label and entry.label.lower() != title.lower() else title
 
 
 def _text(value: Value, raw: str) -> str:

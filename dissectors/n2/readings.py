@@ -70,8 +70,11 @@ def _commanded(command: Command) -> tuple[Reading, ...]:
     value = command.value
     if value is None or command.region is None or command.object is None:
         return ()
-    part = _part(command.region, command.attribute)
-    return (Reading(region_name(command.region), command.object, _raw(value), value, How.WRITE, part),)
+    space, part = region_name(command.region), _part(command.region, command.attribute)
+    if command.attribute is not None and command.region in _BINARY and not part and isinstance(value, int):
+        state = value >> _STATE_BIT & 1  # a write to the attribute writes the octet that a read of it answers
+        return (Reading(space, command.object, value, state, How.WRITE, sure=False),)
+    return (Reading(space, command.object, _raw(value), value, How.WRITE, part),)
 
 
 def _read(told: Interpretation) -> tuple[Reading, ...]:

@@ -107,8 +107,7 @@ def phrase(value: Value) -> str:
         return value.text
     if value.words == f"no {entry.title}":
         return value.words  # which says what of
-    title = said_title(entry).partition(";")[0]  # the name without its remark
-    return f"{title} {value.text}" + (" (?)" if entry.doubt or not value.reading.sure else "")
+    return f"{said_title(entry)} {value.text}" + (" (?)" if entry.doubt or not value.reading.sure else "")
 
 
 def said_title(entry: Entry) -> str:

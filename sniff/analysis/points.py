@@ -163,7 +163,11 @@ class PointReader:
         if readings[0].station is not None:
             station = readings[0].station
         confirmed = (response or request).frame.end
-        for value in decode(self.devices.at(station), readings):
+        profile = self.devices.at(station)
+        limits = profile.limits_on(self.dissector.profile_family) if profile is not None else None
+        for value in decode(profile, readings):
+            if limits is not None and value.how is How.WRITE and limits.ignores(transaction.kind, value.reading.space):
+                continue  # acknowledged, never done
             carrier = response if response is not None and value.how is How.READ else request
             yield Sample(confirmed, station, value, (response or carrier).no if value.how is How.REPORT else carrier.no)
 
