@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 from dissectors.frame import Frame
-from dissectors.profiles.decoding import NO_BITS, Value, decode, number, said_title, say
+from dissectors.profiles.decoding import NO_BITS, Value, brief_title, decode, number, said_title, say
 from dissectors.profiles.model import Entry, Profile
 from dissectors.profiles.properties import due_property
 from dissectors.readings import Reading
@@ -95,7 +95,7 @@ class Meaning:
             if entry is not None and not entry.reserved:
                 part = f" {one.part.replace('.', ' ')}" if one.part else ""
                 lacks = " (this device has none)" if self.profile.lacks(one.space, one.part) else ""
-                titles.append(said_title(entry).partition(";")[0] + part + lacks)
+                titles.append(brief_title(entry) + part + lacks)
         return f"read {', '.join(dict.fromkeys(titles))}" if titles else ""
 
     def questions(self, place: PlaceName) -> Iterator[tuple[str, str]]:

@@ -27,6 +27,8 @@ _EXACT = 1e15
 
 _FIRST = {"coil": 0, "discrete": 1, "input": 3, "holding": 4}
 _REGISTERS = ("holding", "input")
+_OWN_PARAMETER = re.compile(r" \((?:\d\d-\d\d|[0-9A-F]{4}h)\)$")
+"""Behind a title: which parameter of the device the thing is. A line has no room for it, the tree has."""
 _PARAMETER = re.compile(r"[A-Za-z]+2?\.\d+|\d\d-\d\d")
 
 
@@ -107,7 +109,12 @@ def phrase(value: Value) -> str:
         return value.text
     if value.words == f"no {entry.title}":
         return value.words  # which says what of
-    return f"{said_title(entry)} {value.text}" + (" (?)" if entry.doubt or not value.reading.sure else "")
+    return f"{brief_title(entry)} {value.text}" + (" (?)" if entry.doubt or not value.reading.sure else "")
+
+
+def brief_title(entry: Entry) -> str:
+    """The same for a line: without the parameter that stands behind it in brackets."""
+    return _OWN_PARAMETER.sub("", said_title(entry))
 
 
 def said_title(entry: Entry) -> str:

@@ -47,7 +47,7 @@ def values_of(dissector: Dissector, frame: Frame, meaning: Meaning) -> tuple[Fie
     lines = []
     for item, span in zip(meaning.items(dissector.place), spans, strict=False):
         begin, end = span or (None, None)
-        parts = tuple(Field(plain(name), plain(text), begin, end) for name, text in item.parts)
+        parts = tuple(Field(plain(name), plain(text)) for name, text in item.parts)
         lines.append(Field(plain(item.name), plain(item.text), begin, end, parts))
     if not lines and meaning.asked:
         asked = tuple(Field(plain(where), plain(title)) for where, title in meaning.questions(dissector.place))
