@@ -164,14 +164,20 @@ def bit_words(entry: Entry, raw: int) -> str:
 
 def _plain(reading: Reading) -> Value:
     name = plain_name(reading.space, reading.address) + (f"/{reading.part}" if reading.part else "")
-    return Value(name, reading.value, reading.raw, "", _quality(reading, reading.value), reading, words=reading.words)
+    quality = _quality(reading, reading.value)
+    return Value(name, reading.value, reading.raw, "", quality, reading, words=_spoken(reading))
+
+
+def _spoken(reading: Reading) -> str:
+    """The protocol's own words for a number; a text speaks for itself."""
+    return "" if isinstance(reading.value, str) else reading.words
 
 
 def _attribute(profile: Profile, reading: Reading) -> Value:
     """An attribute or property of a known object has the object's name."""
     entry = profile.at(reading.space, reading.address)
     base = plain_name(reading.space, reading.address) if entry is None or entry.reserved else entry.name
-    quality, words = _quality(reading, reading.value), reading.words
+    quality, words = _quality(reading, reading.value), _spoken(reading)
     return Value(f"{base}/{reading.part}", reading.value, reading.raw, "", quality, reading, words=words)
 
 
