@@ -176,7 +176,8 @@ class Limits:
 
     `frame`: octets; `response`: ns; `stations`: the lowest and the highest number that it can be given; `functions`:
     the codes that it knows; `unexecuted`: what it acknowledges and does not do, as the kind of the exchange, or that
-    and the kind of object: "release-override", "override:AI".
+    and the kind of object: "release-override", "override:AI". `read_only`: attributes and properties that can only be
+    read, with their kind of object: "AI:object-status".
     """
 
     frame: int | None = None
@@ -184,6 +185,7 @@ class Limits:
     stations: tuple[int, int] | None = None
     functions: frozenset[int] | None = None
     unexecuted: frozenset[str] = frozenset()
+    read_only: frozenset[str] = frozenset()
 
     def ignores(self, kind: str, space: str = "") -> bool:
         """Whether an exchange of that kind is acknowledged and not done."""

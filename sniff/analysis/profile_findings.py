@@ -256,6 +256,9 @@ class ProfileFindings:
             if profile.is_reserved(reading.space, reading.address):
                 place = entry.number if entry is not None else plain_name(reading.space, reading.address)
                 self._add("PR002", who, place, f"{reading.value} written to reserved {place}", frame.end, no)
+            elif f"{reading.space}:{reading.part}" in profile.limits_on(self._family).read_only:
+                place = f"{reading.space} {reading.address} {reading.part}"
+                self._add("PR003", who, place, f"{place} written, it is read only", frame.end, no)
             elif entry is not None and not entry.access.writable:
                 seen = f"{entry.title} ({entry.number}) written, it is read only"
                 self._add("PR003", who, entry.name, seen, frame.end, no)
