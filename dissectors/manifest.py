@@ -63,6 +63,7 @@ class Dissector:
     `meant(frame, header, role, meaning)`: the same line with what the frame means to its device before the raw numbers;
     ask `line`, which does without where there is none. `place`: the place of a reading in words. `spans`: the octets of
     readings in their frame. `asks`: the places that a request reads.
+    `answer_fields(request, answer)`: fields of an answer that only its request tells.
 
     `default_line`: what such a bus normally runs ("19200,8E1").
     `field_prefixes`: how the names in `fields` begin ("modbus."), so that filters know them; the protocol's name and a
@@ -93,6 +94,7 @@ class Dissector:
     place: PlaceName = plain_place
     spans: Spans | None = None
     asks: Asks | None = None
+    answer_fields: Callable[[Frame, Frame], dict[str, int | float | str]] | None = None
     default_line: str = "9600,8N1"
     field_prefixes: tuple[str, ...] = ()
     noun: str = "station"

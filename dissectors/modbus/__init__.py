@@ -7,7 +7,7 @@ from dissectors.line import Timing
 from dissectors.manifest import Dissector, PacketFile, on_first_use
 from dissectors.modbus.ascii_framing import AsciiFramer
 from dissectors.modbus.envelope import ASCII_NAME, RTU_NAME, make_ascii, make_rtu
-from dissectors.modbus.fields import fields
+from dissectors.modbus.fields import answer_fields, fields
 from dissectors.modbus.framing import RtuFramer
 from dissectors.modbus.header import peek_ascii, peek_rtu
 from dissectors.modbus.places import place, spans
@@ -65,6 +65,7 @@ RTU = Dissector(
     text=text,
     meant=meant,
     asks=asks,
+    answer_fields=answer_fields,
     place=place,
     spans=spans,
     fields=fields,
@@ -95,6 +96,7 @@ ASCII = Dissector(
     text=text,
     meant=meant,
     asks=asks,
+    answer_fields=answer_fields,
     place=place,
     spans=spans,
     fields=fields,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dissectors.frame import Frame
 from dissectors.manifest import Dissector, on_first_use
 from dissectors.n2.envelope import make_answer, make_command
-from dissectors.n2.fields import fields
+from dissectors.n2.fields import answer_fields, fields
 from dissectors.n2.findings import N2Findings
 from dissectors.n2.framing import N2Framer
 from dissectors.n2.header import peek
@@ -53,6 +53,7 @@ N2 = Dissector(
     text=text,
     meant=meant,
     asks=asks,
+    answer_fields=answer_fields,
     fields=fields,
     packet=packet,
     default_line="9600,8N1",

@@ -120,6 +120,9 @@ def fields_of(item: Settled, dissector: Dissector) -> dict[str, int | float | st
             fields["tx.latency_high_ms"] = transaction.latency.high / MS
     if isinstance(event, Frame):
         fields.update(dissector.fields(event, role_of(item)))
+        request = item.meaning.request if item.meaning is not None else None
+        if request is not None and dissector.answer_fields is not None:
+            fields.update(dissector.answer_fields(request, event))
     return fields
 
 
