@@ -17,9 +17,10 @@ from dissectors.findings import Judge, Rule
 from dissectors.frame import Frame, Header, Role
 from dissectors.framer import Framer
 from dissectors.line import Timing
+from dissectors.meaning import Meaning, PlaceName, Spans, plain_place
 from dissectors.pseudonyms import Renamer
 from dissectors.questions import Questions
-from dissectors.readings import Readings, Refusal
+from dissectors.readings import Asks, Readings, Refusal
 from dissectors.token_ring import TokenRing
 from dissectors.tracker import Tracker
 
@@ -69,6 +70,11 @@ class Dissector:
 
     The rest only where there is such a thing:
 
+    `meant(frame, header, role, meaning)`: the same line with what the frame means to its device before the raw numbers;
+    ask `line`, which does without where there is none. `place`: the place of a reading in words. `spans`: the octets of
+    readings in their frame. `asks`: the places that a request reads.
+    `answer_fields(request, answer)`: fields of an answer that only its request tells.
+
     `default_line`: what such a bus normally runs ("19200,8E1").
     `field_prefixes`: how the names in `fields` begin ("modbus."), so that filters know them; the protocol's name and a
     dot where none are given.
@@ -98,6 +104,11 @@ class Dissector:
     text: Callable[[Frame, Header, Role], str]
     fields: Callable[[Frame, Role], dict[str, int | float | str]]
     packet: Callable[[Frame, Role], Any]
+    meant: Callable[[Frame, Header, Role, Meaning], str] | None = None
+    place: PlaceName = plain_place
+    spans: Spans | None = None
+    asks: Asks | None = None
+    answer_fields: Callable[[Frame, Frame], dict[str, int | float | str]] | None = None
     default_line: str = "9600,8N1"
     field_prefixes: tuple[str, ...] = ()
     noun: str = "station"
@@ -118,6 +129,16 @@ class Dissector:
     pairing: Pairing | None = None
     stencil: Stencils | None = None
     field_types: Callable[[], FieldTypes] | None = None
+
+    def line(self, frame: Frame, header: Header, role: Role, meaning: Meaning | None = None) -> str:
+        """One line for the frame list: what the frame means to its device, then what it is; the latter alone where
+        nothing is known."""
+        if meaning is None or (meaning.request is None and not meaning.words):
+            return self.text(frame, header, role)
+        if self.meant is not None:
+            return self.meant(frame, header, role, meaning)
+        said, text = meaning.about, self.text(frame, header, role)
+        return f"{said} — {text}" if said else text
 
     @property
     def prefixes(self) -> tuple[str, ...]:

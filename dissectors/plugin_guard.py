@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from dissectors.frame import Frame, Header, Role
 from dissectors.manifest import Dissector
+from dissectors.meaning import Meaning
 
 if TYPE_CHECKING:
     from dissectors.simulated import SimulatedBus
@@ -44,6 +45,12 @@ def guarded(dissector: Dissector) -> Dissector:
         except Exception as error:
             return failed("text", error)
 
+    def meant(frame: Frame, header: Header, role: Role, meaning: Meaning) -> str:
+        try:
+            return replace(dissector, text=text).line(frame, header, role, meaning)
+        except Exception as error:
+            return failed("meant", error)
+
     def fields(frame: Frame, role: Role) -> dict[str, int | float | str]:
         try:
             return dissector.fields(frame, role)
@@ -64,4 +71,4 @@ def guarded(dissector: Dissector) -> Dissector:
         except Exception:
             return {}  # its buses cannot be had; those of others can
 
-    return replace(dissector, peek=peek, text=text, fields=fields, packet=packet, scenarios=scenarios)
+    return replace(dissector, peek=peek, text=text, meant=meant, fields=fields, packet=packet, scenarios=scenarios)

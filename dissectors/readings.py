@@ -7,7 +7,7 @@ and units. A reading is what was on the wire, no more.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 
 from dissectors.frame import Frame
@@ -28,7 +28,7 @@ class Reading:
     `station`: whose thing it is; None when that is the station of the transaction. `space`: which table of the station
     ("holding", "AI", "analog-input"); `address`: the place in it, as on the wire; `part`: the attribute or property,
     empty for the value itself. `raw`: the bits as they were on the wire, unsigned; None for text. `sure`: False where
-    no public source confirms the layout.
+    no public source confirms the layout. `words`: the value in the protocol's own words, where it has some.
     """
 
     space: str
@@ -39,11 +39,15 @@ class Reading:
     part: str = ""
     sure: bool = True
     station: int | None = None
+    words: str = field(default="", compare=False)
 
 
 Readings = Callable[[Frame | None, Frame | None], tuple[Reading, ...]]
 """(request, response) → readings; total. Without the response: what the request itself tells (a write, a report);
 with it, what is confirmed: nothing after an exception."""
+
+Asks = Callable[[Frame], tuple[Reading, ...]]
+"""frame → the places that it asks for, as readings without a value (`Dissector.asks`); total."""
 
 Refusal = Callable[[Frame], tuple[str, int] | None]
 """frame → the family of its codes ("modbus", "n2") and the code, when it refuses a request (`Dissector.refusal`)."""

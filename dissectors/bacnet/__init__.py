@@ -9,14 +9,14 @@ from dissectors.bacnet.fields import fields
 from dissectors.bacnet.findings import MstpFindings, judge
 from dissectors.bacnet.framing import MstpFramer
 from dissectors.bacnet.header import peek
-from dissectors.bacnet.readings import readings
+from dissectors.bacnet.readings import asks, readings
 from dissectors.bacnet.renamer import MstpRenamer
 from dissectors.bacnet.ring import Ring
 from dissectors.bacnet.ring_observer import RingObserver
 from dissectors.bacnet.ring_window import ring_window
 from dissectors.bacnet.rules import RULES
 from dissectors.bacnet.segmentation import Reassembler
-from dissectors.bacnet.summary import text
+from dissectors.bacnet.summary import meant, text
 from dissectors.bacnet.tracker import MstpTracker
 from dissectors.frame import Frame
 from dissectors.manifest import Dissector, PacketFile, on_first_use
@@ -71,6 +71,8 @@ MSTP = Dissector(
     peek=peek,
     tracker=MstpTracker,
     text=text,
+    meant=meant,
+    asks=asks,
     fields=fields,
     packet=packet,
     default_line="38400,8N1",

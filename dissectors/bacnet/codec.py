@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from dataclasses import field as made
 from typing import Any
 
 from dissectors.bacnet import layout as notation
@@ -71,6 +72,18 @@ class _Misfit(Exception):
         self.at = at
 
 
+VALUE_ONLY = "= "
+
+
+@dataclass(slots=True)
+class Outline:
+    """What the octets of parameters are. `tags`: of each tag "property-identifier: present-value (85)", or its value
+    alone after `VALUE_ONLY`, by its place; `groups`: the records that several tags make, by begin and end."""
+
+    tags: dict[int, str] = made(default_factory=dict)
+    groups: dict[int, dict[int, Record]] = made(default_factory=dict)
+
+
 @dataclass(slots=True)
 class _Scope:
     """Which property is spoken of: the type of its value follows from it."""
@@ -79,7 +92,7 @@ class _Scope:
     object: ObjectId | None = None
     property: int | None = None
     index: int | None = None
-    names: dict[int, str] | None = None  # by the place of each tag, for those who ask
+    names: Outline | None = None  # for those who ask
 
     def inner(self) -> _Scope:
         return _Scope(self.wrong, self.object, self.property, self.index, self.names)
@@ -88,9 +101,13 @@ class _Scope:
         """Inside a value other properties are spoken of."""
         return _Scope(self.wrong, names=self.names)
 
+    def group(self, tags: Sequence[Tag], record: Record) -> None:
+        if self.names is not None and len(tags) > 1:
+            self.names.groups.setdefault(tags[0].start, {}).setdefault(tags[-1].end, record)
+
     def name(self, tag: Tag, text: str) -> None:
         if self.names is not None:
-            self.names.setdefault(tag.start, text)
+            self.names.tags.setdefault(tag.start, text)
 
     def note(self, field: Field, value: Any) -> None:
         if isinstance(value, ObjectId) and field.name != "initiating-device-identifier":
@@ -111,10 +128,10 @@ class _Scope:
         return found
 
 
-def decode(layout: str | None, octets: bytes, names: dict[int, str] | None = None) -> Decoded:
+def decode(layout: str | None, octets: bytes, names: Outline | None = None) -> Decoded:
     """The parameters in `octets` by a layout (None: tags only). Total.
 
-    `names`, when given, is filled with what each tag is ("property-identifier: present-value"), by its place.
+    `names`, when given, is filled with what each tag is.
     """
     tree = tagging.read(octets)
     if layout is None:
@@ -181,14 +198,14 @@ def _field(field: Field, tags: Sequence[Tag], at: int, scope: _Scope, depth: int
     if field.tag is None:
         value, after = _in_place(field.type, tags, at, scope, depth)
         if base(field.type) is not None:
-            scope.name(tags[at], f"{field.name}: {show_part(field.name, value)}")
+            scope.name(tags[at], _named(field, value))
         return value, after
     tag = tags[at]
     if base(field.type) is not None:
         if tag.children is not None:
             raise _Misfit(f"{field.name} is no primitive value")
         value = _primitive(field.type, tag)
-        scope.name(tag, f"{field.name}: {show_part(field.name, value)}")
+        scope.name(tag, _named(field, value))
         return value, at + 1
     if tag.children is None:
         raise _Misfit(f"{field.name} has no opening tag")
@@ -214,6 +231,8 @@ def _in_place(type_name: str, tags: Sequence[Tag], at: int, scope: _Scope, depth
             value, after = _in_place(item, tags, at, scope, depth + 1)
             if after == at:
                 raise _Misfit(f"{item} has no tags")
+            if base(item) is not None:
+                scope.name(tags[at], f"{VALUE_ONLY}{show(value)}")
             values.append(value)
             at = after
         return tuple(values), at
@@ -233,7 +252,16 @@ def _in_place(type_name: str, tags: Sequence[Tag], at: int, scope: _Scope, depth
         entries, after = _sequence(fields, tags, at, scope, depth + 1)
     except _Misfit as misfit:
         raise _Misfit(str(misfit)) from None
-    return Record(type_name, tuple(entries)), after
+    record = Record(type_name, tuple(entries))
+    scope.group(tags[at:after], record)
+    return record, after
+
+
+def _named(field: Field, value: Any) -> str:
+    """A part with its value, an enumeration with its number too, as Wireshark has it."""
+    shown = show_part(field.name, value)
+    is_named = isinstance(value, Enumerated) and shown != str(value.value) and not shown.endswith(str(value.value))
+    return f"{field.name}: {shown} ({value.value})" if is_named else f"{field.name}: {shown}"
 
 
 def _application(type_name: str, tags: Sequence[Tag], at: int) -> Any:
@@ -260,7 +288,7 @@ def _any(tags: Sequence[Tag], scope: _Scope, depth: int) -> Any:
         try:
             value, used = _in_place(expected, tags, 0, scope.of_value(), depth + 1)
             if len(tags) == 1 and base(expected) is not None:
-                scope.name(tags[0], show(value))
+                scope.name(tags[0], f"{VALUE_ONLY}{show(value)}")
             if used == len(tags) and (used or expected.startswith("{")):
                 return value
         except _Misfit:
@@ -284,7 +312,7 @@ def _note_type(expected: str, tags: Sequence[Tag], scope: _Scope) -> None:
     if found == kind:  # the right type, but no such value
         found = f"{found} of {len(tag.octets)} octets"
     scope.wrong.append(WrongType(about, scope.property, kind, found))
-    scope.name(tag, f"{found} {show(plain(tag))} (the property is {kind})")
+    scope.name(tag, f"{VALUE_ONLY}{found} {show(plain(tag))} (the property is {kind})")
 
 
 def plain(tag: Tag) -> Any:

@@ -40,6 +40,39 @@ def readings(request: Frame | None, response: Frame | None) -> tuple[Reading, ..
     return ()
 
 
+def asks(frame: Frame) -> tuple[Reading, ...]:
+    """See `dissectors.readings.Asks`."""
+    message = messages.read(frame) if frame.ok and len(frame.octets) > HEADER else None
+    spoken = message.spoken() if message is not None else None
+    if message is None or spoken is None or spoken[0].type != PduType.CONFIRMED_REQUEST:
+        return ()
+    apdu, parameters = spoken
+    if apdu.service not in (_READ, _READ_MULTIPLE):
+        return ()
+    decoded = messages.decode_parameters(apdu, parameters)
+    if decoded is None or decoded.error is not None:
+        return ()
+    return tuple(_asked(decoded.record, message.destination))
+
+
+def _asked(record: Record, station: int) -> Iterator[Reading]:
+    specs = record.get("list-of-read-access-specs")
+    if specs is None:
+        pairs = [(record.get("object-identifier"), record)]
+    else:
+        pairs = [(spec["object-identifier"], one) for spec in specs for one in spec["list-of-property-references"]]
+    for thing, one in pairs:
+        if isinstance(thing, ObjectId):
+            space, _, number = str(thing).partition(",")
+            part = _part_of(one, one.get("property-array-index"))
+            yield Reading(space, int(number), None, "", How.READ, part, station=station)
+
+
+def _part_of(record: Record, index: int | None) -> str:
+    which = record["property-identifier"]
+    return "" if which.value == PRESENT_VALUE else str(which) + (f".{index}" if index is not None else "")
+
+
 def _told(message: Message) -> Iterator[Reading]:
     """What one frame tells by itself; total: a parameter that is not there ends it."""
     spoken = message.spoken()
@@ -124,12 +157,11 @@ def _reading(
     thing: ObjectId, record: Record, index: int | None, value: Any, how: How, station: int | None
 ) -> Reading | None:
     space, _, number = str(thing).partition(",")
-    which = record["property-identifier"]
-    part = "" if which.value == PRESENT_VALUE else str(which) + (f".{index}" if index is not None else "")
+    part = _part_of(record, index)
     raw, shown = _shown(value)
     if shown is None:
         return None
-    return Reading(space, int(number), raw, shown, how, part, station=station)
+    return Reading(space, int(number), raw, shown, how, part, station=station, words=_words(value, shown))
 
 
 def _shown(value: Any) -> tuple[int | None, int | float | str | None]:
@@ -147,6 +179,15 @@ def _shown(value: Any) -> tuple[int | None, int | float | str | None]:
     if isinstance(value, BitString | ObjectId | Date | Time):
         return None, show(value)
     return None, None
+
+
+def _words(value: Any, shown: int | float | str) -> str:
+    """The value as the standard names it: "hertz", "2024-04-05 Thursday (it is a Friday)"; empty for plain numbers and
+    for texts of the device."""
+    if isinstance(value, Enumerated):
+        words = show(value)
+        return "" if words.endswith(str(value.value)) else words
+    return shown if isinstance(shown, str) and not isinstance(value, str) else ""
 
 
 def _shortest(value: float) -> float:

@@ -17,6 +17,7 @@ from dissectors.bacnet.message import Message
 from dissectors.bacnet.station_address import remote
 from dissectors.bacnet.values import Record, escape, show, show_tag
 from dissectors.frame import Assembly, Frame, Header, Role
+from dissectors.meaning import Meaning
 
 LENGTH_MAX = 160
 """Longest line; longer ones end with an ellipsis."""
@@ -24,8 +25,23 @@ LENGTH_MAX = 160
 
 def text(frame: Frame, header: Header, role: Role) -> str:
     """One line for the frame list, without control characters. Total."""
+    return f"{_parties(header)} {_rest(frame, header)}"
+
+
+def meant(frame: Frame, header: Header, role: Role, meaning: Meaning) -> str:
+    """The same, what it means to its device first: `10 → 2 output frequency 30.00 Hz — complex-ack …`. Total."""
+    said, plain = meaning.about, text(frame, header, role)
+    parties = _parties(header)
+    return f"{parties} {escape(said)} —{plain.removeprefix(parties)}" if said else plain
+
+
+def _parties(header: Header) -> str:
+    return f"{_party(header.source)} → {_party(header.destination)}"
+
+
+def _rest(frame: Frame, header: Header) -> str:
     message = messages.read(frame)
-    line = f"{_party(header.source)} → {_party(header.destination)} {header.kind}"
+    line = header.kind
     if message is not None:
         flaw = reply_flaw(message)
         if flaw is not None:
@@ -36,7 +52,8 @@ def text(frame: Frame, header: Header, role: Role) -> str:
     if not header.ok:
         line += f" [{header.error}]"
     line = escape(line)
-    return line if len(line) <= LENGTH_MAX else line[: LENGTH_MAX - 1] + "…"
+    longest = LENGTH_MAX - len(_parties(header)) - 1
+    return line if len(line) <= longest else line[: longest - 1] + "…"
 
 
 def _party(address: int | None) -> str:

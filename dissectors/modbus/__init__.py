@@ -7,13 +7,14 @@ from dissectors.line import Timing
 from dissectors.manifest import Dissector, PacketFile, on_first_use
 from dissectors.modbus.ascii_framing import AsciiFramer
 from dissectors.modbus.envelope import ASCII_NAME, RTU_NAME, make_ascii, make_rtu
-from dissectors.modbus.fields import fields
+from dissectors.modbus.fields import answer_fields, fields
 from dissectors.modbus.framing import RtuFramer
 from dissectors.modbus.header import peek_ascii, peek_rtu
-from dissectors.modbus.readings import readings, refusal
+from dissectors.modbus.places import place, spans
+from dissectors.modbus.readings import asks, readings, refusal
 from dissectors.modbus.renamer import AsciiRenamer, RtuRenamer
 from dissectors.modbus.rules import RULES
-from dissectors.modbus.text import text
+from dissectors.modbus.text import meant, text
 from dissectors.modbus.tracker import ModbusTracker
 from dissectors.questions import Questions
 
@@ -69,6 +70,11 @@ RTU = Dissector(
     peek=peek_rtu,
     tracker=ModbusTracker,
     text=text,
+    meant=meant,
+    asks=asks,
+    answer_fields=answer_fields,
+    place=place,
+    spans=spans,
     fields=fields,
     packet=packet,
     default_line="19200,8E1",
@@ -98,6 +104,11 @@ ASCII = Dissector(
     peek=peek_ascii,
     tracker=ascii_tracker,
     text=text,
+    meant=meant,
+    asks=asks,
+    answer_fields=answer_fields,
+    place=place,
+    spans=spans,
     fields=fields,
     packet=packet,
     default_line="19200,7E1",

@@ -15,7 +15,9 @@ from dissectors.modbus.functions import EXCEPTION_BIT
 from dissectors.modbus.header import peek_ascii, peek_rtu
 from dissectors.modbus.layout import MESSAGES, SUB_FUNCTIONS
 from dissectors.modbus.notation import Field, Group, Means, Message
+from dissectors.modbus.readings import readings
 from dissectors.modbus.text import printable
+from dissectors.readings import How
 
 Value = int | float | str
 Fields = dict[str, Value]
@@ -46,6 +48,16 @@ def fields(frame: Frame, role: Role) -> Fields:
     if frame.repair is not None:
         found["modbus.repaired"] = frame.repair.flaw.value
     return found
+
+
+def answer_fields(request: Frame, answer: Frame) -> Fields:
+    """The numbers of the registers or bits that an answer holds, which only its request tells."""
+    numbers = [one.address for one in readings(request, answer) if one.how is How.READ]
+    if not numbers or not answer.ok:
+        return {}
+    is_bit = readable_adu(answer)[1] in (0x01, 0x02)
+    name = "modbus.bitnum" if is_bit else f"modbus.{_NUMBERED}"
+    return {name: ",".join(map(str, numbers)) if len(numbers) > 1 else numbers[0]}
 
 
 def _pdu(found: Fields, octets: bytes, role: Role) -> None:

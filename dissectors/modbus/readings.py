@@ -13,6 +13,7 @@ from dissectors.modbus.ranges import AGREEMENTS
 from dissectors.readings import How, Reading
 
 _COIL_ON = 0xFF00
+_MOST_ASKED = 2000  # the standard's limit for bits
 _HEAD = 6  # unit, function, two words
 
 
@@ -38,6 +39,16 @@ def readings(request: Frame | None, response: Frame | None) -> tuple[Reading, ..
     if len(octets) < 2 * count or not answer[2:] or answer[2] != 2 * count:
         return ()
     return (*_written(asked), *_registers(space, begin, octets[: 2 * count], How.READ))
+
+
+def asks(frame: Frame) -> tuple[Reading, ...]:
+    """See `dissectors.readings.Asks`."""
+    octets = adu(frame) if frame.ok else b""
+    if len(octets) < _HEAD or octets[1] not in ITEMS_ASKED:
+        return ()
+    at, _ = ITEMS_ASKED[octets[1]]
+    space, begin, count = MESSAGES[octets[1]].space, _word(octets, at - 2), min(_word(octets, at), _MOST_ASKED)
+    return tuple(Reading(space, begin + step & 0xFFFF, None, "", How.READ) for step in range(count))
 
 
 def refusal(frame: Frame) -> tuple[str, int] | None:

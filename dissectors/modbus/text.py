@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from dissectors.frame import Frame, Header, Role
+from dissectors.meaning import Meaning
 from dissectors.modbus.envelope import readable_adu
 from dissectors.modbus.functions import DIAGNOSTICS, EXCEPTION_BIT, FUNCTIONS
 from dissectors.modbus.header import NO_EXCEPTIONS, exception_name, kind_of
@@ -21,6 +22,15 @@ _ARROWS = {Role.RESPONSE: "→", Role.REQUEST: "←", Role.BROADCAST: "←"}
 
 def text(frame: Frame, header: Header, role: Role) -> str:
     """One line about a frame, free of control characters and braces; role as the tracker gave it. Total."""
+    return _line(frame, header, role, None)
+
+
+def meant(frame: Frame, header: Header, role: Role, meaning: Meaning) -> str:
+    """The same, what it means to its device first: `3 → output frequency 30.00 Hz — 1 register: 3000`. Total."""
+    return _line(frame, header, role, meaning)
+
+
+def _line(frame: Frame, header: Header, role: Role, meaning: Meaning | None) -> str:
     octets = readable_adu(frame)
     damage = f" [{header.error}]" if not header.ok and header.error else ""
     if len(octets) < 2:
@@ -30,6 +40,11 @@ def text(frame: Frame, header: Header, role: Role) -> str:
     unit, code = octets[0], octets[1]
     arrow = _ARROWS.get(role, "↔")
     words = _words(octets, code, role)
+    said = meaning.about if meaning is not None else ""
+    if said and code & EXCEPTION_BIT and code not in NO_EXCEPTIONS and len(octets) > 2:
+        words = f"exception: {said} (code {octets[2]:02X}, {_asked(code)})"  # the maker's words, not the standard's
+    elif said:
+        words = f"{said} — {words.removeprefix('read ')}" if said.startswith("read ") else f"{said} — {words}"
     if role is Role.BROADCAST:
         words = f"broadcast: {words}"
     if frame.repair is not None and header.error:
@@ -48,9 +63,8 @@ def _words(octets: bytes, code: int, role: Role) -> str:
     if code in NO_EXCEPTIONS:
         return _with(f"function 0x{code:02X}", _hex(octets[2:]))
     if code & EXCEPTION_BIT:
-        asked = FUNCTIONS.get(code ^ EXCEPTION_BIT)
         name = exception_name(octets[2]) if len(octets) > 2 else "without code"
-        return f"exception: {name} ({asked.short if asked else kind_of(code ^ EXCEPTION_BIT)})"
+        return f"exception: {name} ({_asked(code)})"
     function = FUNCTIONS.get(code)
     if function is None:
         return _with(f"function 0x{code:02X}", _hex(octets[2:]))
@@ -62,6 +76,12 @@ def _words(octets: bytes, code: int, role: Role) -> str:
         except IndexError:  # cut short: what is there
             pass
     return _with(function.short, _hex(octets[2:]))
+
+
+def _asked(code: int) -> str:
+    """What an exception refuses."""
+    asked = FUNCTIONS.get(code ^ EXCEPTION_BIT)
+    return asked.short if asked else kind_of(code ^ EXCEPTION_BIT)
 
 
 def _u16(octets: bytes, at: int) -> int:

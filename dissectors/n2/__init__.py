@@ -5,15 +5,15 @@ from __future__ import annotations
 from dissectors.frame import Frame
 from dissectors.manifest import Dissector, on_first_use
 from dissectors.n2.envelope import make_answer, make_command
-from dissectors.n2.fields import fields
+from dissectors.n2.fields import answer_fields, fields
 from dissectors.n2.findings import N2Findings
 from dissectors.n2.framing import N2Framer
 from dissectors.n2.header import peek
 from dissectors.n2.interpretation import Interpretation, interpret
-from dissectors.n2.readings import readings, refusal
+from dissectors.n2.readings import asks, readings, refusal
 from dissectors.n2.renamer import N2Renamer
 from dissectors.n2.rules import RULES
-from dissectors.n2.text import text
+from dissectors.n2.text import meant, text
 from dissectors.n2.tracker import N2Tracker
 from dissectors.questions import Questions
 
@@ -54,6 +54,9 @@ N2 = Dissector(
     peek=peek,
     tracker=N2Tracker,
     text=text,
+    meant=meant,
+    asks=asks,
+    answer_fields=answer_fields,
     fields=fields,
     packet=packet,
     default_line="9600,8N1",

@@ -2,6 +2,7 @@
 
 n2.address  n2.command  n2.region  n2.region.name  n2.object  n2.attribute  n2.attribute.name  n2.value  n2.data
 n2.acknowledge  n2.error  n2.error.name  n2.checksum  n2.checksum.status
+n2.changed.tentative  n2.changed.value.tentative  n2.changed.status.tentative     what a poll's answer tells, by commas
 n2.time.tentative  n2.bits.tentative     guesses; `n2.data` has the characters
 """
 
@@ -10,8 +11,8 @@ from __future__ import annotations
 from dissectors.frame import Check, Frame, Role
 from dissectors.n2.commands import Command, error_name, fields_of, parse_command
 from dissectors.n2.header import error_code, meant
-from dissectors.n2.interpretation import guessed_time, printable
-from dissectors.n2.objects import Encoding, attribute_name, guessed_bits, region_name
+from dissectors.n2.interpretation import guessed_time, interpret, printable
+from dissectors.n2.objects import Encoding, attribute_name, guessed_bits, number, object_name, region_name
 from dissectors.n2.text import sent_and_due
 
 Fields = dict[str, int | float | str]
@@ -39,6 +40,27 @@ def fields(frame: Frame, role: Role) -> Fields:
     if sums is not None:
         found["n2.checksum"] = sums[0]
     found["n2.checksum.status"] = CHECKSUM_STATUS[frame.check]
+    return found
+
+
+def answer_fields(request: Frame, answer: Frame) -> Fields:
+    """What an answer says to its command: whose thing it is and its value; of a poll what changed, one by one."""
+    told = interpret(request, answer)
+    found: Fields = {} if told.station is None else {"n2.address": told.station}
+    if told.error is None and told.region is not None and told.object is not None:
+        found |= {"n2.region": told.region, "n2.region.name": region_name(told.region), "n2.object": told.object}
+        if told.attribute is not None:
+            found["n2.attribute"] = told.attribute
+            if name := attribute_name(told.region, told.attribute):
+                found["n2.attribute.name"] = name
+    if told.error is None and told.value is not None and not told.written:
+        found["n2.value"] = told.value
+    if told.records:
+        found["n2.changed.tentative"] = ",".join(object_name(one.region, one.object) for one in told.records)
+        found["n2.changed.value.tentative"] = ",".join(
+            "" if one.value is None else number(one.value) for one in told.records
+        )
+        found["n2.changed.status.tentative"] = ",".join(f"{one.status:02X}" for one in told.records)
     return found
 
 

@@ -38,6 +38,17 @@ def readings(request: Frame | None, response: Frame | None) -> tuple[Reading, ..
     return tuple(map(_change, told.records))
 
 
+def asks(frame: Frame) -> tuple[Reading, ...]:
+    """See `dissectors.readings.Asks`."""
+    if not frame.ok or frame.octets[:1] != b">":
+        return ()
+    command = parse_command(frame.octets)
+    if command.type.kind != "read-attribute" or command.region is None or command.object is None:
+        return ()
+    part = part_of(command.region, command.attribute)
+    return (Reading(region_name(command.region), command.object, None, "", How.READ, part),)
+
+
 def refusal(frame: Frame) -> tuple[str, int] | None:
     """The error code after N, 10 whether it came as 10 or 0A; None of any other frame."""
     code = error_code(frame.octets) if frame.octets[:1] == b"N" else ""
@@ -59,8 +70,11 @@ def _commanded(command: Command) -> tuple[Reading, ...]:
     value = command.value
     if value is None or command.region is None or command.object is None:
         return ()
-    part = part_of(command.region, command.attribute)
-    return (Reading(region_name(command.region), command.object, _raw(value), value, How.WRITE, part),)
+    space, part = region_name(command.region), part_of(command.region, command.attribute)
+    if command.attribute is not None and command.region in _BINARY and not part and isinstance(value, int):
+        state = value >> _STATE_BIT & 1  # a write to the attribute writes the octet that a read of it answers
+        return (Reading(space, command.object, value, state, How.WRITE, sure=False),)
+    return (Reading(space, command.object, _raw(value), value, How.WRITE, part),)
 
 
 def _read(told: Interpretation) -> tuple[Reading, ...]:

@@ -7,15 +7,20 @@ from __future__ import annotations
 
 from dissectors.checksums import sum8
 from dissectors.frame import Check, Frame, Header, Role
+from dissectors.meaning import Meaning
 from dissectors.n2.commands import NATIVE, UNKNOWN, Command, error_text, fields_of, parse_command
-from dissectors.n2.header import damage_of, error_code, meant
-from dissectors.n2.interpretation import guessed_time, printable
+from dissectors.n2.header import damage_of, error_code
+from dissectors.n2.header import meant as meant_octets
+from dissectors.n2.interpretation import Interpretation, guessed_time, interpret, printable
 from dissectors.n2.objects import Encoding, attribute_name, guessed_bits, number, object_name
+
+MOST_RAW = 40
+"""Characters of an answer that follow what it means."""
 
 
 def text(frame: Frame, header: Header, role: Role) -> str:
     """One line without control characters. An answer shows its raw characters: alone it means no more."""
-    octets = meant(frame)
+    octets = meant_octets(frame)
     if octets[:1] == b">":
         line = _command(parse_command(octets))
     elif octets[:1] == b"N":
@@ -24,6 +29,40 @@ def text(frame: Frame, header: Header, role: Role) -> str:
         data = printable(fields_of(octets))
         line = f"A → {data}" if data else "A"
     return line + _damage(frame)
+
+
+def meant(frame: Frame, header: Header, role: Role, meaning: Meaning) -> str:
+    """The same, what it means to its device first: `5 ← output frequency 30.00 Hz — override AO 1 = 30`,
+    `5 → status running — read BI 1: A → 40`. An answer is read with its request."""
+    said, station = meaning.about, "?" if meaning.station is None else str(meaning.station)
+    if frame.octets[:1] == b">":
+        line = text(frame, header, role)
+        begin, arrow, rest = line.partition(" ← ")
+        return f"{begin}{arrow}{said} — {rest}" if said and arrow else line
+    if meaning.request is None:
+        return text(frame, header, role)
+    told, asked = interpret(meaning.request, frame), parse_command(meant_octets(meaning.request))
+    if told.error is not None:
+        code = printable(error_code(frame.octets)) if frame.octets[:1] == b"N" else ""
+        plain = f"N{code} {said}" if said and code else told.error  # the maker's words, not the public list's
+        return f"{station} → {plain} ({_what(asked)}){_damage(frame)}"
+    raw = told.raw if len(told.raw) <= MOST_RAW else f"{told.raw[:MOST_RAW]} … +{len(told.raw) - MOST_RAW}"
+    raw = f"A {raw}" if raw else "A"
+    plain = _answer(told, asked)
+    words = [said, raw] if said and told.value is None else [said, plain, raw] if said else [plain, raw]
+    return f"{station} → {' — '.join(word for word in words if word)}{_damage(frame)}"
+
+
+def _answer(told: Interpretation, asked: Command) -> str:
+    """What an answer says to its command, the object first: `AI 3 = 72.5`; of a poll what changed, one by one."""
+    if told.value is not None and not told.written:
+        what = [] if asked.region is None or asked.object is None else [object_name(asked.region, asked.object)]
+        what += [told.name] if told.name and told.name != "current value" else []
+        doubt = f" ({'; '.join(told.tentative)}, tentative)" if told.tentative else ""
+        return f"{' '.join(what)} = {number(told.value)}{doubt}"
+    if told.tentative:
+        return f"{'; '.join(told.tentative)} (tentative)"
+    return f"done: {_what(asked)}" if told.written or asked.type.kind == "release" else ""
 
 
 def sent_and_due(octets: bytes) -> tuple[str, str] | None:

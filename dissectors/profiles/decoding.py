@@ -15,8 +15,8 @@ from enum import IntEnum
 from dissectors.profiles.model import Entry, Kind, Profile, Role
 from dissectors.readings import How, Reading
 
-MOST_WORDS = 6
-"""Values that one line of words names."""
+MOST_WORDS = 128
+"""Values that one line of words names: all registers of one read."""
 
 NO_BITS = "none"
 """What a register says whose bits are all 0 without a word for that."""
@@ -27,6 +27,8 @@ _EXACT = 1e15
 
 _FIRST = {"coil": 0, "discrete": 1, "input": 3, "holding": 4}
 _REGISTERS = ("holding", "input")
+_OWN_PARAMETER = re.compile(r" \((?:\d\d-\d\d|[0-9A-F]{4}h)\)$")
+"""Behind a title: which parameter of the device the thing is. A line has no room for it, the tree has."""
 _PARAMETER = re.compile(r"[A-Za-z]+2?\.\d+|\d\d-\d\d")
 
 
@@ -107,10 +109,19 @@ def phrase(value: Value) -> str:
         return value.text
     if value.words == f"no {entry.title}":
         return value.words  # which says what of
-    title = entry.title
-    if _PARAMETER.fullmatch(entry.name) and entry.name not in title:
-        title = f"{entry.name} {title}"
-    return f"{title} {value.text}" + (" (?)" if entry.doubt or not value.reading.sure else "")
+    return f"{brief_title(entry)} {value.text}" + (" (?)" if entry.doubt or not value.reading.sure else "")
+
+
+def brief_title(entry: Entry) -> str:
+    """The same for a line: without the parameter that stands behind it in brackets."""
+    return _OWN_PARAMETER.sub("", said_title(entry))
+
+
+def said_title(entry: Entry) -> str:
+    """What an entry is called in words; a parameter with its number: "02-01 motor rated current"."""
+    if _PARAMETER.fullmatch(entry.name) and entry.name not in entry.title:
+        return f"{entry.name} {entry.title}"
+    return entry.title
 
 
 def number(value: int | float | str, entry: Entry | None = None, unit: str = "") -> str:
@@ -153,14 +164,21 @@ def bit_words(entry: Entry, raw: int) -> str:
 
 def _plain(reading: Reading) -> Value:
     name = plain_name(reading.space, reading.address) + (f"/{reading.part}" if reading.part else "")
-    return Value(name, reading.value, reading.raw, "", _quality(reading, reading.value), reading)
+    quality = _quality(reading, reading.value)
+    return Value(name, reading.value, reading.raw, "", quality, reading, words=_spoken(reading))
+
+
+def _spoken(reading: Reading) -> str:
+    """The protocol's own words for a number; a text speaks for itself."""
+    return "" if isinstance(reading.value, str) else reading.words
 
 
 def _attribute(profile: Profile, reading: Reading) -> Value:
     """An attribute or property of a known object has the object's name."""
     entry = profile.at(reading.space, reading.address)
     base = plain_name(reading.space, reading.address) if entry is None or entry.reserved else entry.name
-    return Value(f"{base}/{reading.part}", reading.value, reading.raw, "", _quality(reading, reading.value), reading)
+    quality, words = _quality(reading, reading.value), _spoken(reading)
+    return Value(f"{base}/{reading.part}", reading.value, reading.raw, "", quality, reading, words=words)
 
 
 def _values(entry: Entry, reading: Reading, raws: Sequence[int | None]) -> Iterable[Value]:

@@ -175,13 +175,21 @@ class Limits:
     """What the device promises or cannot take; None: not said.
 
     `frame`: octets; `response`: ns; `stations`: the lowest and the highest number that it can be given; `functions`:
-    the codes that it knows.
+    the codes that it knows; `unexecuted`: what it acknowledges and does not do, as the kind of the exchange, or that
+    and the kind of object: "release-override", "override:AI". `read_only`: attributes and properties that can only be
+    read, with their kind of object: "AI:object-status".
     """
 
     frame: int | None = None
     response: int | None = None
     stations: tuple[int, int] | None = None
     functions: frozenset[int] | None = None
+    unexecuted: frozenset[str] = frozenset()
+    read_only: frozenset[str] = frozenset()
+
+    def ignores(self, kind: str, space: str = "") -> bool:
+        """Whether an exchange of that kind is acknowledged and not done."""
+        return bool(self.unexecuted) and (kind in self.unexecuted or f"{kind}:{space}" in self.unexecuted)
 
 
 @dataclass(frozen=True, slots=True)
@@ -242,6 +250,16 @@ class Profile:
     def limits_on(self, family: str) -> Limits:
         """What the device promises on the protocols of a family (`Dissector.profile_family`)."""
         return self.limits.get(family, Limits())
+
+    def lacks(self, space: str, part: str) -> bool:
+        """Whether the maker says that objects of this kind do not have a property."""
+        kinds = self.properties.get(part.partition(".")[0])
+        return (
+            bool(part)
+            and kinds is not None
+            and space not in kinds
+            and any(space in k for k in self.properties.values())
+        )
 
     def exception(self, family: str, code: int) -> str:
         """The maker's words for an exception code; empty when there are none."""

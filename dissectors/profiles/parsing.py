@@ -273,8 +273,10 @@ def _limits(table: Table) -> Limits:
     lowest, highest = table.pair("stations")
     stations = None if lowest is None or highest is None else (int(lowest), int(highest))
     functions = frozenset(table.numbers("functions")) or None
+    unexecuted = frozenset(table.text("unexecuted", "").split())
+    read_only = frozenset(table.text("read-only", "").split())
     table.finish()
-    return Limits(frame, None if response is None else int(response * MS), stations, functions)
+    return Limits(frame, None if response is None else int(response * MS), stations, functions, unexecuted, read_only)
 
 
 def _sign(table: Table, modbus: Table) -> Sign:

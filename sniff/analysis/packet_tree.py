@@ -14,6 +14,7 @@ from typing import Any
 
 from dissectors.frame import Frame, Role
 from dissectors.manifest import Dissector
+from dissectors.meaning import Node
 from sniff.analysis.plain import plain
 
 DEEPEST = 20
@@ -88,10 +89,21 @@ def _layers(packet: Any, octets: bytes, begin: int, end: int, depth: int) -> Ite
     while getattr(layer, "fields_desc", None) and depth < DEEPEST:
         walk = _Walk(layer, octets, begin, end, depth)
         fields = tuple(walk.fields())
+        own = getattr(type(layer), "tree", None)
+        nodes = own(layer) if own is not None else None
+        if nodes is not None:  # the protocol has a better one than field by field
+            fields = tuple(_of_node(node, None if walk.lost else begin) for node in nodes)
         yield Field(plain(layer.name), "", *_cover(fields), fields)
         begin, end = walk.begin, walk.end
         layer = layer.payload
         depth += 1
+
+
+def _of_node(node: Node, shift: int | None) -> Field:
+    known = shift is not None and node.begin is not None and node.end is not None
+    begin, end = (shift + node.begin, shift + node.end) if known else (None, None)  # type: ignore[operator]  # known
+    children = tuple(_of_node(child, shift) for child in node.children)
+    return Field(plain(node.name), plain(node.text), begin, end, children)
 
 
 def _cover(fields: tuple[Field, ...]) -> tuple[int | None, int | None]:

@@ -17,9 +17,10 @@ from dissectors.frame import Frame, Role
 from dissectors.histogram import Histogram
 from dissectors.line import NS_PER_S
 from dissectors.manifest import Dissector
+from dissectors.meaning import Meaning
 from dissectors.profiles import Devices, Entry
-from dissectors.profiles.decoding import Quality, Value, decode, say
-from dissectors.readings import How
+from dissectors.profiles.decoding import Quality, Value, decode
+from dissectors.readings import How, Reading
 from dissectors.tracker import Transaction, Verdict
 from sniff.engine.engine import Output, Row
 
@@ -105,17 +106,17 @@ class PointReader:
         return [sample for exchange in self._exchanges(output) for sample in self.samples(exchange)]
 
     def remember(self, output: Output) -> None:
-        """Take rows and closed transactions for `words` alone: no value is worked out."""
+        """Take rows and closed transactions for `meaning` alone: no value is worked out."""
         for _ in self._exchanges(output):
             pass
 
-    def words(self, row: Row) -> str:
-        """What a row says of its device: "drive 1: run, reverse"; empty when no profile knows.
+    def meaning(self, row: Row) -> Meaning | None:
+        """What is known of a row besides its octets.
 
         An answer needs its request: ask when its transaction has closed, not much later.
         """
         asked = self.asked.get(row.placement.tx) if row.placement is not None else None
-        return words(self.dissector, self.devices, row, asked.frame if asked is not None else None)
+        return meaning_of(self.dissector, self.devices, row, asked.frame if asked is not None else None)
 
     def _exchanges(self, output: Output) -> Iterator[Exchange]:
         if self._readings is None:
@@ -166,7 +167,11 @@ class PointReader:
         if readings[0].station is not None:
             station = readings[0].station
         confirmed = (response or request).frame.end
-        for value in decode(self.devices.at(station), readings):
+        profile = self.devices.at(station)
+        limits = profile.limits_on(self.dissector.profile_family) if profile is not None else None
+        for value in decode(profile, readings):
+            if limits is not None and value.how is How.WRITE and limits.ignores(transaction.kind, value.reading.space):
+                continue  # acknowledged, never done
             carrier = response if response is not None and value.how is How.READ else request
             yield Sample(confirmed, station, value, (response or carrier).no if value.how is How.REPORT else carrier.no)
 
@@ -175,29 +180,29 @@ class PointReader:
         return Remembered(no, frame) if frame is not None and no is not None else None
 
 
-def words(dissector: Dissector, devices: Devices, row: Row, request: Frame | None) -> str:
-    """What a row says of its device: "drive 1: run, reverse"; empty when no profile knows. An answer needs its
+def meaning_of(dissector: Dissector, devices: Devices, row: Row, request: Frame | None) -> Meaning | None:
+    """What is known of a row besides its octets; None where it is no good frame of an exchange. An answer needs its
     `request`."""
     event, placement = row.event, row.placement
     take = dissector.readings
-    if not devices or take is None or placement is None or not isinstance(event, Frame) or not event.ok:
-        return ""
+    if take is None or placement is None or not isinstance(event, Frame) or not event.ok:
+        return None
     if placement.role is Role.RESPONSE:
         station, readings = placement.source, take(request, event) if request is not None else ()
         readings = tuple(reading for reading in readings if reading.how is not How.WRITE)
     else:
-        station, readings = placement.destination, take(event, None)
+        station, readings, request = placement.destination, take(event, None), None
         station = None if placement.role is Role.BROADCAST else station
-    if readings and readings[0].station is not None:
-        station = readings[0].station
+    asked: tuple[Reading, ...] = ()
+    if not readings and placement.role is Role.REQUEST and dissector.asks is not None:
+        asked = dissector.asks(event)
+    for one in (*readings[:1], *asked[:1]):
+        station = station if one.station is None else one.station
     profile = devices.at(station)
-    if profile is None:
-        return ""
     refusal = dissector.refusal
-    refused = refusal(event) if refusal is not None and not readings else None
-    said = say(profile, readings) if refused is None else profile.exception(*refused)
-    who = f"all {profile.noun}s" if station is None else f"{profile.noun} {station}"
-    return f"{who}: {said}" if said else ""
+    refused = refusal(event) if profile is not None and refusal is not None and not readings else None
+    words = profile.exception(*refused) if profile is not None and refused is not None else ""
+    return Meaning(station, profile, readings, words, request, asked)
 
 
 class Run(NamedTuple):

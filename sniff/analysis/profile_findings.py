@@ -16,12 +16,13 @@ from dissectors.manifest import Dissector
 from dissectors.profiles import Devices, Entry, Profile
 from dissectors.profiles import Role as EntryRole
 from dissectors.profiles.decoding import Value, bit_words, decode, in_range, number, plain_name, state_words
+from dissectors.profiles.properties import due_property
 from dissectors.readings import How, Reading
 from dissectors.row_columns import RowColumns, in_turn
 from dissectors.subject import About, Subject, station
 from dissectors.tracker import Placement, Transaction
 from dissectors.words import milliseconds
-from sniff.analysis.points import ALL, PointReader, Sample
+from sniff.analysis.points import ALL, WHOLE, PointReader, Sample
 from sniff.engine.engine import Output, Row
 
 MOST_TOLD = 2_000
@@ -108,6 +109,23 @@ PROFILE_RULES: dict[str, Rule] = {
             "the wrong profile, or a master that tries what the device refuses",
             "have the master use a function of the device",
         ),
+        Rule(
+            "PR010",
+            Severity.WARNING,
+            "acknowledged and not executed",
+            "A station acknowledged a command that its manual says it answers without doing anything.",
+            "the master believes that it was obeyed: what it released still stands, what it commanded never came",
+            "have the master command what the device executes; release by overriding with the value that is wanted",
+            explains=("N2006",),
+        ),
+        Rule(
+            "PR011",
+            Severity.NOTE,
+            "property other than in the manual",
+            "A station answered a name or unit of an object that its manual gives otherwise.",
+            "another software version of the device, the wrong profile, or somebody renamed the object",
+            "compare the device with its profile (`profile guess`)",
+        ),
     )
 }
 
@@ -140,6 +158,7 @@ class ProfileFindings:
         self._readings = dissector.readings
         self._told: dict[Key, _Told] = {}
         self._answers: dict[Subject, int] = {}
+        self._in_vain: dict[int, tuple[int, str]] = {}  # by transaction: the frame, and what was asked in vain
 
     def see(self, no: int, event: Event, header: Header | None, placement: Placement | None) -> None:
         """Take the next row."""
@@ -154,6 +173,7 @@ class ProfileFindings:
             readings = tuple(reading for reading in self._readings(event, None) if reading.how is How.WRITE)
             if readings:
                 self._judge_writes(no, event, station, readings)
+            self._remember_vain(no, header, placement, readings)
 
     def settle(self, transaction: Transaction) -> None:
         """Take a transaction that closed."""
@@ -161,6 +181,22 @@ class ProfileFindings:
             if sample.value.how is not How.WRITE:
                 self._judge_value(sample)
         self._judge_time(transaction)
+        vain = self._in_vain.pop(transaction.id, None)
+        profile = self._devices.at(transaction.station)
+        if vain is not None and profile is not None and transaction.verdict in WHOLE:
+            seen = f"{vain[1]}: acknowledged, and not executed by this device"
+            self._add("PR010", _subject(profile, transaction.station), vain[1], seen, transaction.end, vain[0])
+
+    def _remember_vain(
+        self, no: int, header: Header | None, placement: Placement, readings: tuple[Reading, ...]
+    ) -> None:
+        profile = self._devices.at(placement.destination)
+        if profile is None or header is None or len(self._in_vain) >= MOST_TOLD:
+            return
+        limits, spaces = profile.limits_on(self._family), [one.space for one in readings] or [""]
+        if any(limits.ignores(header.kind, space) for space in spaces):
+            things = ", ".join(f"{one.space} {one.address}" for one in readings)
+            self._in_vain[placement.tx] = no, f"{header.kind.replace('-', ' ')} {things}".rstrip()
 
     def take(self, rows: RowColumns) -> None:
         """Take rows and what they closed (`dissectors.row_columns.JudgesColumns`)."""
@@ -220,6 +256,9 @@ class ProfileFindings:
             if profile.is_reserved(reading.space, reading.address):
                 place = entry.number if entry is not None else plain_name(reading.space, reading.address)
                 self._add("PR002", who, place, f"{reading.value} written to reserved {place}", frame.end, no)
+            elif f"{reading.space}:{reading.part}" in profile.limits_on(self._family).read_only:
+                place = f"{reading.space} {reading.address} {reading.part}"
+                self._add("PR003", who, place, f"{place} written, it is read only", frame.end, no)
             elif entry is not None and not entry.access.writable:
                 seen = f"{entry.title} ({entry.number}) written, it is read only"
                 self._add("PR003", who, entry.name, seen, frame.end, no)
@@ -238,6 +277,8 @@ class ProfileFindings:
         who = _subject(profile, sample.device)
         self._judge_range(value, who, sample.time, sample.frame)
         entry = value.entry
+        if value.reading.part:
+            self._judge_property(profile, value.reading, who, sample)
         if entry is None or value.bit or value.raw is None:
             return
         if entry.role in CODES:
@@ -246,6 +287,14 @@ class ProfileFindings:
         else:
             for code, words in _told_by_bits(entry, value.raw):
                 self._add_trouble(code, who, OF_STATUS, f"{entry.title}: {words}", sample)
+
+    def _judge_property(self, profile: Profile, reading: Reading, who: Subject, sample: Sample) -> None:
+        entry = profile.at(reading.space, reading.address)
+        due = due_property(entry, reading) if entry is not None else None
+        if entry is not None and due is not None:
+            place = f"{entry.number} {reading.part}"
+            shown = reading.words or number(reading.value)
+            self._add("PR011", who, place, f"{place} is {shown}, the manual has {due}", sample.time, sample.frame)
 
     def _add_trouble(self, code: str, who: Subject, which: str, seen: str, sample: Sample) -> None:
         told = self._add(code, who, which, seen, sample.time, sample.frame)

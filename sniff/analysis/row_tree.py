@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 from dissectors.frame import Frame
 from dissectors.manifest import Dissector
+from dissectors.meaning import Meaning
 from dissectors.tracker import Transaction
 from dissectors.words import milliseconds
 from sniff.analysis.packet_tree import Field, fields_of
@@ -15,9 +16,14 @@ from sniff.engine.engine import Row
 
 
 def tree_of(
-    dissector: Dissector, row: Row, transaction: Transaction | None, time_text: Callable[[int], str]
+    dissector: Dissector,
+    row: Row,
+    transaction: Transaction | None,
+    time_text: Callable[[int], str],
+    meaning: Meaning | None = None,
 ) -> tuple[Field, ...]:
-    """Everything about a row: the layers of its packet, how it was found, its transaction where that has closed.
+    """Everything about a row: what it means to its device, the layers of its packet, how it was found, its transaction
+    where that has closed.
 
     `time_text` writes times (ns since the epoch).
     """
@@ -27,8 +33,35 @@ def tree_of(
         known.append(_transaction(transaction, row.no))
     if isinstance(event, Frame):
         role = row.placement.role if row.placement is not None else row.header.role if row.header else None
-        return (*fields_of(dissector, event, role), *known) if role is not None else tuple(known)
+        said = () if meaning is None else values_of(dissector, event, meaning)
+        return (*said, *fields_of(dissector, event, role), *known) if role is not None else tuple(known)
     return tuple(known)
+
+
+def values_of(dissector: Dissector, frame: Frame, meaning: Meaning) -> tuple[Field, ...]:
+    """Every value by name, as one part of the tree: "drive 3", below it "Register 2524h (wire 0x2524) output
+    frequency: 30.00 Hz (3000)"; nothing where the frame tells none."""
+    if meaning.refused:
+        return (Field(plain(meaning.who), plain(meaning.refused)),)
+    spans = meaning.spans_in(frame, dissector.spans)
+    lines = []
+    for item, span in zip(meaning.items(dissector.place), spans, strict=False):
+        begin, end = span or (None, None)
+        parts = tuple(Field(plain(name), plain(text)) for name, text in item.parts)
+        lines.append(Field(plain(item.name), plain(item.text), begin, end, parts))
+    if not lines and meaning.asked:
+        asked = tuple(Field(plain(where), plain(title)) for where, title in meaning.questions(dissector.place))
+        return (Field(plain(meaning.who), f"is asked for {len(asked)}", None, None, asked),)
+    if not lines:
+        return ()
+    count = f"{len(lines)} value{'s' if len(lines) != 1 else ''}"
+    return (Field(plain(meaning.who), count, *_cover(lines), tuple(lines)),)
+
+
+def _cover(lines: list[Field]) -> tuple[int | None, int | None]:
+    begins = [line.begin for line in lines if line.begin is not None]
+    ends = [line.end for line in lines if line.end is not None]
+    return min(begins, default=None), max(ends, default=None)
 
 
 def _event(row: Row, time_text: Callable[[int], str]) -> Field:

@@ -6,13 +6,14 @@ from dissectors import registry
 from dissectors.frame import Event, Frame, LineError, Noise, Place, Role
 from dissectors.line import MS
 from dissectors.manifest import Dissector
+from dissectors.meaning import Meaning
 from dissectors.tracker import Interval
 from dissectors.words import milliseconds
 from sniff.engine.engine import Row
 
 
-def describe(dissector: Dissector, row: Row) -> str:
-    """One line that says what a row is."""
+def describe(dissector: Dissector, row: Row, meaning: Meaning | None = None) -> str:
+    """One line that says what a row is; before that what it means to its device, where that is known."""
     event = row.event
     if row.searched is not None:
         return f"{_octets(event)} heard while searching for the settings, with {row.searched}"
@@ -20,7 +21,7 @@ def describe(dissector: Dissector, row: Row) -> str:
         return describe_noise(event)
     assert row.header is not None  # the engine peeks every frame
     role = row.placement.role if row.placement is not None else row.header.role
-    return dissector.text(event, row.header, role if role is not Role.UNKNOWN else row.header.role)
+    return dissector.line(event, row.header, role if role is not Role.UNKNOWN else row.header.role, meaning)
 
 
 def describe_noise(noise: Noise) -> str:

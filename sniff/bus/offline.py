@@ -68,9 +68,9 @@ def settled(
 ) -> Iterator[Settled]:
     """Run items through a new engine; give the rows that are `wanted` (by default all) with their verdicts.
 
-    Where the device is known, also what they mean to it. Raises CaptureError as `outputs` does.
+    With `devices`, also what they mean to them. Raises CaptureError as `outputs` does.
     """
-    points = PointReader(dissector_for(session), devices) if devices else None
+    points = PointReader(dissector_for(session), devices) if devices is not None else None
     settling = Settling(points, wanted)
     try:
         for output in outputs(items, session):
@@ -91,8 +91,9 @@ def settled_in_bulk(
     is to be said of devices."""
     from sniff.engine.table_join import TableJoin
 
-    reader = PointReader(dissector_for(session), devices)
-    return _joined(capture, session, _Spoken(reader, wanted) if devices else TableJoin(wanted))
+    if devices is None:
+        return _joined(capture, session, TableJoin(wanted))
+    return _joined(capture, session, _Spoken(PointReader(dissector_for(session), devices), wanted))
 
 
 class _Joining(Protocol[Given]):

@@ -18,11 +18,12 @@ from dissectors.frame import Frame, LineError
 from dissectors.histogram import Histogram
 from dissectors.line import NS_PER_S
 from dissectors.manifest import Dissector
+from dissectors.meaning import Meaning
 from dissectors.profiles import Devices
 from dissectors.tracker import Transaction, Verdict
 from sniff.analysis.load import Load
 from sniff.analysis.nodes import NodeTable
-from sniff.analysis.points import PointTable, words
+from sniff.analysis.points import PointTable, meaning_of
 from sniff.analysis.polls import Polls
 from sniff.analysis.summary import Summary
 from sniff.analysis.wording import describe
@@ -326,12 +327,11 @@ class Store:
 
     def text(self, row: Row) -> str:
         """One line that says what a row is, and what that means to its device."""
-        text = describe(self.dissector, row)
-        if not self.devices:
-            return text
-        asked = self._request_of(row)
-        said = words(self.dissector, self.devices, row, asked)
-        return f"{text} — {said}" if said else text
+        return describe(self.dissector, row, self.meaning(row))
+
+    def meaning(self, row: Row) -> Meaning | None:
+        """What is known of a row besides its octets."""
+        return meaning_of(self.dissector, self.devices, row, self._request_of(row))
 
     def _request_of(self, row: Row) -> Frame | None:
         transaction = self.transaction(row)

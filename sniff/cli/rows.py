@@ -69,11 +69,12 @@ def to_json(item: Settled, dissector: Dissector, session: Session, with_fields: 
         "tx": placement.tx if placement else None,
         "verdict": transaction.verdict.value if transaction is not None else None,
         "latency_ms": round(latency.nominal / MS, 6) if latency is not None else None,
-        "text": _in_words(describe(dissector, row), item),
+        "text": describe(dissector, row, item.meaning),
         "hex": event.octets.hex(),
     }
     if with_fields:
         result["fields"] = fields_of(item, dissector)
+        result["values"] = values_of(item, dissector)
     return result
 
 
@@ -119,7 +120,33 @@ def fields_of(item: Settled, dissector: Dissector) -> dict[str, int | float | st
             fields["tx.latency_high_ms"] = transaction.latency.high / MS
     if isinstance(event, Frame):
         fields.update(dissector.fields(event, role_of(item)))
+        request = item.meaning.request if item.meaning is not None else None
+        if request is not None and dissector.answer_fields is not None:
+            fields.update(dissector.answer_fields(request, event))
     return fields
+
+
+def values_of(item: Settled, dissector: Dissector) -> list[dict[str, Any]]:
+    """Every register, object and property that a row tells, in the order of the wire; "name" and what follows it are
+    null where no profile knows."""
+    if item.meaning is None:
+        return []
+    return [
+        {
+            "place": one.place,
+            "space": one.reading.space,
+            "address": one.reading.address,
+            "part": one.reading.part or None,
+            "raw": one.reading.raw,
+            "value": one.value.value if one.value is not None else one.reading.value,
+            "text": one.text,
+            "name": one.value.name if one.value is not None and one.value.entry is not None else None,
+            "title": one.title or None,
+            "unit": one.value.unit if one.value is not None and one.value.entry is not None else None,
+            "bits": dict(one.parts),
+        }
+        for one in item.meaning.items(dissector.place)
+    ]
 
 
 def text_line(item: Settled, dissector: Dissector, session: Session, colour: bool = False) -> str:
@@ -136,22 +163,16 @@ def text_line(item: Settled, dissector: Dissector, session: Session, colour: boo
             bad = True
         if transaction.latency is not None:
             notes.append(duration(transaction.latency))
-    text = describe(dissector, row)
+    text = describe(dissector, row, item.meaning)
     if not isinstance(row.event, Frame):
         shown = row.event.octets[:16].hex(" ").upper()
         text = f"{text}: {shown}{' …' if len(row.event.octets) > 16 else ''}"
     elif not row.event.ok and row.header is not None and row.header.error and row.header.error not in text:
         notes.insert(0, row.header.error)
-    text = _in_words(text, item)
     line = (
         f"{row.no:>6} {seconds:12.6f} s  {'!' if bad else ' '} {text}{'  [' + '; '.join(notes) + ']' if notes else ''}"
     )
     return f"\x1b[31m{line}\x1b[0m" if colour and bad else line
-
-
-def _in_words(text: str, item: Settled) -> str:
-    """The line with what it says of its device behind it."""
-    return f"{text} — {item.words}" if item.words else text
 
 
 def hex_dump(octets: bytes) -> str:

@@ -77,9 +77,10 @@ def _show_all(args: argparse.Namespace, table: ParquetWriter | None) -> int:
         if args.explain:
             print(wanted.explain())
             continue
-        spoken = devices if not args.table or "text" in args.names else None
+        named = args.tree or args.fields  # then every register is named, with a profile or without
+        spoken = devices if named or (devices and (not args.table or "text" in args.names)) else None
         ours = filtering.FieldCells(args.names, session, devices)
-        if args.reference or spoken or ours or args.tree or args.hex or args.fields:
+        if args.reference or spoken or named or ours or args.hex:
             left = _show(
                 args, _settled(args, capture, session, spoken, ours.noting(wanted)), session, ours, left, table
             )
@@ -193,7 +194,7 @@ def _cells(item: Settled, names: list[str], dissector: Dissector, session: Sessi
 
 
 def _tree(item: Settled, dissector: Dissector) -> str:
-    return "\n".join(_tree_lines(tree_of(dissector, item.row, item.transaction, rows.iso), "        "))
+    return "\n".join(_tree_lines(tree_of(dissector, item.row, item.transaction, rows.iso, item.meaning), "        "))
 
 
 def _tree_lines(fields: Iterable[Field], indent: str) -> Iterator[str]:

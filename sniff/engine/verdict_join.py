@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Protocol
 
+from dissectors.meaning import Meaning
 from dissectors.tracker import Transaction
 from sniff.engine.engine import Output, Row
 
@@ -20,25 +21,25 @@ Wanted = Callable[[Row, Transaction | None], bool]
 
 @dataclass(frozen=True, slots=True)
 class Settled:
-    """A row with the transaction it belongs to (None: noise, or never closed), and what it says of its device."""
+    """A row with the transaction it belongs to (None: noise, or never closed), and what it means to its device."""
 
     row: Row
     transaction: Transaction | None
-    words: str = ""
+    meaning: Meaning | None = None
 
 
-class Words(Protocol):
-    """Says what rows mean to their devices."""
+class Meanings(Protocol):
+    """Knows what rows mean to their devices."""
 
-    def words(self, row: Row) -> str:
-        """What a row says, "" when nothing is known."""
+    def meaning(self, row: Row) -> Meaning | None:
+        """What a row means, None when nothing is known."""
         ...
 
 
 class Settling:
     """Holds rows until their transaction has closed, so that each can be shown with its verdict; keeps the order."""
 
-    def __init__(self, points: Words | None = None, wanted: Wanted | None = None) -> None:
+    def __init__(self, points: Meanings | None = None, wanted: Wanted | None = None) -> None:
         """`points`, fed before this, says what rows mean to their devices. Only rows that are `wanted` are given."""
         self._points = points
         self._wanted = wanted
@@ -68,7 +69,7 @@ class Settling:
         transaction = None if row.placement is None else self._closed.get(row.placement.tx)
         self._forget(row.no - REMEMBERED)
         if self._wanted is None or self._wanted(row, transaction):
-            yield Settled(row, transaction, "" if self._points is None else self._points.words(row))
+            yield Settled(row, transaction, None if self._points is None else self._points.meaning(row))
 
     def _forget(self, before: int) -> None:
         """Let go of what closed and has no row left that could ask for it."""

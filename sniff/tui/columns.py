@@ -11,13 +11,15 @@ from rich.cells import cell_len, set_cell_size
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """One column: `width` in cells, 0 takes what is left; `needs`: the list's width from which it is shown."""
+    """One column: `width` in cells, 0 takes what is left; `needs`: the list's width from which it is shown; `spills`: a
+    text that is too long goes on over empty cells behind it."""
 
     name: str
     title: str
     width: int = 0
     right: bool = False
     needs: int = 0
+    spills: bool = False
 
 
 class Cell(NamedTuple):
@@ -49,9 +51,18 @@ def fit(text: str, width: int, right: bool = False) -> str:
 def pieces(columns: Sequence[Column], cells: dict[str, Cell]) -> list[Cell]:
     """Cells in the order of the columns, each exactly as wide as its column, one space between."""
     line: list[Cell] = []
-    for position, column in enumerate(columns):
+    position = 0
+    while position < len(columns):
+        column = columns[position]
         if position:
             line.append(Cell(" "))
-        cell = cells.get(column.name, Cell(""))
-        line.append(Cell(fit(cell.text, column.width, column.right), cell.style))
+        cell, width = cells.get(column.name, Cell("")), column.width
+        while column.spills and position + 1 < len(columns) and cell_len(cell.text) > width:
+            behind = columns[position + 1]
+            if cells.get(behind.name, Cell("")).text:
+                break
+            width += 1 + behind.width
+            position += 1
+        line.append(Cell(fit(cell.text, width, column.right), cell.style))
+        position += 1
     return line

@@ -20,6 +20,9 @@ from sniff.analysis.packet_tree import Field
 FOLDED = ((("frame", 0),), (("transaction", 0),))
 """What is known besides the packet begins folded: its first line says the most."""
 
+SHIFT = 16
+"""Cells by which long lines scroll at once."""
+
 Path = tuple[tuple[str, int], ...]
 """From the layer down to a field: name, and which of its siblings of that name it is."""
 
@@ -45,7 +48,8 @@ class FieldTree(ScrollView, can_focus=True, inherit_bindings=False):
         Binding("home,g", "move(-65536)", "first line", show=False),
         Binding("end,G", "move(65536)", "last line", show=False),
         Binding("enter", "fold", "fold", tooltip="fold or unfold the part under the cursor"),
-        Binding("left,h", "parent", "parent", tooltip="to the part that holds this one", show=False),
+        Binding("right,l", "right", "right", tooltip="scroll long lines to the right", show=False),
+        Binding("left,h", "left", "left", tooltip="scroll back, then to the part that holds this one", show=False),
     ]
     COMPONENT_CLASSES: ClassVar[set[str]] = {"field-tree--name", "field-tree--cursor", "field-tree--here"}
 
@@ -61,6 +65,7 @@ class FieldTree(ScrollView, can_focus=True, inherit_bindings=False):
         self.fields: tuple[Field, ...] = ()
         self.folded: set[Path] = set(FOLDED)
         self.cursor = 0
+        self.shifted = 0  # cells by which all lines are scrolled to the left
         self._lines: list[_Line] = []
         self._wanted: Path = ()  # where the user was last; kept over frames that have no such field
 
@@ -128,6 +133,18 @@ class FieldTree(ScrollView, can_focus=True, inherit_bindings=False):
             self.folded ^= {self._lines[self.cursor].path}
             self._flatten()
 
+    def action_right(self) -> None:
+        """Scroll to what a narrow pane cuts off."""
+        self.shifted += SHIFT
+        self.refresh()
+
+    def action_left(self) -> None:
+        """Scroll back; where nothing is scrolled, to the part that holds this one."""
+        if not self.shifted:
+            self.action_parent()
+        self.shifted = max(0, self.shifted - SHIFT)
+        self.refresh()
+
     def action_parent(self) -> None:
         """To the part that holds this one."""
         if self._lines:
@@ -170,7 +187,10 @@ class FieldTree(ScrollView, can_focus=True, inherit_bindings=False):
         segments = [Segment(f"{'  ' * line.depth}{arrow} ", base), Segment(line.field.name, name)]
         if line.field.value:
             segments.append(Segment(f": {line.field.value}", base))
-        return Strip(segments).adjust_cell_length(width, base)
+        strip = Strip(segments)
+        if self.shifted:
+            strip = strip.crop(self.shifted, max(self.shifted, strip.cell_length))
+        return strip.adjust_cell_length(width, base)
 
 
 def _placed(fields: tuple[Field, ...], above: Path) -> Iterator[_Line]:
@@ -185,7 +205,7 @@ def _smallest(fields: tuple[Field, ...], offset: int, above: Path) -> _Line | No
     for line in _placed(fields, above):
         inner = _smallest(line.field.children, offset, line.path)
         found = inner or (line if offset in line.field else None)
-        if found is not None and (best is None or _size(found.field) <= _size(best.field)):
+        if found is not None and (best is None or _size(found.field) < _size(best.field)):
             best = found
     return best
 

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from rich.cells import cell_len
+
 from dissectors.frame import Event, Found, Frame, LineError
+from dissectors.tracker import Transaction, Verdict
 from sniff.engine.engine import Row
 from sniff.tui.analyzer import analyzer
 from sniff.tui.columns import Cell, Column
@@ -15,12 +18,13 @@ COLUMNS = (
     Column("time", "time", 12, right=True),
     Column("src", "src", 4, right=True, needs=94),
     Column("dst", "dst", 4, right=True, needs=94),
-    Column("text", "what"),
+    Column("text", "what", spills=True),
     Column("verdict", "verdict", 9),
     Column("latency", "latency ms", 8, right=True),
     Column("len", "len", 4, right=True, needs=98),
     Column("flags", "flag", 4),
 )
+USUAL = frozenset({Verdict.ANSWERED, Verdict.BROADCAST, Verdict.DATA})
 FOUND_LETTERS = {Found.SPLIT: "s", Found.JOINED: "j"}
 
 
@@ -84,20 +88,28 @@ class FrameList(StoreList):
         if self.viewing.colours and not style:
             style = self.viewing.colour_of(row, transaction)
         source, destination = self._addresses(row)
+        text = plain(self.store.text(row))
         answers = transaction is not None and (transaction.response in (number, None))
         return {
             "no": Cell(str(number), "dim"),
             "time": Cell(self._time(row, line)),
             "src": Cell("" if source is None else str(source)),
             "dst": Cell("" if destination is None else str(destination)),
-            "text": Cell(plain(self.store.text(row)), style),
-            "verdict": verdict_cell(transaction, self.width_of("verdict")),
+            "text": Cell(text, style),
+            "verdict": self._verdict(transaction, text),
             "latency": latency_cell(
                 transaction.latency if transaction is not None and answers else None, self.store.session.adapter.latency
             ),
             "len": Cell(str(len(event.octets)), "dim"),
             "flags": Cell(flags(event), style or "dim"),
         }
+
+    def _verdict(self, transaction: Transaction | None, text: str) -> Cell:
+        """The verdict; the usual one gives way to a text that has no room, for what a frame says matters more."""
+        usual = transaction is not None and transaction.verdict in USUAL and transaction.attempt == 1
+        if usual and cell_len(text) > self.width_of("text"):
+            return Cell("")
+        return verdict_cell(transaction, self.width_of("verdict"))
 
     def _time(self, row: Row, line: int) -> str:
         before = self.store.by_no(self.index[line - 1]) if line else None

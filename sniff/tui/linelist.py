@@ -25,6 +25,9 @@ from sniff.tui.columns import Cell, Column, pieces
 from sniff.tui.index import Index
 from sniff.tui.viewing import Viewing
 
+SHIFT = 16
+"""Cells by which the text scrolls at once."""
+
 
 class LineList(ScrollView, can_focus=True, inherit_bindings=False):
     """Shows the numbers of an index, one a line, below a line of column titles that stays."""
@@ -36,8 +39,13 @@ class LineList(ScrollView, can_focus=True, inherit_bindings=False):
         Binding("pagedown", "page(1)", "page down", show=False),
         Binding("home,g", "first", "first line", show=False),
         Binding("end,G", "last", "last line", show=False),
+        Binding("right,l", "shift(1)", "right", tooltip="scroll the text to the right", show=False),
+        Binding("left,h", "shift(-1)", "left", tooltip="scroll the text back to the left", show=False),
         Binding("enter", "choose", "open", tooltip="open the line: show what belongs to it"),
     ]
+    SCROLLED: ClassVar[str] = "text"
+    """The column that may be wider than the screen."""
+
     COMPONENT_CLASSES: ClassVar[set[str]] = {
         "line-list--title",
         "line-list--cursor",
@@ -72,6 +80,7 @@ class LineList(ScrollView, can_focus=True, inherit_bindings=False):
         self.viewing = viewing
         self.index = Index()
         self.cursor = 0
+        self.shifted = 0  # cells by which the text of all lines is scrolled to the left
         self.drawn_lines = 0  # how many lines were ever drawn; tests count them
         self.columns: list[Column] = []
         self._drawn: object = None
@@ -247,6 +256,11 @@ class LineList(ScrollView, can_focus=True, inherit_bindings=False):
             growing = status.reading or (status.live and not status.ended)
             self.viewing.follow = self.viewing.follow or (growing and not self.viewing.frozen)
 
+    def action_shift(self, by: int) -> None:
+        """Scroll the text of the lines, the other columns stand."""
+        self.shifted = max(0, self.shifted + by * SHIFT)
+        self.refresh()
+
     def action_choose(self) -> None:
         """Tell that the line under the cursor was chosen."""
         if self.cursor in self.index:
@@ -293,8 +307,15 @@ class LineList(ScrollView, can_focus=True, inherit_bindings=False):
             return self._strip([Cell(note, "dim")], width, "")
         self.drawn_lines += 1
         number = self.index[line]
-        cells = [self.edge(number), *pieces(self.columns, self.cells(number, line))]
+        cells = [self.edge(number), *pieces(self.columns, self._shifted(self.cells(number, line)))]
         return self._strip(cells, width, "cursor" if number == self.cursor else "")
+
+    def _shifted(self, cells: dict[str, Cell]) -> dict[str, Cell]:
+        """The cells with the text scrolled; what stands left of the screen is "…"."""
+        cell = cells.get(self.SCROLLED)
+        if not self.shifted or cell is None:
+            return cells
+        return {**cells, self.SCROLLED: Cell(f"…{cell.text[self.shifted + 1 :]}", cell.style)}
 
     def _titles(self) -> dict[str, Cell]:
         return {column.name: Cell(column.title) for column in self.columns}

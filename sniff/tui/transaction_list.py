@@ -27,6 +27,7 @@ class TransactionList(StoreList):
     """Closed transactions by the number of their closing."""
 
     COLUMNS = COLUMNS
+    SCROLLED = "kind"
 
     def row_of(self, number: int) -> int | None:
         """Its request, or its response where no request was seen."""

@@ -19,7 +19,9 @@ from scapy.fields import (
 from scapy.packet import Packet
 
 from dissectors.bacnet import codec, services
+from dissectors.bacnet.packets.outlines import outlined
 from dissectors.bacnet.values import APPLICATION, escape, primitive, show
+from dissectors.meaning import Node
 
 _TAGS_MAX = 3000
 """Tags that are taken apart, more than any single frame holds: of a longer message in segments the rest is octets."""
@@ -102,18 +104,26 @@ class Parameters(Packet):
         PacketListField("tags", [], Tag, count_from=_tags_at_most, max_count=_TAGS_MAX + 1)
     ]
 
+    _nodes: tuple[Node, ...] | None = None
+
+    def tree(self) -> tuple[Node, ...] | None:
+        """The parameters as BACnet has them, nested and by name, with their octets in this layer; None where no service
+        is known."""
+        return self._nodes
+
     def post_dissection(self, pkt: Packet) -> None:
         under = self.underlayer
         service = under.fields.get("service") if under is not None else None
         if under is None or service is None:
             return
-        meanings: dict[int, str] = {}
-        octets = b"".join(bytes(tag) for tag in self.tags)
-        codec.decode(services.parameters(under.pdu_type, service), octets, meanings)
+        outline, octets = codec.Outline(), b"".join(bytes(tag) for tag in self.tags)
+        codec.decode(services.parameters(under.pdu_type, service), octets, outline)
+        meanings = outline.tags
+        self._nodes = outlined(octets, outline)
         at = 0
         for tag in self.tags:
             if at in meanings and isinstance(tag, Tag):
-                tag.meaning = escape(meanings[at])
+                tag.meaning = escape(meanings[at].removeprefix(codec.VALUE_ONLY))
             at += len(bytes(tag))
 
 

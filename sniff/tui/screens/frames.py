@@ -160,7 +160,7 @@ class FramesScreen(ListingScreen):
             return
         row, transaction = self._detail
         octets.show(row.no, row.event.octets, row.event.marks)
-        kept = tree.show(tree_of(self.store.dissector, row, transaction, date_and_clock))
+        kept = tree.show(tree_of(self.store.dissector, row, transaction, date_and_clock, self.store.meaning(row)))
         if kept is not None:
             octets.select(kept.begin, kept.end, kept.name)
 

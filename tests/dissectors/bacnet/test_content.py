@@ -260,7 +260,7 @@ def test_addresses_in_parameters_are_written_alike(mac: bytes, words: str):
     event = frame_of(answer("device,1", 30, (binding,)))
     line = text(event, MSTP.peek(event), Role.RESPONSE)
     assert f"network-number=13 mac-address={words}" in line
-    assert f"mac-address: {words}" in str(fields_of(MSTP, event, Role.RESPONSE))
+    assert f"name='mac-address', value='{words}" in str(fields_of(MSTP, event, Role.RESPONSE))
 
 
 def test_the_tree_goes_on_behind_a_null():
@@ -272,8 +272,8 @@ def test_the_tree_goes_on_behind_a_null():
     }
     body = apdus.encode(0, codec.encode(services.CONFIRMED[15], values), invoke_id=1, service=15)
     shown = str(fields_of(MSTP, frame_of(frame(5, 5, 2, npdu.encode(body, expects_reply=True))), Role.REQUEST))
-    assert "value='Null null'" in shown
-    assert "priority: 8" in shown
+    assert "name='property-value', value='null'" in shown
+    assert "name='priority', value='8'" in shown
     assert "Raw" not in shown
 
 

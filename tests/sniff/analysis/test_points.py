@@ -38,7 +38,8 @@ def samples(*exchanges: tuple[str, str | None], devices: Devices | None = None) 
 
 
 def words(*exchanges: tuple[str, str | None], devices: Devices) -> list[str]:
-    return [row.words for row in settled(bus.chunks(*exchanges), bus.SESSION, devices)]
+    meanings = [row.meaning for row in settled(bus.chunks(*exchanges), bus.SESSION, devices)]
+    return ["" if one is None or not one.words else f"{one.who}: {one.words}" for one in meanings]
 
 
 READ = ("012300000001".replace("0123", "0103"), "0103021770")

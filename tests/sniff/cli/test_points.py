@@ -68,11 +68,11 @@ def test_every_sample_as_csv_and_json(sniff485: Run, drive: Path) -> None:
 def test_words_in_show(sniff485: Run, drive: Path) -> None:
     plain, named = sniff485("show", drive).out, sniff485("show", drive, "-d", "1=teco-e510").out
     assert "—" not in plain
-    assert "1 ← write register 0x2502 = 6000 — drive 1: frequency command 60.00 Hz" in named
-    assert "— drive 1: run, reverse" in named
-    assert "— drive 1: status running, forward, not ready, fault; fault external fault 01" in named
+    assert "1 ← frequency command 60.00 Hz — write register 0x2502 = 6000" in named
+    assert "1 ← run, reverse — write register" in named
+    assert "1 → status running, forward, not ready, fault; fault external fault 01" in named
     first = json.loads(sniff485("show", drive, "-d", "1=teco-e510", "--json").out.splitlines()[0])
-    assert first["text"].endswith("drive 1: frequency command 60.00 Hz")
+    assert first["text"].startswith("1 ← frequency command 60.00 Hz — ")
 
 
 def test_findings_in_check(sniff485: Run, drive: Path) -> None:
@@ -102,7 +102,7 @@ def test_convert_writes_the_values(sniff485: Run, drive: Path, tmp_path: Path) -
     ]
     # the file says of itself who is on the bus
     assert "output-frequency" in sniff485("points", target).out
-    assert "drive 1: run, reverse" in sniff485("show", target).out
+    assert "1 ← run, reverse — write register" in sniff485("show", target).out
 
 
 @pytest.mark.parametrize(

@@ -194,7 +194,7 @@ def test_csv_has_one_heading_and_takes_filters(poll: Path, sniff485: Callable) -
 
 def test_no_cell_of_csv_is_a_formula(poll: Path, sniff485: Callable, monkeypatch: pytest.MonkeyPatch) -> None:
     for module in ("rows", "said_texts"):
-        monkeypatch.setattr(f"sniff.cli.{module}.describe", lambda dissector, row: "=1+1,\n2")
+        monkeypatch.setattr(f"sniff.cli.{module}.describe", lambda dissector, row, meaning=None: "=1+1,\n2")
     rows = list(csv.DictReader(io.StringIO(sniff485("show", "--csv", poll, "-c", "1").out)))
     assert [row["text"] for row in rows] == ["'=1+1,\n2"]
 

@@ -36,3 +36,11 @@ def test_narrow_screens_keep_what_matters() -> None:
     assert wide == [column.name for column in FRAMES]
     text = next(column for column in lay_out(FRAMES, 77) if column.name == "text")
     assert text.width >= 20
+
+
+def test_a_long_text_goes_on_over_empty_cells() -> None:
+    columns = [Column("text", "what", 6, spills=True), Column("verdict", "verdict", 4), Column("len", "len", 2)]
+    long = {"text": Cell("0123456789ab"), "verdict": Cell(""), "len": Cell("8")}
+    assert "".join(cell.text for cell in pieces(columns, long)) == "0123456789… 8 "
+    held = {**long, "verdict": Cell("late")}
+    assert "".join(cell.text for cell in pieces(columns, held)) == "01234… late 8 "

@@ -1,0 +1,193 @@
+"""What a frame means to its device: its values by name, before the raw numbers. Pure, total.
+
+A frame alone often does not say: an answer needs its request, a register its profile. Whoever knows both makes a
+`Meaning` of them; a protocol's `Dissector.line` puts it into the line of the list, `Meaning.items` into the tree.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+from dissectors.frame import Frame
+from dissectors.profiles.decoding import NO_BITS, Value, brief_title, decode, number, said_title, say
+from dissectors.profiles.model import Entry, Profile
+from dissectors.profiles.properties import due_property
+from dissectors.readings import Reading
+
+Span = tuple[int, int]
+"""Octets of a frame: the first, and the one behind the last."""
+
+Spans = Callable[[Frame, Sequence[Reading]], Sequence[Span | None]]
+"""Where each reading of a frame stands in its octets (`Dissector.spans`)."""
+
+PlaceName = Callable[[Reading, str, int], str]
+"""(reading, number, offset) → its place in words: `Register 2524h (wire 0x2524)`. `number`: the manual's, empty without
+a profile; `offset`: the wire's number less the manual's (`Dissector.place`)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Node:
+    """One line of a tree that a protocol makes itself. `begin`, `end`: octets of what it was made of, end exclusive."""
+
+    name: str
+    text: str = ""
+    begin: int | None = None
+    end: int | None = None
+    children: tuple[Node, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Item:
+    """One value in words. `place`: where it is; `title`: what it is, empty where nobody knows; `text`: the value with
+    its unit, and its bits where they say more; `value`: None for what is only part of another one. `parts`: its named
+    bits, as names and texts."""
+
+    reading: Reading
+    place: str
+    title: str
+    text: str
+    value: Value | None = None
+    parts: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def name(self) -> str:
+        """`Register 2524h (wire 0x2524) output frequency`."""
+        return f"{self.place} {self.title}".rstrip()
+
+
+@dataclass(frozen=True, slots=True)
+class Meaning:
+    """What is known of a frame besides its octets.
+
+    `station`: whose values they are, None for all stations; `request`: what it answers, None where it is no answer or
+    nobody heard the question. `refused`: the maker's words for the exception code that it carries. `asked`: the places
+    that a request reads.
+    """
+
+    station: int | None
+    profile: Profile | None
+    readings: tuple[Reading, ...] = ()
+    refused: str = ""
+    request: Frame | None = None
+    asked: tuple[Reading, ...] = ()
+
+    @property
+    def who(self) -> str:
+        """The device: "drive 3", "all drives"; "station 3" without a profile."""
+        noun = "station" if self.profile is None else self.profile.noun
+        return f"all {noun}s" if self.station is None else f"{noun} {self.station}"
+
+    @property
+    def words(self) -> str:
+        """What it says in one line: "status running, forward; output current 12.3 A"; empty without a profile."""
+        if self.profile is None:
+            return ""
+        return self.refused or say(self.profile, self.readings) or self._question()
+
+    def _question(self) -> str:
+        """ "read status, fault, output frequency"; what the profile does not know is left out."""
+        if self.profile is None:
+            return ""
+        titles: list[str] = []
+        for one in self.asked:
+            entry = self.profile.at(one.space, one.address)
+            if entry is not None and not entry.reserved:
+                part = f" {one.part.replace('.', ' ')}" if one.part else ""
+                lacks = " (this device has none)" if self.profile.lacks(one.space, one.part) else ""
+                titles.append(brief_title(entry) + part + lacks)
+        return f"read {', '.join(dict.fromkeys(titles))}" if titles else ""
+
+    def questions(self, place: PlaceName) -> Iterator[tuple[str, str]]:
+        """The places that are asked for, each with what is there."""
+        profile = self.profile
+        for one in self.asked:
+            entry = profile.at(one.space, one.address) if profile is not None else None
+            offset = 0 if profile is None else profile.address_offset
+            kept = profile is not None and profile.is_reserved(one.space, one.address)
+            where = place(one, _number(entry, one, offset, kept), offset)
+            title = "reserved" if kept else "" if entry is None else _titled(entry)
+            lacks = profile is not None and profile.lacks(one.space, one.part)
+            yield where, f"{title}; this device has no {one.part}" if lacks else title
+
+    @property
+    def about(self) -> str:
+        """The same, with the device where the line cannot tell it: a broadcast is for all."""
+        said = self.words
+        return f"{self.who}: {said}" if said and self.station is None else said
+
+    def items(self, place: PlaceName) -> Iterator[Item]:
+        """Every reading in words, in the order of the wire; the second word of a number says whose it is."""
+        values: dict[int, list[Value]] = {}
+        for value in decode(self.profile, self.readings):
+            values.setdefault(id(value.reading), []).append(value)
+        for reading in self.readings:
+            yield self._item(reading, values.get(id(reading), []), place)
+
+    def spans_in(self, frame: Frame, spans: Spans | None) -> Sequence[Span | None]:
+        """Where each reading stands in the frame; None where nobody can tell."""
+        return [None] * len(self.readings) if spans is None else spans(frame, self.readings)
+
+    def _item(self, reading: Reading, values: list[Value], place: PlaceName) -> Item:
+        profile = self.profile
+        entry = profile.at(reading.space, reading.address) if profile is not None else None
+        offset = 0 if profile is None else profile.address_offset
+        kept = profile is not None and profile.is_reserved(reading.space, reading.address)
+        where = place(reading, _number(entry, reading, offset, kept), offset)
+        raw = number(reading.value)
+        if reading.words:
+            raw = reading.words + (f" ({raw})" if reading.raw is not None else "")
+        if entry is None:
+            return Item(reading, where, "reserved" if kept else "", raw, values[0] if values else None)
+        if reading.part:
+            due = due_property(entry, reading)
+            text = raw if due is None else f"{raw}; the manual has {due}"
+            return Item(reading, where, _titled(entry), text, values[0] if values else None)
+        if entry.reserved:
+            return Item(reading, where, "reserved", raw)
+        if not values:  # the first register of the number stands for all of it
+            word = entry.word_of(reading.address)
+            return Item(reading, where, said_title(word), raw)
+        value, *bits = values
+        doubt = " (?)" if entry.doubt or not reading.sure else ""
+        titled = _titled(value.entry or entry)
+        return Item(reading, where, titled, _text(value, raw) + doubt, value, _parts(entry, bits))
+
+
+def _number(entry: Entry | None, reading: Reading, offset: int, kept: bool) -> str:
+    """The manual's number of a place; where it has no entry, as its registers are counted."""
+    if entry is None:
+        return f"{reading.address - offset:04X}h" if offset or kept else ""
+    multiple = entry.kind.registers > 1 and reading.address != entry.address
+    return f"{reading.address - offset:04X}h" if multiple else entry.number
+
+
+def _titled(entry: Entry) -> str:
+    """What an entry is called, and in quotes what the device itself calls it, which an operator's client shows."""
+    title = said_title(entry)
+    return f'{title} "{entry.label}"' if entry.label and entry.label.lower() != title.lower() else title
+
+
+def _text(value: Value, raw: str) -> str:
+    """The value for people, and what stood on the wire where that is not the same."""
+    text = value.text if value.words != NO_BITS else raw
+    held = raw if value.raw is None or isinstance(value.reading.value, float) else str(value.raw)
+    return text if text in (held, f"{held} {value.unit}") else f"{text} ({held})"
+
+
+def _parts(entry: Entry, values: Sequence[Value]) -> tuple[tuple[str, str], ...]:
+    """Named bits and numbers in bits, as names and texts."""
+    parts = []
+    for bit, value in zip(entry.bits, values, strict=False):
+        parts.append(
+            (f"bit {bit.number:X} {bit.name}", f"{value.raw} ({value.words})" if value.words else f"{value.raw}")
+        )
+    for part, value in zip(entry.parts, values[len(entry.bits) :], strict=False):
+        words = f"{value.raw} ({value.words})" if value.words else f"{value.raw}"
+        parts.append((f"bits {part.high:X}-{part.low:X} {part.name}", words))
+    return tuple(parts)
+
+
+def plain_place(reading: Reading, number: str, offset: int) -> str:
+    """The place of what has a kind and a number: `AI 3`, `analog-value 1 units`."""
+    return f"{reading.space} {reading.address} {reading.part.replace('.', ' ')}".rstrip()
