@@ -1,0 +1,88 @@
+"""What points of stations without a profile may be: guesses of their registers beside their latest values. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dissectors.manifest import Dissector
+from dissectors.profiles import Devices
+from dissectors.profiles.decoding import plain_name
+from sniff.analysis.points import Key, PointTable, station_name
+from sniff.analysis.register_guess import RegisterGuess, Sure, Use, guessed, read_as
+from sniff.analysis.register_series import Block, RegisterSeries
+
+if TYPE_CHECKING:
+    from sniff.analysis.point_columns import TableSamples
+
+_USES = {
+    Use.CONSTANT: "constant",
+    Use.SENSOR: "sensor",
+    Use.COUNTER: "counter",
+    Use.SETTING: "set point",
+    Use.BITS: "bits",
+}
+_SURE = {Sure.SURE: "sure", Sure.LIKELY: "likely", Sure.OPEN: "open"}
+
+
+@dataclass(frozen=True, slots=True)
+class GuessedPoint:
+    """What one register of a point may be. `value`: of the latest samples, so read; `is_covered`: it is a further part
+    of the value that begins before it. The others as in `RegisterGuess`."""
+
+    words: str
+    value: float | None
+    low: float
+    high: float
+    rate: float
+    is_covered: bool = False
+
+
+class Guessing:
+    """Fed the samples of one bus; tells what the registers of stations without a profile may be."""
+
+    def __init__(self, dissector: Dissector, devices: Devices) -> None:
+        self.dissector = dissector
+        self.devices = devices
+        self.series = RegisterSeries()
+
+    def add(self, samples: TableSamples) -> None:
+        """Take those of a table."""
+        self.series.add_samples(samples)
+
+    def of(self, points: PointTable) -> dict[Key, GuessedPoint]:
+        """By point, for those that the table has."""
+        found: dict[Key, GuessedPoint] = {}
+        for guess in guessed(self._undescribed(), self.series.written):
+            for key, told in _told(guess, points):
+                found[key] = told
+        return found
+
+    def _undescribed(self) -> Iterable[Block]:
+        return (block for block in self.series.blocks() if self.devices.at(block.device) is None)
+
+
+def _told(guess: RegisterGuess, points: PointTable) -> Iterable[tuple[Key, GuessedPoint]]:
+    station = station_name(guess.device)
+    keys = [(station, plain_name(guess.space, guess.address + step)) for step in range(guess.kind.registers)]
+    held = [points.get(*key) for key in keys]
+    raws = [point.sample.value.raw for point in held if point is not None]
+    value = None
+    if len(raws) == len(held) and None not in raws:
+        row = np.array([[(raw or 0) & 0xFFFF for raw in raws]], np.uint16)
+        value = float(read_as(row, guess.kind, guess.swapped, guess.little)[0])
+    words = told(guess)
+    for step, key in enumerate(keys):
+        whole = len(raws) == len(held)
+        yield key, GuessedPoint(words, value, guess.low, guess.high, guess.rate, is_covered=step > 0 and whole)
+
+
+def told(guess: RegisterGuess) -> str:
+    """ "guessed f32 low word first: sensor (sure)"."""
+    order = " low word first" if guess.swapped else ""
+    order += " low octet first" if guess.little else ""
+    kind = "" if guess.use is Use.BITS else f" {guess.kind.value}{order}"
+    return f"guessed{kind}: {_USES[guess.use]} ({_SURE[guess.sure]})"
