@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,9 +11,9 @@ import numpy as np
 from dissectors.manifest import Dissector
 from dissectors.profiles import Devices
 from dissectors.profiles.decoding import plain_name
-from sniff.analysis.points import Key, PointTable, station_name
+from sniff.analysis.points import Key, Point, PointTable, station_name
 from sniff.analysis.register_guess import RegisterGuess, Sure, Use, guessed, read_as
-from sniff.analysis.register_series import Block, RegisterSeries
+from sniff.analysis.register_series import WORD_SPACES, Block, RegisterSeries
 
 if TYPE_CHECKING:
     from sniff.analysis.point_columns import TableSamples
@@ -31,7 +31,7 @@ _SURE = {Sure.SURE: "sure", Sure.LIKELY: "likely", Sure.OPEN: "open"}
 @dataclass(frozen=True, slots=True)
 class GuessedPoint:
     """What one register of a point may be. `value`: of the latest samples, so read; `is_covered`: it is a further part
-    of the value that begins before it. The others as in `RegisterGuess`."""
+    of the value that begins before it. `history`: times, ns, and values so read. The others as in `RegisterGuess`."""
 
     words: str
     value: float | None
@@ -39,6 +39,7 @@ class GuessedPoint:
     high: float
     rate: float
     is_covered: bool = False
+    history: tuple[tuple[int, float], ...] = ()
 
 
 class Guessing:
@@ -63,6 +64,40 @@ class Guessing:
 
     def _undescribed(self) -> Iterable[Block]:
         return (block for block in self.series.blocks() if self.devices.at(block.device) is None)
+
+
+def guess_of(point: Point, series: RegisterSeries, points: PointTable) -> GuessedPoint | None:
+    """What one point may be; None where it is no register, or described."""
+    sample, reading = point.sample, point.sample.value.reading
+    if point.entry is not None or sample.device is None or reading.space not in WORD_SPACES:
+        return None
+    blocks = [
+        block
+        for block in series.blocks()
+        if (block.device, block.space) == (sample.device, reading.space)
+        and block.first <= reading.address < block.first + block.width
+    ]
+    key = sample.station, sample.name
+    for guess in guessed(blocks, series.written):
+        for place, told in _told(guess, points):
+            if place == key:
+                return replace(told, history=_history(guess, blocks))
+    return None
+
+
+def _history(guess: RegisterGuess, blocks: Iterable[Block]) -> tuple[tuple[int, float], ...]:
+    """Times, ns, and values, as the question that was asked most often tells them."""
+    width = guess.kind.registers
+    whole = [
+        block for block in blocks if block.first <= guess.address and guess.address + width <= block.first + block.width
+    ]
+    if not whole:
+        return ()
+    block = max(whole, key=lambda one: one.count)
+    at = guess.address - block.first
+    values = read_as(block.words[:, at : at + width], guess.kind, guess.swapped, guess.little)
+    finite = np.isfinite(values).tolist()
+    return tuple((time, value) for time, value, good in zip(block.times, values.tolist(), finite, strict=True) if good)
 
 
 def _told(guess: RegisterGuess, points: PointTable) -> Iterable[tuple[Key, GuessedPoint]]:
