@@ -37,6 +37,7 @@ pairing = on_first_use("dissectors.modbus.block_pairing:rtu_pairing")
 judge = on_first_use("dissectors.modbus.judging_columns:BulkModbusFindings")
 ascii_kernel = on_first_use("dissectors.modbus.ascii_kernel:kernel")
 ascii_pairing = on_first_use("dissectors.modbus.block_pairing:ascii_pairing")
+register_maps = on_first_use("dissectors.modbus.map_reading:read_map")
 question = on_first_use("dissectors.modbus.questions:question")
 rtu_questions = Questions(question, on_first_use("dissectors.modbus.questions:rtu_stems"))
 ascii_questions = Questions(question, on_first_use("dissectors.modbus.questions:ascii_stems"))
@@ -82,6 +83,7 @@ RTU = Dissector(
     reading_columns=reading_columns,
     refusal=refusal,
     questions=rtu_questions,
+    register_maps=register_maps,
     kernel=kernel,
     pairing=pairing,
 )
@@ -107,6 +109,7 @@ ASCII = Dissector(
     readings=readings,
     refusal=refusal,
     questions=ascii_questions,
+    register_maps=register_maps,
     kernel=ascii_kernel,
     pairing=ascii_pairing,
 )
