@@ -79,13 +79,13 @@ def guess_of(point: Point, series: RegisterSeries, points: PointTable) -> Guesse
     ]
     key = sample.station, sample.name
     for guess in guessed(blocks, series.written):
-        for place, told in _told(guess, points):
+        for place, one in _told(guess, points):
             if place == key:
-                return replace(told, history=_history(guess, blocks))
+                return replace(one, history=history(guess, blocks))
     return None
 
 
-def _history(guess: RegisterGuess, blocks: Iterable[Block]) -> tuple[tuple[int, float], ...]:
+def history(guess: RegisterGuess, blocks: Iterable[Block]) -> tuple[tuple[int, float], ...]:
     """Times, ns, and values, as the question that was asked most often tells them."""
     width = guess.kind.registers
     whole = [

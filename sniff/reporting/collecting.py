@@ -17,6 +17,7 @@ from sniff.analysis.health import Health
 from sniff.analysis.judging import rules_over
 from sniff.analysis.nodes import Node
 from sniff.analysis.summary import Summary, ranked
+from sniff.analysis.trends import Trend, Trends
 from sniff.analysis.wording import describe
 from sniff.bus.model import BusModel
 from sniff.bus.offline import Source, outputs, survey
@@ -36,6 +37,7 @@ from sniff.reporting.numbers import (
     Score,
     Station,
     TimePart,
+    ValueTrend,
     seconds_since,
 )
 from sniff.reporting.timeline import Timeline
@@ -45,6 +47,8 @@ if TYPE_CHECKING:
 
 EVIDENCE_SHOWN, EVIDENCE_OF_NOTES = 5, 2
 LONGEST_TEXT = 180
+VALUES_SHOWN = 12
+"""Plots of values at most."""
 
 
 def collect(
@@ -64,7 +68,8 @@ def collect(
         Timeline(session.line.char),
         Happenings(session),
     )
-    survey(read, session, model, timeline, told, reference=reference)
+    trends = Trends(dissector, devices)
+    survey(read, session, model, timeline, told, trends, reference=reference)
     summary, findings, healths = model.summary, model.findings(), model.health()
     health = healths.bus if summary.octets else None
     stations = tuple(
@@ -102,7 +107,13 @@ def collect(
         happenings=tuple(told.happenings),
         measurement=_measurement(session, dissector),
         ring=None if dissector.ring is None else _ring(dissector.ring, model.ring()),
+        values=tuple(_value(trend, session) for trend in trends.moved(VALUES_SHOWN)),
     )
+
+
+def _value(trend: Trend, session: Session) -> ValueTrend:
+    at = tuple(round(seconds_since(session.started, time), 3) for time in trend.times)
+    return ValueTrend(trend.station, trend.name, trend.unit, trend.how, at, tuple(trend.values))
 
 
 def verdict(health: Health | None, findings: tuple[Found, ...], stations: tuple[Station, ...], summary: Summary) -> str:
