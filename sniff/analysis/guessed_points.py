@@ -13,7 +13,7 @@ from dissectors.profiles import Devices
 from dissectors.profiles.decoding import plain_name
 from sniff.analysis.points import Key, Point, PointTable, station_name
 from sniff.analysis.register_guess import RegisterGuess, Sure, Use, guessed, read_as
-from sniff.analysis.register_series import WORD_SPACES, Block, RegisterSeries
+from sniff.analysis.register_series import WORD_SPACES, Block, RegisterSeries, covering
 
 if TYPE_CHECKING:
     from sniff.analysis.point_columns import TableSamples
@@ -57,7 +57,7 @@ class Guessing:
     def of(self, points: PointTable) -> dict[Key, GuessedPoint]:
         """By point, for those that the table has."""
         found: dict[Key, GuessedPoint] = {}
-        for guess in guessed(self._undescribed(), self.series.written):
+        for guess in guessed(covering(self._undescribed()), self.series.written):
             for key, told in _told(guess, points):
                 found[key] = told
         return found
@@ -78,7 +78,7 @@ def guess_of(point: Point, series: RegisterSeries, points: PointTable) -> Guesse
         and block.first <= reading.address < block.first + block.width
     ]
     key = sample.station, sample.name
-    for guess in guessed(blocks, series.written):
+    for guess in guessed(covering(blocks), series.written):
         for place, one in _told(guess, points):
             if place == key:
                 return replace(one, history=history(guess, blocks))

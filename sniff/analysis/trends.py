@@ -16,7 +16,7 @@ from dissectors.profiles.decoding import plain_name
 from sniff.analysis.guessed_points import history, told
 from sniff.analysis.points import Key, PointReader, Sample, station_name
 from sniff.analysis.register_guess import Sure, Use, guessed
-from sniff.analysis.register_series import WORD_SPACES, RegisterSeries
+from sniff.analysis.register_series import WORD_SPACES, RegisterSeries, covering
 
 if TYPE_CHECKING:
     from sniff.engine.engine import Output
@@ -118,7 +118,7 @@ class Trends:
         trend.add(sample.time, float(value.value))
 
     def _guesses(self) -> Iterator[Trend]:
-        blocks = list(self._series.blocks())
+        blocks = covering(self._series.blocks())
         for guess in guessed(blocks, self._series.written):
             if guess.use in (Use.SENSOR, Use.COUNTER, Use.SETTING) and guess.sure > Sure.OPEN:
                 seen = history(guess, [one for one in blocks if (one.device, one.space) == (guess.device, guess.space)])
