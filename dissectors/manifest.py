@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     # columns need numpy, which takes longer to import than a small capture to read; simulated buses are seldom wanted
     from dissectors.columns import Kernel, Pairing
     from dissectors.reading_columns import BulkReadings
+    from dissectors.register_maps import MapReader
     from dissectors.simulated import SimulatedBus
     from dissectors.stencil import Stencils
 
@@ -85,6 +86,7 @@ class Dissector:
     `readings`: what exchanges say of the things inside a station; `refusal`: the code with which one refuses.
     `reading_columns`: `readings` of many exchanges at once, as far as they are plain registers or say nothing.
     `questions`: what its requests ask, without the values that they carry.
+    `register_maps`: reads maps of registers that others wrote.
     `packet_file`: how its frames lie in packet files.
     `renamer`: makes what gives stations other numbers and blanks texts, checks made right again.
     `kernel`: framer and peek for clean stretches of many frames at once (`dissectors/columns.py`).
@@ -121,6 +123,7 @@ class Dissector:
     reading_columns: BulkReadings | None = None
     refusal: Refusal | None = None
     questions: Questions | None = None
+    register_maps: MapReader | None = None
     packet_file: PacketFile | None = None
     renamer: Callable[[], Renamer] | None = None
     makers: Mapping[str, Callable[..., bytes]] = field(default_factory=dict)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -25,6 +25,9 @@ MOST_SAMPLES = 512
 """Answers of one block that are kept: beyond it every second one is let go, and so on."""
 
 MOST_BLOCKS = 4096
+ENOUGH = 2
+"""Blocks that tell of one register, where not all are looked at."""
+
 WORD_SPACES = ("holding", "input")
 
 _WRITE = HOWS.index(How.WRITE)
@@ -116,11 +119,9 @@ class RegisterSeries:
 
     def add_samples(self, samples: TableSamples) -> None:
         """Take those of a table."""
-        if any(sample.value.reading.space in WORD_SPACES for _, sample in samples.others):
-            self.add(samples.in_order())  # one that came late stands between others
-            return
-        self.add_columns(samples.plain)
-        self.add(sample for _, sample in samples.others)
+        words = [one for one in samples.others if _is_word(one[1])]
+        self.add_columns(_together(samples.plain, words) if words else samples.plain)
+        self.add(sample for _, sample in samples.others if not _is_word(sample))
 
     def add_columns(self, plain: PlainSamples) -> None:
         """Take samples of many exchanges; the same as one after the other."""
@@ -151,11 +152,13 @@ class RegisterSeries:
         keys = np.stack([words.device[begins], words.space[begins], words.address[begins], widths], axis=1)
         distinct, first, which = np.unique(keys, axis=0, return_index=True, return_inverse=True)
         which = which.reshape(-1)
+        by_block = begins[np.argsort(which, kind="stable")]
+        ends = np.cumsum(np.bincount(which))
         for number in np.argsort(first).tolist():
             device, space, address, width = distinct[number].tolist()
             block = self._block((device, words.spaces[space], address, width))
             if block is not None:
-                at = begins[which == number]
+                at = by_block[ends[number - 1] if number else 0 : ends[number]]
                 block.add_many(words.time[at], (words.raw[at[:, None] + np.arange(width)] & 0xFFFF).astype(np.uint16))
 
     def blocks(self) -> Iterator[Block]:
@@ -197,6 +200,44 @@ class SeriesReader:
 
     def add_line_event(self, event: LineEvent) -> None:
         """It says nothing of a register."""
+
+
+def _is_word(sample: Sample) -> bool:
+    reading = sample.value.reading
+    return reading.space in WORD_SPACES and reading.raw is not None and not sample.value.bit
+
+
+def _together(plain: PlainSamples, words: Sequence[tuple[int, Sample]]) -> PlainSamples:
+    """Both as columns in the order of closing: one that came late stands between others."""
+    spaces = (*plain.spaces, *WORD_SPACES)
+    columns: dict[str, list[int]] = {
+        "order": [order for order, _ in words],
+        "time": [one.time for _, one in words],
+        "device": [NONE if one.device is None else one.device for _, one in words],
+        "frame": [one.frame for _, one in words],
+        "space": [spaces.index(one.value.reading.space) for _, one in words],
+        "address": [one.value.reading.address for _, one in words],
+        "raw": [(one.value.reading.raw or 0) & 0xFFFF for _, one in words],
+        "how": [HOWS.index(one.value.reading.how) for _, one in words],
+    }
+    both = {name: np.concatenate([getattr(plain, name), values]) for name, values in columns.items()}
+    in_order = np.argsort(both["order"], kind="stable")
+    sorted_ones: dict[str, Any] = {name: values[in_order].astype(np.int64) for name, values in both.items()}
+    return replace(plain, **sorted_ones, spaces=spaces)
+
+
+def covering(blocks: Iterable[Block]) -> list[Block]:
+    """Blocks that hold every register of all of them, those first that were answered most; none whose registers are
+    all in two others already, so that their number is bounded by that of the registers."""
+    covered: dict[tuple[int, str, int], int] = {}
+    kept = []
+    for block in sorted(blocks, key=lambda one: (-len(one.rows), -one.width)):
+        places = [(block.device, block.space, block.first + step) for step in range(block.width)]
+        if any(covered.get(place, 0) < ENOUGH for place in places):
+            kept.append(block)
+            for place in places:
+                covered[place] = covered.get(place, 0) + 1
+    return kept
 
 
 def _follows(before: Sample, sample: Sample) -> bool:

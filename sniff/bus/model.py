@@ -12,6 +12,7 @@ from sniff.analysis.judging import Judging
 from sniff.analysis.load import KEPT_SECONDS
 from sniff.analysis.points import PointReader, PointTable, Sample
 from sniff.analysis.polls import Polls
+from sniff.analysis.register_series import RegisterSeries
 from sniff.analysis.summary import Summary
 from sniff.bus.telling_rows import telling_rows, telling_transactions
 from sniff.engine.engine import Output
@@ -25,7 +26,8 @@ class BusModel:
     """What is counted, found and measured on one bus.
 
     `summary`: counts, stations, load. `judging`: the rules. `reader`, `points`: values by device. `samples`: those that
-    the newest output completed. `polls`: the master's programme. `version` changes whenever anything changed.
+    the newest output completed. `series`: what the registers of stations without a profile did. `polls`: the master's
+    programme. `version` changes whenever anything changed.
     """
 
     def __init__(
@@ -41,6 +43,7 @@ class BusModel:
         self.devices = devices or Devices()
         self.summary = Summary(session.line, kept_seconds=kept_seconds)
         self.points = PointTable()
+        self.series = RegisterSeries()
         self.samples: list[Sample] = []
         self.version = 0
         self._use(session, dissector)
@@ -66,7 +69,7 @@ class BusModel:
         self.judging.add(output)
         if self._with_points:
             self.samples = self.reader.add(output)
-            self.points.add(self.samples)
+            self._take_samples()
             self.polls.add(output)
 
     def add_table(self, table: Table) -> None:
@@ -76,8 +79,14 @@ class BusModel:
         self.judging.add_table(table)
         if self._with_points:
             self.samples = self.reader.add(telling_rows(table, telling_transactions(table)))
-            self.points.add(self.samples)
+            self._take_samples()
             self.polls.add_table(table)
+
+    def _take_samples(self) -> None:
+        self.points.add(self.samples)
+        undescribed = [one for one in self.samples if self.devices.at(one.device) is None]
+        if undescribed:
+            self.series.add(undescribed)
 
     def add_line_event(self, event: LineEvent) -> None:
         """Take something that happened to the line."""

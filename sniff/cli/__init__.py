@@ -34,7 +34,7 @@ COMMANDS: dict[str, str] = {
     "profile": "device profiles: list, show, check, and guess from a capture",
     "check": "what is wrong with a bus, where, and what to do next: findings with evidence",
     "rule": "explain the rules behind the findings of check, or list them",
-    "report": "a page to hand on: verdict, findings, stations, load, response times, ring; HTML that stands alone",
+    "report": "a page to hand on: verdict, findings, stations, load, values, times, ring; HTML that stands alone",
     "convert": "one capture format into another, by suffix",
     "cut": "a stretch of a capture: by time, by frames, around a finding",
     "merge": "captures of one bus into one, by time",

@@ -1,17 +1,21 @@
 """Values by name: the latest of each point as a table; --csv, --json and --parquet give every sample. Names and units
-come from device profiles (-d), else a point is its place: holding/40108, AI/9. Quality: 0 good, 1 uncertain, 2 out of
-range. Parquet needs `pip install 'sniff485[parquet]'`.
+come from device profiles (-d), else a point is its place: holding/40108, AI/9, and the table says what its values look
+like: "guessed" stands before that, and two registers that are one number are one row then. Quality: 0 good, 1 doubtful,
+2 out of range. every ms: from one sample to the next, half of them are shorter; ±: by how much nine of ten differ,
+halved. Parquet needs `pip install 'sniff485[parquet]'`.
 """
 
 from __future__ import annotations
 
 import argparse
 import fnmatch
-from collections.abc import Iterator
+import math
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
-from dissectors.line import NS_PER_S
-from dissectors.profiles.decoding import number
+from dissectors.line import MS, NS_PER_S
+from dissectors.profiles import Devices
+from dissectors.profiles.decoding import Quality, number
 from sniff.analysis.points import Point, PointReader, PointTable, Sample
 from sniff.bus.offline import outputs
 from sniff.bus.sample_row import COLUMNS, sample_row, shown_value
@@ -25,9 +29,32 @@ from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import LineEvent, Session
 
 if TYPE_CHECKING:
+    from sniff.analysis.guessed_points import GuessedPoint
     from sniff.analysis.point_columns import TableSamples
 
-LATEST = ("device", "point", "value", "unit", "means", "quality", "age s", "changed s", "samples")
+LATEST = (
+    "device",
+    "point",
+    "value",
+    "unit",
+    "means",
+    "quality",
+    "age s",
+    "changed s",
+    "samples",
+    "every ms",
+    "± ms",
+    "low",
+    "high",
+    "a second",
+    "written",
+)
+_SELDOM = ("unit", "written")
+"""Columns that a person need not see when there is nothing in them."""
+
+FRESH = 2.0
+"""Seconds for which a change is marked on a terminal."""
+
 SAMPLES = ("time", "device", "point", "value", "raw", "unit", "quality", "how", "frame", "means")
 
 
@@ -39,6 +66,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
     arguments.add_reference(parser)
     filtering.add_filter(parser, "only values of exchanges with a frame that matches")
     parser.add_argument("-n", "--name", action="append", default=[], metavar="GLOB", help="only points like output-*")
+    parser.add_argument("--sort", choices=SORTS, default="device", help="order of the table (default: device)")
+    parser.add_argument("--no-guess", action="store_true", help="say nothing of what undescribed registers may hold")
     parser.add_argument("--bits", action="store_true", help="in the table, also the single bits of registers")
     style = parser.add_mutually_exclusive_group()
     style.add_argument("--json", action="store_const", const="json", dest="style", help="one JSON object a sample")
@@ -61,7 +90,7 @@ def run(args: argparse.Namespace) -> int:
         assert table is not None
         for name, capture in arguments.open_captures(args.files):
             session = arguments.settings_of(args, capture.session, name)
-            for samples in _samples(args, capture, session):
+            for samples in _chosen(args, capture, session):
                 for sample in samples.in_order():
                     table.add(sample_row(sample))
             writing.say_incomplete(name, capture)
@@ -75,33 +104,39 @@ def _print(args: argparse.Namespace) -> int:
         if latest:
             _print_latest(args, capture, session)
         else:
-            chosen = (cells for samples in _samples(args, capture, session) for cells in _cells(samples))
+            chosen = (cells for samples in _chosen(args, capture, session) for cells in _cells(samples))
             tables.write(SAMPLES, chosen, args.style)
         writing.say_incomplete(path, capture)
     return 0
 
 
-def _samples(args: argparse.Namespace, capture: Capture, session: Session) -> Iterator[TableSamples]:
+def _chosen(args: argparse.Namespace, capture: Capture, session: Session) -> Iterator[TableSamples]:
     """The samples that the user wants, many at a time."""
+    for samples in _samples(args, capture, session, arguments.noted_devices(args, session)):
+        yield _wanted(args, samples)
+
+
+def _samples(args: argparse.Namespace, capture: Capture, session: Session, devices: Devices) -> Iterator[TableSamples]:
+    """All samples, many at a time."""
     from sniff.analysis.point_columns import TableSamples, no_samples
     from sniff.analysis.table_points import samples_of
     from sniff.engine.bulk import tables as tables_of
 
-    reader = PointReader(dissector_for(session), arguments.noted_devices(args, session))
+    reader = PointReader(dissector_for(session), devices)
     watched = Watched(capture, prints=True)
     if args.filter:
         taken = _Taken(reader)
         filtering.surveyed(args, capture, session, taken, every_row=True, devices=reader.devices)
-        yield _wanted(args, TableSamples(no_samples(), [(0, sample) for sample in taken.samples]))
+        yield TableSamples(no_samples(), [(0, sample) for sample in taken.samples])
         return
     if args.reference:
         for output in outputs(watched.items(), session):
             if isinstance(output, Output):
-                yield _wanted(args, TableSamples(no_samples(), [(0, sample) for sample in reader.add(output)]))
+                yield TableSamples(no_samples(), [(0, sample) for sample in reader.add(output)])
         return
     for table in tables_of(watched.blocks(), session):
         if not isinstance(table, LineEvent):
-            yield _wanted(args, samples_of(reader, table))
+            yield samples_of(reader, table)
 
 
 class _Taken:
@@ -127,24 +162,75 @@ def _wanted(args: argparse.Namespace, samples: TableSamples) -> TableSamples:
 
 
 def _print_latest(args: argparse.Namespace, capture: Capture, session: Session) -> None:
+    from sniff.analysis.guessed_points import Guessing
     from sniff.analysis.point_columns import add_to
 
+    devices, dissector = arguments.noted_devices(args, session), dissector_for(session)
     points, end = PointTable(), 0
-    for samples in _samples(args, capture, session):
+    guessing = None if args.no_guess else Guessing(dissector, devices)
+    for samples in _samples(args, capture, session, devices):
+        if guessing is not None:
+            guessing.add(samples)
+        samples = _wanted(args, samples)
         add_to(points, samples)
         end = max(end, samples.last or 0)
     shown = [point for point in points if args.bits or args.name or not point.sample.value.bit]
-    shown.sort(key=lambda point: (point.sample.device is not None, point.sample.device or 0))
-    tables.write(LATEST, [_latest(point, end, args.style) for point in shown], args.style)
+    told = guessing.of(points) if guessing is not None else {}
+    rows = []
+    for point in sorted(shown, key=SORTS[args.sort]):
+        guess = told.get((point.sample.station, point.sample.name))
+        if guess is None or not guess.is_covered:
+            rows.append(_latest(point, end, args.style, guess))
+    if args.style != "text":
+        tables.write(LATEST, rows, args.style)
+        return
+    kept = [at for at, name in enumerate(LATEST) if name not in _SELDOM or any(row[at] for row in rows)]
+    changed = LATEST.index("changed s")
+    fresh = [_is_fresh(row[changed]) for row in rows] if arguments.colour() else ()
+    tables.write([LATEST[at] for at in kept], [[row[at] for at in kept] for row in rows], bold=fresh)
 
 
-def _latest(point: Point, end: int, style: str) -> tuple[Cell, ...]:
+def _latest(point: Point, end: int, style: str, guess: GuessedPoint | None) -> tuple[Cell, ...]:
     sample, value = point.sample, point.sample.value
     means = f"command: {value.words}".rstrip(": ") if point.is_command else value.words
+    quality, low, high, rate = int(value.quality), point.low, point.high, point.rate
+    shown = _rounded(sample) if style == "text" else shown_value(sample)
+    if guess is not None:
+        means = f"{means}; {guess.words}".removeprefix("; ")
+        quality, low, high, rate = int(Quality.UNCERTAIN), guess.low, guess.high, guess.rate
+        shown = guess.value if style != "text" or guess.value is None else f"{guess.value:.7g}"
     age = round((end - sample.time) / NS_PER_S, 3)
     changed = round((end - point.changed) / NS_PER_S, 3) if point.changed else None
-    shown = _rounded(sample) if style == "text" else shown_value(sample)
-    return (sample.station, sample.name, shown, value.unit, means, int(value.quality), age, changed, point.count)
+    often = (_ms(point.interval), _ms(point.jitter))
+    span = tuple(_brief(number, style) for number in (low, high, rate))
+    counted = (age, changed, point.count, *often, *span, point.written)
+    return (sample.station, sample.name, shown, value.unit, means, quality, *counted)
+
+
+def _is_fresh(changed: Cell) -> bool:
+    return isinstance(changed, float) and changed <= FRESH
+
+
+def _ms(time: int | None) -> Cell:
+    return None if time is None else round(time / MS, 1)
+
+
+def _brief(value: float | None, style: str) -> Cell:
+    return value if value is None or style != "text" else f"{value:.5g}"
+
+
+def _by_device(point: Point) -> tuple[float, ...]:
+    return (-1 if point.sample.device is None else point.sample.device,)
+
+
+SORTS: dict[str, Callable[[Point], tuple[float | str, ...]]] = {
+    "device": _by_device,
+    "name": lambda point: (point.sample.name, *_by_device(point)),
+    "changed": lambda point: (-point.changed, *_by_device(point)),
+    "samples": lambda point: (-point.count, *_by_device(point)),
+    "every": lambda point: (math.inf if point.interval is None else point.interval, *_by_device(point)),
+    "rate": lambda point: (-(point.rate or 0.0), *_by_device(point)),
+}
 
 
 def _cells(samples: TableSamples) -> Iterator[tuple[Cell, ...]]:

@@ -1,7 +1,7 @@
 """list: what there is. show NAME: registers, objects, limits. check FILE…: whether profiles are right. guess CAPTURE…:
 which profiles fit the stations that were heard. draft CAPTURE…: a profile of a station that has none, from what its
 registers did; types, orders and uses are guesses, with how sure. import MAP: a profile out of a register map: a table
-as CSV with headings (address, name, type, scale, unit, function …), or Home Assistant's modbus: YAML. Own profiles:
+as CSV with headings (address, name, type, scale, unit, function …), or the YAML of Home Assistant. Own profiles:
 ./profiles/NAME.toml, or the user's folder.
 """
 

@@ -7,23 +7,16 @@ import re
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from dissectors import registry
 from dissectors.profiles import ProfileError, parse_text
 from dissectors.profiles.parsing import is_name
+from dissectors.register_maps import NUMBERINGS, TABLES, MapError, MapReader, RegisterMap, document
 from sniff.analysis.plain import plain
 from sniff.cli import UNREADABLE, USAGE, Failure, arguments, writing
 
-if TYPE_CHECKING:
-    from sniff.analysis.register_map import RegisterMap
-
 LARGEST = 16 << 20
 """Octets of a map that are read at most."""
-
-NUMBERINGS = ("auto", "40001", "0", "1")
-TABLES = ("holding", "input", "coil", "discrete")
-_YAML = (".yaml", ".yml")
-_WORKSPACES = (".mbp", ".mbw", ".mbs")
 
 
 def configure(
@@ -47,13 +40,15 @@ def configure(
 
 def run(args: argparse.Namespace) -> int:
     """Read the map, write the profile, say what could not be taken over."""
-    from sniff.analysis.register_map import document
-
+    knowing = [one for one in registry.usable() if one.register_maps is not None]
+    reader, family = knowing[0].register_maps, knowing[0].profile_family
+    assert reader is not None
+    protocols = [one.name for one in knowing if one.profile_family == family]
     if args.write is not None:
         writing.refuse_to_overwrite(args.write, [args.file], args.force)
-    found = _of_station(args, _read(args))
+    found = _of_station(args, _read(args, reader))
     name = args.name or _name_of(args.file)
-    text, count = document(name, f"imported from {Path(args.file).name}", found)
+    text, count = document(name, f"imported from {Path(args.file).name}", found, family, protocols)
     if not count:
         raise Failure(f"{args.file}: no register that can be read", UNREADABLE)
     try:
@@ -94,72 +89,22 @@ def _listed(stations: list[int]) -> str:
     return ", ".join(map(str, stations))
 
 
-def _read(args: argparse.Namespace) -> RegisterMap:
-    """The map in a file, by what is in it."""
-    path, text = Path(args.file), _text_of(args.file)
-    if path.suffix.lower() in _YAML or re.search(r"^modbus:", text, re.MULTILINE):
-        return _home_assistant(args.file, text)
-    from sniff.analysis.register_map_csv import read_csv
-
-    found = read_csv(text, args.numbering, args.table)
-    if found is None:
-        raise Failure(
-            f"{args.file}: no line has a heading for the number of a register (address, register …), with commas, "
-            "semicolons, tabs or bars between the columns",
-            UNREADABLE,
-        )
-    return found
-
-
-def _text_of(name: str) -> str:
-    path = Path(name)
-    if path.suffix.lower() in _WORKSPACES:
-        raise Failure(
-            f"{name}: the form of a Modbus Poll workspace is not published; copy its table, or log it as text, "
-            "and import that with a heading line such as address,name,type",
-            USAGE,
-        )
+def _read(args: argparse.Namespace, reader: MapReader) -> RegisterMap:
+    """The map in a file."""
     try:
-        if name == "-":
+        if args.file == "-":
             octets = sys.stdin.buffer.read(LARGEST + 1)
         else:
-            with path.open("rb") as file:
+            with Path(args.file).open("rb") as file:
                 octets = file.read(LARGEST + 1)
     except OSError as error:
-        raise Failure(f"{name}: {error.strerror or error}", UNREADABLE) from None
+        raise Failure(f"{args.file}: {error.strerror or error}", UNREADABLE) from None
     if len(octets) > LARGEST:
-        raise Failure(f"{name}: over {LARGEST >> 20} MiB is no register map", UNREADABLE)
-    if octets.startswith((b"PK\x03\x04", b"\xd0\xcf\x11\xe0")):
-        raise Failure(f"{name}: a spreadsheet file; save the sheet as CSV and import that", USAGE)
-    for encoding in ("utf-16",) if octets[:2] in (b"\xff\xfe", b"\xfe\xff") else ("utf-8-sig", "cp1252"):
-        try:
-            return octets.decode(encoding)
-        except UnicodeDecodeError:
-            continue
-    return octets.decode("latin-1")
-
-
-def _home_assistant(name: str, text: str) -> RegisterMap:
-    from sniff.analysis.register_map_yaml import read_home_assistant
-
+        raise Failure(f"{args.file}: over {LARGEST >> 20} MiB is no register map", UNREADABLE)
     try:
-        import yaml
-    except ImportError:
-        raise Failure("YAML needs PyYAML: pip install 'sniff485[yaml]'", USAGE) from None
-
-    class Loader(yaml.SafeLoader):
-        """As safe as its parent; `!include`, `!secret` and other tags of Home Assistant stand for nothing."""
-
-    Loader.add_multi_constructor("!", lambda loader, suffix, node: f"!{suffix}")
-    try:
-        data = yaml.load(text, Loader)  # a SafeLoader makes nothing but plain values
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
-        said = str(error).replace("\n", " ") or "nested too deeply"
-        raise Failure(f"{name}: {said}", UNREADABLE) from None
-    found = read_home_assistant(data)
-    if found is None:
-        raise Failure(f"{name}: no modbus: with sensors, switches or the like", UNREADABLE)
-    return found
+        return reader(args.file, octets, args.numbering, args.table)
+    except MapError as error:
+        raise Failure(f"{args.file}: {error}", UNREADABLE) from None
 
 
 def _name_of(file: str) -> str:

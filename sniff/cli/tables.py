@@ -13,8 +13,11 @@ from sniff.cli import json_output
 Cell = str | int | float | None
 
 
-def write(headings: Sequence[str], rows: Iterable[Sequence[Cell]], style: str = "text") -> None:
-    """Print a table. `style`: "text" (aligned), "csv", "json" (one object a row, headings as keys)."""
+def write(
+    headings: Sequence[str], rows: Iterable[Sequence[Cell]], style: str = "text", bold: Sequence[bool] = ()
+) -> None:
+    """Print a table. `style`: "text" (aligned), "csv", "json" (one object a row, headings as keys). `bold`: rows that
+    stand out, for a terminal that can show it."""
     if style == "json":
         for row in rows:
             print(json_output.dumps(dict(zip(headings, row, strict=True))))
@@ -23,7 +26,7 @@ def write(headings: Sequence[str], rows: Iterable[Sequence[Cell]], style: str = 
         writer.writerow(headings)
         writer.writerows([[safe_cell(cell) for cell in row] for row in rows])
     else:
-        _write_text(headings, [[_shown(cell) for cell in row] for row in rows])
+        _write_text(headings, [[_shown(cell) for cell in row] for row in rows], bold)
 
 
 def safe_cell(cell: Cell) -> Cell:
@@ -48,18 +51,19 @@ def _shown(cell: Cell) -> str:
     return plain(cell)
 
 
-def _write_text(headings: Sequence[str], rows: list[list[str]]) -> None:
+def _write_text(headings: Sequence[str], rows: list[list[str]], bold: Sequence[bool]) -> None:
     if not rows:
         print("nothing")
         return
     widths = [max(len(line[column]) for line in [list(headings), *rows]) for column in range(len(headings))]
     numeric = [all(_is_number(row[column]) for row in rows) for column in range(len(headings))]
-    for line in [list(headings), *rows]:
+    for at, line in enumerate([list(headings), *rows], -1):
         cells = [
             cell.rjust(width) if right else cell.ljust(width)
             for cell, width, right in zip(line, widths, numeric, strict=True)
         ]
-        print("  ".join(cells).rstrip())
+        text = "  ".join(cells).rstrip()
+        print(f"\x1b[1m{text}\x1b[0m" if 0 <= at < len(bold) and bold[at] else text)
 
 
 def _is_number(text: str) -> bool:

@@ -17,6 +17,7 @@ from sniff.analysis.health import Health
 from sniff.analysis.judging import rules_over
 from sniff.analysis.nodes import Node
 from sniff.analysis.summary import Summary, ranked
+from sniff.analysis.trends import Trend, Trends
 from sniff.analysis.wording import describe
 from sniff.bus.model import BusModel
 from sniff.bus.offline import Source, outputs, survey
@@ -38,6 +39,7 @@ from sniff.reporting.numbers import (
     Score,
     Station,
     TimePart,
+    ValueTrend,
     seconds_since,
 )
 from sniff.reporting.timeline import Timeline
@@ -47,6 +49,8 @@ if TYPE_CHECKING:
 
 EVIDENCE_SHOWN, EVIDENCE_OF_NOTES = 5, 2
 LONGEST_TEXT = 180
+VALUES_SHOWN = 12
+"""Plots of values at most."""
 
 
 def collect(
@@ -68,14 +72,15 @@ def collect(
         Timeline(session.line.char),
         Happenings(session),
     )
+    trends = Trends(dissector, devices)
     if wanted is None:
-        survey(read, session, model, timeline, told, reference=reference)
+        survey(read, session, model, timeline, told, trends, reference=reference)
     else:
         survey(read, session, model, reference=reference)
     summary, findings, healths = model.summary, model.findings(), model.health()
     if wanted is not None:
         summary = Summary(session.line)
-        sift(capture, session, wanted, summary, timeline, told)
+        sift(capture, session, wanted, summary, timeline, told, trends)
         findings = shown_findings(capture, session, wanted, findings)
     health = healths.bus if summary.octets else None
     stations = tuple(
@@ -113,7 +118,13 @@ def collect(
         happenings=tuple(told.happenings),
         measurement=_measurement(session, dissector),
         ring=None if dissector.ring is None else _ring(dissector.ring, model.ring()),
+        values=tuple(_value(trend, session) for trend in trends.moved(VALUES_SHOWN)),
     )
+
+
+def _value(trend: Trend, session: Session) -> ValueTrend:
+    at = tuple(round(seconds_since(session.started, time), 3) for time in trend.times)
+    return ValueTrend(trend.station, trend.name, trend.unit, trend.how, at, tuple(trend.values))
 
 
 def verdict(health: Health | None, findings: tuple[Found, ...], stations: tuple[Station, ...], summary: Summary) -> str:

@@ -152,6 +152,19 @@ class Measurement:
 
 
 @dataclass(frozen=True, slots=True)
+class ValueTrend:
+    """How one value went: `at`: s since the capture's start, `values` in `unit`. `how`: what registers that nobody
+    described are guessed to be, empty where it is known."""
+
+    station: str
+    name: str
+    unit: str
+    how: str
+    at: tuple[float, ...]
+    values: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Numbers:
     """Everything about one capture. `first`, `last`: ISO 8601, None without octets; `part`: s of a part of the time."""
 
@@ -182,6 +195,7 @@ class Numbers:
     happenings: tuple[Happening, ...]
     measurement: Measurement
     ring: RingNumbers | None = field(default=None)
+    values: tuple[ValueTrend, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """Plain values, keys in the order of the fields; the keys are a promise."""

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from sniff.analysis.wording import station_word
-from sniff.reporting.numbers import CLASSES, Numbers, RingNumbers, Station, TimePart
+from sniff.reporting.numbers import CLASSES, Numbers, RingNumbers, Station, TimePart, ValueTrend
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -31,7 +31,7 @@ TROUBLE: tuple[tuple[str, str, str, str], ...] = (
 
 
 def pictures(numbers: Numbers, prefix: str) -> dict[str, str]:
-    """SVG by name: "timeline", "responses", "ring", each only where there is something to draw.
+    """SVG by name: "timeline", "responses", "ring", "values", each only where there is something to draw.
 
     `prefix`: makes the ids in them unique on the page. Raises ImportError without matplotlib.
     """
@@ -44,6 +44,9 @@ def pictures(numbers: Numbers, prefix: str) -> dict[str, str]:
         drawn["responses"] = _svg(_responses(answering, numbers.measurement.latency_ms, word), f"{prefix}-responses")
     if numbers.ring is not None and len(numbers.ring.order) > 1:
         drawn["ring"] = _svg(_ring(numbers.ring), f"{prefix}-ring")
+    if numbers.values:
+        word = station_word(numbers.measurement.protocol)
+        drawn["values"] = _svg(_values(numbers.values, word), f"{prefix}-values")
     return drawn
 
 
@@ -97,6 +100,33 @@ def _timeline(parts: Sequence[TimePart], width: float) -> Figure:
     all_axes[-1].set_xlabel(f"{name} since the start of the capture")
     all_axes[-1].set_xlim(at[0], (parts[-1].at + width) / unit)
     return figure
+
+
+def _values(trends: Sequence[ValueTrend], word: str) -> Figure:
+    """One small plot a value, all over the same time."""
+    columns = min(3, len(trends))
+    rows = -(-len(trends) // columns)
+    figure = _figure(0.4 + 1.5 * rows)
+    all_axes = figure.subplots(rows, columns, sharex=True, squeeze=False).flatten()
+    unit, name = _time_unit(max(trend.at[-1] for trend in trends))
+    for axes, trend in zip(all_axes, trends, strict=False):
+        axes.plot([at / unit for at in trend.at], trend.values, color=BLUE, linewidth=0.9)
+        title = f"{word} {trend.station} {trend.name}" + (f", {trend.unit}" if trend.unit else "")
+        told = f"{_drawable(title)}\n{trend.how}" if trend.how else _drawable(title)
+        axes.set_title(told, fontsize=8, color=INK, loc="left")
+        axes.ticklabel_format(axis="y", useOffset=False)
+        _plain(axes)
+    for axes in all_axes[len(trends) :]:
+        axes.set_visible(False)
+    for axes in all_axes[max(0, len(trends) - columns) : len(trends)]:
+        axes.set_xlabel(name, fontsize=8)
+        axes.tick_params(labelbottom=True)
+    return figure
+
+
+def _drawable(text: str) -> str:
+    """Text from a capture as a title: short, printable, and no formula."""
+    return "".join(c if c.isprintable() else "?" for c in text[:48]).replace("$", "\\$")
 
 
 def _time_unit(longest: float) -> tuple[float, str]:

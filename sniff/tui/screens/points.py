@@ -6,17 +6,20 @@ from collections.abc import Callable, Sequence
 from typing import ClassVar
 
 from rich.text import Text
+from textual import events
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.widgets import DataTable, Static
 
-from dissectors.line import NS_PER_S
+from dissectors.line import MS, NS_PER_S
 from dissectors.profiles.decoding import Quality, Value, number
+from sniff.analysis.guessed_points import GuessedPoint, guess_of
 from sniff.analysis.points import Point
 from sniff.tui.analyzer import analyzer
 from sniff.tui.charts import BARS
 from sniff.tui.plain import plain
-from sniff.tui.screens.base import ViewScreen
+from sniff.tui.plot import HistoryPlot
+from sniff.tui.screens.tabling import TableScreen
 from sniff.tui.still_judging import still_judging
 from sniff.tui.tables import StationTable
 
@@ -59,27 +62,56 @@ def shown_value(value: Value) -> str:
     return plain(text if len(text) <= WORDS else text[: WORDS - 1] + "…")
 
 
-COLUMNS: tuple[str, ...] = ("", "stn", "point", "value", "age", "trend")
+NARROW: tuple[str, ...] = ("", "stn", "point", "value", "age", "n", "every ms")
+WIDE: tuple[str, ...] = (*NARROW, "±", "low", "high", "trend")
+FROM = 110
+"""Width from which on all columns are shown."""
+
+TALL = 30
+"""Height from which on the plot is shown at once."""
+
 Key = tuple[str, str]
 
 
-class PointsScreen(ViewScreen):
+Order = Callable[[Point], tuple[float | str, ...]]
+
+
+def _device(point: Point) -> float:
+    return 1 << 20 if point.sample.device is None else point.sample.device
+
+
+ORDERS: tuple[tuple[str, Order], ...] = (
+    ("station", lambda point: (_device(point),)),
+    ("name", lambda point: (point.sample.name, _device(point))),
+    ("newest change", lambda point: (-point.changed, _device(point))),
+    ("most samples", lambda point: (-point.count, _device(point))),
+    ("shortest interval", lambda point: (point.interval or NS_PER_S << 20, _device(point))),
+)
+
+
+class PointsScreen(TableScreen):
     """One line a point; enter shows the frame that carried its latest value."""
 
     TITLE = "Points"
+    ORDERS = tuple(name for name, _ in ORDERS)
+    HINT = "output-   3/   holding   running"
     LEGEND = (
         ("^", "pinned to the top (p)"),
         ("→", "a command: written to the device"),
         ("?", "uncertain value"),
         ("!", "value out of its range"),
-        ("*", "before a value: it changed in the last two seconds"),
+        ("*", "before a value: it changed in the last two seconds; then it is bold too"),
         ("age", "how long ago the value was seen, at the time of the newest row"),
+        ("n", "how often it was seen"),
+        ("every ms  ±", "from one time to the next, half are shorter; by how much nine of ten differ, halved"),
+        ("low  high", "the least and the most of its values"),
         ("trend", "the last values, between their least and their most"),
     )
     CSS_PATH = "points.tcss"
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("p", "pin", "pin", tooltip="pin the point to the top, or let it go"),
         Binding("b", "bits", "bits", tooltip="show the single bits of registers, or hide them"),
+        Binding("v", "plot", "plot", tooltip="plot the last values of the point under the cursor, or not"),
         Binding("c", "commands", "commands", tooltip="only what was written to devices, or everything"),
     ]
 
@@ -89,22 +121,40 @@ class PointsScreen(ViewScreen):
         self._bits = False
         self._commands = False
         self._drawn: tuple[int, tuple[object, ...]] | None = None
+        self._columns: tuple[str, ...] = ()
+        self._plotted: bool | None = None
+        self._guessed: tuple[tuple[Key, int] | None, GuessedPoint | None] = (None, None)
 
     def compose_view(self) -> ComposeResult:
         """The table, and more about the point under the cursor."""
         yield StationTable(id="main", cursor_type="row", zebra_stripes=True)
+        yield HistoryPlot(id="plot")
         yield Static(id="detail", markup=False)
 
     def on_mount(self) -> None:
         """Columns."""
+        self.query_one(StationTable).cell_padding = 1
+        self._lay_out(self.app.size.width, self.app.size.height)
+
+    def on_resize(self, event: events.Resize) -> None:
+        """Columns that fit, and a plot where there is room."""
+        self._lay_out(event.size.width, event.size.height)
+
+    def _lay_out(self, width: int, height: int) -> None:
+        self.query_one(HistoryPlot).display = height >= TALL if self._plotted is None else self._plotted
+        columns = WIDE if width >= FROM else NARROW
+        if columns == self._columns:
+            return
+        self._columns = columns
         table = self.query_one(StationTable)
-        for title in COLUMNS:
+        table.clear(columns=True)
+        for title in columns:
             table.add_column(Text(title), key=title or "mark")
-        table.cell_padding = 1
+        self._drawn = None
 
     def draw(self) -> None:
         """Bring the table up to date, unless frozen."""
-        view = (tuple(self._pinned), self._bits, self._commands)
+        view = (tuple(self._pinned), self._bits, self._commands, *self.view)
         state = (self.store.version, view)
         if self._drawn == state or (self.viewing.frozen and self._drawn and self._drawn[1] == view):
             return
@@ -112,22 +162,48 @@ class PointsScreen(ViewScreen):
         newest = self.store.by_no(self.store.last_no)
         now = newest.event.end if newest is not None else 0
         points = self._chosen()
-        self.query_one(StationTable).fill((_key(point), _cells(point, now, self._pinned)) for point in points[:SHOWN])
+        self.query_one(StationTable).fill(
+            (_key(point), _cells(point, now, self._pinned)[: len(self._columns)]) for point in points[:SHOWN]
+        )
         self._hidden = max(0, len(points) - SHOWN)
         self._draw_detail()
 
     def _chosen(self) -> list[Point]:
         wanted: Callable[[Point], bool] = lambda point: (  # noqa: E731
-            (self._bits or not point.sample.value.bit) and (not self._commands or point.is_command)
+            (self._bits or not point.sample.value.bit)
+            and (not self._commands or point.is_command)
+            and self.holds(f"{point.sample.station}/{point.sample.name}", point.sample.value.words)
         )
         pinned = [point for key in self._pinned if (point := self.store.points.get(*key)) is not None]
         others = [point for point in self.store.points if _place(point) not in self._pinned and wanted(point)]
-        others.sort(key=lambda point: (point.sample.device is None, point.sample.device or 0))
+        others.sort(key=ORDERS[self.order][1])
         return pinned + others
 
     def _draw_detail(self) -> None:
         open_end = still_judging(analyzer(self).status, self.store)
         self.query_one("#detail", Static).update("\n".join(part for part in (open_end, self._detail()) if part))
+        self._draw_plot()
+
+    def _draw_plot(self) -> None:
+        plot, point = self.query_one(HistoryPlot), self._here()
+        if not plot.display:
+            return
+        if point is None:
+            plot.show("", ())
+            return
+        unit = f" in {point.sample.value.unit}" if point.sample.value.unit else ""
+        history, how = tuple(point.history), ""
+        guess = self._guess(point)
+        if guess is not None and guess.history:
+            history, how = guess.history, f", {guess.words}"
+        plot.show(f"{_key(point)}{unit}{how}; seconds before the newest", history)
+
+    def _guess(self, point: Point) -> GuessedPoint | None:
+        """What it may be, worked out once for each sample."""
+        state = _place(point), point.count
+        if self._guessed[0] != state:
+            self._guessed = state, guess_of(point, self.store.model.series, self.store.points)
+        return self._guessed[1]
 
     def _detail(self) -> str:
         point = self._here()
@@ -144,8 +220,12 @@ class PointsScreen(ViewScreen):
         words += [{Quality.UNCERTAIN: "? uncertain", Quality.BAD: "! out of range"}.get(point.quality, "")]
         words += [f"? {entry.doubt}" if entry is not None and entry.doubt else ""]
         words.append("→ a command" if point.is_command else "")
-        words.append(f"{point.count} samples, row {point.sample.frame}")
-        return plain(" · ".join(word for word in words if word) + self._more())
+        guess = self._guess(point)
+        if guess is not None:
+            words.append(guess.words + ("" if guess.value is None else f", so read {guess.value:.7g}"))
+        words += _seen(point, guess)
+        words.append(f"row {point.sample.frame}")
+        return plain(" · ".join(word for word in words if word) + f" · {self.said}" + self._more())
 
     def _more(self) -> str:
         hidden = getattr(self, "_hidden", 0)
@@ -190,6 +270,12 @@ class PointsScreen(ViewScreen):
             self._pinned.append(key)
         self.draw()
 
+    def action_plot(self) -> None:
+        """The plot or not."""
+        plot = self.query_one(HistoryPlot)
+        self._plotted = plot.display = not plot.display
+        self._draw_detail()
+
     def action_bits(self) -> None:
         """Single bits or not."""
         self._bits = not self._bits
@@ -199,6 +285,28 @@ class PointsScreen(ViewScreen):
         """Only commands or everything."""
         self._commands = not self._commands
         self.draw()
+
+
+def _seen(point: Point, guess: GuessedPoint | None) -> list[str]:
+    """How often, how it moved, who wrote it."""
+    samples = f"{point.count} samples"
+    if point.interval is not None:
+        samples += f" every {_ms(point.interval)} ms"
+        samples += f" ±{_ms(point.jitter)}" if point.jitter is not None else ""
+    words = [samples]
+    low, high, rate = (point.low, point.high, point.rate) if guess is None else (guess.low, guess.high, guess.rate)
+    if low is not None and high is not None and low != high:
+        words.append(f"seen {low:.7g} … {high:.7g}")
+    if rate:
+        words.append(f"moves {rate:.3g} a second")
+    if point.written:
+        words.append(f"written {point.written} times" if point.written > 1 else "written once")
+    return words
+
+
+def _ms(time: int | None) -> str:
+    """Milliseconds, with a decimal where there are few."""
+    return "–" if time is None else f"{time / MS:.0f}" if time >= 10 * MS else f"{time / MS:.1f}"
 
 
 def _place(point: Point) -> Key:
@@ -220,5 +328,10 @@ def _cells(point: Point, now: int, pinned: list[Key]) -> list[Text]:
         Text(plain(sample.name)),
         Text(("*" if fresh else "") + shown_value(value), style=style, justify="right"),
         Text(age(now - sample.time), justify="right"),
+        Text(str(point.count), justify="right"),
+        Text(_ms(point.interval), justify="right"),
+        Text(_ms(point.jitter), justify="right"),
+        Text("–" if point.low is None else f"{point.low:.5g}", justify="right"),
+        Text("–" if point.high is None else f"{point.high:.5g}", justify="right"),
         Text(trend([number for _, number in point.history])),
     ]

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from dissectors.profiles.model import Kind
 from sniff.analysis.register_guess import RegisterGuess, Sure, Use, guessed
-from sniff.analysis.register_series import Block, RegisterSeries
+from sniff.analysis.register_series import Block, RegisterSeries, covering
 from sniff.bus.offline import survey
 from sniff.engine.follow_settings import dissector_for
 from sniff.formats import read
@@ -207,3 +207,12 @@ def test_many_answers_are_thinned_as_one_by_one(parts: list[int]) -> None:
         many.add_many(times, (times & 0xFFFF).astype(np.uint16).reshape(-1, 1))
         at += part
     assert one == many
+
+
+def test_blocks_that_cover_all_registers_are_few() -> None:
+    blocks = [Block(1, "holding", first, width) for first in range(40) for width in range(1, 9)]
+    for block in blocks:
+        block.add(0, (0,) * block.width)
+    kept = covering(blocks)
+    assert {block.first + step for block in kept for step in range(block.width)} == set(range(47))
+    assert len(kept) <= 47 < len(blocks)

@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 from dissectors.modbus.envelope import seal_rtu
+from tests.sniff.cli.test_profile_draft import meter
 
 EXCHANGES = (
     ("010625021770", "010625021770"),
@@ -209,3 +210,41 @@ def test_profile_guess(sniff485: Run, drive: Path) -> None:
         (1, "teco-e510"),
         (1, "teco-f510"),
     }
+
+
+def test_undescribed_registers_say_what_they_may_be(sniff485: Run, tmp_path: Path) -> None:
+    capture = tmp_path / "meter.cap.txt"
+    meter(capture)
+    rows = [json.loads(line) for line in sniff485("points", capture, "--json", "--latest").out.splitlines()]
+    assert [(row["point"], row["means"]) for row in rows] == [
+        ("input/30001", "guessed f32 low word first: sensor (sure)"),
+        ("input/30003", "guessed f32 low word first: sensor (sure)"),
+        ("input/30005", "guessed f32 low word first: sensor (sure)"),
+        ("input/30007", "guessed u32 low word first: counter (sure)"),
+        ("input/30009", "guessed s16: sensor (sure)"),
+    ]
+    volts = rows[0]
+    assert 220 < volts["low"] <= volts["value"] <= volts["high"] < 240
+    assert (volts["quality"], volts["samples"], volts["written"]) == (1, 200, 0)
+    assert volts["every ms"] > 500
+    plain = sniff485("points", capture, "--no-guess")
+    assert "guessed" not in plain.out
+    assert len(plain.out.splitlines()) == 1 + 9
+    assert "guessed" not in sniff485("points", capture, "--csv").out
+
+
+def test_a_described_station_is_not_guessed_at(sniff485: Run, drive: Path) -> None:
+    out = sniff485("points", drive, "-d", "1=teco-e510").out
+    assert all("guessed" not in line for line in out.splitlines() if line.lstrip().startswith("1 "))
+    assert any("guessed" in line for line in out.splitlines() if line.lstrip().startswith("2 "))
+
+
+@pytest.mark.parametrize("order", ["device", "name", "changed", "samples", "every", "rate"])
+def test_orders_of_the_table(sniff485: Run, drive: Path, order: str) -> None:
+    ran = sniff485("points", drive, "--sort", order, "--json", "--latest")
+    assert ran.code == 0, ran.err
+    rows = [json.loads(line) for line in ran.out.splitlines()]
+    if order == "samples":
+        assert [row["samples"] for row in rows] == sorted((row["samples"] for row in rows), reverse=True)
+    if order == "name":
+        assert [row["point"] for row in rows] == sorted(row["point"] for row in rows)

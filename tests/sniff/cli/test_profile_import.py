@@ -11,10 +11,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from dissectors.modbus.map_home_assistant import read_home_assistant
+from dissectors.modbus.map_tables import read_csv
 from dissectors.profiles import Access, Kind, Profile, parse_text
-from sniff.analysis.register_map import document, kind_of, order_of
-from sniff.analysis.register_map_csv import NUMBERINGS, read_csv
-from sniff.analysis.register_map_yaml import read_home_assistant
+from dissectors.register_maps import NUMBERINGS, document, kind_of, order_of
 
 Run = Callable[..., Any]
 
@@ -145,8 +145,8 @@ def test_several_stations_are_asked_for(sniff485: Run, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "octets", "code", "said"),
     [
-        ("map.mbp", b"\x00", 2, "Modbus Poll"),
-        ("map.xlsx", b"PK\x03\x04", 2, "save the sheet as CSV"),
+        ("map.mbp", b"\x00", 3, "Modbus Poll"),
+        ("map.xlsx", b"PK\x03\x04", 3, "save the sheet as CSV"),
         ("map.csv", b"a,b\n1,2\n", 3, "heading"),
         ("map.csv", b"address,name\n,\n", 3, "no register"),
         ("map.yaml", b"modbus: [", 3, "map.yaml"),
@@ -209,7 +209,7 @@ def test_any_text_gives_a_document_or_nothing(text: str, numbering: str) -> None
     for whole in (text, "address,name,type,unit,scale,states,length\n" + text):
         found = read_csv(whole, numbering)
         if found is not None:
-            said, count = document("some", "somewhere", found)
+            said, count = document("some", "somewhere", found, "modbus", ["modbus-rtu"])
             assert len(parse_text(said, "some").entries) == count
 
 
@@ -229,4 +229,4 @@ plain_values = st.recursive(
 def test_any_values_give_a_map_or_nothing(data: object) -> None:
     found = read_home_assistant(data)
     if found is not None:
-        parse_text(document("some", "somewhere", found)[0], "some")
+        parse_text(document("some", "somewhere", found, "modbus", ["modbus-rtu"])[0], "some")

@@ -142,3 +142,50 @@ def test_trend_and_age() -> None:
     assert trend([0, 1, 2])[0] < trend([0, 1, 2])[1] < trend([0, 1, 2])[2]
     assert len(trend(list(range(100)))) == 12
     assert [age(seconds * 10**9) for seconds in (-5, 3, 119, 600, 90_000)] == ["0 s", "3 s", "119 s", "10 min", "25 h"]
+
+
+def test_words_order_columns_and_plot(look: Any) -> None:
+    store = store_of("modbus-rtu", 20)
+
+    async def script(see: Any) -> None:
+        assert len(cells(see, keys(see)[0])) == 7
+        await see.press("slash", *"output-f", "enter")
+        assert keys(see) == ["1/output-frequency", "2/output-frequency", "3/output-frequency"]
+        await see.press("escape", "s")
+        names = [key.partition("/")[2] for key in keys(see)]
+        assert names == sorted(names)
+        assert "sorted by name" in " ".join(see.text().split())
+        assert "seconds before the newest" not in see.text()
+        await see.press("v")
+        assert "seconds before the newest" in see.text()
+        await see.press("v")
+        assert "seconds before the newest" not in see.text()
+
+    look(store, script, start="points")
+
+
+def test_large_screens_show_all_columns_and_the_plot(look: Any) -> None:
+    async def script(see: Any) -> None:
+        assert len(cells(see, keys(see)[0])) == 11
+        assert "seconds before the newest" in see.text()
+        assert all(len(line) <= 160 for line in see.lines())
+
+    look(store_of("modbus-rtu", 20), script, (160, 50), "points")
+
+
+def test_what_nobody_described_is_guessed(look: Any) -> None:
+    async def script(see: Any) -> None:
+        assert "guessed u16: sensor" in " ".join(see.text().split())
+
+    look(store_of("modbus-rtu", 20, known=False), script, start="points")
+
+
+def test_without_the_plotting_library_there_are_bars(look: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sniff.tui.plot.HAS_PLOT", False)
+
+    async def script(see: Any) -> None:
+        await see.press("slash", *"1/output-f", "enter", "v")
+        assert "seconds before the newest" in see.text()
+        assert any(bar in see.text() for bar in "▁▂▃▄▅▆▇█")
+
+    look(store_of("modbus-rtu", 20), script, start="points")

@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from dissectors.profiles.decoding import plain_name
@@ -66,8 +66,21 @@ class RegisterMap:
         return RegisterMap(entries, self.said, self.left_out)
 
 
-def document(name: str, source: str, said: RegisterMap) -> tuple[str, int]:
-    """The map as a TOML document, and how many entries are in it. `source`: where it is from, for people.
+class MapError(ValueError):
+    """No map that can be read; the message says why, and the way out."""
+
+
+MapReader = Callable[[str, bytes, str, str | None], RegisterMap]
+"""(name of the file, its octets, one of `NUMBERINGS`, table) → the map; raises MapError. The table is that of registers
+whose map does not say it."""
+
+NUMBERINGS = ("auto", "40001", "0", "1")
+"""How numbers are to be read: 40001-style where all can be, else of the wire; 40001-style; of the wire; one more."""
+
+
+def document(name: str, source: str, said: RegisterMap, family: str, protocols: Sequence[str]) -> tuple[str, int]:
+    """The map as a TOML document, and how many entries are in it. `source`: where it is from, for people; `family`,
+    `protocols`: as in a profile.
 
     Of two entries that share a register the first is kept, the other counted.
     """
@@ -82,14 +95,14 @@ def document(name: str, source: str, said: RegisterMap) -> tuple[str, int]:
         "",
         f"name = {_quoted(name)}",
         f"title = {_quoted(f'{name} (imported)')}",
-        'protocols = ["modbus-rtu", "modbus-ascii"]',
+        f"protocols = [{', '.join(map(_quoted, protocols))}]",
         f"source = {_quoted(source)}",
         "",
-        "[modbus]",
+        f"[{family}]",
         f"tables = [{', '.join(map(_quoted, tables))}]",
     ]
     for entry, point in zip(entries, names, strict=True):
-        lines += ["", *_entry(entry, point, of_table=len(tables) > 1)]
+        lines += ["", *_entry(family, entry, point, of_table=len(tables) > 1)]
     return "\n".join(lines) + "\n", len(entries)
 
 
@@ -124,8 +137,8 @@ def _names(entries: Sequence[Mapped]) -> list[str]:
     return names
 
 
-def _entry(entry: Mapped, name: str, of_table: bool) -> list[str]:
-    lines = ["[[modbus.register]]", f"address = 0x{entry.address:04X}", f"name = {_quoted(name)}"]
+def _entry(family: str, entry: Mapped, name: str, of_table: bool) -> list[str]:
+    lines = [f"[[{family}.register]]", f"address = 0x{entry.address:04X}", f"name = {_quoted(name)}"]
     if entry.title:
         lines.append(f"title = {_quoted(entry.title[:LONGEST_TITLE])}")
     if of_table:
@@ -148,7 +161,7 @@ def _entry(entry: Mapped, name: str, of_table: bool) -> list[str]:
     if entry.doubt:
         lines.append(f"doubt = {_quoted(entry.doubt)}")
     if entry.states:
-        lines.append("[modbus.register.states]")
+        lines.append(f"[{family}.register.states]")
         lines += [f"{code} = {_quoted(words)}" for code, words in sorted(entry.states.items())]
     return lines
 

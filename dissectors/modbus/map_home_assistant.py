@@ -12,7 +12,7 @@ from itertools import islice
 from typing import Any
 
 from dissectors.profiles.model import Access, Kind
-from sniff.analysis.register_map import MOST_ENTRIES, Mapped, RegisterMap, kind_of
+from dissectors.register_maps import MOST_ENTRIES, Mapped, RegisterMap, kind_of
 
 PARTS = ("sensors", "binary_sensors", "switches", "lights", "fans", "covers", "climates")
 _SPACES = {

@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from dissectors.profiles.model import Access, Kind
-from sniff.analysis.register_map import MOST_ENTRIES, Mapped, RegisterMap, kind_of, order_of
+from dissectors.register_maps import MOST_ENTRIES, Mapped, RegisterMap, kind_of, order_of
 
 HEADINGS: Mapping[str, str] = {
     "address": "address addr register reg registeraddress regaddress modbusaddress modbusregister registernumber "
@@ -43,9 +43,6 @@ HEADINGS: Mapping[str, str] = {
 
 MOST_ABOVE = 50
 """Lines above the heading that are passed over."""
-
-NUMBERINGS = ("auto", "40001", "0", "1")
-"""How numbers are to be read: 40001-style, as on the wire, one more than on the wire."""
 
 _BY_HEADING = {word: column for column, words in HEADINGS.items() for word in words.split()}
 _SPACES = {
@@ -93,7 +90,7 @@ class _Number:
 def read_csv(text: str, numbering: str = "auto", table: str | None = None) -> RegisterMap | None:
     """The map in a table of text; None where no line of it is a heading with a column for the number.
 
-    `numbering`: one of `NUMBERINGS`. `table`: of registers whose row does not say it (holding).
+    `numbering`: one of `register_maps.NUMBERINGS`. `table`: of registers whose row does not say it (holding).
     """
     lines = text.splitlines()
     found = RegisterMap()

@@ -1,0 +1,123 @@
+"""What points of stations without a profile may be: guesses of their registers beside their latest values. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dissectors.manifest import Dissector
+from dissectors.profiles import Devices
+from dissectors.profiles.decoding import plain_name
+from sniff.analysis.points import Key, Point, PointTable, station_name
+from sniff.analysis.register_guess import RegisterGuess, Sure, Use, guessed, read_as
+from sniff.analysis.register_series import WORD_SPACES, Block, RegisterSeries, covering
+
+if TYPE_CHECKING:
+    from sniff.analysis.point_columns import TableSamples
+
+_USES = {
+    Use.CONSTANT: "constant",
+    Use.SENSOR: "sensor",
+    Use.COUNTER: "counter",
+    Use.SETTING: "set point",
+    Use.BITS: "bits",
+}
+_SURE = {Sure.SURE: "sure", Sure.LIKELY: "likely", Sure.OPEN: "open"}
+
+
+@dataclass(frozen=True, slots=True)
+class GuessedPoint:
+    """What one register of a point may be. `value`: of the latest samples, so read; `is_covered`: it is a further part
+    of the value that begins before it. `history`: times, ns, and values so read. The others as in `RegisterGuess`."""
+
+    words: str
+    value: float | None
+    low: float
+    high: float
+    rate: float
+    is_covered: bool = False
+    history: tuple[tuple[int, float], ...] = ()
+
+
+class Guessing:
+    """Fed the samples of one bus; tells what the registers of stations without a profile may be."""
+
+    def __init__(self, dissector: Dissector, devices: Devices) -> None:
+        self.dissector = dissector
+        self.devices = devices
+        self.series = RegisterSeries()
+
+    def add(self, samples: TableSamples) -> None:
+        """Take those of a table."""
+        self.series.add_samples(samples)
+
+    def of(self, points: PointTable) -> dict[Key, GuessedPoint]:
+        """By point, for those that the table has."""
+        found: dict[Key, GuessedPoint] = {}
+        for guess in guessed(covering(self._undescribed()), self.series.written):
+            for key, told in _told(guess, points):
+                found[key] = told
+        return found
+
+    def _undescribed(self) -> Iterable[Block]:
+        return (block for block in self.series.blocks() if self.devices.at(block.device) is None)
+
+
+def guess_of(point: Point, series: RegisterSeries, points: PointTable) -> GuessedPoint | None:
+    """What one point may be; None where it is no register, or described."""
+    sample, reading = point.sample, point.sample.value.reading
+    if point.entry is not None or sample.device is None or reading.space not in WORD_SPACES:
+        return None
+    blocks = [
+        block
+        for block in series.blocks()
+        if (block.device, block.space) == (sample.device, reading.space)
+        and block.first <= reading.address < block.first + block.width
+    ]
+    key = sample.station, sample.name
+    for guess in guessed(covering(blocks), series.written):
+        for place, one in _told(guess, points):
+            if place == key:
+                return replace(one, history=history(guess, blocks))
+    return None
+
+
+def history(guess: RegisterGuess, blocks: Iterable[Block]) -> tuple[tuple[int, float], ...]:
+    """Times, ns, and values, as the question that was asked most often tells them."""
+    width = guess.kind.registers
+    whole = [
+        block for block in blocks if block.first <= guess.address and guess.address + width <= block.first + block.width
+    ]
+    if not whole:
+        return ()
+    block = max(whole, key=lambda one: one.count)
+    at = guess.address - block.first
+    values = read_as(block.words[:, at : at + width], guess.kind, guess.swapped, guess.little)
+    finite = np.isfinite(values).tolist()
+    return tuple((time, value) for time, value, good in zip(block.times, values.tolist(), finite, strict=True) if good)
+
+
+def _told(guess: RegisterGuess, points: PointTable) -> Iterable[tuple[Key, GuessedPoint]]:
+    station = station_name(guess.device)
+    keys = [(station, plain_name(guess.space, guess.address + step)) for step in range(guess.kind.registers)]
+    held = [points.get(*key) for key in keys]
+    raws = [point.sample.value.raw for point in held if point is not None]
+    value = None
+    if len(raws) == len(held) and None not in raws:
+        row = np.array([[(raw or 0) & 0xFFFF for raw in raws]], np.uint16)
+        value = float(read_as(row, guess.kind, guess.swapped, guess.little)[0])
+    words = told(guess)
+    for step, key in enumerate(keys):
+        whole = len(raws) == len(held)
+        yield key, GuessedPoint(words, value, guess.low, guess.high, guess.rate, is_covered=step > 0 and whole)
+
+
+def told(guess: RegisterGuess) -> str:
+    """ "guessed f32 low word first: sensor (sure)"."""
+    order = " low word first" if guess.swapped else ""
+    order += " low octet first" if guess.little else ""
+    kind = "" if guess.use is Use.BITS else f" {guess.kind.value}{order}"
+    return f"guessed{kind}: {_USES[guess.use]} ({_SURE[guess.sure]})"

@@ -1,0 +1,75 @@
+"""A plot of a value over time: by textual-plot (the extra `plot`) where it is installed, else a row of bars."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from importlib.util import find_spec
+
+from textual.app import ComposeResult
+from textual.containers import Vertical
+from textual.widget import Widget
+from textual.widgets import Sparkline, Static
+
+from dissectors.line import NS_PER_S
+from sniff.tui.plain import plain
+
+HAS_PLOT = find_spec("textual_plot") is not None
+
+LEAST = 3
+"""Values that make a plot."""
+
+
+class HistoryPlot(Vertical):
+    """Times, ns, and values. The newest is at the right, the axis counts seconds before it."""
+
+    DEFAULT_CSS = """
+    HistoryPlot { height: 11; width: 100%; }
+    HistoryPlot > PlotWidget, HistoryPlot > Sparkline { height: 1fr; }
+    HistoryPlot > Static { height: 1; padding: 0 1; color: $text-muted; }
+    """
+
+    def __init__(self, *, id: str | None = None) -> None:
+        super().__init__(id=id)
+        self._drawn: tuple[str, tuple[tuple[int, float], ...]] = ("", ())
+
+    def compose(self) -> ComposeResult:
+        """A title, and the plot."""
+        yield Static(id="plot-title", markup=False)
+        yield self._canvas()
+
+    def _canvas(self) -> Widget:
+        if not HAS_PLOT:
+            return Sparkline([], id="plot-canvas")
+        from textual_plot import PlotWidget
+
+        made: Widget = PlotWidget(id="plot-canvas", allow_pan_and_zoom=False)
+        made.can_focus = False  # the arrows are the table's
+        return made
+
+    def show(self, title: str, history: Sequence[tuple[int, float]]) -> None:
+        """Draw these values, unless they are drawn already."""
+        state = title, tuple(history)
+        if state == self._drawn:
+            return
+        self._drawn = state
+        few = len(history) < LEAST
+        self.query_one("#plot-title", Static).update(plain(f"{title}: too few values for a plot" if few else title))
+        canvas = self.query_one("#plot-canvas")
+        if isinstance(canvas, Sparkline):
+            canvas.data = [] if few else [value for _, value in history]
+            return
+        from textual_plot import HiResMode, PlotWidget
+
+        assert isinstance(canvas, PlotWidget)
+        canvas.margin_top, canvas.margin_bottom = 1, 2  # no titles on the axes
+        canvas.clear()
+        if few:
+            return
+        newest = history[-1][0]
+        seconds = [(time - newest) / NS_PER_S for time, _ in history]
+        values = [value for _, value in history]
+        low, high = min(values), max(values)
+        spare = (high - low) * 0.05 or max(1.0, abs(high) * 0.05)
+        canvas.set_xlimits(min(seconds[0], -1e-3), 0.0)
+        canvas.set_ylimits(low - spare, high + spare)
+        canvas.plot(seconds, values, line_style="cyan", hires_mode=HiResMode.BRAILLE)
