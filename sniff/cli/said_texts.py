@@ -63,7 +63,7 @@ class SaidTexts:
         most = max((len(one) for one in whole), default=0)
         limit = min(most, int(4 * sizes.mean() + 32))
         column = np.zeros((len(at), max([limit, *(texts.shape[1] for _, texts in numbers)])), np.uint8)
-        column[:, :limit] = matrix([one[:limit] for one in whole])[codes, :limit] if limit else 0
+        column[:, :limit] = matrix([one[:limit] for one in whole]).take(codes, axis=0)[:, :limit] if limit else 0
         for rows, texts in numbers:
             column[rows, : texts.shape[1]] = texts
             alone[rows] = False
