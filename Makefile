@@ -17,6 +17,8 @@ lint: $(VENV)/.test
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
+# Paired with tshark where that can do the same; FRAMES=1000000 for captures of a million frames instead of 100000.
+# `make bench ARGS=tests/bench/test_bulk_commands.py` prints the table of whole commands alone.
 bench: $(VENV)/.test
 	$(BIN)/python -m pytest tests/bench -o norecursedirs=.venv -o testpaths=tests/bench --benchmark-only --benchmark-group-by=group $(ARGS)
 

@@ -2,8 +2,7 @@
 
 A dissector may say of frames of a kind and length which octets its `text` never reads, and which it reads only as plain
 numbers that stand in the line by themselves. Everything else is as `text` gives it: whoever uses a stencil asks `text`
-about frames with numbers that no other part of a line could be mistaken for, and takes the stencil only where they show
-as they should. So a stencil that says too much costs time; it never changes a line.
+about a frame and about the same with other numbers, and takes the stencil only where both lines are as it says.
 """
 
 from __future__ import annotations

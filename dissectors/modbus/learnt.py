@@ -48,6 +48,14 @@ class Learnt:
             self._unanswered = deque((gap for gap in self._unanswered if gap > latency), maxlen=_SAMPLES)
             self._timeout = self._agreed()
 
+    def answered_often(self, unit: int, pace: int, latencies: Sequence[int]) -> None:
+        """The same for one answer after the other."""
+        if self._timeout is not None and max(latencies, default=0) > self._timeout:
+            for latency in latencies:
+                self.answered(unit, pace, latency)
+        elif latencies and ((unit, pace) in self._times or len(self._times) < _PACES_KEPT):
+            self._times.setdefault((unit, pace), deque(maxlen=_SAMPLES)).extend(latencies)
+
     def unanswered(self, elapsed: int, repeated: bool = False) -> None:
         """A sure request got nothing for `elapsed`; then a master sent another, or the same one again (`repeated`).
 

@@ -6,6 +6,7 @@ bounded.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Final
 
 from dissectors.frame import Flaw
@@ -103,6 +104,18 @@ class Past:
             self._constant[key] = (
                 (length, min(times + 1, _CONSTANT)) if length == len(octets) and times >= 0 else (0, -1)
             )
+
+    def note_requests(self, asked: Iterable[bytes]) -> None:
+        """Good requests of functions whose layout is known: the same as `note` of one after the other."""
+        requests, calls = self._requests, self._calls
+        for octets in asked:
+            if self._strays:
+                self._strays -= self._strays >> 6
+            calls.add(octets[0] << 8 | octets[1])
+            if octets not in requests:
+                requests[octets] = None
+                if len(requests) > _MOST_REQUESTS:
+                    del requests[next(iter(requests))]
 
     def note_stray_zero(self) -> None:
         """A zero behind a frame that cannot be its last octet."""

@@ -7,9 +7,11 @@ import numpy.typing as npt
 
 from dissectors.columns import ROLES, FrameColumns, Octets, Times
 from dissectors.frame import Role
+from dissectors.modbus.functions import EXCEPTION_BIT, FUNCTIONS
 from dissectors.modbus.past import Past
 
 _RESPONSE = ROLES.index(Role.RESPONSE)
+_IS_KNOWN = np.array([code & ~EXCEPTION_BIT in FUNCTIONS and not code & EXCEPTION_BIT for code in range(256)])
 _WORD = 8
 """Octets of the commonest requests, which are compared as numbers."""
 
@@ -40,8 +42,20 @@ def learn(past: Past, units: set[int], frames: FrameColumns, octets: Octets) -> 
         _first_of_each(frames, octets, asked[frames.length[asked] == length], known)
         for length in np.flatnonzero(np.bincount(frames.length[asked])).tolist()
     ]
-    for row in sorted(np.concatenate(first).tolist()) if first else ():
-        past.note(_octets_of(frames, octets, row), request=True)
+    if not first:
+        return
+    rows = np.sort(np.concatenate(first))
+    if not len(rows):
+        return
+    said = octets[int(frames.offset[rows[0]]) : int(frames.offset[rows[-1]] + frames.length[rows[-1]])].tobytes()
+    begins = frames.offset[rows] - frames.offset[rows[0]]
+    pairs = zip(begins.tolist(), (begins + frames.length[rows]).tolist(), strict=True)
+    whole = [said[begin:end] for begin, end in pairs]
+    if _IS_KNOWN[octets[frames.offset[rows] + 1]].all():
+        past.note_requests(whole)
+        return
+    for one in whole:
+        past.note(one, request=True)
 
 
 def _new_answers(frames: FrameColumns, octets: Octets, rows: Times, known: Learnt) -> list[int]:

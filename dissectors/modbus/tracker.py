@@ -406,8 +406,7 @@ class ModbusTracker:
         first = by.first
         self._learn_from_next(first, first.header.role is not Role.EITHER)
         for (unit, pace), times in went.times.items():
-            for time in times:
-                self.learnt.answered(unit, pace, time)
+            self.learnt.answered_often(unit, pace, times)
         for pause, cycle in went.pauses:
             self.learnt.paused(pause, cycle)
         self.learnt.waited(went.unanswered)

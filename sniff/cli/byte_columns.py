@@ -83,7 +83,7 @@ def side_by_side(columns: Sequence[Column], rows: slice) -> Bytes:
         if isinstance(column, bytes):
             line[:, at:end] = np.frombuffer(column, np.uint8)
         elif isinstance(column, Chosen):
-            line[:, at:end] = column.texts[column.codes[rows]]
+            line[:, at:end] = column.texts.take(column.codes[rows], axis=0)  # twice as fast as an index
         else:
             line[:, at:end] = column[rows]
         at = end

@@ -13,9 +13,18 @@ def distinct_codes(codes: Times) -> tuple[Times, Codes]:
     if not len(codes):
         return np.zeros(1, np.int64), codes
     most = int(codes.max())
-    if most > 1 << 20:
-        distinct, inverse = np.unique(codes, return_inverse=True)
-        return distinct, inverse
+    if most > _DENSE:
+        order = np.argsort(codes, kind="stable")
+        ascending = codes[order]
+        first = np.ones(len(codes), bool)
+        first[1:] = ascending[1:] != ascending[:-1]
+        inverse = np.empty(len(codes), np.int64)
+        inverse[order] = np.cumsum(first) - 1
+        return ascending[first], inverse
     used = np.zeros(most + 1, bool)
     used[codes] = True
     return np.flatnonzero(used), (np.cumsum(used) - 1)[codes]
+
+
+_DENSE = 1 << 20
+"""Numbers up to this are not sorted. (`np.unique` is no way: its first call imports all of `numpy.ma`.)"""

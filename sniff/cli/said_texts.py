@@ -12,6 +12,7 @@ from dissectors.manifest import Dissector
 from dissectors.stencil import Form, Stencil
 from sniff.analysis.wording import describe, is_error
 from sniff.cli.byte_columns import Bytes, Chosen, Column, digits, hex_words, matrix, short_numbers, side_by_side, width
+from sniff.cli.distinct import distinct_codes
 from sniff.cli.specimens import Numbers, Specimens, with_numbers
 from sniff.engine.engine import Row
 from sniff.engine.table import Table
@@ -20,15 +21,13 @@ Pieces = tuple[bytes, ...]
 """A text in one piece, or what stands before, between and behind its numbers."""
 
 
-def _probes(form: Form, place: int) -> tuple[bytes, bytes]:
-    """Two numbers that nothing else in a line is likely to look like, by their place among its numbers."""
+def _probe(form: Form, place: int) -> bytes:
+    """A number that nothing else in a line is likely to look like, by its place among its numbers."""
     if form is Form.REAL:
-        return struct.pack(">f", -1.234567e-37 * (1 + place)), struct.pack(">f", 9.876543e30 * (1 + place))
+        return struct.pack(">f", -1.234567e-37 * (1 + place))
     if form is Form.INSTANCE:
-        return (2_718_281 + 103 * place).to_bytes(4), (3_141_592 + 107 * place).to_bytes(4)
-    if form is Form.HEX:
-        return (0xA7B1 + 0x111 * place).to_bytes(2), (0xF9C8 - 0x111 * place).to_bytes(2)
-    return (51_234 + 107 * place).to_bytes(2), (64_987 - 103 * place).to_bytes(2)
+        return (2_718_281 + 103 * place).to_bytes(4)
+    return ((0xA7B1 if form is Form.HEX else 51_234) + 0x111 * place).to_bytes(2)
 
 
 class SaidTexts:
@@ -55,19 +54,16 @@ class SaidTexts:
         if not self._pieces:
             return np.zeros((len(at), 0), np.uint8), np.zeros(len(at), np.int64), np.ones(len(at), bool)
         alone = found.which < 0
-        used = np.zeros(len(self._pieces), bool)
-        used[which] = True
-        distinct = np.flatnonzero(used)
-        places = np.cumsum(used) - 1
+        distinct, codes = distinct_codes(which)
         pieces = [self._pieces[one] for one in distinct.tolist()]
-        sizes = np.array([sum(map(len, one)) for one in pieces], np.int64)[places[which]]
+        sizes = np.array([sum(map(len, one)) for one in pieces], np.int64)[codes]
         alone |= sizes > 4 * sizes.mean() + 32
         numbers = [_with_numbers(one, self._pieces, found.which) for one in found.numbers]
         whole = [one[0] if len(one) == 1 and size else b"" for one, size in zip(pieces, map(bool, pieces), strict=True)]
         most = max((len(one) for one in whole), default=0)
         limit = min(most, int(4 * sizes.mean() + 32))
         column = np.zeros((len(at), max([limit, *(texts.shape[1] for _, texts in numbers)])), np.uint8)
-        column[:, :limit] = matrix([one[:limit] for one in whole])[places[which], :limit] if limit else 0
+        column[:, :limit] = matrix([one[:limit] for one in whole]).take(codes, axis=0)[:, :limit] if limit else 0
         for rows, texts in numbers:
             column[rows, : texts.shape[1]] = texts
             alone[rows] = False
@@ -93,18 +89,13 @@ class SaidTexts:
     def _divided(self, row: Row, stencil: Stencil, said: bytes) -> Pieces | None:
         """The pieces of a text around its numbers; None where the text is not as the stencil says."""
         forms = [form for _, form in stencil.numbers]
-        probes = [_probes(form, place) for place, form in enumerate(forms)]
-        found: list[Pieces | None] = []
-        for number in range(2):
-            values = [probe[number] for probe in probes]
-            probed = with_numbers(row, stencil, values, unread=(0xFF, 0x5A)[number])
-            texts = [_number_text(form, value) for form, value in zip(forms, values, strict=True)]
-            found.append(_split(self._render(describe(self._dissector, probed)), texts))
-        if found[0] is None or found[0] != found[1]:
+        probes = [_probe(form, place) for place, form in enumerate(forms)]
+        probed = self._render(describe(self._dissector, with_numbers(row, stencil, probes)))
+        pieces = _split(probed, list(map(_number_text, forms, probes)))
+        if pieces is None:
             return None
         octets = row.event.octets
         own = [_number_text(form, octets[begin : begin + form.octets]) for begin, form in stencil.numbers]
-        pieces = found[0]
         whole = b"".join(piece + number for piece, number in zip(pieces, [*own, b""], strict=True))
         return pieces if whole == said else None
 
@@ -130,7 +121,7 @@ def _number_text(form: Form, octets: bytes) -> bytes:
 def _with_numbers(numbers: Numbers, pieces: Sequence[Pieces], which: Times) -> tuple[Times, Bytes]:
     """Rows with numbers of their own, and their texts."""
     specimens = which[numbers.at]
-    distinct, inverse = np.unique(specimens, return_inverse=True)
+    distinct, inverse = distinct_codes(specimens)
     held = [pieces[one] for one in distinct.tolist()]
     columns: list[Column] = []
     for place in range(len(numbers.forms) + 1):

@@ -17,6 +17,7 @@ from dissectors.columns import ROLES, Masks, Octets, Times
 from dissectors.frame import Frame
 from dissectors.stencil import Form, Stencil, Stencils
 from sniff.cli.byte_columns import stretches
+from sniff.cli.distinct import distinct_codes
 from sniff.engine.engine import Row
 from sniff.engine.table import Table, rows_at
 
@@ -35,31 +36,36 @@ class _Class:
     where no two have the same."""
 
     hashes: Words
-    shared: Words
+    shared: list[Words]
     numbers: Times
     by_words: dict[bytes, int]
 
     @classmethod
-    def empty(cls, shared: Words) -> _Class:
+    def empty(cls, shared: Sequence[Words]) -> _Class:
         """One without specimens."""
-        return cls(np.zeros(0, np.uint64), shared[:0], np.zeros(0, np.int64), {})
+        return cls(np.zeros(0, np.uint64), [one[:0] for one in shared], np.zeros(0, np.int64), {})
 
-    def find(self, hashes: Words, shared: Words) -> Times:
+    def find(self, hashes: Words, shared: Sequence[Words]) -> Times:
         """Their numbers; `_UNKNOWN` where they are not found so."""
         if not len(self.hashes):
             return np.full(len(hashes), _UNKNOWN, np.int64)
         place = np.minimum(np.searchsorted(self.hashes, hashes), len(self.hashes) - 1)
-        same = (self.shared[place] == shared).all(axis=1)
+        same = np.ones(len(hashes), bool)
+        for theirs, ours in zip(self.shared, shared, strict=True):
+            same &= theirs[place] == ours
         which: Times = np.where(same, self.numbers[place], _UNKNOWN)
         return which
 
-    def learn(self, hashes: Words, shared: Words, which: Times, rows: list[int]) -> None:
+    def learn(self, hashes: Words, shared: Sequence[Words], which: Times, rows: list[int]) -> None:
         """Find some rows fast from now on."""
         everything = np.concatenate([self.hashes, hashes[rows]])
-        distinct, firsts = np.unique(everything, return_index=True)
-        self.hashes = distinct
-        self.shared = np.concatenate([self.shared, shared[rows]])[firsts]
-        self.numbers = np.concatenate([self.numbers, which[rows]])[firsts]
+        order = np.argsort(everything, kind="stable")
+        everything = everything[order]
+        first = np.ones(len(order), bool)
+        first[1:] = everything[1:] != everything[:-1]
+        order, self.hashes = order[first], everything[first]
+        self.shared = [np.concatenate([old, new[rows]])[order] for old, new in zip(self.shared, shared, strict=True)]
+        self.numbers = np.concatenate([self.numbers, which[rows]])[order]
 
 
 @dataclass(slots=True)
@@ -126,7 +132,7 @@ class Specimens:
             blank[:, list(stencil.unread)] = 0
             for begin, form in stencil.numbers:
                 blank[:, begin : begin + form.octets] &= ~np.frombuffer(form.mask, np.uint8)
-            shared = np.concatenate([_words(blank), made[chosen]], axis=1)
+            shared = [*_words(blank), *(one[chosen] for one in made)]
             which = self._look_up(table, at[rows[chosen]], (length, stencil), shared)
             known = which >= 0
             chosen, which = chosen[known], which[known]
@@ -137,8 +143,9 @@ class Specimens:
                 found.numbers.append(Numbers(rows[chosen], tuple(form for _, form in stencil.numbers), values))
         chosen = np.flatnonzero(left)
         if len(chosen):
-            shared = np.concatenate([_words(octets[chosen]), made[chosen]], axis=1)
-            found.which[rows[chosen]] = self._look_up(table, at[rows[chosen]], (length, None), shared)
+            if len(chosen) < len(rows):
+                octets, made, rows = octets[chosen], [one[chosen] for one in made], rows[chosen]
+            found.which[rows] = self._look_up(table, at[rows], (length, None), [*_words(octets), *made])
 
     def _stencilled(self, table: Table, at: Times, octets: Octets, length: int) -> list[tuple[Stencil, Masks]]:
         """Stencils that may fit rows of one length, and which."""
@@ -148,11 +155,11 @@ class Specimens:
         plain = table.good[at] & frames.ok[at] & (frames.error[at] == 0)
         if not plain.any():
             return []
-        roles, kinds = table.shown("role")[at].astype(np.int64), frames.kind[at].astype(np.int64)
-        classes = roles << 16 | kinds
+        classes = frames.kind[at].astype(np.int64) * len(ROLES) + table.shown("role")[at]
         fitting: list[tuple[Stencil, Masks]] = []
-        for one in np.unique(classes[plain]).tolist():
-            stencil = self._stencils(ROLES[one >> 16], frames.names[one & 0xFFFF], length)
+        for one in distinct_codes(classes[plain])[0].tolist():
+            kind, role = divmod(one, len(ROLES))
+            stencil = self._stencils(ROLES[role], frames.names[kind], length)
             if stencil is None:
                 continue
             inside = plain & (classes == one)
@@ -168,21 +175,21 @@ class Specimens:
                 fitting.append((stencil, inside))
         return fitting
 
-    def _look_up(self, table: Table, at: Times, of: tuple[int, Stencil | None], shared: Words) -> Times:
+    def _look_up(self, table: Table, at: Times, of: tuple[int, Stencil | None], shared: list[Words]) -> Times:
         """The specimen of each row; -1 where a stencil does not hold."""
         hashes = _hashed(shared)
         known = self._classes.setdefault(of, _Class.empty(shared))
         which = known.find(hashes, shared)
         while len(unknown := np.flatnonzero(which == _UNKNOWN)):
             some = unknown[:_FEW] if len(known.by_words) < _FEW else unknown  # the first teach most of the rest
-            keys = [one.tobytes() for one in shared[some]]
+            keys = [one.tobytes() for one in np.stack([word[some] for word in shared], axis=1)]
             new = {key: row for row, key in zip(some.tolist(), keys, strict=True) if key not in known.by_words}
             for key, row in zip(new, rows_at(table, at[list(new.values())].tolist()), strict=True):
                 known.by_words[key] = self._asked(row, of[1])
             which[some] = [known.by_words[key] for key in keys]
             if len(some) < len(unknown):
                 known.learn(hashes, shared, which, list(new.values()))
-                which[unknown] = known.find(hashes[unknown], shared[unknown])
+                which[unknown] = known.find(hashes[unknown], [word[unknown] for word in shared])
             elif new:
                 known.learn(hashes, shared, which, list(new.values()))
         return which
@@ -199,38 +206,41 @@ _UNKNOWN = -2
 _FEW = 1024
 
 
-def _made_of(table: Table, at: Times) -> Words:
+def _made_of(table: Table, at: Times) -> list[Words]:
     """What was made of rows, and whom their exchange says they are between."""
     frames, placed = table.frames, table.placed
     made = (frames.check[at].astype(np.int64) << 16 | frames.found[at].astype(np.int64) << 8) | frames.damage[at]
     whole = made << 33 | (frames.expected[at].astype(np.int64) + 1)
     ways = (placed.source[at].astype(np.int64) + 1) << 16 | (placed.destination[at].astype(np.int64) + 1)
     between = np.where(placed.tx[at] > 0, ways << 8 | placed.role[at], -1)
-    return np.stack([whole, between << 8 | frames.role[at]], axis=1).view(np.uint64)
+    return [whole.view(np.uint64), (between << 8 | frames.role[at]).view(np.uint64)]
 
 
-def _words(octets: Octets) -> Words:
-    """Rows of octets as words, zeros behind."""
+def _words(octets: Octets) -> list[Words]:
+    """Rows of octets as columns of words, zeros behind."""
     size = -(-octets.shape[1] // 8)
-    padded = np.zeros((len(octets), 8 * size), np.uint8)
-    padded[:, : octets.shape[1]] = octets
-    return padded.view(np.uint64)
+    if octets.shape[1] < 8 * size:
+        padded = np.zeros((len(octets), 8 * size), np.uint8)
+        padded[:, : octets.shape[1]] = octets
+        octets = padded
+    words = np.ascontiguousarray(octets).view(np.uint64)
+    return [words[:, column] for column in range(size)]
 
 
-def _hashed(shared: Words) -> Words:
-    hashes = np.zeros(len(shared), np.uint64)
-    for column in range(shared.shape[1]):
-        hashes = (hashes ^ shared[:, column]) * np.uint64(0x9E3779B97F4A7C15)
+def _hashed(shared: Sequence[Words]) -> Words:
+    hashes = np.zeros(len(shared[0]), np.uint64)
+    for column in shared:
+        hashes = (hashes ^ column) * np.uint64(0x9E3779B97F4A7C15)
         hashes ^= hashes >> np.uint64(29)
     return hashes
 
 
-def with_numbers(row: Row, stencil: Stencil, numbers: Sequence[bytes], unread: int) -> Row:
-    """The row with other octets where a stencil says that they are not read (`unread`), or are plain numbers."""
+def with_numbers(row: Row, stencil: Stencil, numbers: Sequence[bytes]) -> Row:
+    """The row with other octets where a stencil says that they are not read, or are plain numbers."""
     assert isinstance(row.event, Frame)
     octets = bytearray(row.event.octets)
     for place in stencil.unread:
-        octets[place] ^= unread
+        octets[place] ^= 0xFF
     for (begin, form), number in zip(stencil.numbers, numbers, strict=True):
         for place, (bits, octet) in enumerate(zip(form.mask, number, strict=True), begin):
             octets[place] = octets[place] & ~bits | octet & bits

@@ -321,12 +321,12 @@ def joined_columns(kind: type[Named], parts: Sequence[Named]) -> Named:
     """Columns one after the other, their texts under common numbers."""
     names, columns = Names(), [one.name for one in fields(kind)[:-1]]
     held: dict[str, list[npt.NDArray[Any]]] = {name: [] for name in columns}
-    known: dict[int, npt.NDArray[np.uint16]] = {}  # by the identity of their texts, which many parts share
+    known: dict[tuple[str, ...], npt.NDArray[np.uint16]] = {}  # by their texts, which many parts share
     for part in parts:
-        numbers = known.get(id(part.names))
+        numbers = known.get(part.names)
         if numbers is None:
             numbers = np.array([names.number(text) for text in part.names], np.uint16)
-            known[id(part.names)] = numbers
+            known[part.names] = numbers
         for name in columns:
             values = getattr(part, name)
             held[name].append(numbers[values] if name in TEXTS else values)

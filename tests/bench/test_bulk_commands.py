@@ -16,7 +16,7 @@ def test_table(benchmark: Any, capsys: pytest.CaptureFixture[str]) -> None:
     def printed() -> None:
         with capsys.disabled():
             print()
-            for line in bulk_commands.lines(int(os.environ.get("FRAMES", "1000000")), bulk_commands.ROUNDS):
+            for line in bulk_commands.lines(int(os.environ.get("FRAMES", "100000")), bulk_commands.ROUNDS):
                 print(line, flush=True)
 
     benchmark.pedantic(printed, rounds=1)
