@@ -1,7 +1,7 @@
 """What exchanges tell: the words of cyclic inputs and outputs, high octet first.
 
-`space` is "input" or "output", `address` the word, from 0. Data of an odd number of octets are told octet by octet
-("input-octet"): only configuration and GSD say what they are.
+`space` is "dp-input" or "dp-output", `address` the word, from 0. Data of an odd number of octets are told octet by octet
+("dp-input-octet"): only configuration and GSD say what they are.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ def readings(request: Frame | None, response: Frame | None) -> tuple[Reading, ..
         return ()
     service = service_of(asked)
     if service is Service.DATA_EXCHANGE:
-        return (*_words("output", asked.data, How.WRITE), *_words("input", told.data, How.READ))
+        return (*_words("dp-output", asked.data, How.WRITE), *_words("dp-input", told.data, How.READ))
     if service is Service.READ_INPUTS:
-        return _words("input", told.data, How.READ)
-    return _words("output", told.data, How.READ) if service is Service.READ_OUTPUTS else ()
+        return _words("dp-input", told.data, How.READ)
+    return _words("dp-output", told.data, How.READ) if service is Service.READ_OUTPUTS else ()
 
 
 def _words(space: str, data: bytes, how: How) -> tuple[Reading, ...]:
