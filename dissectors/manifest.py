@@ -60,6 +60,7 @@ class Dissector:
     The rest only where there is such a thing:
 
     `default_line`: what such a bus normally runs ("19200,8E1").
+    `other_lines`: what else such a bus runs, where those are not the usual rates and formats; a search tries them, too.
     `field_prefixes`: how the names in `fields` begin ("modbus."), so that filters know them; the protocol's name and a
     dot where none are given.
     `noun`: what its people call a place on the bus. `family`: under which name device profiles speak of it.
@@ -85,6 +86,7 @@ class Dissector:
     fields: Callable[[Frame, Role], dict[str, int | float | str]]
     packet: Callable[[Frame, Role], Any]
     default_line: str = "9600,8N1"
+    other_lines: tuple[str, ...] = ()
     field_prefixes: tuple[str, ...] = ()
     noun: str = "station"
     family: str = ""
