@@ -77,6 +77,7 @@ class Dissector:
     `answer_fields(request, answer)`: fields of an answer that only its request tells.
 
     `default_line`: what such a bus normally runs ("19200,8E1").
+    `other_lines`: what else such a bus runs, where those are not the usual rates and formats; a search tries them, too.
     `field_prefixes`: how the names in `fields` begin ("modbus."), so that filters know them; the protocol's name and a
     dot where none are given.
     `noun`: what its people call a place on the bus. `family`: under which name device profiles speak of it.
@@ -112,6 +113,7 @@ class Dissector:
     asks: Asks | None = None
     answer_fields: Callable[[Frame, Frame], dict[str, int | float | str]] | None = None
     default_line: str = "9600,8N1"
+    other_lines: tuple[str, ...] = ()
     field_prefixes: tuple[str, ...] = ()
     noun: str = "station"
     family: str = ""

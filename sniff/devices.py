@@ -2,6 +2,7 @@
 
     teco-e510             by name: ./profiles and those above it, the user's folder, the package, other packages
     drives/pump.toml      a file by its path
+    F510-P.GSD            a maker's description of a device, by its path
 
 Other packages give theirs under the entry point group `sniff485.profiles`: the name of the profile to the text of a
 TOML document, or to a path of one.
@@ -24,6 +25,9 @@ from sniff.engine.session import DEVICES_NOTE, Session
 
 GROUP = "sniff485.profiles"
 FOLDER = "profiles"
+GSD_SUFFIXES = (".gsd", ".gse", ".gsg")
+"""Files in which makers of field devices describe them; the last letter is a language."""
+
 LARGEST = 16 << 20
 """Octets of a profile that are read at most."""
 
@@ -53,7 +57,7 @@ class Listed:
 
 def find(name: str) -> Profile:
     """A profile by name or path. Raises UnknownProfile, ProfileError."""
-    if name.endswith(SUFFIX) or os.sep in name:
+    if name.endswith(SUFFIX) or os.sep in name or name.lower().endswith(GSD_SUFFIXES):
         return read(Path(name))
     for folder in folders():
         path = folder / (name + SUFFIX)
@@ -73,7 +77,8 @@ def read(path: Path) -> Profile:
     try:
         if path.stat().st_size > LARGEST:
             raise ProfileError(f"{path}: over {LARGEST >> 20} MiB is no profile")
-        text = path.read_text(encoding="utf-8")
+        is_gsd = path.suffix.lower() in GSD_SUFFIXES
+        text = path.read_text(encoding="latin-1" if is_gsd else "utf-8")
     except OSError as error:
         raise ProfileError(f"{path}: {error.strerror}") from None
     except UnicodeDecodeError as error:

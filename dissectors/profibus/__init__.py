@@ -51,6 +51,7 @@ PROFIBUS = Dissector(
     fields=fields,
     packet=packet,
     default_line="1500000,8E1",
+    other_lines=("187500,8E1", "500000,8E1", "93750,8E1", "45450,8E1"),
     field_prefixes=("pb.",),
     bits=bits,
     judge=ProfibusFindings,

@@ -22,7 +22,7 @@ from dissectors.words import milliseconds
 _LEAST = 3
 _SHARE = 0.01
 _URGENT_MOST = 20
-_CLEAR_LONG = 10 * NS_PER_S
+_CLEAR_LONG = 5 * NS_PER_S
 _ONE_STATION = 0.9
 _TOLERANCE = 5
 """Bit times by which a measured answer time may be off."""
@@ -132,6 +132,10 @@ class ProfibusFindings:
             grave = Severity.ERROR if fallen.count >= _LEAST else Severity.WARNING
             seen = f"left data exchange {times(fallen.count)}{_watchdog(slave)}"
             yield fallen.found(RULES["PB007"], who, seen, grave)
+        starved = self._noted.get((Notice.STARVED, address))
+        if starved is not None and fallen is None:
+            seen = f"left data exchange {times(starved.count)} when its master was silent for longer than its watchdog"
+            yield starved.found(RULES["PB007"], who, seen, Severity.NOTE)
         if slave.urgent >= _URGENT_MOST and "PB009" not in tallies:
             time, _ = slave.changes[-1] if slave.changes else (0, None)
             tally = Tally()
@@ -195,8 +199,8 @@ class ProfibusFindings:
                 seen = f"the token to it was sent again {times(tally.count)}"
                 yield tally.found(RULES["PB014"], station(address), seen, _grave(tally.count, self._tokens))
             elif what is Notice.OUT_OF_TURN and tally.count >= _LEAST:
-                seen = f"{counted(tally.count, 'request')} while another master held the token"
-                yield tally.found(RULES["PB015"], station(address), seen)
+                seen = f"station {address} sent {times(tally.count)} while another master held the token"
+                yield tally.found(RULES["PB015"], BUS, seen)
             elif what is Notice.CLEAR and tally.last - tally.first >= _CLEAR_LONG:
                 seen = f"outputs are cleared for {(tally.last - tally.first) / NS_PER_S:.0f} s of data exchange"
                 yield tally.found(RULES["PB012"], station(address), seen)

@@ -1,12 +1,13 @@
 """What exchanges tell: the words of cyclic inputs and outputs, high octet first.
 
-`space` is "input" or "output", `address` the word, from 0. Data of an odd number of octets are told octet by octet
-("input-octet"): only configuration and GSD say what they are.
+`space` is "dp-input" or "dp-output", `address` the word, from 0. Data of an odd number of octets are told octet by
+octet ("dp-input-octet"): only configuration and GSD say what they are. A diagnosis tells "dp-ident" 0.
 """
 
 from __future__ import annotations
 
 from dissectors.frame import Frame
+from dissectors.profibus.diagnosis import parse_diagnosis
 from dissectors.profibus.header import refusal_words
 from dissectors.profibus.services import Service, service_of
 from dissectors.profibus.telegram import parse
@@ -21,10 +22,12 @@ def readings(request: Frame | None, response: Frame | None) -> tuple[Reading, ..
         return ()
     service = service_of(asked)
     if service is Service.DATA_EXCHANGE:
-        return (*_words("output", asked.data, How.WRITE), *_words("input", told.data, How.READ))
+        return (*_words("dp-output", asked.data, How.WRITE), *_words("dp-input", told.data, How.READ))
+    if service is Service.DIAGNOSIS and (said := parse_diagnosis(told.data)) is not None:
+        return (Reading("dp-ident", 0, said.ident, said.ident, How.READ),)
     if service is Service.READ_INPUTS:
-        return _words("input", told.data, How.READ)
-    return _words("output", told.data, How.READ) if service is Service.READ_OUTPUTS else ()
+        return _words("dp-input", told.data, How.READ)
+    return _words("dp-output", told.data, How.READ) if service is Service.READ_OUTPUTS else ()
 
 
 def _words(space: str, data: bytes, how: How) -> tuple[Reading, ...]:

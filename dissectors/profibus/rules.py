@@ -70,7 +70,7 @@ RULES: dict[str, Rule] = {
             Severity.WARNING,
             "dropped out of data exchange",
             "A slave that exchanged data wants new parameters, or refuses data, although nobody unlocked it. An error "
-            "from three times on.",
+            "from three times on. Only noted where its master had asked nothing for longer than the watchdog.",
             "its watchdog expired because requests did not reach it, its supply failed, or it restarted",
             "whether its master was silent before; the watchdog time in Set_Prm; the supply of the slave",
             explains=("PB009", "PB017"),
@@ -117,7 +117,7 @@ RULES: dict[str, Rule] = {
             "PB012",
             Severity.WARNING,
             "master in Clear",
-            "Data is exchanged for more than ten seconds while the master's last Global_Control says Clear: all "
+            "Data is exchanged for more than five seconds while the master's last Global_Control says Clear: all "
             "outputs are zero or in their safe state.",
             "the controller is in stop, or one of its slaves is missing and it clears the others (auto clear)",
             "the controller's mode switch and its fault list",
@@ -129,6 +129,7 @@ RULES: dict[str, Rule] = {
             "A master made a token of its own in a ring that was running.",
             "the token was damaged, or its holder fell silent: switched off, restarted, disturbed",
             "who held the token before; terminators; whether that master restarted",
+            explains=("PB007", "PB014"),
         ),
         Rule(
             "PB014",

@@ -110,7 +110,7 @@ class Slave:
         if service is Service.FDL_STATUS:
             return telegram(heard.source or 0, self.address, 0x00)
         if service is Service.DIAGNOSIS:
-            return self._reply(heard, Status.DATA_LOW, self._diagnosis(now))
+            return self._reply(heard, Status.DATA_LOW, self._diagnosis(heard.source, now))
         if service is Service.SET_PARAMETERS:
             return self._parameterised(heard, now)
         if service is Service.CHECK_CONFIGURATION:
@@ -159,10 +159,12 @@ class Slave:
                 self._fault = bits.CONFIGURATION_FAULT
         return bytes((SC,))
 
-    def _diagnosis(self, now: int) -> bytes:
+    def _diagnosis(self, asker: int | None, now: int) -> bytes:
         trouble = self._told_trouble = self._trouble(now)
         ready = self.state is SlaveState.EXCHANGE
         first = self._fault | (0 if ready else bits.NOT_READY) | (bits.EXTENDED if trouble else 0)
+        if self._master not in (NO_MASTER, asker):
+            first |= bits.LOCKED
         wants = bits.PARAMETERS_WANTED if self.state is SlaveState.WAIT_PARAMETERS else 0
         second = 0x04 | wants | (bits.WATCHDOG if self._watchdog is not None else 0)
         return bytes((first, second, 0, self._master, self.ident >> 8, self.ident & 0xFF)) + trouble

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from dissectors.line import MS
 from dissectors.profibus.control import Status
 from dissectors.profibus.diagnosis import EXTENDED, NO_MASTER, Diagnosis, parse_diagnosis
 from dissectors.profibus.parameters import UNLOCK, Parameters, parse_parameters
@@ -36,6 +37,23 @@ class SlaveView:
     has: bytes = b""
     told: Diagnosis | None = None
     unlocked: bool = False
+    asked: int | None = None  # when it was asked last, ns
+    silence: int = 0  # the longest pause between requests since it answered well
+
+    def ask(self, time: int) -> None:
+        """It is asked for something."""
+        self.silence = max(self.silence, 0 if self.asked is None else time - self.asked)
+        self.asked = time
+
+    def heard(self, time: int) -> None:
+        """It has answered."""
+        self.silence = 0
+
+    @property
+    def was_starved(self) -> bool:
+        """Whether nobody asked it for longer than its watchdog."""
+        watchdog = None if self.given is None else self.given.watchdog_ms
+        return watchdog is not None and self.silence >= watchdog * MS
 
     def become(self, state: SlaveState, time: int) -> None:
         """Take a state."""

@@ -18,6 +18,9 @@ from dissectors.profibus.services import Service, service_of
 from dissectors.profibus.slave_watch import SlaveView
 from dissectors.profibus.telegram import HIGHEST, Telegram, parse
 
+_LEAST_CLAIM = 6 * 37
+"""Bit times of silence after which the lowest master makes a new token: six slot times, of 37 bits at least."""
+
 
 class Notice(Enum):
     """What was noticed, about which station."""
@@ -26,6 +29,7 @@ class Notice(Enum):
     TOKEN_AGAIN = auto()  # a token was sent again: its taker did not show itself
     OUT_OF_TURN = auto()  # a request by who did not hold the token
     DROP = auto()  # a slave left data exchange by itself
+    STARVED = auto()  # the same, after its master had asked nothing for longer than its watchdog
     DIAGNOSIS = auto()  # a slave told its diagnosis
     CLEAR = auto()  # data is exchanged while the master is in Clear
 
@@ -60,6 +64,8 @@ class BusWatch:
         self._first: int | None = None
         self._last = 0
         self._wasted = 0
+        self._heard = self._slack = 0  # end of the row before, and by how much it may have been earlier
+        self._least_claim = timing.line.bits(_LEAST_CLAIM)
         self._holder: int | None = None
         self._token: tuple[int, int] | None = None  # source and destination of the last token, nothing after it
         self._asked: tuple[Telegram, Service, int] | None = None  # an open request and its end
@@ -67,7 +73,11 @@ class BusWatch:
     def see(self, no: int, event: Event, header: Header | None) -> None:
         """Take the next row."""
         self._first = event.start if self._first is None else self._first
+        self._see(no, event, header)
         self._last = max(self._last, event.end)
+        self._heard, self._slack = event.end, event.slack if isinstance(event, Frame) else 0
+
+    def _see(self, no: int, event: Event, header: Header | None) -> None:
         if not isinstance(event, Frame) or header is None or not event.ok:
             self.miss(event.end)
             return
@@ -113,6 +123,9 @@ class BusWatch:
         giver = self._master(source)
         is_again = self._token == (source, to) and source != to
         by_another = self._token is None or self._token[0] != source  # else its taker is gone, and it goes on alone
+        if self._holder not in (None, source) and self._is_at_once(frame):
+            self._tell(Notice.OUT_OF_TURN, source, no, frame.start)
+            self._holder = None
         is_claim = source == to and by_another and self._holder not in (None, source)
         was_in_ring = any(other != source for other in giver.following)
         giver.view = replace(
@@ -134,6 +147,10 @@ class BusWatch:
             taker.got = frame.end
         self._holder, self._token = to, (source, to)
 
+    def _is_at_once(self, frame: Frame) -> bool:
+        """Whether it is sure that less silence was before a frame than any master waits before it claims the token."""
+        return frame.start - self._heard + self._slack < self._least_claim
+
     def _ask(self, no: int, asked: Telegram, frame: Frame) -> None:
         self._unanswered(frame.start)
         source, to = asked.source, asked.destination
@@ -152,6 +169,8 @@ class BusWatch:
             master.is_clear = control.is_clear
         if asked.control is not None and asked.control.wants_answer and to <= HIGHEST:
             self._asked = asked, service, frame.end
+            if not is_poll and to in self.slaves:
+                self.slaves[to].ask(frame.start)
 
     def _answer(self, no: int, answer: Telegram, frame: Frame) -> None:
         if self._asked is None:
@@ -168,7 +187,8 @@ class BusWatch:
         slave = self.slaves.setdefault(asked.destination, SlaveView())
         fell = slave.answered(service, asked, answer, frame.end)
         if fell:
-            self._tell(Notice.DROP, asked.destination, no, frame.start)
+            self._tell(Notice.STARVED if slave.was_starved else Notice.DROP, asked.destination, no, frame.start)
+        slave.heard(frame.end)
         if service is Service.DIAGNOSIS:
             self._tell(Notice.DIAGNOSIS, asked.destination, no, frame.start)
         elif service is Service.DATA_EXCHANGE and master.is_clear:

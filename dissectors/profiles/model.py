@@ -198,7 +198,8 @@ class Profile:
 
     `noun`: what a person calls it ("drive"). `protocols`: registry names. `limits`, `exceptions`: by family ("modbus",
     "n2", "bacnet"); the exceptions are exception and error codes in the maker's words. `properties`: BACnet property →
-    object types that have it. `constants`: BACnet device property → its value. `absent`: parameters that the manual
+    object types that have it. `constants`: BACnet device property → its value. `facts`: what a GSD file says of it,
+    by keyword. `absent`: parameters that the manual
     lists without a register. `reserved`: spans of registers (first, last, on the wire) that the maker keeps for itself.
     `address_offset`: number on the wire less the manual's.
     `document`: the text of the TOML document that all this was read from.
@@ -216,6 +217,7 @@ class Profile:
     signs: tuple[Sign, ...] = ()
     properties: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     constants: Mapping[str, str | int] = field(default_factory=dict)
+    facts: Mapping[str, str | int] = field(default_factory=dict)
     absent: tuple[str, ...] = ()
     reserved: tuple[tuple[int, int], ...] = ()
     address_offset: int = 0

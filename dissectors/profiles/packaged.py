@@ -8,6 +8,7 @@ from functools import cache
 from importlib.resources import files
 
 from dissectors.profiles.checked import ProfileError
+from dissectors.profiles.gsd import is_gsd, parse_gsd
 from dissectors.profiles.model import Profile
 from dissectors.profiles.parsing import parse
 
@@ -30,7 +31,9 @@ def packaged(name: str) -> Profile:
 
 
 def parse_text(text: str, origin: str) -> Profile:
-    """The profile in the text of a TOML document. Raises ProfileError."""
+    """The profile in the text of a TOML document, or of a GSD file. Raises ProfileError."""
+    if is_gsd(text):
+        return replace(parse_gsd(text, origin), document=text)
     try:
         data = tomllib.loads(text)
     except (tomllib.TOMLDecodeError, RecursionError) as error:

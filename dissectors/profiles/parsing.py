@@ -22,10 +22,12 @@ def parse(data: Mapping[str, Any], origin: str) -> Profile:
     top = Table(origin, "", data)
     name = _name(top, "name")
     modbus, n2, bacnet = top.table("modbus"), top.table("n2"), top.table("bacnet")
+    profibus = top.table("profibus")
     registers, absent = _modbus(modbus)
     exceptions = {"modbus": modbus.words("exceptions"), "n2": n2.words("errors")}
     objects = [_object(table, _n2_place(table), n2=True) for table in n2.tables("object")]
     objects += [_object(table, _bacnet_place(table)) for table in bacnet.tables("object")]
+    objects += [_entry(table, *_word_place(table), None) for table in profibus.tables("word")]
     profile = Profile(
         name=name,
         title=top.text("title"),
@@ -34,18 +36,19 @@ def parse(data: Mapping[str, Any], origin: str) -> Profile:
         noun=top.text("noun", "device"),
         protocols=top.texts("protocols"),
         entries=_with_shared_meaning(origin, (*registers, *objects)),
-        limits={family.path: _limits(family.table("limits")) for family in (modbus, n2, bacnet)},
+        limits={family.path: _limits(family.table("limits")) for family in (modbus, n2, bacnet, profibus)},
         exceptions=exceptions,
         signs=tuple(_sign(table, modbus) for table in top.tables("sign")),
         properties=_properties(bacnet.table("properties")),
         constants=_constants(bacnet.table("device")),
+        facts=_constants(profibus.table("device")),
         absent=absent,
         reserved=_reserved(modbus),
         address_offset=modbus.whole("address-offset", 0),
         source=top.text("source", ""),
         origin=origin,
     )
-    for table in (top, modbus, n2, bacnet):
+    for table in (top, modbus, n2, bacnet, profibus):
         table.finish()
     _check(profile)
     return profile
@@ -141,6 +144,15 @@ def _bacnet_place(table: Table) -> tuple[str, int]:
     if not re.fullmatch(r"[a-z][a-z-]*", space) or not number.isdigit() or int(number) > 0x3FFFFF:
         raise table.error("object", 'expected "analog-input 0": object type and instance')
     return space, int(number)
+
+
+def _word_place(table: Table) -> tuple[str, int, str]:
+    """ "input 3" → the table of cyclic words, the place in it, and what people call it."""
+    told = table.text("word")
+    direction, _, number = told.partition(" ")
+    if direction not in ("input", "output") or not number.isdigit() or int(number) > 121:
+        raise table.error("word", 'expected "input 0" or "output 0": the words of cyclic data, from 0 to 121')
+    return f"dp-{direction}", int(number), told
 
 
 def _object(table: Table, place: tuple[str, int], n2: bool = False) -> Entry:
@@ -241,7 +253,10 @@ def _with_shared_meaning(origin: str, entries: tuple[Entry, ...]) -> tuple[Entry
     for entry in entries:
         if entry.like and entry.like not in first:
             raise ProfileError(f"{origin}: {entry.number}: like: no entry {entry.like!r}")
-    by_name = {entry.name: entry.states for entry in entries if entry.states}
+    by_name: dict[str, Mapping[int, str]] = {}
+    for entry in entries:  # of those that have the same name, the first
+        if entry.states:
+            by_name.setdefault(entry.name, entry.states)
     for entry in entries:
         if entry.states_from and entry.states_from not in by_name:
             raise ProfileError(f"{origin}: {entry.number}: states-from: no entry {entry.states_from!r} with states")

@@ -57,9 +57,11 @@ FORMATS = ("8N1", "8E1", "8O1", "7E1", "7O1")
 
 
 def candidates(
-    lines: Iterable[LineSettings] | None = None, first: Iterable[LineSettings] = ()
+    lines: Iterable[LineSettings] | None = None,
+    first: Iterable[LineSettings] = (),
+    last: Iterable[LineSettings] = (),
 ) -> tuple[LineSettings, ...]:
-    """Settings in the order of trying: `first`, then the usual ones. `lines`: these and no others."""
+    """Settings in the order of trying: `first`, the usual ones, `last`. `lines`: these and no others."""
     if lines is not None:
         return tuple(dict.fromkeys(lines))
     # The frequent rates in both frequent formats before anything else; parity odd and seven bits last.
@@ -69,7 +71,7 @@ def candidates(
         for place in range(len(FORMATS))
     )
     usual = [LineSettings.parse(f"{BAUDS[rate]},{FORMATS[place]}") for _, rate, place in ranked]
-    return tuple(dict.fromkeys((*first, *usual)))
+    return tuple(dict.fromkeys((*first, *usual, *last)))
 
 
 def bits_of(frame: Frame) -> float:

@@ -121,7 +121,7 @@ def _show(args: argparse.Namespace) -> int:
     for family, codes in profile.exceptions.items():
         for code, words in codes.items():
             print(f"{family} error {code:02d} ({code:02X}h): {words}")
-    for key, value in profile.constants.items():
+    for key, value in (*profile.constants.items(), *profile.facts.items()):
         print(f"{key}: {value}")
     for first, last in profile.reserved:
         offset = profile.address_offset

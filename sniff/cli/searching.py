@@ -33,8 +33,11 @@ class Unknowns:
     def detecting(self, latency: int = 0, reports: tuple[str, ...] | None = None) -> Detecting:
         """A search over everything that is not given; the protocol's own settings first."""
         protocols = (self.protocol,) if self.protocol else registry.names()
-        first = (LineSettings.parse(registry.get(self.protocol).default_line),) if self.protocol else ()
-        return Detecting(candidates(None if self.line is None else (self.line,), first), protocols, latency, reports)
+        own = [registry.get(name) for name in protocols]
+        named = [LineSettings.parse(line) for one in own for line in (one.default_line, *one.other_lines)]
+        first, last = (named, ()) if self.protocol else ((), named)
+        lines = None if self.line is None else (self.line,)
+        return Detecting(candidates(lines, first, last), protocols, latency, reports)
 
 
 def search(link: CaptureLink, unknowns: Unknowns, timeout: float = TIMEOUT) -> Outcome:

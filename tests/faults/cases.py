@@ -38,6 +38,7 @@ from tests.faults.modbus_cases import MODBUS_CASES
 from tests.faults.mstp_cases import MSTP_CASES
 from tests.faults.n2_cases import N2_CASES
 from tests.faults.n2_rule_cases import N2_RULE_CASES
+from tests.faults.profibus_cases import PROFIBUS_CASES
 from tests.faults.ring_cases import RING_CASES
 from tests.faults.stations import (
     AnswersAs,
@@ -211,6 +212,7 @@ CASES: tuple[Case, ...] = (  # of each a capture is kept in captures/findings
     *N2_RULE_CASES,
     *DRIVE_CASES,
     *RING_CASES,
+    *PROFIBUS_CASES,
     *LINE_RULE_CASES,
 )
 

@@ -19,6 +19,7 @@ from tests.faults.case import Case, Heard
 from tests.faults.hearing import busy_host, hidden_latency
 from tests.faults.misbehaving import ScansOnce
 from tests.faults.n2_clean_cases import n2_clean_cases
+from tests.faults.profibus_cases import profibus
 from tests.faults.ring_nodes import TestsItself
 from tests.faults.ring_programs import Lister, Scans, Segmenting, controller, drive
 from tests.faults.uneven_stations import Waits
@@ -196,6 +197,7 @@ CLEAN: tuple[Clean, ...] = (
     Clean("ASCII clean", _ascii),
     Clean("N2 clean", n2),
     Clean("MS/TP clean", mstp, is_ring=True),
+    Clean("PROFIBUS clean", profibus, is_ring=True),
     # slow and brisk
     Clean("RTU clean, slow stations", _slow(False, _mixed)),
     Clean("RTU clean, slow stations that are only written to", _slow(False, _writes)),

@@ -62,6 +62,9 @@ CAPTURES: Mapping[str, Made] = {
     "mstp-noisy-ftdi": Made("mstp", 2, (NoiseInGaps(0.05), BitFlips(0.001), LostResponse(0.02)), FTDI),
     "mstp-exceptions": Made("mstp", 0.6, skip=10.2),
     "mstp-breaks": Made("mstp", 2, (Break(0.02),), UART),
+    "profibus-clean": Made("profibus", 1),
+    "profibus-usual-faults": Made("profibus", 3, None, skip=5),
+    "profibus-noisy-ftdi": Made("profibus", 2, (NoiseInGaps(0.05), BitFlips(0.001), LostResponse(0.02)), FTDI),
 }
 
 
