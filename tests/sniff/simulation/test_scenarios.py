@@ -11,6 +11,7 @@ import pytest
 from dissectors import registry
 from dissectors.frame import Chunk, Frame
 from dissectors.line import LineSettings
+from dissectors.profibus.telegram import token
 from dissectors.simulated_faults import (
     BitFlips,
     Break,
@@ -32,7 +33,7 @@ from sniff.simulation.tap import EXACT, FTDI, FTDI_LOW_LATENCY, OCTETS, UART, Ta
 from sniff.simulation.wire import Sent
 
 NAMES = scenarios.names()
-QUICK = {"modbus-rtu-busy": 2, "mstp": 4, "profibus": 4}  # seconds that show enough of a bus with hundreds of frames in each
+QUICK = {"modbus-rtu-busy": 2, "mstp": 4, "profibus": 4}  # seconds that show enough of a bus with hundreds of frames
 
 
 def sniff(plan: Scenario, seconds: float, tap: TapModel = EXACT) -> tuple[list[Row], list[Transaction]]:
@@ -61,7 +62,7 @@ def readings(plan: Scenario, octets: list[bytes]) -> list[bytes]:
     if plan.protocol == "mstp":  # one filler octet may follow a frame
         return octets + [one + b"\xff" for one in octets]
     if plan.protocol == "profibus":  # a token has no check: two that collide may make a third
-        return octets + [bytes((0xDC, 1, 1)), bytes((0xDC, 2, 2))]
+        return [*octets, token(1, 1), token(2, 2)]
     return octets
 
 
