@@ -19,7 +19,7 @@ from sniff.cli import UNREADABLE, USAGE, Failure, arguments, json_output, writin
 from sniff.engine.capture import CaptureError
 from sniff.fleet import running
 from sniff.fleet.answer import Answer, answer, marks
-from sniff.fleet.archive import Task, files_below, is_being_written, tasks_of
+from sniff.fleet.archive import FileState, Task, files_below, is_being_written, tasks_of
 from sniff.fleet.bus_day import Archive
 from sniff.fleet.index import NAME, Index
 from sniff.fleet.running import Done, Unreachable
@@ -53,6 +53,7 @@ def run(args: argparse.Namespace) -> int:
     for place in (args.parquet, args.html):
         if place:
             writing.refuse_to_overwrite(Path(place), (), args.force or args.watch)
+    _find(args)
     index = _index(args)
     code = _once(args, index)
     while args.watch:
@@ -62,12 +63,9 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _once(args: argparse.Namespace, index: Index | None) -> int:
-    try:
-        now = time.time_ns()
-        found = [one for one in files_below(args.folders) if not is_being_written(one[1], now)]
-        tasks, unreadable = tasks_of(found, args.since)
-    except CaptureError as error:
-        raise Failure(str(error), UNREADABLE) from None
+    now = time.time_ns()
+    found = [one for one in _find(args) if not is_being_written(one[1], now)]
+    tasks, unreadable = tasks_of(found, args.since)
     archive = Archive(unreadable={one.file.path: one.why for one in unreadable})
     missing = []
     for task in tasks:
@@ -87,6 +85,13 @@ def _once(args: argparse.Namespace, index: Index | None) -> int:
     if archive.unreadable:
         return UNREADABLE
     return int(any(bus.troubles or bus.is_silent for bus in said.buses))
+
+
+def _find(args: argparse.Namespace) -> list[tuple[str, FileState]]:
+    try:
+        return files_below(args.folders)
+    except CaptureError as error:
+        raise Failure(str(error), UNREADABLE) from None
 
 
 def _read(args: argparse.Namespace, index: Index | None, archive: Archive, missing: list[Task], whole: int) -> None:
