@@ -7,6 +7,7 @@ beginning of each file is read here.
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -128,7 +129,7 @@ def tasks_of(found: Sequence[tuple[str, FileState]], since: int | None = None) -
         try:
             capture = read(file.path)
         except CaptureError as error:
-            unreadable.append(Unreadable(file, site, str(error).removeprefix(f"{file.path}: ")))
+            unreadable.append(Unreadable(file, site, _why(error, file)))
             continue
         session, part = capture.session, capture.part if isinstance(capture, McapCapture) else 1
         key = _group(site, session, part, capture, file)
@@ -138,6 +139,11 @@ def tasks_of(found: Sequence[tuple[str, FileState]], since: int | None = None) -
         members.sort(key=lambda one: (one[1], one[2].path))
         tasks.append(Task(site, tuple(file for _, _, file in members), members[0][0].protocol))
     return sorted(tasks, key=lambda task: task.files[0].path), unreadable
+
+
+def _why(error: CaptureError, file: FileState) -> str:
+    """Without the file's name, which stands before it anyhow."""
+    return re.sub(rf"^{re.escape(file.path)}(:\d+)*: ", "", str(error))
 
 
 def _group(site: str, session: Session, part: int, capture: Capture, file: FileState) -> tuple[str, ...]:

@@ -125,6 +125,7 @@ def _finding(finding: Finding) -> dict[str, Any]:
         "evidence": finding.evidence,
         "cause": finding.cause,
         "stations": finding.stations,
+        "is_once": finding.is_once,
         "stated": _subject(finding.stated),
     }
 
@@ -136,6 +137,7 @@ def _finding_of(value: dict[str, Any]) -> Finding:
         evidence=tuple(value["evidence"]),
         cause=tuple(value["cause"]) if value["cause"] else None,
         stations=tuple(value["stations"]),
+        is_once=value["is_once"],
         stated=_subject_of(value["stated"]),
     )
 

@@ -319,7 +319,8 @@ def event_line(event: LineEvent, last: int) -> str:
 def is_plain_comment(text: str, in_header: bool) -> bool:
     """Whether a comment can stand in a file as it is, and would not be read as something else."""
     return (
-        text.isprintable()
+        bool(text)
+        and text.isprintable()
         and text == text.strip()
         and not text.startswith(("!", "#"))
         and not (in_header and ":" in text)

@@ -46,7 +46,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
     environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
     ran = subprocess.run(command, capture_output=True, text=True, timeout=60, cwd=folder, env=environment, check=False)
     assert ran.returncode == 0, ran.stderr
-    assert "— drive 1: " in ran.stdout
+    assert "read status, fault" in ran.stdout
     return path
 
 

@@ -174,7 +174,7 @@ def test_tags_carry_their_meaning():
     found = dissect(octets)
     assert [tag.meaning for tag in found.lastlayer().tags] == [
         "object-identifier: device,1234",
-        "property-identifier: object-name",
+        "property-identifier: object-name (77)",
     ]
 
 

@@ -99,7 +99,7 @@ def test_tree_and_hex(poll: Path, sniff485: Callable) -> None:
         (["show", "{poll}", "-T", "fields"], 2, "-e"),
         (["show", "{text}"], 3, "byte log"),
         (["show", "{folder}"], 3, "directory"),
-        (["show", "{broken}"], 3, "broken.cap.txt:2"),
+        (["show", "{broken}"], 3, "broken.cap.txt:3"),
     ],
 )
 def test_an_error_is_one_line_with_a_way_out(
@@ -108,7 +108,7 @@ def test_an_error_is_one_line_with_a_way_out(
     text, folder, broken = tmp_path / "text.mcap", tmp_path / "folder.mcap", tmp_path / "broken.cap.txt"
     text.write_text("hello, this is no recording\n")
     folder.mkdir()
-    broken.write_text("#!sniff-capture 1\n+0 01 0G\n")
+    broken.write_text("#!sniff-capture 1\n# protocol: modbus-rtu\n+0 01 0G\n")
     names = {"poll": poll, "text": text, "folder": folder, "broken": broken}
     ran = sniff485(*(argument.format(**names) for argument in arguments))
     assert ran.code == code

@@ -166,7 +166,7 @@ def test_a_file_that_cannot_be_read_is_told_with_its_reason(
     (tmp_path / "growing.mcap").write_bytes(cut[: len(cut) // 2])
     assert main(["fleet", "--no-index", "--workers", "1", str(tmp_path)]) == 3
     out = capsys.readouterr().out
-    assert f"not read: {tmp_path}/b.mcap: not an MCAP file" in out
+    assert f"not read: {tmp_path}/b.mcap: no byte log" in out
     assert "c.mcap" not in out
     assert "growing" not in out
     assert "trunk-01" in out

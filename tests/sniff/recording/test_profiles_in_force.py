@@ -68,7 +68,7 @@ def test_names_are_known_elsewhere(recorded: Path, capsys: pytest.CaptureFixture
     assert "not known here" not in ran.err
     assert noted(read(recorded).session) == ({"1": "pump", "2": "teco-e510"}, ())
     assert main(["show", str(recorded), "-c", "2"]) == 0
-    assert "pump 1: state 36" in capsys.readouterr().out
+    assert "1 → state 36" in capsys.readouterr().out
 
 
 def test_what_the_user_says_wins(recorded: Path, capsys: pytest.CaptureFixture[str]) -> None:
