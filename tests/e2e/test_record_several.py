@@ -75,8 +75,8 @@ def record(tmp_path: Path) -> Iterator:
     yield begin
     for process in running:
         if process.poll() is None:
-            process.kill()
-            process.communicate()
+            process.terminate()  # a killed one would leave its capture behind
+            rest_of(process)
 
 
 def begun(path: Path) -> bool:
