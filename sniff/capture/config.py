@@ -31,7 +31,8 @@ class SourceSpec:
 class RecordSpec:
     """Where to record. `rotation`, `keep`: as the recorder takes them ("size:64MB", "time:1h"; parts to keep).
 
-    `before`, `after`: ns round a trigger that are kept, and nothing else is; None: everything is kept.
+    `before`, `after`: ns round a trigger that are kept, and nothing else is; None: everything is kept. `keep_free`:
+    octets of the disk that stay free; the oldest parts go for them.
     """
 
     path: str
@@ -39,6 +40,7 @@ class RecordSpec:
     keep: int | None = None
     before: int | None = None
     after: int | None = None
+    keep_free: int | None = None
 
 
 @dataclass(frozen=True, slots=True)

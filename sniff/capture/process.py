@@ -83,7 +83,7 @@ def open_recorders(config: CaptureConfig, sessions: list[Session]) -> list[Recor
     if record is None:
         return []
     rotation = None if record.rotation is None else Rotation.parse(record.rotation)
-    return SharedFile(record.path, sessions, rotation, record.keep).recorders()
+    return SharedFile(record.path, sessions, rotation, record.keep, record.keep_free).recorders()
 
 
 def round_triggers(record: RecordSpec | None) -> tuple[int, int] | None:

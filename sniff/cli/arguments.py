@@ -152,6 +152,16 @@ def whole(text: str) -> int:
     return int(text)
 
 
+def octets(text: str) -> int:
+    """argparse type for a size: "1GB", "500MB"."""
+    from sniff.recording.rotation import octets_of
+
+    try:
+        return octets_of(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+
+
 def rotation(text: str) -> str:
     """argparse type for --rotate."""
     from sniff.recording.rotation import Rotation

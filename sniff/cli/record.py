@@ -35,6 +35,12 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--keep", type=arguments.positive, metavar="N", help="remove this recording's files but the N newest"
     )
     parser.add_argument(
+        "--keep-free",
+        type=arguments.octets,
+        metavar="SIZE",
+        help="keep so much of the disk free (1GB): the oldest parts of this name go first",
+    )
+    parser.add_argument(
         "--on",
         action="append",
         default=[],
@@ -58,12 +64,15 @@ def run(args: argparse.Namespace) -> int:
     path = args.write or (buses[0].record if len(buses) == 1 else None)
     path = path or targets.new_recording("-".join(target.source.bus for target in buses[:NAMED]))
     targets.refuse_recording(path)
-    if args.keep and not args.rotate:
-        raise Failure("--keep: of which rotation? say when a new file begins with --rotate size:64MB or time:1h", USAGE)
-    round_trigger = [None if each is None else int(each * 1e9) for each in (args.before, args.after)]
-    if not args.on and round_trigger != [None, None]:
+    if (args.keep or args.keep_free) and not args.rotate:
+        raise Failure(
+            "--keep, --keep-free: of which rotation? say when a new file begins with --rotate size:64MB or time:1h",
+            USAGE,
+        )
+    before, after = (None if each is None else int(each * 1e9) for each in (args.before, args.after))
+    if not args.on and (before is not None or after is not None):
         raise Failure("--before, --after: round which trigger? say with --on FILTER or --on CODE", USAGE)
-    record = RecordSpec(path, args.rotate, args.keep, *round_trigger)
+    record = RecordSpec(path, args.rotate, args.keep, before, after, args.keep_free)
     lives = listening.start_all(buses, record, args.duration, args.count, watched=False)
     try:
         printers = [printing.Printer(live, quiet=True) for live in lives]

@@ -23,7 +23,7 @@ from sniff.engine.session import Session
 from sniff.formats.files import explain
 from sniff.recording.batch import Message
 from sniff.recording.part import PartFile
-from sniff.recording.rotation import NewestParts, Rotation, part_name, parts
+from sniff.recording.rotation import FreeSpace, NewestParts, Rotation, part_name, parts
 from sniff.recording.syncing import Syncer
 from sniff.recording.topics import LINE, RAW
 
@@ -129,7 +129,14 @@ class Keeper:
     not where it was begun, and nothing followed it.
     """
 
-    def __init__(self, path: Path, sessions: Sequence[Session], rotation: Rotation | None, keep: int | None) -> None:
+    def __init__(
+        self,
+        path: Path,
+        sessions: Sequence[Session],
+        rotation: Rotation | None,
+        keep: int | None,
+        keep_free: int | None = None,
+    ) -> None:
         self.orders: SimpleQueue[Parcel | Order | Changed] = SimpleQueue()
         self.paths: list[Path] = []
         self.shares = [Share() for _ in sessions]
@@ -142,6 +149,7 @@ class Keeper:
         self._to_close = len(sessions)
         self._rotation = rotation
         self._newest = NewestParts(keep)
+        self._free = FreeSpace(path, keep_free) if keep_free is not None else None
         self._finished_size = 0
         self._count = self._number = 0  # of parts begun; of the newest, as its name has it
         self._began: int | None = None  # time of the part's first batch
@@ -266,6 +274,9 @@ class Keeper:
 
     def _check(self) -> None:
         """Go on in a new part if the file is no longer where it was begun. Raises OSError while none can be begun."""
+        if self._free is not None:
+            for gone in self._free.make(self.paths[-1]):
+                self._tell(f"{gone} was removed: the disk is nearly full")
         fate = self._fate()
         if fate is None:
             return
@@ -288,6 +299,10 @@ class Keeper:
         for share, held in zip(self.shares, octets, strict=True):
             said = f", with {held} octets of the bus in it" if fate != MOVED else ""
             share.notices.append(f"{path} was {fate} while it was recorded{said}; goes on in {self.paths[-1]}")
+
+    def _tell(self, text: str) -> None:
+        for share in self.shares:
+            share.notices.append(text)
 
     def _fate(self) -> str | None:
         """What somebody did to the file that is being written; None where it is as it should be, or nobody knows."""

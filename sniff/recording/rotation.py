@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import os
 import re
+import shutil
 from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
@@ -62,6 +63,15 @@ class Rotation:
         )
 
 
+def octets_of(text: str) -> int:
+    """Read "1GB", "500MB", "64MiB". Raises ValueError with what was expected."""
+    match = re.fullmatch(r"([0-9]{1,9}(?:\.[0-9]{1,3})?)\s*([a-z]*)", text.strip(), re.IGNORECASE)
+    scale = _UNITS["size"].get(match[2].lower().removesuffix("b") and match[2].lower()) if match else None
+    if match is None or scale is None:
+        raise ValueError(f"size {text!r}: expected octets as 1GB, 500MB or 64MiB")
+    return int(float(match[1]) * scale)
+
+
 def part_name(path: Path, number: int) -> Path:
     """night.mcap, 7 → night-0007.mcap."""
     return path.with_name(f"{path.stem}-{number:04}{path.suffix}")
@@ -100,6 +110,37 @@ class NewestParts:
         if self._keep is not None:
             old, newest = self._begun[: -self._keep], self._begun[-self._keep :]
             self._begun = [part for part in old if not _removed(*part)] + newest
+
+
+class FreeSpace:
+    """Keeps some of a disk free by removing the oldest parts of a recording, whichever run of the program made them.
+
+    Only files that are called as this recording's parts are, never the one being written.
+    """
+
+    def __init__(self, path: Path, least: int) -> None:
+        """`path`: of the recording, as `part_name` takes it. `least`: octets that stay free."""
+        self._path = path
+        self._least = least
+
+    def make(self, current: Path) -> list[Path]:
+        """Remove what must go; what was removed. Never raises."""
+        gone = []
+        for _, part in parts(self._path):
+            if part.name == current.name or _free(self._path.parent) >= self._least:
+                break
+            with contextlib.suppress(OSError):
+                part.unlink()
+                gone.append(part)
+        return gone
+
+
+def _free(folder: Path) -> int:
+    """Octets that are free on the disk of a folder; as many as anybody wants where nobody knows."""
+    try:
+        return shutil.disk_usage(folder).free
+    except OSError:
+        return 1 << 62
 
 
 def _removed(path: Path, begun: os.stat_result) -> bool:

@@ -141,9 +141,15 @@ class SharedFile:
     """
 
     def __init__(
-        self, path: str | Path, sessions: Sequence[Session], rotation: Rotation | None = None, keep: int | None = None
+        self,
+        path: str | Path,
+        sessions: Sequence[Session],
+        rotation: Rotation | None = None,
+        keep: int | None = None,
+        keep_free: int | None = None,
     ) -> None:
-        self.keeper = Keeper(Path(path), sessions, rotation, keep)
+        """`keep_free`: octets of the disk that stay free; the oldest parts of this name go for them."""
+        self.keeper = Keeper(Path(path), sessions, rotation, keep, keep_free)
         self._sessions = sessions
         self._thread = threading.Thread(target=self.keeper.run, name="recorder", daemon=True)
         self._thread.start()

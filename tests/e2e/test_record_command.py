@@ -144,7 +144,11 @@ def wait_for(path: Path) -> None:
         (["-w", "/dev/stdout"], 2, "/dev/stdout: recordings are .mcap"),
         (["-w", "x.pcap"], 2, "x.pcap: recordings are .mcap; convert it afterwards"),
         (["-w", "x.mcap", "--rotate", "daily"], 2, "rotation 'daily': expected size:64MB, time:1h"),
-        (["-w", "x.mcap", "--keep", "3"], 2, "--keep: of which rotation? say when a new file begins with --rotate"),
+        (
+            ["-w", "x.mcap", "--keep", "3"],
+            2,
+            "--keep, --keep-free: of which rotation? say when a new file begins with --rotate",
+        ),
         (["-w", "x.mcap", "--rotate", "time:1h", "--keep", "0"], 2, "'0': expected a whole number from 1 on"),
         (["-w", "x.mcap", "--count", "-3"], 2, "'-3': expected a whole number from 1 on"),
         (["-w", "x.mcap", "--duration", "0"], 2, "duration '0'"),
