@@ -53,6 +53,7 @@ PROFIBUS = Dissector(
     default_line="1500000,8E1",
     other_lines=("187500,8E1", "500000,8E1", "93750,8E1", "45450,8E1"),
     field_prefixes=("pb.",),
+    field_types=on_first_use("dissectors.profibus.field_types:types"),
     bits=bits,
     judge=ProfibusFindings,
     rules=RULES,

@@ -1,0 +1,60 @@
+"""The types of the fields of PROFIBUS: what `fields.py` may give."""
+
+from __future__ import annotations
+
+from dissectors.field_types import FieldType, FieldTypes, Kind, texts
+from dissectors.profibus.control import REQUESTS, StationType, Status
+from dissectors.profibus.services import Service
+from dissectors.profibus.telegram import SC, SD1, SD2, SD3, SD4
+
+_STARTS = {"SD1": SD1, "SD2": SD2, "SD3": SD3, "SD4": SD4, "SC": SC}
+
+
+def types() -> FieldTypes:
+    """By name."""
+    text, number, octets = Kind.TEXT, Kind.NUMBER, Kind.OCTETS
+    services = {name: one.value for one in Service for name in (one.title, one.value)}
+    functions = texts(dict.fromkeys((*(one.name for one in REQUESTS.values()), *(one.words for one in Status))))
+    return {
+        "pb.sd": FieldType(number, "start delimiter", dict(_STARTS), octet=0),
+        "pb.le": FieldType(number, "length, of SD2"),
+        "pb.da": FieldType(Kind.STATION, "station spoken to"),
+        "pb.sa": FieldType(Kind.STATION, "station that speaks"),
+        "pb.fc": FieldType(number, "function code, the whole octet"),
+        "pb.request": FieldType(Kind.TRUTH, "whether it is a request"),
+        "pb.function": FieldType(number, "function, the low four bits"),
+        "pb.function.name": FieldType(text, "the same in words", functions),
+        "pb.fcb": FieldType(Kind.TRUTH, "frame count bit of a request"),
+        "pb.fcv": FieldType(Kind.TRUTH, "whether that bit counts"),
+        "pb.status": FieldType(text, "status of an answer", texts(one.short for one in Status)),
+        "pb.station_type": FieldType(
+            number, "who answers", {name: one.value for one in StationType for name in (one.words, one.name.lower())}
+        ),
+        "pb.dsap": FieldType(number, "access point spoken to"),
+        "pb.ssap": FieldType(number, "access point that speaks"),
+        "pb.service": FieldType(text, "what a telegram is for", services, closed=True),
+        "pb.data": FieldType(octets, "data unit"),
+        "pb.fcs": FieldType(number, "check as sent"),
+        "pb.fcs.status": FieldType(number, "state of the check", {"Bad": 0, "Good": 1, "Not present": 3}),
+        "pb.diag.status": FieldType(number, "the three status octets of a diagnosis, the first lowest"),
+        "pb.diag.words": FieldType(text, "a diagnosis in words", several=False),
+        "pb.diag.master": FieldType(number, "master that parameterised the slave, 255 for none"),
+        "pb.diag.ident": FieldType(number, "ident number"),
+        "pb.diag.extended": FieldType(octets, "extended diagnosis"),
+        "pb.prm.status": FieldType(number, "station status of Set_Prm"),
+        "pb.prm.watchdog_ms": FieldType(Kind.DURATION, "watchdog", unit="ms"),
+        "pb.prm.tsdr": FieldType(number, "min TSDR, bit times"),
+        "pb.prm.ident": FieldType(number, "ident number"),
+        "pb.prm.groups": FieldType(number, "groups, a bit each"),
+        "pb.prm.user": FieldType(octets, "user parameters"),
+        "pb.cfg": FieldType(octets, "configuration"),
+        "pb.cfg.inputs": FieldType(number, "octets of inputs"),
+        "pb.cfg.outputs": FieldType(number, "octets of outputs"),
+        "pb.cfg.modules": FieldType(number, "modules"),
+        "pb.gc.command": FieldType(number, "Global_Control, the command octet"),
+        "pb.gc.words": FieldType(text, "the same in words", several=False),
+        "pb.gc.groups": FieldType(number, "groups that it is for, 0 all"),
+        "pb.new_address": FieldType(number, "address given by Set_Slave_Add"),
+        "pb.new_address.ident": FieldType(number, "ident number in it"),
+        "kind": FieldType(text, "what a frame is", dict(services), closed=True),
+    }
