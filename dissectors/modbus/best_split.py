@@ -175,7 +175,8 @@ class Paths:
             total, step = self._open_hope(start)
             if total > winner.worth:
                 hoping[id(step)] = step
-        agreed = len(path)
+        open_ended = set(unfinished)
+        agreed = next((at for at, each in enumerate(path) if each.start in open_ended), len(path))
         for step in hoping.values():
             other = _frames(step)
             while other[:agreed] != path[:agreed]:

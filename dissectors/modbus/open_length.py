@@ -81,7 +81,8 @@ class _Begin:
 class OpenLengthFinder:
     """Finds such frames in a growing window. Positions count from the first octet ever fed.
 
-    `unfinished`: where, when last looked, a frame began behind one of its station and function and had no end yet.
+    `unfinished`: where, when last looked, a frame began behind one of its station and function and had no end yet, or
+    none that anything behind it agrees with.
     """
 
     __slots__ = ("_begins", "unfinished")
@@ -174,17 +175,21 @@ class OpenLengthFinder:
             begin = self._begins[position] = _Begin(position)
         most = min(position + MAX_FRAME, base + end)
         frames = []
+        unsure = False
         for position_after in begin.follow(known, base, position + MIN_FRAME, most):
             after = position_after - base
             last = silent and after == end
             agreed = last or position_after in starts or _same(known, at, after)
             if not agreed and not (partner and after + 2 <= end and known[after]):
                 continue
+            unsure = not agreed
             partner = False  # where nothing agrees but what is before, only its first end counts
             stretch = known[at:after]
             if known_station or not is_text(stretch):
                 bits = WHOLE_STRETCH if last else ANY_END
                 frames.append(Candidate(position, after - at, bits, stretch[0], True, True, stretch))
+        if unsure and not silent and len(frames) == 1 and end - at < MAX_FRAME:
+            self.unfinished.append(position)  # of a longer one, at whose end something agrees, the rest may come yet
         return frames
 
 

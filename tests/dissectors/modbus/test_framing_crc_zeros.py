@@ -132,3 +132,13 @@ def test_a_zero_behind_an_awaited_answer_without_proved_silence_makes_no_request
             wire.append((now, octet))
     frames = [e.octets for e in drive(RtuFramer(timing), ftdi(wire)) if isinstance(e, Frame)]
     assert frames[:2] == [asked, answered]
+
+
+def test_a_vendor_frame_whose_begin_checks_too_is_read_whole_when_the_next_frame_has_come() -> None:
+    """Eleven of its seventeen octets have a good CRC by chance, and the frame behind it comes in two reads."""
+    asked, answered = "0942fa02ce5c9b4dda0000", "0942828ae0c632af5778b4dd340332fa87"
+    before = ("1e42feeba637", "1e424845d47ec065af2ad29cb3daf270bae319a686a1f200")
+    poll = ("0903000000018542", "090302123454f2")
+    sent = [(bytes.fromhex(one), bytes.fromhex(other)) for one, other in (before, poll, poll, (asked, answered), poll)]
+    for adapter in ADAPTERS:
+        assert misread(sent, "115200,8N1", PACES["brisk"], adapter) == []
