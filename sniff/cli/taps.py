@@ -39,12 +39,16 @@ def run(args: argparse.Namespace) -> int:
 
     heard, doubts = [], []
     taps = _taps(args.words)
+    spoken = []
     for path, capture in taps:
         session = arguments.settings_of(args, capture.session, path)
+        spoken.append(session.protocol)
         ear = TapEar()
         survey(Watched(capture), session, ear, reference=args.reference)
         heard.append(ear.frames())
         doubts.append(_doubt(session))
+    if spoken[0] != spoken[1]:
+        raise Failure(f"A is {spoken[0]}, B is {spoken[1]}: these are not two taps on one line; -p names both", USAGE)
     doubt = sum(doubts)
     first, second = heard
     senders = traffic(first, second, matched(first, second, doubt))
@@ -54,7 +58,7 @@ def run(args: argparse.Namespace) -> int:
         for fault in found:
             print(json_output.dumps(words.as_value(fault)))
     if args.style == "text":
-        _say(found, bool(senders), doubt, taps[0][0], taps[1][0])
+        _say(found, bool(senders), any(one.both for one in senders.values()), doubt, taps[0][0], taps[1][0])
     return 1 if found else 0
 
 
@@ -75,12 +79,14 @@ def _taps(words: Sequence[str]) -> list[tuple[str, Capture]]:
     return [by_name[name] for name in wanted]
 
 
-def _say(found: Sequence[Fault], heard: bool, doubt: int, first: str, second: str) -> None:
+def _say(found: Sequence[Fault], heard: bool, common: bool, doubt: int, first: str, second: str) -> None:
     from sniff.taps import words
 
     print(f"A: {plain(first)}, B: {plain(second)}; {words.certainty(doubt)}")
     if not heard:
         print("no frame was heard while both taps listened")
+    elif not common:
+        print("not one frame was heard at both: two lines, two times, or nothing passes; nothing more can be said")
     elif not found:
         print("nothing is wrong between the taps")
     for fault in found:

@@ -12,7 +12,7 @@ from dissectors.histogram import Histogram
 from dissectors.tracker import Verdict
 from sniff.analysis.health import Health
 from sniff.analysis.nodes import Node
-from sniff.fleet.bus_day import Archive, BusDay
+from sniff.fleet.bus_day import NO_DATE, Archive, BusDay
 
 DRIFTED = 1.25
 """A station's median response time has drifted when it grew, or shrank, by this factor …"""
@@ -201,7 +201,10 @@ def _is_there(node: Node) -> bool:
     return node.heard >= 2 or any(node.verdicts[verdict] for verdict in (Verdict.ANSWERED, Verdict.EXCEPTION))
 
 
-def _missing(days: list[str]) -> tuple[str, ...]:
+def _missing(told: list[str]) -> tuple[str, ...]:
+    days = [day for day in told if day != NO_DATE]
+    if not days:
+        return ()
     first, last = date.fromisoformat(days[0]), date.fromisoformat(days[-1])
     there, found = set(days), []
     for number in range(1, min((last - first).days, 4000)):

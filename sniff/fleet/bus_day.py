@@ -9,6 +9,9 @@ from dissectors.line import LineSettings
 from sniff.analysis.health import HealthReport, health_of
 from sniff.analysis.summary import Summary
 
+NO_DATE = "no date"
+"""The day of captures whose times only count from their begin."""
+
 Key = tuple[str, str, str, str]
 """Site, bus, protocol, day."""
 

@@ -7,6 +7,7 @@ from html import escape
 
 from sniff.analysis.plain import plain
 from sniff.fleet.answer import Answer, Bus, Day
+from sniff.fleet.bus_day import NO_DATE
 from sniff.fleet.text import change_words, trouble_words
 
 _STYLE = """
@@ -26,7 +27,7 @@ def page(found: Answer, title: str = "Fieldbus archive") -> str:
 
 def _parts(found: Answer, title: str) -> Iterator[str]:
     yield f"<!doctype html><html lang=en><meta charset=utf-8><title>{_safe(title)}</title><style>{_STYLE}</style>"
-    days = sorted({day.day for bus in found.buses for day in bus.days})
+    days = sorted({day.day for bus in found.buses for day in bus.days if day.day != NO_DATE})
     ill = sum(bool(bus.troubles or bus.is_silent) for bus in found.buses)
     span = f"{days[0]} to {days[-1]}" if days else "no day"
     yield f"<h1>{_safe(title)}</h1><p>{len(found.buses)} buses, {span}: {ill} with something wrong.</p>"

@@ -18,12 +18,15 @@ from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import LineEvent, Session
 from sniff.engine.table import Table
 from sniff.fleet.archive import Task
-from sniff.fleet.bus_day import BusDay
+from sniff.fleet.bus_day import NO_DATE, BusDay
 from sniff.formats import read
 from sniff.recording.rotated import joined
 
 NAMELESS = Session.__dataclass_fields__["bus"].default
 """What a session calls a bus that nobody named."""
+
+FIRST_DATE = 365 * 86_400 * 1_000_000_000
+"""ns; whoever recorded in 1970 had no clock."""
 
 NS_PER_DAY = 86_400 * 1_000_000_000
 
@@ -133,8 +136,10 @@ def _bus_name(session: Session, path: str) -> str:
 
 
 def _day(time: int) -> str:
-    """The day of UTC; times that no calendar has are on the first or last day that there is."""
-    seconds = min(max(time // 1_000_000_000, 0), 253_402_300_799)
+    """The day of UTC; `NO_DATE` where times only count from the begin of a capture."""
+    if time < FIRST_DATE:
+        return NO_DATE
+    seconds = min(time // 1_000_000_000, 253_402_300_799)
     return datetime.fromtimestamp(seconds, UTC).date().isoformat()
 
 

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dissectors.words import milliseconds
 from sniff.analysis.plain import plain
 from sniff.fleet.answer import Answer, Bus, Change, Day, Fresh, StationChange, Trouble
+from sniff.fleet.bus_day import NO_DATE
 
 SHOWN = 12
 """Buses that are told in full; the others are counted."""
@@ -19,7 +20,7 @@ BARS = "▁▂▃▄▅▆▇█"
 
 def page(found: Answer, shown: int = SHOWN) -> Iterator[str]:
     """Lines, without control characters."""
-    days = sorted({day.day for bus in found.buses for day in bus.days})
+    days = sorted({day.day for bus in found.buses for day in bus.days if day.day != NO_DATE})
     sites = {bus.site for bus in found.buses}
     ill = [bus for bus in found.buses if bus.troubles or bus.is_silent]
     span = f"{days[0]} … {days[-1]}" if days else "no day"

@@ -156,7 +156,10 @@ def damage(sent: bytes, came: bytes) -> Kind:
 
 
 def faults(senders: Mapping[int, Traffic], doubt: int) -> list[Fault]:
-    """What can be said. `doubt`: ns by which both adapters together may misplace a frame."""
+    """What can be said: nothing where not one frame was heard at both. `doubt`: ns by which both adapters together may
+    misplace a frame."""
+    if not any(one.both for one in senders.values()):
+        return []
     return [fault for tap in (1, 0) if (fault := _fault(senders, tap, doubt)) is not None]
 
 

@@ -46,6 +46,12 @@ def test_nothing_is_said_of_a_clean_line(tmp_path: Path, capsys: pytest.CaptureF
     assert "nothing is wrong between the taps" in capsys.readouterr().out
 
 
+def test_two_lines_are_not_compared(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    captures = Path(__file__).parents[3] / "captures"
+    assert main(["taps", str(captures / "rtu-clean.cap.txt"), str(captures / "mstp-clean.cap.txt")]) == 2
+    assert "not two taps on one line" in capsys.readouterr().err
+
+
 def test_captures_of_different_days_have_nothing_in_common(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     near, far = written(tmp_path, Segment()), tmp_path / "later.cap.txt"
     far.write_text(Path(near[1]).read_text().replace("# start: 1970", "# start: 1999"))

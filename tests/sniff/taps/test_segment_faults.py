@@ -123,6 +123,12 @@ def test_of_a_clean_stretch_nothing_is_said(name: str, adapter: str) -> None:
     assert sum(one.both for one in senders.values()) == sum(one.heard for one in senders.values()) == 2400
 
 
+def test_without_one_common_frame_nothing_is_said() -> None:
+    apart = {name: Traffic(missing=[0, 50]) for name in (1, 2, 3)} | {5: Traffic(missing=[50, 0])}
+    assert faults(apart, 2 * LINE.char) == []
+    assert faults({**apart, -1: Traffic(both=200)}, 2 * LINE.char)
+
+
 @pytest.mark.parametrize("delay", [0, 3 * MS, 40 * MS])
 def test_delays_are_those_of_the_stretch(delay: int) -> None:
     segment = Segment(delay=delay)
