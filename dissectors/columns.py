@@ -284,7 +284,7 @@ def counted(*keys: npt.NDArray[np.integer[Any]]) -> Iterator[tuple[tuple[int, ..
     combined = np.zeros(len(keys[0]), np.int64)
     for key, size in zip(keys, sizes, strict=True):
         combined = combined * size + key
-    if math.prod(sizes) <= _DENSE:
+    if math.prod(sizes) <= min(_DENSE, _SPARSE * len(combined) + _FEW):
         counts = np.bincount(combined)
         distinct = np.flatnonzero(counts)
         counts = counts[distinct]
@@ -300,6 +300,9 @@ def counted(*keys: npt.NDArray[np.integer[Any]]) -> Iterator[tuple[tuple[int, ..
 
 _DENSE = 1 << 22
 """So many combinations are counted without sorting."""
+
+_SPARSE, _FEW = 64, 4096
+"""And no more than so many for each number, and at least so many: a look at each costs more than sorting a few."""
 
 
 class Run(NamedTuple):

@@ -47,13 +47,15 @@ class Node:
     @property
     def asked(self) -> int:
         """Requests that expected an answer from it; an answer that came late has its request among them."""
+        if not self.verdicts:  # most addresses that are only polled for
+            return 0
         late = min(self.verdicts[Verdict.LATE], self.verdicts[Verdict.NO_RESPONSE])
         return sum(self.verdicts[verdict] for verdict in EXPECTING) - late
 
     @property
     def unanswered(self) -> int:
         """Those of them that got none, not even late."""
-        return max(0, self.verdicts[Verdict.NO_RESPONSE] - self.verdicts[Verdict.LATE])
+        return max(0, self.verdicts[Verdict.NO_RESPONSE] - self.verdicts[Verdict.LATE]) if self.verdicts else 0
 
     def merge(self, other: Node) -> Node:
         """Both together, as a new value."""

@@ -104,7 +104,7 @@ class Summary:
         self.nodes.add_table(table)
         for row in table.odd.values():
             if row.searched is None:
-                self._add_marks(row)
+                self.add_marks(row)
         bad = is_frame & ~table.good
         self.damaged += int(bad.sum())
         for code, count in enumerate(np.bincount(frames.found[is_frame]).tolist()):
@@ -141,7 +141,7 @@ class Summary:
         self.octets += len(event.octets)
         self.load.add(row)
         self.nodes.add_row(row)
-        self._add_marks(row)
+        self.add_marks(row)
         if not isinstance(event, Frame):
             self.noise += len(event.octets)
             return
@@ -153,7 +153,8 @@ class Summary:
             self.damaged += 1
             self.damages[event.damage.value if event.damage is not None else event.check.value] += 1
 
-    def _add_marks(self, row: Row) -> None:
+    def add_marks(self, row: Row) -> None:
+        """Count the line errors of one row."""
         for mark in row.event.marks:
             self.marks[mark_names(mark.error & ~LineError.OVERRUN) or "overrun"] += 1
 

@@ -10,6 +10,7 @@ import json
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from typing import Any
 
 from dissectors.findings import Finding, Severity
 from dissectors.histogram import Histogram
@@ -57,27 +58,40 @@ class DerivedMessage:
 class BusChannels:
     """Messages of one bus, of what its model knows; `due` gives what is to be written by then."""
 
-    def __init__(self, model: BusModel, judged_every: int = JUDGED_EVERY) -> None:
-        """`judged_every`: windows between two looks at the findings; 0: only when asked."""
+    def __init__(
+        self, model: BusModel, judged_every: int = JUDGED_EVERY, ring_of: Callable[[], Any] | None = None
+    ) -> None:
+        """`judged_every`: windows between two looks at the findings; 0: only when asked. `ring_of`: gives the ring
+        by the end of each window; else the model does.
+        """
         self._model = model
         self._judged_every = judged_every
         session, ring = model.session, model.dissector.ring
         self._session = session
         self._bus = re.sub(r"[^A-Za-z0-9_.-]+", "-", session.bus).strip("-") or "bus"
         self._compare = ring.window if ring is not None else None
-        self._ring = model.ring()
+        self._ring_of = model.ring if ring_of is None else ring_of
+        self._ring = self._ring_of()
         self._window = Summary(session.line)
+        self._has_part = False  # whether anything is counted in it
         self._begin: int | None = None
         self._windows = 0
         self._said: dict[tuple[str, str], Severity] = {}
 
     def add(self, output: Output) -> None:
         """Take what the engine gave, and the model took."""
+        self._has_part = True
         self._window.add(output)
 
     def add_table(self, table: Table) -> None:
         """The same with many rows at once."""
+        self._has_part = True
         self._window.add_table(table)
+
+    def add_summary(self, part: Summary) -> None:
+        """The same counted by somebody else, of one window or a piece of it."""
+        self._window = self._window.merge(part) if self._has_part else part
+        self._has_part = True
 
     def is_due(self, now: int) -> bool:
         """Whether a window has ended by `now`: what was heard until then should be counted in it."""
@@ -93,7 +107,7 @@ class BusChannels:
         if not self.is_due(now):
             return []
         begin, window = self._begin, self._window
-        self._begin, self._window = now, Summary(self._session.line)
+        self._begin, self._window, self._has_part = now, Summary(self._session.line), False
         self._windows += 1
         messages = [*self._of_window(begin, now, window, has_turn)]
         if self._judged_every and self._windows % self._judged_every == 0:
@@ -137,7 +151,7 @@ class BusChannels:
         """Numbers of the ring and of its stations since the last call."""
         if self._compare is None:
             return {}, {}
-        before, self._ring = self._ring, self._model.ring()
+        before, self._ring = self._ring, self._ring_of()
         window = self._compare(before, self._ring)
         return dict(window.bus), {mac: dict(numbers) for mac, numbers in window.nodes.items()}
 

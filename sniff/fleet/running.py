@@ -26,6 +26,10 @@ MEMORY = "2GB"
 """Of a worker of this machine; it is begun anew when it takes more."""
 
 
+ANSWER_WITHIN = 10
+"""Seconds in which a scheduler has to answer."""
+
+
 class Unreachable(Exception):
     """No scheduler there, or no Dask here; the message says what to do."""
 
@@ -91,7 +95,7 @@ def by_cluster(tasks: Sequence[Task], address: str) -> Iterator[Done]:
     distributed = _dask()
     with _quietly():
         try:
-            client = distributed.Client(address, timeout=10)
+            client = distributed.Client(address, timeout=ANSWER_WITHIN)
         except (OSError, ValueError) as error:
             raise Unreachable(f"{address}: no scheduler answers ({error}); start one with `dask scheduler`") from None
         with client:

@@ -60,13 +60,20 @@ def literals(type: FieldType) -> st.SearchStrategy[str]:
     return st.sampled_from(words or ['"read"', '"a"', '"CRC"', '"1"', '""'])
 
 
-@st.composite
-def relations(draw: st.DrawFn, session: Session) -> str:
-    """One test."""
-    dissector = dissector_for(session)
+@cache
+def types_in(capture: str) -> dict[str, FieldType]:
+    """What a filter on a capture may name, in order."""
+    dissector = dissector_for(capture_of(capture)[0])
     own = {name: type for name, type in types_of(dissector).items() if name not in COLUMN_TYPES}
     names = {**{name: column_type(name, dissector) for name in COLUMN_TYPES if name != "finding"}, **own}
-    name = draw(st.sampled_from(sorted(names)))
+    return dict(sorted(names.items()))
+
+
+@st.composite
+def relations(draw: st.DrawFn, capture: str) -> str:
+    """One test. `capture`: by name, since what a strategy is made of is written out at each draw."""
+    names = types_in(capture)
+    name = draw(st.sampled_from(list(names)))
     type = names[name]
     shape = draw(st.integers(0, 11))
     numeric = type.kind in (Kind.NUMBER, Kind.STATION, Kind.DURATION)
@@ -100,10 +107,11 @@ def relations(draw: st.DrawFn, session: Session) -> str:
     return f"{name} {draw(st.sampled_from(operators))} {draw(literals(type))}"
 
 
-def filters(session: Session) -> st.SearchStrategy[str]:
+@cache
+def filters(capture: str) -> st.SearchStrategy[str]:
     """Tests, joined as the grammar joins them."""
     return st.recursive(
-        relations(session),
+        relations(capture),
         lambda inner: st.one_of(
             inner.map(lambda one: f"!({one})"),
             st.tuples(inner, st.sampled_from(("&&", "||", "^^", "and", "or", "xor")), inner).map(
@@ -119,7 +127,7 @@ def filters(session: Session) -> st.SearchStrategy[str]:
 @given(st.data())
 def test_columns_accept_what_rows_accept(name: str, data: st.DataObject) -> None:
     session, rows, columns = capture_of(name)
-    text = data.draw(filters(session))
+    text = data.draw(filters(name))
     scope = Scope(session.started)
     by_rows, by_columns = (compile_filter(text, dissector_for(session), scope) for _ in range(2))
     expected = [item.row.no for item in rows if by_rows(item.row, item.transaction)]

@@ -14,6 +14,7 @@ from sniff.engine.session import Item
 from sniff.formats import read
 from sniff.formats.bytelog import ByteLog
 from sniff.formats.text import parse
+from tests.sniff.formats.written_anew import write_anew
 
 TEXT = """\
 #!sniff-capture 1
@@ -129,7 +130,7 @@ def test_the_terminal_ui_gets_the_rows_before_the_damage(tmp_path: Path) -> None
 
 def read_log(path: Path, text: str) -> tuple[list[Item], str, str]:
     """Items, kind and what is said of a log; no items where it is refused."""
-    path.write_bytes(text.encode("utf-8", "surrogateescape"))
+    write_anew(path, text.encode("utf-8", "surrogateescape"))
     try:
         log = read(path)
     except CaptureError as error:

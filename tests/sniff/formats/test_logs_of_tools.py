@@ -11,6 +11,7 @@ from sniff.analysis.told_protocol import detected
 from sniff.bus.offline import settled
 from sniff.engine.capture import CaptureError
 from sniff.formats import read
+from tests.sniff.formats.written_anew import write_anew
 
 LOGS = Path(__file__).parents[3] / "captures" / "logs"
 NAMES = sorted(path.name for path in LOGS.iterdir() if path.suffix not in (".frames", ".md"))
@@ -35,7 +36,7 @@ def test_logs_of_tools(name: str) -> None:
 def test_a_windows_log_of_two_octets_a_character(tmp_path: Path) -> None:
     text = (LOGS / "qmodmaster.log").read_text()
     path = tmp_path / "x.log"
-    path.write_bytes(text.replace("\n", "\r\n").encode("utf-16"))
+    write_anew(path, text.replace("\n", "\r\n").encode("utf-16"))
     assert list(read(path).items()) == list(read(LOGS / "qmodmaster.log").items())
 
 
@@ -77,7 +78,7 @@ def test_logs_cut_anywhere(name: str, tmp_path: Path) -> None:
     expected = b"".join(frames_of(LOGS / name))
     path = tmp_path / name
     for end in range(0, len(whole), max(1, len(whole) // 60)):
-        path.write_bytes(whole[:end])
+        write_anew(path, whole[:end])
         try:
             heard = b"".join(item.octets for item in read(path).items() if isinstance(item, Chunk))
         except CaptureError as error:

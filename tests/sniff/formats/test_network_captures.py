@@ -20,6 +20,7 @@ from sniff.formats.several_buses import SeveralBuses
 from sniff.formats.telnet import Telnet
 from tests.captures_shared import CAPTURES
 from tests.sniff.formats.packets_made import CLIENT, SERVER, SYN, Packet, as_pcap, as_pcapng, tcp, udp
+from tests.sniff.formats.written_anew import write_anew
 
 START, MS = 1_772_359_200_000_000_000, 1_000_000
 
@@ -167,7 +168,7 @@ def test_cut_and_mutated_files_are_read_or_refused(tmp_path: Path) -> None:
                 mutated[some.randrange(24, len(mutated))] = some.randrange(256)
             broken.append(bytes(mutated))
         for octets in broken:
-            path.write_bytes(octets)
+            write_anew(path, octets)
             with contextlib.suppress(CaptureError):
                 capture = read(path)
                 for bus in capture.buses if isinstance(capture, SeveralBuses) else (capture,):

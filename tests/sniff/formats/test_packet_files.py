@@ -25,6 +25,7 @@ from sniff.formats.linktypes import USER1
 from sniff.formats.pcapng import PcapngWriter
 from sniff.formats.records import Record
 from sniff.formats.text import parse
+from tests.sniff.formats.written_anew import write_anew
 
 MODBUS = """\
 #!sniff-capture 1
@@ -153,7 +154,7 @@ def test_microseconds_and_the_other_byte_order_are_read(tmp_path: Path) -> None:
         data = struct.pack(order + "IHHiIII", magic, 2, 4, 0, 0, 65535, 165)
         data += struct.pack(order + "IIII", 7, 5, len(frame), len(frame)) + frame
         path = tmp_path / "x.pcap"
-        path.write_bytes(data)
+        write_anew(path, data)
         assert list(read(path).items()) == [Chunk(7_000_000_000 + 5 * tick, frame)]
 
 
@@ -172,11 +173,11 @@ def octets_of(path: Path) -> tuple[bytes, bool]:
 @pytest.mark.parametrize("name", ["x.pcap", "x.pcapng"])
 def test_cut_anywhere_gives_what_was_before_the_cut(tmp_path: Path, small: dict[str, bytes], name: str) -> None:
     path = tmp_path / name
-    path.write_bytes(small[name])
+    write_anew(path, small[name])
     everything, _ = octets_of(path)
     whole = 0
     for size in range(len(small[name])):
-        path.write_bytes(small[name][:size])
+        write_anew(path, small[name][:size])
         try:
             found, is_whole = octets_of(path)
         except CaptureError:
@@ -194,7 +195,7 @@ def test_any_octet_changed_is_no_traceback(
     data = bytearray(small[name])
     data[int(place * len(data))] = octet
     path = tmp_path / name
-    path.write_bytes(data)
+    write_anew(path, data)
     with contextlib.suppress(CaptureError):
         octets_of(path)
 
@@ -253,10 +254,11 @@ def made(path: Path, comment: bytes = b"", interface: bytes = b"", ticks: int = 
     """A pcapng file of one poll, with options as somebody hostile would write them."""
     about = option(1, comment) + option(0) if comment else b""
     packet = struct.pack("<IIIII", 0, ticks >> 32, ticks & 0xFFFFFFFF, len(POLL), len(POLL)) + POLL
-    path.write_bytes(
+    write_anew(
+        path,
         block(0x0A0D0D0A, struct.pack("<IHHq", 0x1A2B3C4D, 1, 0, -1) + about)
         + block(1, struct.pack("<HHI", 147, 0, 0) + interface + option(0))
-        + block(6, packet)
+        + block(6, packet),
     )
     return path
 

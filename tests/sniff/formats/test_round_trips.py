@@ -13,6 +13,7 @@ from sniff.bus.offline import settled
 from sniff.engine.session import Adapter, Item, LineEvent, LineEventKind, Session
 from sniff.formats import FRAMES, ITEMS, read
 from sniff.formats.table import writers
+from tests.sniff.formats.written_anew import write_anew
 
 BEGAN = 1_772_359_200_000_000_000
 SESSION = Session(
@@ -74,7 +75,7 @@ def test_cut_at_every_octet_it_gives_the_begin(suffix: str, tmp_path: Path) -> N
     path = tmp_path / f"cut{suffix}"
     expected = b"".join(item.octets for item in conversation() if isinstance(item, Chunk))
     for end in range(0, len(whole), max(1, len(whole) // 300)):
-        path.write_bytes(whole[:end])
+        write_anew(path, whole[:end])
         heard = b""
         try:
             for item in read(path).items():

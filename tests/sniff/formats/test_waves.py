@@ -23,6 +23,7 @@ from sniff.formats.uart import Decoder, Uart
 from sniff.formats.uart_finding import decoded, find
 from tests.captures_shared import CAPTURES
 from tests.sniff.formats.waves_made import as_binary, as_csv, as_sigrok, as_vcd, edges_of
+from tests.sniff.formats.written_anew import write_anew
 
 MS = 1_000_000
 RTU = LineSettings.parse("19200,8E1")
@@ -243,7 +244,7 @@ def test_a_file_that_is_cut_or_damaged_is_read_or_refused(tmp_path: Path, kind: 
             mutated[some.randrange(len(mutated))] = some.randrange(256)
         broken.append(bytes(mutated))
     for octets in broken:
-        path.write_bytes(octets)
+        write_anew(path, octets)
         with contextlib.suppress(CaptureError):
             capture = OPENERS[kind](path)
             for _ in capture.items():
@@ -256,7 +257,7 @@ def test_a_zip_that_says_more_than_can_be_is_refused(tmp_path: Path) -> None:
     octets = bytearray(path.read_bytes())
     directory = octets.rfind(b"PK\1\2")
     octets[directory + 24 : directory + 28] = (0xFFFFFFF0).to_bytes(4, "little")
-    path.write_bytes(bytes(octets))
+    write_anew(path, bytes(octets))
     with pytest.raises(CaptureError, match="which cannot be"):
         read(path)
 
@@ -293,7 +294,7 @@ def test_a_newer_binary_export_is_refused_with_a_way_out(tmp_path: Path) -> None
     path, _ = _made(tmp_path, "bin")
     octets = bytearray(path.read_bytes())
     octets[8] = 1
-    path.write_bytes(bytes(octets))
+    write_anew(path, bytes(octets))
     with pytest.raises(CaptureError, match="as CSV"):
         DigitalBinary(path)
 
