@@ -22,7 +22,8 @@ NUMERIC = frozenset((Kind.NUMBER, Kind.STATION, Kind.TRUTH, Kind.DURATION, Kind.
 
 @dataclass(frozen=True, slots=True)
 class Expression:
-    """What a row has of something: no value, one or several. `columns`: as tables hold it; `words`: as written."""
+    """What a row has of something: no value, one or several. `columns`: as tables hold it; `words`: as written.
+    `fixed`: the same of every row; `size`: how many octets or characters it always has."""
 
     words: str
     type: FieldType
@@ -31,6 +32,8 @@ class Expression:
     of_closing: bool = False
     spelled: bool = False
     field: str = ""
+    fixed: bool = False
+    size: int | None = None
 
 
 def sliced(of: Expression, spans: Sequence[Span], words: str) -> Expression:

@@ -82,6 +82,13 @@ WRONG = (
     ("line.error == brake", "did you mean 'break'?"),
     ('kind == "token', 'without its closing "'),
     ("dst == 3 # x", "unexpected '#'"),
+    ("len / 0 == 1", "nothing is divided by 0"),
+    ("len % 0 == 1", "nothing is divided by 0"),
+    ("len(5) == 1", "expected a field, not 5"),
+    ("5", "expected a field, not 5"),
+    ("max(9, 9) == 9", "expected a field, not 9"),
+    ('text contains "\\x"', "takes two hex digits"),
+    ('text matches "[[:alpha:]]"', "[:alpha:] is not known here"),
     ("error == 5", 'write "5" in quotes'),
 )
 
