@@ -250,6 +250,8 @@ class _Compiler:
         text = FieldType(Kind.TEXT, digits=True) if left.type.kind is not Kind.OCTETS else left.type
         (wanted,) = value_of(parsed.part, text, left.words, self.stations, left.spelled)
         assert isinstance(wanted, str | bytes)
+        if left.size is not None and len(wanted) > left.size:
+            self._possible(left, wanted, parsed.part)
         words = f"{left.words} contains {_written(parsed.part)}"
         node = leaf(left, Holding(wanted), parsed.quantifier == "all", words)
         if left.field in ("hex", "frame.octets") and isinstance(wanted, bytes) and wanted:
@@ -495,9 +497,20 @@ class _Compiler:
         wanted = self._literal(left, written)
         if isinstance(wanted[0], Instant):
             return When(operator, wanted[0])
+        if operator not in ORDERED:
+            self._possible(left, wanted[0], written)
         if operator in ORDERED and len(wanted) > 1:
             raise FilterError(f"{written.text!r} is {len(wanted)} stations: they have no order", written.column)
         return With(operator, wanted)
+
+    def _possible(self, left: Expression, wanted: int | float | str | bytes, written: Word | Quoted) -> None:
+        """Refuse what is equal to nothing that there can be."""
+        if isinstance(wanted, str | bytes) and left.size is not None and len(wanted) != left.size:
+            unit = "octets" if isinstance(wanted, bytes) else "characters"
+            raise FilterError(f"{left.words} has {left.size} {unit}, {_written(written)} {len(wanted)}", written.column)
+        whole = left.type.kind is Kind.STATION or (left.type.kind is Kind.NUMBER and left.field in fields.COLUMN_TYPES)
+        if whole and isinstance(wanted, float):
+            raise FilterError(f"{left.words} is a whole number, {written.text} is none", written.column)
 
     def _prefers_word(self, left: Expression, written: Value) -> bool:
         """Whether a word is meant as one of the values of what it is compared with, though there is such a field."""

@@ -42,7 +42,16 @@ def sliced(of: Expression, spans: Sequence[Span], words: str) -> Expression:
     def get(row: Row, tx: Transaction | None) -> Values:
         return tuple(part for value in of.get(row, tx) if (part := _parts(value, spans)) is not None)
 
-    return Expression(words, FieldType(of.type.kind, several=False), get, None, of.of_closing, of.spelled)
+    sizes = [_size(span) for span in spans]
+    size = None if None in sizes else sum(one for one in sizes if one is not None)
+    return Expression(words, FieldType(of.type.kind, several=False), get, None, of.of_closing, of.spelled, size=size)
+
+
+def _size(span: Span) -> int | None:
+    """How long it is, wherever that is always the same."""
+    if span.last is None:
+        return -span.first if span.first < 0 else None
+    return span.last - span.first if (span.first < 0) is (span.last < 0) else None
 
 
 def _parts(value: Value, spans: Sequence[Span]) -> Value | None:

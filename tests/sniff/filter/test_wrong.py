@@ -89,6 +89,14 @@ WRONG = (
     ("max(9, 9) == 9", "expected a field, not 9"),
     ('text contains "\\x"', "takes two hex digits"),
     ('text matches "[[:alpha:]]"', "[:alpha:] is not known here"),
+    ("frame.octets[2:2] == 03", "frame.octets[…] has 2 octets, 03 1"),
+    ("frame.octets[2:2] == 03:00:01", "has 2 octets"),
+    ("frame.octets[-2:2] in {03}", "has 2 octets"),
+    ("hex[0-1,3] != 03", "has 3 octets"),
+    ('kind[0:2] == "rea"', "has 2 characters"),
+    ("frame.octets[0] contains 03:04", "has 1 octets"),
+    ("noise_before == 1.5", "noise_before is a whole number"),
+    ("dst in {1.5}", "dst is a whole number"),
     ("error == 5", 'write "5" in quotes'),
 )
 
