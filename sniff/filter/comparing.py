@@ -214,6 +214,8 @@ def pattern_of(text: str, column: int) -> re.Pattern[str]:
     """A regular expression, without regard to case. Raises FilterError."""
     if len(text) > _LONGEST:
         raise FilterError(f"a regular expression of more than {_LONGEST} characters", column)
+    if posix := _POSIX.search(text):
+        raise FilterError(f"regular expression: {posix[1]} is not known here: write [A-Za-z], [0-9] or such", column)
     try:
         return re.compile(text, re.IGNORECASE | re.DOTALL)
     except (re.error, RecursionError, OverflowError) as error:
@@ -221,3 +223,4 @@ def pattern_of(text: str, column: int) -> re.Pattern[str]:
 
 
 _LONGEST = 500
+_POSIX = re.compile(r"\[[^\]]*(\[:\^?[a-z]+:\])")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from dissectors.field_types import FieldType, Kind
@@ -249,6 +250,8 @@ class _Compiler:
         text = FieldType(Kind.TEXT, digits=True) if left.type.kind is not Kind.OCTETS else left.type
         (wanted,) = value_of(parsed.part, text, left.words, self.stations, left.spelled)
         assert isinstance(wanted, str | bytes)
+        if left.size is not None and len(wanted) > left.size:
+            self._possible(left, wanted, parsed.part)
         words = f"{left.words} contains {_written(parsed.part)}"
         node = leaf(left, Holding(wanted), parsed.quantifier == "all", words)
         if left.field in ("hex", "frame.octets") and isinstance(wanted, bytes) and wanted:
@@ -302,8 +305,10 @@ class _Compiler:
         return sliced(of, value.spans, f"{of.words}[…]")
 
     def _call(self, call: Call) -> Expression:
-        parts = [self._value(one) for one in call.arguments]
-        of, words = parts[0], f"{call.name}({', '.join(part.words for part in parts)})"
+        parts = self._arguments(call)
+        words = f"{call.name}({', '.join(part.words for part in parts)})"
+        parts.sort(key=lambda part: part.fixed)  # the type is that of a field
+        of = parts[0]
         kind = of.type.kind
         if call.name == "count":
             return counted(of, words)
@@ -323,6 +328,26 @@ class _Compiler:
             return each(of, words, FieldType(Kind.NUMBER), lambda found: len(found) if hasattr(found, "__len__") else 0)
         make: Callable[[Any], Any] = str.lower if call.name == "lower" else str.upper
         return each(of, words, FieldType(Kind.TEXT, digits=True), lambda found: make(str(found)))
+
+    def _arguments(self, call: Call) -> list[Expression]:
+        """What a function is of; min and max also of written values, as the first field among them has them."""
+        found = [self._is_value(one) if call.name in ("min", "max") else self._value(one) for one in call.arguments]
+        field = next((one for one in found if one is not None), None)
+        parts: list[Expression] = []
+        for one, written in zip(found, call.arguments, strict=True):
+            if one is None:
+                assert isinstance(written, Word | Quoted)
+                if field is None or (
+                    isinstance(written, Word) and not written.text[0].isdigit() and written.text[0] != "-"
+                ):
+                    self._no_field(written)
+                    raise AssertionError
+                made = self._literal(field, written)[0]
+                if isinstance(made, Instant | str | bytes):
+                    raise FilterError(f"expected a number, not {written.text!r}", written.column)
+                one = replace(constant(made, written.text, field.type), fixed=True)
+            parts.append(one)
+        return parts
 
     def _numeric(self, of: Expression, call: Call, words: str) -> None:
         if of.type.kind not in NUMERIC and of.type.kind is not Kind.ANY:
@@ -351,6 +376,8 @@ class _Compiler:
                     f"{value.operator} takes numbers; {one.words} is {_article(one.type)}", written.column
                 )
             sides.append(one)
+        if value.operator in ("/", "%") and fixed[1] == 0:
+            raise FilterError(f"nothing is divided by 0: {value.operator} 0 has no value", value.right.column)
         kind = self._kind_of(value, sides)
         unit = next((one.type.unit for one in sides if one.type.unit), "s")
         return reckoned(value.operator, sides[0], sides[1], FieldType(kind, unit=unit), fixed)
@@ -402,6 +429,8 @@ class _Compiler:
     def _field(self, word: Word) -> Expression:
         name = fields.ALIASES.get(word.text, word.text)
         type = self._type(name)
+        if type is None and number_of(word.text) is not None:
+            raise FilterError(f"expected a field, not {word.text}", word.column)
         if type is None:
             raise FilterError(self._unknown(word.text), word.column)
         return self._column(name) if name in fields.COLUMN_TYPES else self._of_protocol(name, type)
@@ -468,9 +497,20 @@ class _Compiler:
         wanted = self._literal(left, written)
         if isinstance(wanted[0], Instant):
             return When(operator, wanted[0])
+        if operator not in ORDERED:
+            self._possible(left, wanted[0], written)
         if operator in ORDERED and len(wanted) > 1:
             raise FilterError(f"{written.text!r} is {len(wanted)} stations: they have no order", written.column)
         return With(operator, wanted)
+
+    def _possible(self, left: Expression, wanted: int | float | str | bytes, written: Word | Quoted) -> None:
+        """Refuse what is equal to nothing that there can be."""
+        if isinstance(wanted, str | bytes) and left.size is not None and len(wanted) != left.size:
+            unit = "octets" if isinstance(wanted, bytes) else "characters"
+            raise FilterError(f"{left.words} has {left.size} {unit}, {_written(written)} {len(wanted)}", written.column)
+        whole = left.type.kind is Kind.STATION or (left.type.kind is Kind.NUMBER and left.field in fields.COLUMN_TYPES)
+        if whole and isinstance(wanted, float):
+            raise FilterError(f"{left.words} is a whole number, {written.text} is none", written.column)
 
     def _prefers_word(self, left: Expression, written: Value) -> bool:
         """Whether a word is meant as one of the values of what it is compared with, though there is such a field."""

@@ -22,7 +22,8 @@ NUMERIC = frozenset((Kind.NUMBER, Kind.STATION, Kind.TRUTH, Kind.DURATION, Kind.
 
 @dataclass(frozen=True, slots=True)
 class Expression:
-    """What a row has of something: no value, one or several. `columns`: as tables hold it; `words`: as written."""
+    """What a row has of something: no value, one or several. `columns`: as tables hold it; `words`: as written.
+    `fixed`: the same of every row; `size`: how many octets or characters it always has."""
 
     words: str
     type: FieldType
@@ -31,6 +32,8 @@ class Expression:
     of_closing: bool = False
     spelled: bool = False
     field: str = ""
+    fixed: bool = False
+    size: int | None = None
 
 
 def sliced(of: Expression, spans: Sequence[Span], words: str) -> Expression:
@@ -39,7 +42,16 @@ def sliced(of: Expression, spans: Sequence[Span], words: str) -> Expression:
     def get(row: Row, tx: Transaction | None) -> Values:
         return tuple(part for value in of.get(row, tx) if (part := _parts(value, spans)) is not None)
 
-    return Expression(words, FieldType(of.type.kind, several=False), get, None, of.of_closing, of.spelled)
+    sizes = [_size(span) for span in spans]
+    size = None if None in sizes else sum(one for one in sizes if one is not None)
+    return Expression(words, FieldType(of.type.kind, several=False), get, None, of.of_closing, of.spelled, size=size)
+
+
+def _size(span: Span) -> int | None:
+    """How long it is, wherever that is always the same."""
+    if span.last is None:
+        return -span.first if span.first < 0 else None
+    return span.last - span.first if (span.first < 0) is (span.last < 0) else None
 
 
 def _parts(value: Value, spans: Sequence[Span]) -> Value | None:

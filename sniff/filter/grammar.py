@@ -271,6 +271,7 @@ class _Parser:
             return found
         if token.kind == "text":
             self._next()
+            _escapes(token)
             return Quoted(re.sub(r"\\(.)", r"\1", token.text[1:-1]), token.column)
         if token.kind != "word":
             before = self.tokens[self.at - 1] if self.at else None
@@ -347,6 +348,13 @@ class _Parser:
 
 
 _BEFORE_VALUES = frozenset((",", "contains", "matches", "~", "in", "{", "..", "+", "-", "*", "/", "%", "&"))
+
+
+def _escapes(token: _Token) -> None:
+    """Refuse escapes of octets that lack their digits."""
+    for match in re.finditer(r"\\(x[0-9A-Fa-f]{2}|.)", token.text, re.DOTALL):
+        if match[1] == "x":
+            raise FilterError(r"\x takes two hex digits; a backslash is \\", token.column + match.start())
 
 
 def _spans(token: _Token) -> tuple[Span, ...]:
