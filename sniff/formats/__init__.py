@@ -87,9 +87,11 @@ def _with_reads(capture: Capture) -> Capture:
         return capture
     capture = buses[0]
     session = capture.session
-    if session.unknown or session.reads is not None:
+    if session.unknown or (session.reads is not None and session.sample):
         return capture
-    capture.session = with_first_reads(session, capture.items())
+    looked = with_first_reads(session, capture.items())
+    known = session.reads is not None  # by a format that knows how exact its times are
+    capture.session = replace(session, sample=looked.sample) if known else looked
     return capture
 
 

@@ -155,6 +155,8 @@ SPELLINGS: tuple[Spelling, ...] = (
     Spelling("bits", r"[01]{8}", r"[ ,;]{1,2}", _by(r"[01]{8}", 2), 3),
     Spelling("signed numbers", r"[\[{(](?=[^\]})]{0,4000}-\d)-?\d{1,3}(?:, ?-?\d{1,3}){1,4096}[\]})]", None,
              _signed, 1, before="", after=""),
+    Spelling("0x, and the same in brackets", r"0[xX][0-9A-Fa-f]{1,2} ?\((?:0b[01]{8}|[0-9]{1,3})\)", _SEPARATOR,
+             _by(r"0[xX]([0-9A-Fa-f]{1,2}) ?\(", 16), 1),
     Spelling("binary", r"0b[01]{8}(?: ?\(0[xX][0-9A-Fa-f]{1,2}\))?", _SEPARATOR, _by(r"0b([01]{8})", 2), 1),
     Spelling("0x and digits", r"0[xX][0-9A-Fa-f]{1,2}(?![0-9A-Za-z])", r"['\"]?[ ]?[,;:/|]?[ \t]{0,2}['\"]?",
              _by(r"0[xX]([0-9A-Fa-f]{1,2})", 16), 2),

@@ -96,3 +96,13 @@ def test_a_whole_capture_on_one_line(way: str, between: str, tmp_path: Path) -> 
     chunks = [item for item in read(path).items() if isinstance(item, Chunk)]
     assert b"".join(chunk.octets for chunk in chunks) == heard
     assert max(len(chunk.octets) for chunk in chunks) < 20_000
+
+
+@pytest.mark.parametrize(
+    "form", ["0x{0:02X} (0b{0:08b})", "0b{0:08b} (0x{0:02x})", "0x{0:02x} ({0})", "0x{0:02X}(0b{0:08b})"]
+)
+def test_an_octet_that_is_written_twice_is_one(form: str, tmp_path: Path) -> None:
+    heard = bytes.fromhex("010300100002C5CE")
+    path = tmp_path / "x.log"
+    path.write_text("".join(f">>> {', '.join(form.format(octet) for octet in heard)}\n" for _ in range(4)))
+    assert b"".join(item.octets for item in read(path).items() if isinstance(item, Chunk)) == heard * 4

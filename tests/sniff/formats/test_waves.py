@@ -145,6 +145,7 @@ def test_two_sides_of_a_conversation_are_one_bus(tmp_path: Path) -> None:
     assert bus.session.bus == "M+S"
     assert bus.session.line == RTU
     assert "DE never changes" in bus.session.adapter.detail
+    assert bus.session.sample  # of which its protocol is told
 
 
 def test_a_and_b_of_a_pair_are_one_line(tmp_path: Path) -> None:
