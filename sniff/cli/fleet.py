@@ -20,7 +20,7 @@ from sniff.engine.capture import CaptureError
 from sniff.fleet import running
 from sniff.fleet.answer import Answer, answer, marks
 from sniff.fleet.archive import FileState, Task, files_below, is_being_written, tasks_of
-from sniff.fleet.bus_day import Archive
+from sniff.fleet.bus_day import Archive, BusDay
 from sniff.fleet.index import NAME, Index
 from sniff.fleet.running import Done, Unreachable
 
@@ -73,7 +73,7 @@ def _once(args: argparse.Namespace, index: Index | None) -> int:
         if known is None:
             missing.append(task)
         for day in known or ():
-            archive.add(day)
+            _add(args, archive, day)
     _read(args, index, archive, missing, len(tasks))
     before = index.said_before() if index is not None else None
     said = answer(archive, before, {name: registry.get(name).noun for name in registry.names()})
@@ -85,6 +85,12 @@ def _once(args: argparse.Namespace, index: Index | None) -> int:
     if archive.unreadable:
         return UNREADABLE
     return int(any(bus.troubles or bus.is_silent for bus in said.buses))
+
+
+def _add(args: argparse.Namespace, archive: Archive, day: BusDay) -> None:
+    """A day that was asked for: a file may hold some that were before."""
+    if args.since is None or day.last is None or day.last >= args.since:
+        archive.add(day)
 
 
 def _find(args: argparse.Namespace) -> list[tuple[str, FileState]]:
@@ -104,7 +110,7 @@ def _read(args: argparse.Namespace, index: Index | None, archive: Archive, missi
             if index is not None:
                 index.put(done.task, list(done.days))
             for day in done.days:
-                archive.add(day)
+                _add(args, archive, day)
         progress.tell(done)
     progress.clear()
 

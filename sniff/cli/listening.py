@@ -6,7 +6,6 @@ import contextlib
 import sys
 import time
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
 
 from dissectors.profiles import Devices
 from dissectors.words import milliseconds
@@ -23,9 +22,6 @@ from sniff.cli.targets import Target
 from sniff.engine.capture import CaptureError
 from sniff.formats.table import suffixes
 from sniff.sources import PortError
-
-if TYPE_CHECKING:
-    pass
 
 
 def start(

@@ -10,7 +10,6 @@ import time
 from collections import Counter
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from dissectors import registry
 from dissectors.line import LineSettings
@@ -21,9 +20,6 @@ from sniff.cli import UNREADABLE, USAGE, Failure, arguments
 from sniff.cli.searching import Unknowns
 from sniff.config import AUTO, FILE, Config, ConfigError, load
 from sniff.engine.session import DEVICES_NOTE
-
-if TYPE_CHECKING:
-    pass
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,16 +5,12 @@ from __future__ import annotations
 import contextlib
 import sys
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
 
 from sniff.analysis.plain import plain
 from sniff.bus.triggers import Triggers
 from sniff.cli import USAGE, Failure, targets
 from sniff.cli.printing import Printer
 from sniff.filter import Scope
-
-if TYPE_CHECKING:
-    pass
 
 
 def add_triggers(printers: Sequence[Printer], words: Sequence[str]) -> None:

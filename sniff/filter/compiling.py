@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from dissectors.field_types import FieldType, Kind
 from dissectors.line import NS_PER_S
@@ -50,9 +50,6 @@ from sniff.filter.syntax import (
     Value,
     Word,
 )
-
-if TYPE_CHECKING:
-    pass
 
 ORDERED = frozenset(("<", "<=", ">", ">="))
 _ARTICLES = {Kind.OCTETS: "octets", Kind.ANY: "anything", Kind.TRUTH: "true or false", Kind.STATION: "a station"}

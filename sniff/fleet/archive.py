@@ -10,18 +10,18 @@ import os
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from glob import glob, has_magic
 from pathlib import Path
 
 from sniff.engine.capture import Capture, CaptureError
-from sniff.engine.session import Session
 from sniff.formats import read
+from sniff.formats.several_buses import buses_in
 from sniff.formats.table import suffixes
 from sniff.recording import scan
 from sniff.recording.reader import McapCapture
 
 NS_PER_S = 1_000_000_000
+NS_PER_DAY = 86_400 * NS_PER_S
 STILL_WRITTEN = 120 * NS_PER_S
 """A recording that was not written to for so long, and has no end, was cut off."""
 
@@ -121,7 +121,7 @@ def tasks_of(found: Sequence[tuple[str, FileState]], since: int | None = None) -
 
     Reads the begin of each file; those that cannot be read are given beside.
     """
-    groups: dict[tuple[str, ...], list[tuple[Session, int, FileState]]] = {}
+    groups: dict[tuple[str, ...], list[tuple[Capture, str | None, FileState]]] = {}
     unreadable = []
     for site, file in found:
         if since is not None and file.changed < since:
@@ -131,14 +131,17 @@ def tasks_of(found: Sequence[tuple[str, FileState]], since: int | None = None) -
         except CaptureError as error:
             unreadable.append(Unreadable(file, site, _why(error, file)))
             continue
-        session, part = capture.session, capture.part if isinstance(capture, McapCapture) else 1
-        key = _group(site, session, part, capture, file)
-        groups.setdefault(key, []).append((session, part, file))
+        buses = buses_in(capture)
+        for bus in buses:
+            name = bus.session.bus if len(buses) > 1 else None
+            key = (site, name or "", *_recording(bus, file))
+            groups.setdefault(key, []).append((bus, name, file))
     tasks = []
     for (site, *_), members in groups.items():
-        members.sort(key=lambda one: (one[1], one[2].path))
-        tasks.append(Task(site, tuple(file for _, _, file in members), members[0][0].protocol))
-    return sorted(tasks, key=lambda task: task.files[0].path), unreadable
+        members.sort(key=lambda one: (_part(one[0]), one[2].path))
+        first, name, _ = members[0]
+        tasks.append(Task(site, tuple(file for _, _, file in members), first.session.protocol, name))
+    return sorted(tasks, key=lambda task: (task.files[0].path, task.bus or "")), unreadable
 
 
 def _why(error: CaptureError, file: FileState) -> str:
@@ -146,10 +149,15 @@ def _why(error: CaptureError, file: FileState) -> str:
     return re.sub(rf"^{re.escape(file.path)}(:\d+)*: ", "", str(error))
 
 
-def _group(site: str, session: Session, part: int, capture: Capture, file: FileState) -> tuple[str, ...]:
-    """What the parts of one recording that are read together have in common."""
-    is_part = isinstance(capture, McapCapture) and (part > 1 or Path(file.path).stem.endswith("-0001"))
-    if not session.started or not is_part:
-        return site, file.path
-    day = datetime.fromtimestamp(file.changed / NS_PER_S, UTC).date().isoformat()
-    return site, session.port, str(session.started), day
+def _part(capture: Capture) -> int:
+    return capture.part if isinstance(capture, McapCapture) else 1
+
+
+def _recording(capture: Capture, file: FileState) -> tuple[str, ...]:
+    """What the parts of one recording that are read together have in common: its port, its begin, and the day on which
+    their first reads came."""
+    session = capture.session
+    is_part = isinstance(capture, McapCapture) and (capture.part > 1 or Path(file.path).stem.endswith("-0001"))
+    if not (session.started and is_part and session.sample):
+        return (file.path,)
+    return session.port, str(session.started), str(session.sample[0].time // NS_PER_DAY)

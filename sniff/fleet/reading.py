@@ -17,9 +17,10 @@ from sniff.engine.engine import Output
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import LineEvent, Session
 from sniff.engine.table import Table
-from sniff.fleet.archive import Task
+from sniff.fleet.archive import NS_PER_DAY, Task
 from sniff.fleet.bus_day import NO_DATE, BusDay
 from sniff.formats import read
+from sniff.formats.several_buses import buses_in
 from sniff.recording.rotated import joined
 
 NAMELESS = Session.__dataclass_fields__["bus"].default
@@ -28,16 +29,19 @@ NAMELESS = Session.__dataclass_fields__["bus"].default
 FIRST_DATE = 365 * 86_400 * 1_000_000_000
 """ns; whoever recorded in 1970 had no clock."""
 
-NS_PER_DAY = 86_400 * 1_000_000_000
-
 
 def read_task(task: Task) -> list[BusDay]:
     """What the captures of a task tell, a value a day. Raises CaptureError for what cannot be read at all."""
-    opened = joined([(file.path, read(file.path)) for file in task.files])
+    opened = joined([(file.path, _bus_of(task, read(file.path))) for file in task.files])
     days: list[BusDay] = []
     for _, capture in opened:
         days += _read(task, capture)
     return days
+
+
+def _bus_of(task: Task, capture: Capture) -> Capture:
+    """The bus that a task is about."""
+    return next(bus for bus in buses_in(capture) if task.bus in (None, bus.session.bus))
 
 
 def _read(task: Task, capture: Capture) -> Iterator[BusDay]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from dissectors.findings import Finding, Severity, under_causes
 from dissectors.line import MS
@@ -43,9 +43,6 @@ from sniff.reporting.numbers import (
     seconds_since,
 )
 from sniff.reporting.timeline import Timeline
-
-if TYPE_CHECKING:
-    pass
 
 EVIDENCE_SHOWN, EVIDENCE_OF_NOTES = 5, 2
 LONGEST_TEXT = 180

@@ -13,6 +13,9 @@ from pathlib import Path
 
 import pytest
 
+from dissectors.frame import Chunk
+from sniff.analysis.summary import Summary
+from sniff.bus.offline import survey
 from sniff.cli import main
 from sniff.engine.capture import CaptureError
 from sniff.fleet import codec, running
@@ -25,6 +28,9 @@ from sniff.fleet.index import Index
 from sniff.fleet.reading import read_task
 from sniff.fleet.text import page
 from sniff.fleet.values import as_values
+from sniff.formats import read
+from sniff.recording.rotation import Rotation
+from sniff.recording.writer import SharedFile
 from tests.sniff.fleet.made_archive import FAULTS, Plan, plans, write
 
 SECONDS, DAYS, BUSES = 20.0, 3, 12
@@ -254,3 +260,40 @@ def test_an_index_of_somebody_else_is_refused_or_read_again(made: Made, tmp_path
     with index._reach() as base:
         base.execute("""UPDATE task SET days = '[{"site": 1}]'""")
     assert index.get(tasks[0]) is None
+
+
+def test_a_recording_of_several_buses_is_several_buses(made: Made, tmp_path: Path) -> None:
+    """One file for all ports of a site, in parts that were copied on another day than they were recorded."""
+    captures = [
+        read(made[0] / f"{site}/{bus}/day-2.mcap") for site, bus in (("north", "trunk-00"), ("south", "trunk-10"))
+    ]
+    file = SharedFile(tmp_path / "site.mcap", [one.session for one in captures], Rotation(count=300))
+    recorders = file.recorders()
+    items = sorted(
+        ((item.time, bus, item) for bus, one in enumerate(captures) for item in one.items()), key=lambda one: one[:2]
+    )
+    for time, bus, item in items:
+        assert isinstance(item, Chunk)
+        recorders[bus].chunk(item)
+        recorders[1 - bus].tick(time)
+    for recorder in recorders:
+        recorder.finish()
+    for recorder in recorders:
+        recorder.close()
+    assert len(recorders[0].paths) > 2
+    tasks, unreadable = tasks_of(files_below([str(tmp_path)]))
+    assert not unreadable
+    assert [task.bus for task in tasks] == ["trunk-00", "trunk-10"]
+    assert all(len(task.files) == len(recorders[0].paths) for task in tasks)
+    told = {day.bus: day for task in tasks for day in read_task(task)}
+    for capture in captures:
+        alone = Summary(capture.session.line)
+        survey(capture, capture.session, alone)
+        day = told[capture.session.bus]
+        assert (day.summary.frames, day.summary.octets, day.notes) == (alone.frames, alone.octets, ())
+
+
+def test_since_leaves_out_days_before_it(made: Made, capsys: pytest.CaptureFixture[str]) -> None:
+    main(["fleet", "--no-index", "--workers", "1", "--json", "--since", "2026-03-03", str(made[0] / "north")])
+    said = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert {day["day"] for bus in said for day in bus["days"]} == {"2026-03-03"}
