@@ -13,6 +13,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 from dissectors.frame import Event, Frame, Header, Role
 from dissectors.line import NS_PER_S, Timing
@@ -65,7 +66,7 @@ class Polling:
     def close(self) -> tuple[Transaction, ...]:
         """End of capture: an answer could still have come."""
         asked, self._open = self._open, None
-        return () if asked is None else (_closed(asked, Verdict.OPEN),)
+        return () if asked is None else (closed_exchange(asked, Verdict.OPEN),)
 
     def _ask(self, no: int, frame: Frame, header: Header, before: tuple[Transaction, ...]) -> Tracked:
         before += self._give_up()
@@ -87,7 +88,7 @@ class Polling:
                 verdict = Verdict.DAMAGED_ANSWER
             else:
                 verdict = Verdict.ANSWERED if asked.attempt == 1 else Verdict.RETRY
-            closed = _closed(asked, verdict, no, frame)
+            closed = closed_exchange(asked, verdict, no, frame)
             return Tracked(self._place(no, asked.id, header, asked), (*before, closed))
         late, self._failed = self._failed, None
         if late is not None and self._open is None and _is_of(header, late):
@@ -102,7 +103,7 @@ class Polling:
         if asked is None:
             return ()
         self._failed = asked
-        return (_closed(asked, Verdict.NO_RESPONSE if asked.frame.ok else Verdict.DAMAGED_REQUEST),)
+        return (closed_exchange(asked, Verdict.NO_RESPONSE if asked.frame.ok else Verdict.DAMAGED_REQUEST),)
 
     def _alone(self, no: int, frame: Frame, header: Header, verdict: Verdict, of: int | None) -> Transaction:
         self._tx += 1
@@ -121,7 +122,27 @@ def _is_of(answer: Header, asked: _Asked) -> bool:
     return answer.source is None or answer.source == asked.header.destination
 
 
-def _closed(asked: _Asked, verdict: Verdict, no: int | None = None, answer: Frame | None = None) -> Transaction:
+class Request(Protocol):
+    """A request as a tracker keeps it while it is open. `attempt`, `of`: as in `Transaction`."""
+
+    @property
+    def id(self) -> int: ...
+    @property
+    def no(self) -> int: ...
+    @property
+    def frame(self) -> Frame: ...
+    @property
+    def header(self) -> Header: ...
+    @property
+    def attempt(self) -> int: ...
+    @property
+    def of(self) -> int | None: ...
+
+
+def closed_exchange(
+    asked: Request, verdict: Verdict, no: int | None = None, answer: Frame | None = None, error: str | None = None
+) -> Transaction:
+    """The exchange of a request that is over; with its answer, which is row `no`, where one came."""
     latency = None
     end = asked.frame.end
     if answer is not None:
@@ -140,4 +161,5 @@ def _closed(asked: _Asked, verdict: Verdict, no: int | None = None, answer: Fram
         latency,
         asked.attempt,
         asked.of,
+        error,
     )

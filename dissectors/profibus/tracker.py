@@ -19,10 +19,11 @@ from dataclasses import dataclass
 
 from dissectors.frame import Event, Frame, Header, Noise, Role
 from dissectors.line import NS_PER_S, Timing
+from dissectors.plain_tracker import closed_exchange
 from dissectors.profibus.control import Control
 from dissectors.profibus.header import meant
 from dissectors.profibus.telegram import parse
-from dissectors.tracker import NOTHING_TRACKED, Interval, Placement, Tracked, Transaction, Verdict
+from dissectors.tracker import NOTHING_TRACKED, Placement, Tracked, Transaction, Verdict
 
 PATIENCE = NS_PER_S
 """ns after which no answer comes any more; a master's slot time is far shorter, and its next telegram says so."""
@@ -82,7 +83,7 @@ class ProfibusTracker:
     def close(self) -> tuple[Transaction, ...]:
         """End of capture: an answer could still have come."""
         asked, self._open = self._open, None
-        return () if asked is None else (_closed(asked, Verdict.OPEN),)
+        return () if asked is None else (closed_exchange(asked, Verdict.OPEN),)
 
     def _ask(self, no: int, frame: Frame, header: Header, before: tuple[Transaction, ...]) -> Tracked:
         before += self._give_up()
@@ -123,7 +124,7 @@ class ProfibusTracker:
         else:
             verdict = Verdict.ANSWERED if asked.attempt == 1 else Verdict.RETRY
         role = Role.RESPONSE
-        closed = _closed(asked, verdict, no, frame, header.error)
+        closed = closed_exchange(asked, verdict, no, frame, header.error)
         source, destination = asked.header.destination, asked.header.source
         return Tracked(Placement(no, asked.id, role, source, destination), (*before, closed))
 
@@ -168,7 +169,7 @@ class ProfibusTracker:
             verdict = Verdict.DAMAGED_REQUEST
         else:
             verdict = Verdict.DAMAGED_ANSWER if asked.disturbed else Verdict.NO_RESPONSE
-        return (_closed(asked, verdict),)
+        return (closed_exchange(asked, verdict),)
 
     def _next(self) -> int:
         self._tx += 1
@@ -184,28 +185,3 @@ def _is_of(answer: Header, asked: _Asked) -> bool:
 
 def _placed(no: int, tx: int, header: Header) -> Placement:
     return Placement(no, tx, header.role, header.source, header.destination)
-
-
-def _closed(
-    asked: _Asked, verdict: Verdict, no: int | None = None, answer: Frame | None = None, error: str | None = None
-) -> Transaction:
-    latency = None
-    end = asked.frame.end
-    if answer is not None:
-        gap = max(0, answer.start - asked.frame.end)
-        latency = Interval(gap, max(0, gap - answer.slack), gap + asked.frame.slack)
-        end = answer.end
-    return Transaction(
-        asked.id,
-        asked.header.destination,
-        asked.header.kind,
-        asked.no,
-        no,
-        verdict,
-        asked.frame.start,
-        end,
-        latency,
-        asked.attempt,
-        asked.of,
-        error,
-    )

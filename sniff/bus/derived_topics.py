@@ -7,7 +7,6 @@ message in the schema foxglove.Log for each finding when it is raised, and again
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
@@ -22,6 +21,7 @@ from sniff.analysis.summary import Summary
 from sniff.bus.model import BusModel
 from sniff.engine.engine import Output
 from sniff.engine.table import Table
+from sniff.recording.topics import topic_part
 
 WINDOW = NS_PER_S
 JUDGED_EVERY = 5
@@ -68,7 +68,7 @@ class BusChannels:
         self._judged_every = judged_every
         session, ring = model.session, model.dissector.ring
         self._session = session
-        self._bus = re.sub(r"[^A-Za-z0-9_.-]+", "-", session.bus).strip("-") or "bus"
+        self._bus = topic_part(session.bus) or "bus"
         self._compare = ring.window if ring is not None else None
         self._ring_of = model.ring if ring_of is None else ring_of
         self._ring = self._ring_of()

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from dissectors.profiles import Devices, Entry
 from sniff.analysis.points import Sample
+from sniff.recording.topics import topic_part
 
 MOST_CHANNELS = 4096
 """Points that get a channel; the rest is only in the octets, from which it can be computed."""
@@ -32,7 +33,7 @@ class ValueChannels:
     """Makes messages of the samples of one bus. A single bit is written when it changes, and at first."""
 
     def __init__(self, bus: str, devices: Devices) -> None:
-        self._prefix = f"/values/{_safe(bus) or 'bus'}"
+        self._prefix = f"/values/{topic_part(bus) or 'bus'}"
         self._devices = devices
         self._schemas: dict[str, str] = {}
         self._metadata: dict[str, dict[str, str]] = {}

@@ -233,15 +233,7 @@ class _Compiler:
         return Between(first, last)
 
     def _contains(self, parsed: Contains) -> Node:
-        left = self._is_value(parsed.value)
-        if left is None:
-            self._no_field(parsed.value)
-            raise AssertionError
-        if left.type.kind not in (Kind.TEXT, Kind.OCTETS, Kind.ANY):
-            raise FilterError(
-                f"contains asks texts and octets; {left.words} is {_article(left.type)}, string({left.words}) a text",
-                parsed.column,
-            )
+        left = self._searched(parsed, "contains")
         if not isinstance(parsed.part, Word | Quoted):
             raise FilterError("contains is followed by a text or octets", parsed.part.column)
         text = FieldType(Kind.TEXT, digits=True) if left.type.kind is not Kind.OCTETS else left.type
@@ -257,16 +249,21 @@ class _Compiler:
             return Leaf(node.ask, holding(wanted), words)
         return node
 
-    def _matches(self, parsed: Matches) -> Node:
+    def _searched(self, parsed: Contains | Matches, word: str) -> Expression:
+        """The text or octets in which something is looked for."""
         left = self._is_value(parsed.value)
         if left is None:
             self._no_field(parsed.value)
             raise AssertionError
         if left.type.kind not in (Kind.TEXT, Kind.OCTETS, Kind.ANY):
             raise FilterError(
-                f"matches asks texts and octets; {left.words} is {_article(left.type)}, string({left.words}) a text",
+                f"{word} asks texts and octets; {left.words} is {_article(left.type)}, string({left.words}) a text",
                 parsed.column,
             )
+        return left
+
+    def _matches(self, parsed: Matches) -> Node:
+        left = self._searched(parsed, "matches")
         if not isinstance(parsed.pattern, Word | Quoted):
             raise FilterError("matches is followed by a regular expression", parsed.pattern.column)
         pattern = pattern_of(parsed.pattern.text, parsed.pattern.column)
