@@ -123,6 +123,21 @@ def _signed(text: str) -> bytes:
     return bytes(number & 0xFF for number in numbers)
 
 
+def _explained(text: str) -> bytes:
+    """Octets in hexadecimal, each with its number in decimal or binary, or its character, beside it."""
+    found = bytearray()
+    for digits, number in re.findall(
+        r"(?:0[xX])?([0-9A-Fa-f]{1,2})[hH]? ?(?:[(\[/]((?:0b)?[0-9]+)[)\]]?|\(?'.'\)?)", text
+    ):
+        octet = int(digits, 16)
+        bits = number.removeprefix("0b")
+        said = [int(bits, 2)] if len(bits) == 8 and not bits.strip("01") else [int(bits)] if number else [octet]
+        if octet not in said:
+            raise ValueError("two numbers")
+        found.append(octet)
+    return bytes(found)
+
+
 def _controls(text: str) -> bytes:
     """Characters, and names in angle brackets for those that are none: `<SOH><ETX>A`."""
     found = bytearray()
@@ -139,6 +154,7 @@ def _controls(text: str) -> bytes:
 
 
 _H2 = r"[0-9A-Fa-f]{2}"
+_BESIDE = r"(?:\((?:0b)?[0-9]{1,8}\)|\[(?:0b)?[0-9]{1,8}\]|/[0-9]{1,3}|\('.'\)|'.')"
 _CONTROL = rf"<(?:{'|'.join(_NAMED)})>"
 _HEX = _by(_H2, 16)
 
@@ -155,8 +171,8 @@ SPELLINGS: tuple[Spelling, ...] = (
     Spelling("bits", r"[01]{8}", r"[ ,;]{1,2}", _by(r"[01]{8}", 2), 3),
     Spelling("signed numbers", r"[\[{(](?=[^\]})]{0,4000}-\d)-?\d{1,3}(?:, ?-?\d{1,3}){1,4096}[\]})]", None,
              _signed, 1, before="", after=""),
-    Spelling("0x, and the same in brackets", r"0[xX][0-9A-Fa-f]{1,2} ?\((?:0b[01]{8}|[0-9]{1,3})\)", _SEPARATOR,
-             _by(r"0[xX]([0-9A-Fa-f]{1,2}) ?\(", 16), 1),
+    Spelling("octets, each with the same beside it", rf"(?:0[xX][0-9A-Fa-f]{{1,2}}|{_H2}[hH]?) ?{_BESIDE}", _SEPARATOR,
+             _explained, 2, after=""),
     Spelling("binary", r"0b[01]{8}(?: ?\(0[xX][0-9A-Fa-f]{1,2}\))?", _SEPARATOR, _by(r"0b([01]{8})", 2), 1),
     Spelling("0x and digits", r"0[xX][0-9A-Fa-f]{1,2}(?![0-9A-Za-z])", r"['\"]?[ ]?[,;:/|]?[ \t]{0,2}['\"]?",
              _by(r"0[xX]([0-9A-Fa-f]{1,2})", 16), 2),

@@ -99,7 +99,20 @@ def test_a_whole_capture_on_one_line(way: str, between: str, tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize(
-    "form", ["0x{0:02X} (0b{0:08b})", "0b{0:08b} (0x{0:02x})", "0x{0:02x} ({0})", "0x{0:02X}(0b{0:08b})"]
+    "form",
+    [
+        "0x{0:02X} (0b{0:08b})",
+        "0b{0:08b} (0x{0:02x})",
+        "0x{0:02x} ({0})",
+        "0x{0:02X}(0b{0:08b})",
+        "{0:02X} ({0})",
+        "{0:02X}h ({0})",
+        "0x{0:02X} '.'",
+        "{0:02X}('.')",
+        "0x{0:02X}/{0:03d}",
+        "{0:02X}[{0:08b}]",
+        "0x{0:X} ({0})",
+    ],
 )
 def test_an_octet_that_is_written_twice_is_one(form: str, tmp_path: Path) -> None:
     heard = bytes.fromhex("010300100002C5CE")
