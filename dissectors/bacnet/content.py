@@ -23,7 +23,7 @@ from dissectors.bacnet.limits import BROADCAST
 from dissectors.bacnet.message import Message
 from dissectors.bacnet.npdu import Npdu
 from dissectors.bacnet.tags import Tag
-from dissectors.bacnet.values import APPLICATION, Date, Record, Time, primitive
+from dissectors.bacnet.values import APPLICATION, ConstructedValue, Date, Time, primitive
 from dissectors.frame import Frame
 
 
@@ -126,7 +126,7 @@ def _whens(value: Any, depth: int) -> Iterator[Date | Time]:
         yield value
     elif depth > 40:
         return
-    elif isinstance(value, Record):
+    elif isinstance(value, ConstructedValue):
         for _, entry in value:
             yield from _whens(entry, depth + 1)
     elif isinstance(value, (tuple, list)):

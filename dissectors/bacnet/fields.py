@@ -17,11 +17,11 @@ from dissectors.bacnet.npdu import Npdu
 from dissectors.bacnet.tags import Tag
 from dissectors.bacnet.values import (
     BitString,
+    ConstructedValue,
     Date,
     Double,
     Enumerated,
     ObjectId,
-    Record,
     Signed,
     Time,
     escape,
@@ -182,7 +182,7 @@ _VENDOR_IDENTIFIER = 120
 _OBJECT_NAME = 77
 
 
-def _parameters(record: Record, about: int | None, found: dict[str, list[Value]], depth: int) -> None:
+def _parameters(record: ConstructedValue, about: int | None, found: dict[str, list[Value]], depth: int) -> None:
     """Fields of named values; `about` is the property spoken of."""
     if depth > 40:
         return
@@ -199,7 +199,7 @@ def _parameters(record: Record, about: int | None, found: dict[str, list[Value]]
 
 
 def _value(value: Any, about: int | None, found: dict[str, list[Value]], depth: int) -> None:
-    if isinstance(value, Record):
+    if isinstance(value, ConstructedValue):
         _parameters(value, about, found, depth)
     elif isinstance(value, (tuple, list)):
         for item in value if depth <= 40 else ():

@@ -10,7 +10,7 @@ from dissectors.bacnet.content_findings import ContentFindings
 from dissectors.bacnet.findings_of_damage import damage, duplicates
 from dissectors.bacnet.findings_of_use import polls, use
 from dissectors.bacnet.limits import MAX_MASTER, N_POLL, T_REPLY_DELAY, T_USAGE_DELAY
-from dissectors.bacnet.ring import COARSE_LIMIT, Node, Ring, What
+from dissectors.bacnet.ring import COARSE_LIMIT, Ring, RingEventKind, RingNode
 from dissectors.bacnet.ring_remarks import Remark, listed, milliseconds, of, plain
 from dissectors.bacnet.rules import RULES
 from dissectors.findings import Finding, Severity, Tally, as_consequence, counted, times
@@ -45,19 +45,19 @@ REFUSED_KEPT = 512
 
 _ANSWERED = frozenset((Verdict.ANSWERED, Verdict.RETRY, Verdict.EXCEPTION))
 
-_SIMPLE: tuple[tuple[str, What, int, str], ...] = (
-    ("MS102", What.RETRY, 1, "token repeated {times}"),
-    ("MS105", What.REJOINED, 1, "answered a Poll For Master {times} though it had been in the ring"),
-    ("MS107", What.SELF_TOKEN, 1, "passed the token to itself {times}"),
-    ("MS301", What.NO_REPLY, 1, "no answer to {requests}"),
-    ("MS304", What.BROADCAST_REQUEST, 1, "sent a broadcast that expects a reply {times}"),
-    ("MS404", What.ILLEGAL, 1, "sent a forbidden address or length {times}"),
+_SIMPLE: tuple[tuple[str, RingEventKind, int, str], ...] = (
+    ("MS102", RingEventKind.RETRY, 1, "token repeated {times}"),
+    ("MS105", RingEventKind.REJOINED, 1, "answered a Poll For Master {times} though it had been in the ring"),
+    ("MS107", RingEventKind.SELF_TOKEN, 1, "passed the token to itself {times}"),
+    ("MS301", RingEventKind.NO_REPLY, 1, "no answer to {requests}"),
+    ("MS304", RingEventKind.BROADCAST_REQUEST, 1, "sent a broadcast that expects a reply {times}"),
+    ("MS404", RingEventKind.ILLEGAL, 1, "sent a forbidden address or length {times}"),
 )
 """Rules that only count: code, kind of event, from how many on, what was seen."""
 
-_TIMED: tuple[tuple[str, What, int, str], ...] = (
-    ("MS202", What.LATE_POLL_REPLY, T_USAGE_DELAY, "answered a poll late {times}, up to {most}"),
-    ("MS302", What.LATE_REPLY, T_REPLY_DELAY, "answered late {times}, up to {most}"),
+_TIMED: tuple[tuple[str, RingEventKind, int, str], ...] = (
+    ("MS202", RingEventKind.LATE_POLL_REPLY, T_USAGE_DELAY, "answered a poll late {times}, up to {most}"),
+    ("MS302", RingEventKind.LATE_REPLY, T_REPLY_DELAY, "answered late {times}, up to {most}"),
 )
 """Rules that name the longest time."""
 
@@ -107,7 +107,7 @@ def _under_causes(made: list[Remark]) -> Iterable[Finding]:
 
 def _tokens(ring: Ring) -> Iterable[Remark]:
     for (what, mac), happened in ring.happened.items():
-        if what is What.LOST_TOKEN:
+        if what is RingEventKind.LOST_TOKEN:
             longest = max((event.value or 0 for event in happened.events), default=0)
             makers = sorted({event.other for event in happened.events if event.other is not None})
             disturbed = "who had it is not known, or octets that are no good frame came first"
@@ -118,12 +118,16 @@ def _tokens(ring: Ring) -> Iterable[Remark]:
                 f"begun anew by MAC {listed(makers)}"
             )
             yield of("MS101", mac, seen, happened, grave)
-        elif what is What.LEFT and mac is not None and ring.of(What.REJOINED, mac).last <= happened.last:
+        elif (
+            what is RingEventKind.LEFT
+            and mac is not None
+            and ring.of(RingEventKind.REJOINED, mac).last <= happened.last
+        ):
             node = ring.nodes.get(mac)
             if node is not None and node.last <= happened.last:
                 seen = "did not use its token, was passed over, and has been silent since"
                 yield of("MS106", mac, seen, happened)
-    strays = [happened for (what, _), happened in ring.happened.items() if what is What.TWO_TOKENS]
+    strays = [happened for (what, _), happened in ring.happened.items() if what is RingEventKind.TWO_TOKENS]
     total = sum(happened.count for happened in strays)
     if total >= 2 and ring.shows_tokens:
         together = strays[0]
@@ -151,7 +155,7 @@ def _holders(ring: Ring) -> Iterable[Remark]:
                 f"{f'only {listed(polled)}' if polled else 'nobody'}, never {_between(by, following)}"
             )
             yield plain("MS110", ring, mac, seen, rounds)
-        unasked = ring.of(What.UNASKED, mac)
+        unasked = ring.of(RingEventKind.UNASKED, mac)
         if unasked.count and not (node.is_master and mac <= MAX_MASTER) and ring.shows_tokens:
             held = sorted({event.other for event in unasked.events if event.other is not None})
             why = "an address above 127 can have no token" if mac > MAX_MASTER else "it never gets a token"
@@ -159,7 +163,7 @@ def _holders(ring: Ring) -> Iterable[Remark]:
             yield of("MS111", mac, seen, unasked, Severity.NOTE if unasked.count == 1 else None)
 
 
-def _skipped_by(ring: Ring, mac: int, node: Node) -> tuple[int, int, int] | None:
+def _skipped_by(ring: Ring, mac: int, node: RingNode) -> tuple[int, int, int] | None:
     """Who passes the token past a station that was in the ring: (who, to whom, how often).
 
     It missed no token, or is heard while the token goes past it and nobody polls it.
@@ -205,10 +209,10 @@ def _counted(ring: Ring) -> Iterable[Remark]:
                     severity = Severity.NOTE
                 seen = words.format(times=times(happened.count), requests=counted(happened.count, "request"))
                 # a forbidden address is the sender's affair, and may stand for no station
-                yield of(code, mac, seen, happened, severity, pair=what is not What.ILLEGAL)
+                yield of(code, mac, seen, happened, severity, pair=what is not RingEventKind.ILLEGAL)
 
 
-def _share(count: int, node: Node | None) -> float:
+def _share(count: int, node: RingNode | None) -> float:
     return count / max(1, node.tokens_received if node is not None else 0)
 
 
@@ -225,9 +229,9 @@ def _times(ring: Ring) -> Iterable[Remark]:
 
 
 def _late_uses(ring: Ring) -> Iterable[Remark]:
-    uses = {mac: (ring.of(What.LATE_USE, mac), node) for mac, node in ring.nodes.items() if node.use.count}
+    uses = {mac: (ring.of(RingEventKind.LATE_USE, mac), node) for mac, node in ring.nodes.items() if node.use.count}
     for mac, (late, node) in uses.items():
-        given_up = ring.of(What.GIVEN_UP, mac)
+        given_up = ring.of(RingEventKind.GIVEN_UP, mac)
         words, evidence = [], given_up
         others = [(theirs.count, other.use.count) for who, (theirs, other) in uses.items() if who != mac]
         share = sum(count for count, _ in others) / max(1, sum(count for _, count in others))
@@ -247,7 +251,7 @@ def _late_uses(ring: Ring) -> Iterable[Remark]:
                 f"{milliseconds(most)} "
                 "after it came: two tokens for a moment"
             )
-        both = ring.of(What.USED_BOTH, mac)
+        both = ring.of(RingEventKind.USED_BOTH, mac)
         if _uses_both(ring, mac, node):
             most = max((event.value or 0 for event in both.events), default=0)
             words.append(
@@ -259,12 +263,12 @@ def _late_uses(ring: Ring) -> Iterable[Remark]:
             yield of("MS103", mac, "; ".join(words), evidence)
 
 
-def _uses_both(ring: Ring, mac: int, node: Node) -> bool:
+def _uses_both(ring: Ring, mac: int, node: RingNode) -> bool:
     """Whether the damage after tokens that were repeated to a station is its own: it uses them and their repeats.
 
     A noisy neighbour, or noise that falls anywhere, strikes as often after tokens that were not repeated.
     """
-    both, repeated = ring.of(What.USED_BOTH, mac).count, ring.of(What.RETRY, mac).count
+    both, repeated = ring.of(RingEventKind.USED_BOTH, mac).count, ring.of(RingEventKind.RETRY, mac).count
     usual = node.tokens_received - repeated
     if both < max(USED_BOTH_LEAST, USED_BOTH_SHARE * repeated) or usual < repeated:
         return False

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from dissectors.bacnet.limits import N_POLL, T_USAGE_TIMEOUT_MAX
-from dissectors.bacnet.ring import Ring, What
+from dissectors.bacnet.ring import Ring, RingEventKind
 from dissectors.bacnet.ring_questions import T_GO_ON
 from dissectors.bacnet.ring_remarks import Remark, listed, milliseconds, of, plain
 from dissectors.findings import Severity, counted, times
@@ -43,7 +43,7 @@ def polls(ring: Ring) -> Iterable[Remark]:
                 f"unanswered, up to address {node.highest_polled}; "
                 f"unanswered polls of all stations take {ring.poll_waste_share:.0%} of the time"
             )
-        stopped = ring.of(What.STOPPED, mac)
+        stopped = ring.of(RingEventKind.STOPPED, mac)
         if stopped.count > 1:
             longest = max(event.value or 0 for event in stopped.events)
             seen.append(
@@ -63,7 +63,7 @@ def _waits(ring: Ring) -> Iterable[Remark]:
         if node is None or mac is None:
             continue
         waited = node.poll_wait
-        if what is What.SLOW_SEARCH and happened.count >= max(SLOW_POLLS_LEAST, waited.count // 2):
+        if what is RingEventKind.SLOW_SEARCH and happened.count >= max(SLOW_POLLS_LEAST, waited.count // 2):
             seen = (
                 f"{happened.count} of {times(waited.count)} it went on later than {milliseconds(T_GO_ON)} after a "
                 "poll that "
@@ -72,7 +72,7 @@ def _waits(ring: Ring) -> Iterable[Remark]:
             )
             yield of("MS203", mac, seen, happened)
         if (
-            what is What.TOO_SOON
+            what is RingEventKind.TOO_SOON
             and happened.count >= HASTY_LEAST
             and not ring.coarse
             and not has_two_rhythms(ring, mac)
@@ -92,7 +92,7 @@ def has_two_rhythms(ring: Ring, mac: int) -> bool:
     No single station does both.
     """
     node = ring.nodes.get(mac)
-    soon = ring.of(What.TOO_SOON, mac).count
+    soon = ring.of(RingEventKind.TOO_SOON, mac).count
     return node is not None and not ring.coarse and soon >= HASTY_LEAST and node.polls_waited >= HASTY_LEAST
 
 
@@ -137,7 +137,9 @@ def _slow_rounds(ring: Ring) -> Iterable[Remark]:
 
 def _storm(ring: Ring) -> Iterable[Remark]:
     storms = {
-        mac: happened for (what, mac), happened in ring.happened.items() if what is What.STORM and mac is not None
+        mac: happened
+        for (what, mac), happened in ring.happened.items()
+        if what is RingEventKind.STORM and mac is not None
     }
     if not storms:
         return

@@ -225,7 +225,7 @@ class Time:
 
 
 @dataclass(frozen=True, slots=True)
-class Record:
+class ConstructedValue:
     """A sequence or a choice: named values in wire order. `type` is its name in the tables, None for a service."""
 
     type: str | None
@@ -405,7 +405,7 @@ def show(value: Any, depth: int = 0) -> str:
         return value.hex() if len(value) <= 32 else f"{value[:32].hex()}… ({len(value)} octets)"
     if isinstance(value, str):
         return '"' + escape(value) + '"'
-    if isinstance(value, Record):
+    if isinstance(value, ConstructedValue):
         if depth > 16:
             return "…"
         inner = " ".join(f"{name}={show_part(name, entry, depth + 1)}" for name, entry in value.entries)

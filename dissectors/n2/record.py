@@ -101,7 +101,7 @@ class Override:
 
 
 @dataclass(slots=True)
-class Station:
+class N2StationRecord:
     """What is known of one station. `turns`: how often the master turned to it; `quickest`: shortest answer, ns."""
 
     asked: int = 0

@@ -1,4 +1,4 @@
-"""What was remembered of a Modbus line, judged and put into words. Pure: `Evidence` in, findings out."""
+"""What was remembered of a Modbus line, judged and put into words. Pure: `BusRecord` in, findings out."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from dissectors.findings import Finding, Severity, Tally, counted, found, times
-from dissectors.modbus.damage_shares import Damage, shares_of_damage, to_blame
-from dissectors.modbus.evidence import Evidence
-from dissectors.modbus.judgement_words import MS, ms, note_if, request_words, seconds, units
+from dissectors.modbus.bus_record import BusRecord
+from dissectors.modbus.damage_shares import DamageShare, shares_of_damage, to_blame
+from dissectors.modbus.finding_words import MS, ms, note_if, request_words, seconds, units
 from dissectors.modbus.rules import RULES
-from dissectors.modbus.station_judgement import FLAWS, is_absent, of_station
+from dissectors.modbus.rules_station import FLAWS, is_absent, of_station
 
 _WASTE = 0.05
 _HABIT = 10  # a sender that is too quick is so once in so many frames at least; what a computer holds up is rarer
@@ -22,7 +22,7 @@ _CUT_LEAST = 3
 _COMMON_LEAST = 3
 
 
-def judge(seen: Evidence, timeout: int | None) -> tuple[Finding, ...]:
+def judge(seen: BusRecord, timeout: int | None) -> tuple[Finding, ...]:
     """All findings: the bus first, then station by station. `timeout`: the master's, ns, None while unlearnt."""
     damage = shares_of_damage(seen)
     made = [
@@ -40,7 +40,7 @@ def judge(seen: Evidence, timeout: int | None) -> tuple[Finding, ...]:
 # ---- the bus
 
 
-def _of_bus(seen: Evidence, is_blamed: bool) -> Iterator[Finding]:
+def _of_bus(seen: BusRecord, is_blamed: bool) -> Iterator[Finding]:
     requests = sum(station.asked for station in seen.stations.values()) + seen.damaged_requests.count
     damaged = seen.damaged_requests
     if damaged.count:
@@ -97,7 +97,7 @@ def _of_bus(seen: Evidence, is_blamed: bool) -> Iterator[Finding]:
     yield from _cycle(seen)
 
 
-def _of_requests(seen: Evidence) -> Iterator[Finding]:
+def _of_requests(seen: BusRecord) -> Iterator[Finding]:
     """What is wrong with what the master sends, and what its own adapter makes of it."""
     malformed = seen.malformed
     if malformed.count:
@@ -134,7 +134,7 @@ def _of_requests(seen: Evidence) -> Iterator[Finding]:
             yield tally.found(RULES[FLAWS[flaw]], "master", words, severity)
 
 
-def _of_masters(seen: Evidence) -> Iterator[Finding]:
+def _of_masters(seen: BusRecord) -> Iterator[Finding]:
     """Requests into the wait of another, sooner than the station asked has ever answered.
 
     An answer that this tap missed cannot have come before, and a master that never waits sends after the same time
@@ -163,7 +163,7 @@ def _of_masters(seen: Evidence) -> Iterator[Finding]:
     yield tally.found(RULES["MB203"], "bus", words)
 
 
-def _asked_twice(seen: Evidence) -> Iterator[Finding]:
+def _asked_twice(seen: BusRecord) -> Iterator[Finding]:
     """Requests that came twice at once, and had two answers: no echo is answered, and no master repeats so soon.
 
     Not where copies are usual, as behind a repeater, or where answers come twice to requests that do not.
@@ -176,7 +176,7 @@ def _asked_twice(seen: Evidence) -> Iterator[Finding]:
     yield twice.found(RULES["MB203"], "bus", words)
 
 
-def _of_gaps(seen: Evidence) -> Iterator[Finding]:
+def _of_gaps(seen: BusRecord) -> Iterator[Finding]:
     timing = seen.timing
     for sender, calls in sorted(seen.close.items()):
         tally = Tally()
@@ -209,7 +209,7 @@ def _of_gaps(seen: Evidence) -> Iterator[Finding]:
         yield found(RULES["MB303"], "adapter", words, first=seen.first or 0, last=seen.now)
 
 
-def _of_ends(seen: Evidence) -> Iterator[Finding]:
+def _of_ends(seen: BusRecord) -> Iterator[Finding]:
     """Frames without LF: of those who leave it out while others send it; where all do, it is how this bus speaks."""
     habits = {
         sender: tally
@@ -231,7 +231,7 @@ def _of_ends(seen: Evidence) -> Iterator[Finding]:
         yield tally.found(RULES["MB019"], sender, words)
 
 
-def _common_damage(seen: Evidence, damage: Damage) -> list[Finding]:
+def _common_damage(seen: BusRecord, damage: DamageShare) -> list[Finding]:
     """What is damaged of senders none of which has more of it than its share."""
     hits, struck = damage.common, [int(sender.split()[1]) for sender in damage.common if sender != "master"]
     damaged = sum(hits.values())
@@ -252,7 +252,7 @@ def _common_damage(seen: Evidence, damage: Damage) -> list[Finding]:
     return [replace(finding, count=answers, last=last)]
 
 
-def _cycle(seen: Evidence) -> Iterator[Finding]:
+def _cycle(seen: BusRecord) -> Iterator[Finding]:
     usual = seen.cycles.usual()
     if usual is None or len(usual[2]) < 4:
         return

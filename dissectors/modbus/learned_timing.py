@@ -24,7 +24,7 @@ UNLEARNT_LIMIT = 100_000_000
 than that it may be the answer of a slow station as well as the request again."""
 
 
-class Learnt:
+class LearnedTiming:
     """Response times by unit, the master's timeout, its pauses between an answer and the next request."""
 
     __slots__ = ("_answer", "_cycles", "_margin", "_pauses", "_timeout", "_times", "_tolerance", "_unanswered")
