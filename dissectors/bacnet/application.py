@@ -1,4 +1,4 @@
-"""What a simulated MS/TP node does with data: ask, or be a device with objects. Pure: octets in, octets out."""
+"""Simulated applications behind an MS/TP node: one that asks, one that is a device with objects. Pure."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a good frame says that cannot be right: reply bits, dates that are none, values of another type. Pure, total.
+"""Oddities in the content of good frames: reply bits, dates that are none, values of another type. Pure, total.
 
 Whether a reply is expected is said twice: by the frame type (5, 32: the receiver answers at once; ANSI/ASHRAE 135, 9.3)
 and by bit 2 of the network header (6.2.2, which a router makes the frame type from). A confirmed request has both

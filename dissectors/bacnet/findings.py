@@ -1,4 +1,4 @@
-"""What the rules say of a ring. `judge` is pure: a Ring in, findings out; `MstpFindings` feeds it from the live bus."""
+"""The rules' findings about a ring: `judge` is pure, a Ring in, findings out; `MstpFindings` feeds it from a bus."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the rules say of damaged frames and noise, and of two stations with one address."""
+"""Findings about damaged frames and noise, and about two stations with one address."""
 
 from __future__ import annotations
 

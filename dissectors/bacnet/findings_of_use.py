@@ -1,4 +1,4 @@
-"""What the rules say of polls for masters, and of who uses the line."""
+"""Findings about polls for masters, and about who uses the line."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What BACnet requests ask: properties of objects; of other services the object, where they name one."""
+"""The questions in BACnet requests: properties of objects; of other services the object, where they name one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What BACnet exchanges tell: properties with their values. Reads, writes and changes of value. A message in
+"""Readings of BACnet exchanges: properties with their values. Reads, writes and changes of value. A message in
 segments tells it with its last one."""
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What waits for an answer on a ring, polls, tests and requests: whether it comes, too late, or never."""
+"""Polls, tests and requests that wait for an answer on a ring: whether it comes, too late, or never."""
 
 from __future__ import annotations
 

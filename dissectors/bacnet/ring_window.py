@@ -1,4 +1,4 @@
-"""What a ring did between two looks at it, as flat numbers: for a line a second in a recording."""
+"""A ring between two looks at it, as flat numbers: for a line a second in a recording."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What was seen on a Modbus line as a whole: what `observer.py` gathers and `rules_bus.py` judges."""
+"""The record of a Modbus line as a whole: what `observer.py` gathers and `rules_bus.py` judges."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whose the damage is: a sender's own, or the bus's, that falls on whoever sends. Pure.
+"""Shares of the damage: a sender's own, or the bus's, that falls on whoever sends. Pure.
 
 Noise that falls anywhere strikes each sender as often as it sends octets. So a sender is blamed only where so great a
 part of all damage as it has would seldom come about by its share of the octets; the worst one first, then the others

@@ -1,4 +1,4 @@
-"""Whether a copy of a request is its echo: given back at once, sooner than a station can answer or a master repeat.
+"""Echoes: copies of a request given back at once, sooner than a station can answer or a master repeat.
 
 A bus with an echo (a converter or adapter that hears itself) gives back every request; most buses none.
 """

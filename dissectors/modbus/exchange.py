@@ -1,4 +1,4 @@
-"""What the tracker holds of a request until it closes, and the transactions that come of it."""
+"""An exchange: what the tracker holds of a request until it closes, and the transactions that come of it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What regular exchanges need of the tracker's memory, and what they leave there.
+"""The tracker's memory, as far as regular exchanges need it and change it.
 
 What the tracker learns decides a few things of a regular exchange. No answer may come later than 4/5 of the master's
 timeout; a copy that comes at once must not be an echo; the copy of a write must come in time by the station's last 16

@@ -1,4 +1,4 @@
-"""What the tracker learns of a bus while it listens: response times, the master's timeout, the master's pauses.
+"""The timing of a bus, learnt while it is heard: response times, the master's timeout, the master's pauses.
 
 Only traffic whose direction the octets decide teaches. Each quantity keeps its last samples, so memory is bounded and
 a bus that changes is learnt anew. All times are int ns, as they were measured (nominal).

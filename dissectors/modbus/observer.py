@@ -1,4 +1,4 @@
-"""What is wrong on a Modbus line: what is remembered of each row and transaction. `rules_bus.py` puts it into words.
+"""The observer of a Modbus line: remembers each row and transaction. `rules_bus.py` puts it into words.
 
 Implements `dissectors.findings.Judge` for RTU and ASCII. An adapter's delay is always taken off in favour of the
 station: it is slow when even the shortest reading is too long, too quick when even the longest is too short.

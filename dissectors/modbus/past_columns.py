@@ -1,4 +1,4 @@
-"""What a bus has said, learnt from many good frames at once: the memory of the framer over a stretch of a kernel."""
+"""The past of a bus, learnt from many good frames at once: the framer's memory over a stretch of a kernel."""
 
 from __future__ import annotations
 

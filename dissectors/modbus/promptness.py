@@ -1,4 +1,4 @@
-"""Whether a frame comes when an answer to the open request would, by the times that this bus has shown."""
+"""Promptness: whether a frame comes when an answer to the open request would, by the times that this bus has shown."""
 
 from __future__ import annotations
 

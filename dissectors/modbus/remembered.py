@@ -1,4 +1,4 @@
-"""What the rules keep in mind while a Modbus line is judged: what is open, and what is still to be settled. Bounded."""
+"""The memory of the rules while a Modbus line is judged: what is open, and what is still to be settled. Bounded."""
 
 from __future__ import annotations
 

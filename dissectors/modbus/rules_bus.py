@@ -1,4 +1,4 @@
-"""What was remembered of a Modbus line, judged and put into words. Pure: `BusRecord` in, findings out."""
+"""The rules of a Modbus line as a whole, in words. Pure: `BusRecord` in, findings out."""
 
 from __future__ import annotations
 

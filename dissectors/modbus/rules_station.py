@@ -1,4 +1,4 @@
-"""What was remembered of one Modbus station, judged and put into words. Pure."""
+"""The rules of one Modbus station, in words. Pure: `StationRecord` in, findings out."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How rarely chance makes octets look as well formed as those of a message: a function for each message of the layout.
+"""Shapes of messages: how rarely chance makes octets look as well formed; a function for each message of the layout.
 
 A field held to some values tells as many bits as chance seldom hits them (a quantity of 1 … 125 of 65536: 9 bits); a
 byte count that must agree with a quantity tells all of its bits. No frame is believed for its shape beyond 12 bits.

@@ -1,4 +1,4 @@
-"""What the rules remember of a station, and of the times on the bus; bounded, without judgement."""
+"""The record of a station and of the times on the bus: what the rules remember; bounded, without judgement."""
 
 from __future__ import annotations
 

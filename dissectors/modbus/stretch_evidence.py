@@ -1,4 +1,4 @@
-"""What the rules learn of the stations, exchange by exchange, in a stretch of regular ones (`regular_exchanges.py`)."""
+"""Evidence about the stations in a stretch of regular exchanges (`regular_exchanges.py`), one by one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is wrong on an N2 bus: the class that gathers it row by row. The words are in `wording.py`.
+"""The observer of an N2 bus: gathers row by row what is wrong. The words are in `wording.py`.
 
 `see` takes every row of the bus, `settle` every transaction that closed; `findings` may be asked at any time and
 gives the same for the same rows. A limit is judged by the bound that the adapter's latency leaves: a station is slow

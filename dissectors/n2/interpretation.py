@@ -1,4 +1,4 @@
-"""What an answer means, given the command it answers.
+"""The interpretation of an answer, given the command it answers.
 
 An N2 answer carries neither address nor object, so alone it is only characters. Fields that no public source
 describes (status and configuration bits, change-of-state records, the time in 0/0) are read as *tentative*: in words,

@@ -1,4 +1,4 @@
-"""Whether a second master speaks: what no single one would do.
+"""Signs of a second master: what no single one would do.
 
 A command that no answer followed says little: a master may be impatient, its answer may not have been heard here. So
 only this counts:

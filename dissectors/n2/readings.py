@@ -1,4 +1,4 @@
-"""What N2 exchanges tell: objects with their values.
+"""Readings of N2 exchanges: objects with their values.
 
 A binary object answers its status octet; that bit 6 of it is the state no public source confirms, so such a reading is
 not sure. Reports of changes are tentative altogether.

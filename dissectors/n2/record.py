@@ -1,4 +1,4 @@
-"""What is kept of one station, or of the master, while a bus is judged."""
+"""The record of one station, or of the master, while a bus is judged."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What was gathered of an N2 bus, as findings in words."""
+"""The words of the findings about an N2 bus."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What an entry of the master's programme asks, and when it changed, for people and programs. Pure."""
+"""The words of the master's programme: what an entry asks, and when it changed, for people and programs. Pure."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What fills the terminal UI from a live bus."""
+"""The source of rows from a live bus."""
 
 from __future__ import annotations
 

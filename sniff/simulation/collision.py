@@ -1,4 +1,4 @@
-"""What a receiver on the pair gets when drivers talk over each other: bits mixed in time, sampled like a UART does.
+"""Collisions: what a receiver gets when drivers talk over each other, bits mixed in time, sampled like a UART does.
 
 Used only where transmissions overlap or the line is held low; a transmission that is alone needs no bits. The model:
 a driver that is off leaves the line at 1 (fail-safe bias), and where two drivers disagree the 0 wins. Real drivers

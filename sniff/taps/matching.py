@@ -1,4 +1,4 @@
-"""Which frame at one tap is which at the other: in order, by octets, never further apart in time than a line can hold.
+"""Matches of frames at two taps: in order, by octets, never further apart in time than a line can hold.
 
 Frames that are good at both taps are paired first; what lies between two such pairs is then compared: a good frame
 beside something damaged at the same moment was damaged, beside nothing it is missing, beside another good frame it was

@@ -1,4 +1,4 @@
-"""What two taps tell, in words for people."""
+"""The words of what two taps tell, for people."""
 
 from __future__ import annotations
 
