@@ -11,7 +11,7 @@ from dissectors.bacnet.findings_of_damage import damage, duplicates
 from dissectors.bacnet.findings_of_use import polls, use
 from dissectors.bacnet.limits import MAX_MASTER, N_POLL, T_REPLY_DELAY, T_USAGE_DELAY
 from dissectors.bacnet.ring import COARSE_LIMIT, Ring, RingEventKind, RingNode
-from dissectors.bacnet.ring_remarks import Remark, listed, milliseconds, of, plain
+from dissectors.bacnet.ring_remarks import Remark, listed, measured, of, plain
 from dissectors.bacnet.rules import RULES
 from dissectors.findings import Finding, Severity, Tally, as_consequence, counted, times
 from dissectors.frame import Event, Header
@@ -114,7 +114,7 @@ def _tokens(ring: Ring) -> Iterable[Remark]:
             held = disturbed if mac is None else f"MAC {mac} had it"
             grave = None if mac is not None else Severity.WARNING if happened.count > 1 else Severity.NOTE
             seen = (
-                f"the token was lost {times(happened.count)}; {held}; silence up to {milliseconds(longest)}; "
+                f"the token was lost {times(happened.count)}; {held}; silence up to {measured(longest)}; "
                 f"begun anew by MAC {listed(makers)}"
             )
             yield of("MS101", mac, seen, happened, grave)
@@ -223,7 +223,7 @@ def _times(ring: Ring) -> Iterable[Remark]:
         for (what, mac), happened in ring.happened.items():
             if what is kind:
                 most = max((event.value or 0 for event in happened.events), default=0)
-                seen = words.format(times=times(happened.count), most=milliseconds(most))
+                seen = words.format(times=times(happened.count), most=measured(most))
                 yield of(code, mac, seen, happened, pair=True)
     yield from _late_uses(ring)
 
@@ -239,23 +239,23 @@ def _late_uses(ring: Ring) -> Iterable[Remark]:
         often = late.count >= max(2, LATE_SHARE * node.use.count)
         if often and not ring.coarse and alone and node.use.count >= LEAST_USES:
             words.append(
-                f"{late.count} of {node.use.count} times it used the token over {milliseconds(T_USAGE_DELAY)} "
+                f"{late.count} of {node.use.count} times it used the token over {measured(T_USAGE_DELAY)} "
                 "after "
-                f"it came; median {milliseconds(node.use.quantile(0.5))}, longest {milliseconds(node.use.most)}"
+                f"it came; median {measured(node.use.quantile(0.5))}, longest {measured(node.use.most)}"
             )
             evidence = late.merge(given_up)
         if given_up.count:
             most = max((event.value or 0 for event in given_up.events), default=0)
             words.append(
                 f"{times(given_up.count)} only after its neighbour had taken the token back, up to "
-                f"{milliseconds(most)} "
+                f"{measured(most)} "
                 "after it came: two tokens for a moment"
             )
         both = ring.of(RingEventKind.USED_BOTH, mac)
         if _uses_both(ring, mac, node):
             most = max((event.value or 0 for event in both.events), default=0)
             words.append(
-                f"{times(both.count)} only after its neighbour had repeated the token, up to {milliseconds(most)} "
+                f"{times(both.count)} only after its neighbour had repeated the token, up to {measured(most)} "
                 "after it came, and then it used the repeated one too, while the next station sent"
             )
             evidence = evidence.merge(both)
@@ -281,7 +281,7 @@ def _answers(ring: Ring) -> Iterable[Remark]:
         if node.postponed >= 5 and node.postponed > POSTPONED_SHARE * node.requests_received:
             seen = f"{node.postponed} of {counted(node.requests_received, 'request')} answered with Reply Postponed"
             if node.service.count:
-                median, most = milliseconds(node.service.quantile(0.5)), milliseconds(node.service.most)
+                median, most = measured(node.service.quantile(0.5)), measured(node.service.most)
                 seen += f"; the real answers took {median}, up to {most}"
             yield plain("MS303", ring, mac, seen, node.postponed)
 

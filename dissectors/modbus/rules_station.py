@@ -8,12 +8,14 @@ from itertools import pairwise
 
 from dissectors.findings import Finding, Severity, Tally, counted, found, times
 from dissectors.frame import Flaw
+from dissectors.line import MS
 from dissectors.modbus.bus_record import BusRecord
-from dissectors.modbus.finding_words import MS, ms, note_if, request_words, seconds, wilson
+from dissectors.modbus.finding_words import note_if, request_words, wilson
 from dissectors.modbus.functions import EXCEPTIONS as EXCEPTION_NAMES
 from dissectors.modbus.response_groups import AnsweredRequest
 from dissectors.modbus.rules import EXCEPTIONS, MAKER_EXCEPTION, RULES, USED_ALIKE, VENDOR_EXCEPTION
 from dissectors.modbus.station_record import Key, Requested, StationRecord, middle
+from dissectors.words import duration, fine_milliseconds
 
 SILENT_AT_END = 5
 """Unanswered requests in a row to the end, from which on a station that used to answer has fallen silent."""
@@ -86,7 +88,7 @@ def _missing(seen: BusRecord, name: str, unit: int, station: StationRecord) -> I
     silent = station.silent
     if silent.count >= SILENT_AT_END and station.answered and station.last_heard is not None:
         since = seen.now - station.last_heard
-        words = f"no answer to its last {silent.count} requests; last heard {seconds(since)} before the end"
+        words = f"no answer to its last {silent.count} requests; last heard {duration(since)} before the end"
         yield silent.found(RULES["MB003"], name, words)
     ignored = [(key, request) for key, request in sorted(station.requests.items(), key=str) if _is_ignored(request)]
     if station.answered >= 3 and silent.count < SILENT_AT_END:
@@ -230,9 +232,9 @@ def _times(
     times_, slow = station.times, station.slow
     if slow.count >= 3 and 100 * slow.count >= station.slow_of:
         since = "" if station.slow_of == station.answered else " since the timeout is known"
-        against = "500 ms" if timeout is None else f"70% of the master's timeout of {ms(timeout)}"
+        against = "500 ms" if timeout is None else f"70% of the master's timeout of {fine_milliseconds(timeout)}"
         words = f"{slow.count} of {counted(station.slow_of, 'answer')}{since} took longer than {against}"
-        words += f", the longest at least {ms(times_.longest)}"
+        words += f", the longest at least {fine_milliseconds(times_.longest)}"
         yield slow.found(RULES["MB101"], name, words, note_if(timeout is None))
     quarters = times_.quarters()
     if quarters:
@@ -240,13 +242,14 @@ def _times(
         rises = all(20 * b.nominal >= 19 * a.nominal for a, b in pairwise(quarters))
         quickest_too = 2 * (last.least - first.least) > last.nominal - first.nominal  # not only more of a second kind
         if rises and quickest_too and 2 * last.low > 3 * first.high and last.low - first.high > 5 * MS:
-            words = f"median response time rose from {ms(first.nominal)} to {ms(last.nominal)}"
+            rose = f"from {fine_milliseconds(first.nominal)} to {fine_milliseconds(last.nominal)}"
+            words = f"median response time rose {rose}"
             yield found(
                 RULES["MB102"], name, words, first=seen.first or 0, last=station.last_heard or 0, count=times_.count
             )
     if station.late.count:
         words = f"{counted(station.late.count, 'answer')} came after the master had given up"
-        waits = f"; it waits {ms(timeout)}" if timeout is not None else ""
+        waits = f"; it waits {fine_milliseconds(timeout)}" if timeout is not None else ""
         yield station.late.found(
             RULES["MB103"], name, words + waits, note_if(seen.rare(station.late.count, station.asked))
         )
@@ -254,7 +257,7 @@ def _times(
         share = station.repeats_cost / seen.span
         words = (
             f"{counted(station.repeats.count, 'request')} sent again; each cost the time that the master had waited: "
-            f"{seconds(station.repeats_cost)} in all, {share:.1%} of the time of the bus"
+            f"{duration(station.repeats_cost)} in all, {share:.1%} of the time of the bus"
         )
         costly = share > _REPEATS_COST and station.repeats.count >= _REPEATS_LEAST and not is_common
         yield station.repeats.found(RULES["MB104"], name, words, Severity.WARNING if costly else None)
@@ -287,5 +290,5 @@ def _two_times(name: str, station: StationRecord) -> Iterator[Finding]:
 
 def _range(answers: Sequence[AnsweredRequest]) -> str:
     """Where the times of a group lie, from the shortest to the longest nominal reading."""
-    least, most = ms(answers[0].latency.nominal), ms(answers[-1].latency.nominal)
+    least, most = fine_milliseconds(answers[0].latency.nominal), fine_milliseconds(answers[-1].latency.nominal)
     return least if least == most else f"{least} to {most}"
