@@ -18,12 +18,13 @@ from dissectors.bacnet import codec, services
 from dissectors.bacnet import message as messages
 from dissectors.bacnet import npdu as npdus
 from dissectors.bacnet.apdu import Apdu, PduType
+from dissectors.bacnet.dates import Date, Time
 from dissectors.bacnet.frame_types import EXPECTING
 from dissectors.bacnet.limits import BROADCAST
 from dissectors.bacnet.message import Message
 from dissectors.bacnet.npdu import Npdu
 from dissectors.bacnet.tags import Tag
-from dissectors.bacnet.values import APPLICATION, ConstructedValue, Date, Time, primitive
+from dissectors.bacnet.values import APPLICATION, ConstructedValue, primitive
 from dissectors.frame import Frame
 
 

@@ -10,22 +10,13 @@ from typing import Any
 from dissectors.bacnet import message as messages
 from dissectors.bacnet import npdu as npdus
 from dissectors.bacnet.apdu import Apdu, PduType
+from dissectors.bacnet.dates import Date, Time
 from dissectors.bacnet.frame_types import HEADER, PREAMBLE, PROPRIETARY, is_encoded
 from dissectors.bacnet.framing import body_is_good, header_is_good
 from dissectors.bacnet.message import Message
 from dissectors.bacnet.npdu import Npdu
 from dissectors.bacnet.tags import Tag
-from dissectors.bacnet.values import (
-    BitString,
-    ConstructedValue,
-    Date,
-    Double,
-    Enumerated,
-    ObjectId,
-    Signed,
-    Time,
-    escape,
-)
+from dissectors.bacnet.values import BitString, ConstructedValue, Double, Enumerated, ObjectId, Signed, escape
 from dissectors.frame import Frame, Role
 
 Value = int | float | str

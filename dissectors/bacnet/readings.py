@@ -10,9 +10,10 @@ from typing import Any
 from dissectors.bacnet import message as messages
 from dissectors.bacnet import names
 from dissectors.bacnet.apdu import PduType
+from dissectors.bacnet.dates import Date, Time
 from dissectors.bacnet.frame_types import HEADER
 from dissectors.bacnet.message import Message
-from dissectors.bacnet.values import BitString, ConstructedValue, Date, Double, Enumerated, ObjectId, Time, show
+from dissectors.bacnet.values import BitString, ConstructedValue, Double, Enumerated, ObjectId, show
 from dissectors.frame import Frame
 from dissectors.readings import How, Reading
 

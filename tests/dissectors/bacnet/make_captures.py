@@ -15,8 +15,9 @@ from typing import Any
 
 from dissectors.bacnet import apdu as apdus
 from dissectors.bacnet import codec, services
+from dissectors.bacnet.dates import Date, Time
 from dissectors.bacnet.frame_types import FrameType
-from dissectors.bacnet.values import ConstructedValue, Date, Enumerated, Time
+from dissectors.bacnet.values import ConstructedValue, Enumerated
 from tests.dissectors.bacnet.segmented_bus import (
     READ,
     READ_MULTIPLE,

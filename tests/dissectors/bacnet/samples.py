@@ -15,10 +15,11 @@ from dissectors.bacnet import apdu as apdus
 from dissectors.bacnet import codec, layout, names, npdu, services
 from dissectors.bacnet.apdu import MORE_FOLLOWS, SEGMENTED, SEGMENTED_ACCEPTED, PduType
 from dissectors.bacnet.choices import CHOICES
+from dissectors.bacnet.dates import Date, Time
 from dissectors.bacnet.enumerations import BIT_STRINGS, ENUMERATIONS
 from dissectors.bacnet.envelope import frame, npdu_frame
 from dissectors.bacnet.property_types import PROPERTY_TYPES
-from dissectors.bacnet.values import BitString, ConstructedValue, Date, Double, Enumerated, ObjectId, Signed, Time, base
+from dissectors.bacnet.values import BitString, ConstructedValue, Double, Enumerated, ObjectId, Signed, base
 from tests.dissectors.bacnet.generate_tables import types_by_object
 
 SEEDS = 25

@@ -13,10 +13,11 @@ from dissectors.bacnet import MSTP, codec, npdu, services
 from dissectors.bacnet import apdu as apdus
 from dissectors.bacnet.content import Odd, ReplyFlaw, oddities
 from dissectors.bacnet.content_findings import ContentFindings
+from dissectors.bacnet.dates import Date, Time, WhenFlaw
 from dissectors.bacnet.envelope import frame
 from dissectors.bacnet.station_address import mac_text, remote
 from dissectors.bacnet.text import text
-from dissectors.bacnet.values import ConstructedValue, Date, ObjectId, Time, WhenFlaw
+from dissectors.bacnet.values import ConstructedValue, ObjectId
 from dissectors.frame import Chunk, Frame, Role
 from dissectors.line import LineSettings, Timing
 from sniff.analysis.packet_tree import fields_of

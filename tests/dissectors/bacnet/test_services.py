@@ -17,14 +17,8 @@ from hypothesis import strategies as st
 
 from dissectors.bacnet import codec, layout, names, services, tags
 from dissectors.bacnet.choices import CHOICES
-from dissectors.bacnet.values import (
-    BitString,
-    ConstructedValue,
-    Date,
-    Enumerated,
-    ObjectId,
-    Time,
-)
+from dissectors.bacnet.dates import Date, Time
+from dissectors.bacnet.values import BitString, ConstructedValue, Enumerated, ObjectId
 from tests.dissectors.bacnet.generate_tables import kebab
 from tests.dissectors.bacnet.samples import LAYOUTS, SEEDS, WITH_PARAMETERS, apdu_of, parameters_of
 
