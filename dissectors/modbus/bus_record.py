@@ -10,6 +10,7 @@ from dissectors.findings import Tally
 from dissectors.frame import Flaw
 from dissectors.line import NS_PER_S, Timing
 from dissectors.modbus.station_record import Cycles, StationRecord
+from dissectors.strikes import Strikes
 
 _SENDERS_KEPT = 300
 _SCAN_LEAST = 4
@@ -48,6 +49,7 @@ class BusRecord:
     echoes: int = 0
     stations: dict[int, StationRecord] = field(default_factory=dict)
     damaged_requests: Tally = field(default_factory=Tally)
+    strikes: Strikes = field(default_factory=Strikes)  # "master", "station 3" …
     unasked: Tally = field(default_factory=Tally)
     asked_twice: Tally = field(default_factory=Tally)
     answers_to_broadcast: Tally = field(default_factory=Tally)

@@ -1,5 +1,7 @@
 """Shares of the damage: a sender's own, or the bus's, that falls on whoever sends. Pure.
 
+Damage is counted in strikes (`dissectors.strikes`): what a master repeats into one disturbance is one observation.
+
 Noise that falls anywhere strikes each sender as often as it sends octets. So a sender is blamed only where so great a
 part of all damage as it has would seldom come about by its share of the octets; the worst one first, then the others
 among themselves.
@@ -30,9 +32,11 @@ def shares_of_damage(seen: BusRecord) -> DamageShare:
 
     Stations are compared with each other, and the master with all: what strikes all answers is no station's fault.
     """
-    hits = {f"station {unit}": one.damaged.count - one.explained for unit, one in seen.stations.items()}
+    frames = {f"station {unit}": one.damaged.count - one.explained for unit, one in seen.stations.items()}
+    hits = {sender: seen.strikes.of(sender, count) for sender, count in frames.items()}
     octets = {sender: max(1, seen.octets[sender]) for sender in (*hits, "master")}
-    requests = seen.damaged_requests.count
+    frames["master"] = seen.damaged_requests.count
+    requests = seen.strikes.of("master", frames["master"])
     if len(hits) == 1:
         hits["master"] = requests
     blamed = to_blame(hits, octets)
@@ -42,7 +46,7 @@ def shares_of_damage(seen: BusRecord) -> DamageShare:
         alone = not any(count for sender, count in hits.items() if sender != "master")
         if chance(requests, sum(hits.values()), share) < (_SELDOM_ALONE if alone else _SELDOM):
             blamed.add("master")
-    common = {sender: count for sender, count in hits.items() if count > 0 and sender not in blamed}
+    common = {sender: count for sender, count in frames.items() if count > 0 and sender not in blamed}
     return DamageShare(frozenset(blamed), common)
 
 

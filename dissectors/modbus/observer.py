@@ -112,6 +112,7 @@ class ModbusFindings(Remembered):
         if ended is not None:
             self._see_end(*ended)
         if verdict is Verdict.DAMAGED_REQUEST:
+            self.seen.strikes.struck("master")
             self.seen.damaged_requests.add(transaction.start, transaction.request)
             if flaw is not None:
                 tallies = self.seen.requests_damaged_by
@@ -291,6 +292,7 @@ class ModbusFindings(Remembered):
         if not self.seen.requests and self.seen.answers == 1:
             return  # the capture began between a request and its answer
         if transaction.id in self.damaged:  # more likely a request, when nobody was asked
+            self.seen.strikes.struck("master")
             self.seen.damaged_requests.add(transaction.start, transaction.response)
             return
         self.seen.unasked.add(transaction.start, transaction.response)
@@ -330,9 +332,11 @@ class ModbusFindings(Remembered):
             return
         station.heard(transaction.end)
         if verdict is Verdict.DAMAGED_ANSWER:
+            self.seen.strikes.struck(f"station {asked.unit}")
             station.damaged.add(transaction.end, transaction.request, transaction.response)
             station.garbled += transaction.response is None
             return
+        self.seen.strikes.whole()
         station.answered += 1
         station.copies += answer == asked.octets
         if transaction.latency is not None and not self.torn.is_torn(transaction.id):

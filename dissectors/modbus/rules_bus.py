@@ -234,10 +234,10 @@ def _of_ends(seen: BusRecord) -> Iterator[Finding]:
 
 
 def _common_damage(seen: BusRecord, damage: DamageShare) -> list[Finding]:
-    """What is damaged of senders none of which has more of it than its share."""
+    """What is damaged of senders none of which surely has more of it than its share."""
     hits, struck = damage.common, [int(sender.split()[1]) for sender in damage.common if sender != "master"]
     damaged = sum(hits.values())
-    if len(hits) < 2 or not struck or damaged < _COMMON_LEAST:
+    if not struck or damaged < _COMMON_LEAST:
         return []
     asked = sum(seen.stations[unit].asked for unit in struck)
     answers = damaged - hits.get("master", 0)
@@ -248,7 +248,9 @@ def _common_damage(seen: BusRecord, damage: DamageShare) -> list[Finding]:
     words = f"{answers} of {counted(asked, 'answer')} damaged ({answers / max(1, asked):.1%}), of {units(struck)}"
     if "master" in hits:
         words += f", and {counted(hits['master'], 'request')}"
-    words += ": of each about as much as it sends"
+    words += (
+        ": of each about as much as it sends" if len(hits) > 1 else ": too few, and too close together, to say whose"
+    )
     finding = tally.found(RULES["MB007"], "bus", words, note_if(seen.rare(damaged, asked)))
     last = max(seen.stations[unit].damaged.last for unit in struck)
     return [replace(finding, count=answers, last=last)]

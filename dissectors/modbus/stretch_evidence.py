@@ -198,6 +198,8 @@ class StretchEvidence:
                 request.answers.append(at)
             elif request.is_new:
                 self._compare(at, said, request)
+        if min(became[begin:end]) <= REFUSED:
+            self._judge.seen.strikes.whole()
         self._pause_until(one.last[end - 1])
         self._count_all()
         for request in self._compared:

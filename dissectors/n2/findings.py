@@ -19,6 +19,7 @@ from dissectors.n2.masters import Masters, OpenCommand
 from dissectors.n2.record import Damages, N2StationRecord, Override
 from dissectors.n2.torn import TornFrames
 from dissectors.n2.wording import SLOW, N2Evidence, worded
+from dissectors.strikes import Strikes
 from dissectors.tracker import Placement, Transaction, Verdict
 
 __all__ = ["SLOW", "N2Findings"]
@@ -46,6 +47,7 @@ class N2Findings:
         self._asked: dict[int, OpenCommand] = {}  # by transaction
         self.masters = Masters()
         self.torn = TornFrames(timing)
+        self.strikes = Strikes()
         self._stray = Tally()
         self._codes: dict[int, str] = {}  # transaction → error code, of refusals that are still to close
         self._answers: OrderedDict[int, bytes] = OrderedDict()  # transaction → its good answer
@@ -77,12 +79,13 @@ class N2Findings:
                 self.station(placement.destination).turns += 1
             self.turn = placement.destination
         elif event.damage is not Damage.RESTARTED or event.repair is not None:
-            self._add_bad(self.master, no, event)
+            self._add_bad("master", self.master, no, event)
 
     def _see_answer(self, no: int, event: Frame, header: Header, placement: Placement) -> None:
         self.masters.see_other()
         octets = event.octets
         if header.ok:
+            self.strikes.whole()
             if octets[:1] == b"N":
                 self._codes[placement.tx] = refusal_code(octets)
             self.keep_answer(placement.tx, octets)
@@ -94,11 +97,12 @@ class N2Findings:
         sent.frames += 1
         sent.octets += len(octets)
         if not header.ok:
-            self._add_bad(sent, no, event)
+            self._add_bad(f"station {placement.source}", sent, no, event)
 
-    def _add_bad(self, sender: Damages, no: int, event: Frame) -> None:
+    def _add_bad(self, name: str, sender: Damages, no: int, event: Frame) -> None:
         if self.torn.is_late(event) or self.torn.completes(no):
             return  # its begin was read before, or may have been
+        self.strikes.struck(name)
         sender.add_bad(event.end, no, event.repair.flaw if event.repair is not None else None)
         self.torn.struck(sender)
 
@@ -145,6 +149,7 @@ class N2Findings:
                     return
                 station.missing.add(transaction.id, transaction.end, transaction.request)
             elif verdict is Verdict.DAMAGED_ANSWER and not self.torn.is_torn(transaction.id, transaction.request):
+                self.strikes.struck(f"station {transaction.station}")
                 station.sent.add_bad(transaction.end, transaction.request)
             return
         station.answered += 1
@@ -157,7 +162,7 @@ class N2Findings:
     def findings(self) -> tuple[Finding, ...]:
         """All findings so far: the bus first, then station by station."""
         seconds = (self.now - (self.first or 0)) / 1e9
-        heard = N2Evidence(self.now, seconds, self.master, self.stations, self.masters.seen, self._stray)
+        heard = N2Evidence(self.now, seconds, self.master, self.stations, self.masters.seen, self._stray, self.strikes)
         return tuple(worded(heard))
 
     # --- judging ---

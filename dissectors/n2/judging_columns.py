@@ -128,6 +128,8 @@ class _Judging:
         frames = rows.frames
         judge.first = int(frames.start[stretch.start]) if judge.first is None else judge.first
         judge.now = max(judge.now, int(frames.end[stretch].max()))
+        if self.found.answered[which].any():
+            judge.strikes.whole()
         judge.torn.pass_by(rows.first + stretch.start, rows.slack[stretch])
         self._count(which)
         for at in (begin + np.flatnonzero(self._events[which])).tolist():

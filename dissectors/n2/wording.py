@@ -13,6 +13,7 @@ from dissectors.n2.commands import error_name
 from dissectors.n2.objects import attribute_name, number, object_name
 from dissectors.n2.record import Damages, N2StationRecord
 from dissectors.n2.rules import RULES
+from dissectors.strikes import Strikes
 
 SLOW = 250 * MS
 """Shortest message timeout that an NAE can be given, ns (JCI help, N2 trunk)."""
@@ -40,6 +41,7 @@ class N2Evidence:
     stations: Mapping[int, N2StationRecord]
     masters: Tally
     stray: Tally
+    strikes: Strikes
 
     def is_rare(self, tally: Tally, of: int) -> bool:
         """Whether so few are not worth a warning: one, or under 1 in 100 and at most two a minute."""
@@ -80,12 +82,13 @@ def _damaged(heard: N2Evidence) -> Iterator[Finding]:
     """Damaged frames, at their sender or at the bus."""
     senders = _senders(heard)
     frames = sum(sent.frames for sent in senders.values())
-    for subject, tally in blamed(senders).items():
+    for subject, tally in blamed(senders, heard.strikes).items():
         of = senders[subject].frames if subject in senders else frames
         what = {"bus": "frame", "master": "command"}.get(subject, "answer")
         seen = f"{counted(tally.count, f'damaged {what}')} of {of}"
         if subject == "bus":
-            seen += ", of all senders as long as they send"
+            several = sum(one.bad.count > 0 for one in senders.values()) > 1
+            seen += ", of all senders as long as they send" if several else ", too few to say whose they are"
         yield heard.noted_if(heard.is_rare(tally, of), tally.found(RULES["N2004"], subject, seen))
 
 
@@ -93,9 +96,9 @@ def _alike(heard: N2Evidence) -> Iterator[Finding]:
     """Senders whose frames are damaged in one and the same way."""
     senders = {name: sent for name, sent in _senders(heard).items() if sent.frames}
     found = {name: flaw for name, sent in senders.items() if (flaw := _flaw(sent)) is not None}
-    stations = [name for name in senders if name != "master" and senders[name].frames >= ALIKE]
-    flaws = {found.get(name) for name in stations}
-    if len(stations) > 1 and len(flaws) == 1 and (flaw := flaws.pop()) is not None:
+    stations = [name for name, sent in senders.items() if name != "master" and (sent.frames >= ALIKE or sent.bad.count)]
+    flaws = {found.get(name) or _only_flaw(senders[name]) for name in stations}
+    if found.keys() - {"master"} and len(stations) > 1 and len(flaws) == 1 and (flaw := flaws.pop()) is not None:
         tallies = [senders[name].flaws[flaw] for name in stations]
         tally = Tally(sum(one.count for one in tallies), min(one.first for one in tallies))
         tally.last = max(one.last for one in tallies)
@@ -117,6 +120,12 @@ def _flaw(sent: Damages) -> Flaw | None:
         if tally.count >= ALIKE and 5 * tally.count >= 4 * sent.bad.count:
             return flaw
     return None
+
+
+def _only_flaw(sent: Damages) -> Flaw | None:
+    """The flaw that all frames of a sender of few have."""
+    flaws = [flaw for flaw, tally in sent.flaws.items() if tally.count == sent.frames]
+    return flaws[0] if len(flaws) == 1 else None
 
 
 def _flaw_words(flaw: Flaw) -> str:

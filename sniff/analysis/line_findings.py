@@ -28,6 +28,9 @@ from sniff.engine.session import LineEvent, LineEventKind, Session
 STRAY_MOST = 3
 """So many octets that are no frame are stray ones; more are the remains of something."""
 
+ECHOES_LEAST = 3
+"""Echoes from which on a repeater or converter is likely, where half of the requests have one."""
+
 MOST_RESTS = 16
 """Stretches that are no frame and are asked what they may be."""
 
@@ -342,7 +345,8 @@ class LineFindings:
             yield self._of_rests(self._rest.found(RULES["LN204"], "bus", words, severity))
         if self._echo.count:
             words = f"{self._echo.count} of {counted(self._asked, 'request')} came twice, the copy directly behind"
-            severity = Severity.WARNING if 10 * self._echo.count >= self._asked else None
+            often = self._echo.count >= ECHOES_LEAST and 2 * self._echo.count >= self._asked
+            severity = Severity.WARNING if often else None
             yield self._echo.found(RULES["LN205"], "bus", words, severity)
 
     def _of_rests(self, finding: Finding) -> Finding:

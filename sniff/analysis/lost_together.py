@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 LOST_IN_A_ROW = 3
 ANSWERED_BEFORE = 5
 MOST_STATIONS = 300
+BY_CHANCE = 0.1
+"""Chance below which losses in one part of a capture are no chance: each falls anywhere in it."""
 
 
 @dataclass(slots=True)
@@ -105,7 +107,7 @@ class LostTogether:
             names = sorted({loss[3] for loss in together})
             window = max(loss[1] for loss in together) - min(loss[0] for loss in together)
             losses = [loss for loss in losses if loss not in together]
-            if len(names) >= 2 and 10 * window <= span:
+            if len(names) >= 2 and window < span and (window / span) ** (len(names) - 1) <= BY_CHANCE:
                 yield self._lost(together, names, moment, first)
 
     def _lost(self, together: list[tuple[int, int, int, int]], names: list[int], moment: int, first: int) -> Finding:
