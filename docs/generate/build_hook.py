@@ -1,4 +1,4 @@
-"""Puts manual pages and shell completion into the wheel; they are made from the command line itself while it is built."""
+"""Puts manual pages and completion into the wheel; they are made from the command line while it is built."""
 
 from __future__ import annotations
 

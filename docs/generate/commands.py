@@ -29,7 +29,7 @@ class Group:
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """A command: `words` as typed behind the program's name, `text` what stands below its help, `parts` its commands."""
+    """A command. `words`: as typed behind the program. `text`: what stands below its help. `parts`: its commands."""
 
     words: tuple[str, ...]
     summary: str
