@@ -49,6 +49,7 @@ COMMANDS: dict[str, str] = {
     "extcap": "lets Wireshark capture from a port through this program",
     "snapshot": "writes or compares the expectations of captures that are tests",
     "config": "where the configured buses and their values come from",
+    "serve": "the terminal UI in a browser, on a capture or on a port that it records",
     "mcp": "answers assistants' questions about captures (Model Context Protocol), reading only",
     "completion": "what teaches a shell to complete commands, options and files",
     "demo": "a virtual RS-485 bus with simulated drives, through the real capture path",

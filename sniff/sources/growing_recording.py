@@ -44,7 +44,7 @@ class GrowingRecordingSource:
         self._clock = clock
         self._items: Iterator[Item] | None = None
         self._due = clock.now()
-        self._now = self._file.session.started
+        self._now: int = self._file.session.started
         self._closed = False
 
     @property
