@@ -12,6 +12,7 @@ import re
 import shlex
 import subprocess
 import sys
+import textwrap
 import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -28,7 +29,7 @@ ENDLESS = frozenset({"live", "record", "demo", "open", "serve", "mcp", "detect",
 """Commands that need a port or a terminal, or go on until somebody ends them."""
 
 _FENCE = re.compile(
-    r'^```(?P<kind>[\w-]*)[ \t]*(?:title="(?P<title>[^"]*)")?[ \t]*\n(?P<text>.*?)^```[ \t]*$', re.M | re.S
+    r'^(?P<in> *)```(?P<kind>[\w-]*) *(?:title="(?P<title>[^"]*)")? *\n(?P<text>.*?)^(?P=in)``` *$', re.M | re.S
 )
 _EXAMPLE = "<!-- an example -->"
 
@@ -49,7 +50,8 @@ def fenced(text: str) -> Iterator[Block]:
     for match in _FENCE.finditer(text):
         before = text[: match.start()].rstrip().rpartition("\n")[2]
         line = text.count("\n", 0, match.start()) + 1
-        yield Block(line, match["kind"], match["title"] or "", match["text"], before.strip() == _EXAMPLE)
+        text_of = textwrap.dedent(match["text"])
+        yield Block(line, match["kind"], match["title"] or "", text_of, before.strip() == _EXAMPLE)
 
 
 def indented(text: str) -> Iterator[Block]:
@@ -70,7 +72,7 @@ def carry_out(block: Block, names: dict[str, Any]) -> list[str]:
         path = Path(block.title)
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(block.text, encoding="utf-8")
-    if block.kind == "python" and not block.title.startswith("test_"):  # those pytest runs
+    if block.kind == "python" and not Path(block.title).name.startswith("test_"):  # those pytest runs
         exec(compile(block.text, f"line {block.line}", "exec"), names)  # an exception tells by itself
     elif block.kind == "toml":
         _load(block.text)
@@ -83,7 +85,7 @@ def carry_out(block: Block, names: dict[str, Any]) -> list[str]:
         for line in block.text.splitlines():
             if line.startswith("sniff485 "):
                 _parse(shlex.split(line.partition(" > ")[0], comments=True)[1:])
-    elif block.kind == "text" and block.text.startswith("#!sniff-capture"):
+    elif block.kind == "text" and block.text.startswith("#!sniff-capture") and "protocol: ping" not in block.text:
         from sniff.formats import read
 
         path = Path("shown.cap.txt")
