@@ -11,6 +11,7 @@ import contextlib
 import os
 import sys
 import traceback
+from collections.abc import Iterable
 from importlib import import_module
 from types import ModuleType
 from typing import cast
@@ -48,6 +49,9 @@ COMMANDS: dict[str, str] = {
     "extcap": "lets Wireshark capture from a port through this program",
     "snapshot": "writes or compares the expectations of captures that are tests",
     "config": "where the configured buses and their values come from",
+    "serve": "the terminal UI in a browser, on a capture or on a port that it records",
+    "mcp": "answers assistants' questions about captures (Model Context Protocol), reading only",
+    "completion": "what teaches a shell to complete commands, options and files",
     "demo": "a virtual RS-485 bus with simulated drives, through the real capture path",
 }
 """Name → what it does, in the order of the help. Each is `sniff/cli/<name>.py`: `configure(parser)`, `run(args)`."""
@@ -138,28 +142,11 @@ def _place(error: Exception) -> str:
 def _run(arguments: list[str]) -> int:
     name = next((word for word in arguments if not word.startswith("-")), None)
     asked = name is None and {"-h", "--help"} & {*arguments}  # all protocols are imported only then
-    parser = argparse.ArgumentParser(
-        prog="sniff485",
-        description=DESCRIPTION,
-        epilog=f"{_protocols()}\n\n{EPILOG}" if asked else EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    parser.add_argument("--version", action="version", version=f"sniff485 {__version__}")
-    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     if name is not None and name not in COMMANDS:
         raise Failure(_no_such_command(name), USAGE)
-    chosen: ModuleType | None = None
-    for command, text in COMMANDS.items():
-        sub = commands.add_parser(
-            command,
-            help=text,
-            description=text[0].upper() + text[1:] + ".",
-            formatter_class=argparse.RawDescriptionHelpFormatter,
-        )
-        if command == name:
-            chosen = import_module(f"sniff.cli.{command}")
-            sub.epilog = chosen.__doc__
-            chosen.configure(sub)
+    epilog = f"{_protocols()}\n\n{EPILOG}" if asked else EPILOG
+    parser, imported = command_line([name] if name is not None else [], epilog)
+    chosen = imported.get(name or "")
     if getattr(chosen, "TOLERANT", False):
         args, _ = parser.parse_known_args(arguments)
     else:
@@ -167,6 +154,36 @@ def _run(arguments: list[str]) -> int:
     assert chosen is not None  # argparse has refused anything else
     with bus_chosen(getattr(args, "bus", None)):
         return int(chosen.run(args))
+
+
+def command_line(
+    configured: Iterable[str] = COMMANDS, epilog: str = EPILOG
+) -> tuple[argparse.ArgumentParser, dict[str, ModuleType]]:
+    """The parser of all commands, and the modules of those whose options it knows; the others are only names.
+
+    What is generated from the command line (manual pages, completion, pages of the documentation) is made from it.
+    """
+    parser = argparse.ArgumentParser(
+        prog="sniff485",
+        description=DESCRIPTION,
+        epilog=epilog,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action="version", version=f"sniff485 {__version__}")
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    wanted, imported = set(configured), {}
+    for command, text in COMMANDS.items():
+        sub = commands.add_parser(
+            command,
+            help=text,
+            description=text[0].upper() + text[1:] + ".",
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+        if command in wanted:
+            imported[command] = module = import_module(f"sniff.cli.{command}")
+            sub.epilog = module.__doc__
+            module.configure(sub)
+    return parser, imported
 
 
 def _protocols() -> str:

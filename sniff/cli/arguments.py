@@ -260,5 +260,9 @@ def colour() -> bool:
 
 
 def on_terminal() -> bool:
-    """Whether there is a whole terminal for the terminal UI, which draws through standard error."""
+    """Whether there is a whole terminal for the terminal UI, which draws through standard error; or a browser."""
+    import os
+
+    if os.environ.get("TEXTUAL_DRIVER", "").endswith(":WebDriver"):  # `serve` starts us so
+        return True
     return sys.stdin.isatty() and sys.stdout.isatty() and sys.stderr.isatty()

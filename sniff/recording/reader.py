@@ -137,7 +137,7 @@ class McapCapture:
         clean = CleanBatches()
         with self._pass(since) as one:
             try:
-                for head, batch in self._raw(one, joiner):
+                for head, batch in self.batches_of(one, joiner):
                     if one.jumped:
                         joiner.next, one.jumped = None, False
                     if since is not None and head[2] < since:
@@ -165,7 +165,7 @@ class McapCapture:
             return self._completeness
         joiner = self._joiner(None)
         with self._pass() as one:
-            for head, batch in self._raw(one, joiner):
+            for head, batch in self.batches_of(one, joiner):
                 joiner.skip(head[1], batch)
             return self._note(one, joiner)
 
@@ -204,7 +204,7 @@ class McapCapture:
 
     # inside
 
-    def _raw(self, one: MessagePass, joiner: Joiner) -> Iterator[tuple[Head, Batch]]:
+    def batches_of(self, one: MessagePass, joiner: Joiner) -> Iterator[tuple[Head, Batch]]:
         """Batches of a pass; what is on /line goes to the joiner."""
         for topic, head, data in one.messages():
             if topic == self._line_topic:
@@ -221,6 +221,15 @@ class McapCapture:
                 yield MessagePass(stream, scan.Report(os.fstat(stream.fileno()).st_size), since, start, self._known)
             except OSError as error:
                 raise explain(self.path, error) from None
+
+    @property
+    def known_topics(self) -> list[str]:
+        """Of the first channels, by number: known before the file says so."""
+        return self._known
+
+    def joiner(self) -> Joiner:
+        """What puts the batches of this file in order from its begin."""
+        return self._joiner(None)
 
     def _joiner(self, since: int | None) -> Joiner:
         return Joiner(self.first_chunk if since is None and self._known_first else None)
