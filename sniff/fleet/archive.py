@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from glob import glob, has_magic
 from pathlib import Path
 
@@ -19,6 +19,7 @@ from sniff.formats.several_buses import buses_in
 from sniff.formats.table import suffixes
 from sniff.recording import scan
 from sniff.recording.reader import McapCapture
+from sniff.recording.rotated import joined
 
 NS_PER_S = 1_000_000_000
 NS_PER_DAY = 86_400 * NS_PER_S
@@ -36,14 +37,29 @@ class FileState:
 
 
 @dataclass(frozen=True, slots=True)
+class Window:
+    """From when (with it) until when (without it), ns; None: from the begin, to the end."""
+
+    begin: int | None
+    end: int | None
+
+
+@dataclass(frozen=True, slots=True)
 class Task:
     """What is read in one go: files that follow one another, of one site and one `bus` of several in them (None: the
-    only one). `protocol`: a registry name, "" where it is not known yet or cannot be."""
+    only one). `protocol`: a registry name, "" where it is not known yet or cannot be. `window`: of a piece of a task
+    that is too large (pieces.py)."""
 
     site: str
     files: tuple[FileState, ...]
     protocol: str = ""
     bus: str | None = None
+    window: Window | None = None
+
+    @property
+    def whole(self) -> Task:
+        """What a piece is a piece of."""
+        return replace(self, window=None)
 
     @property
     def name(self) -> str:
@@ -142,6 +158,16 @@ def tasks_of(found: Sequence[tuple[str, FileState]], since: int | None = None) -
         first, name, _ = members[0]
         tasks.append(Task(site, tuple(file for _, _, file in members), first.session.protocol, name))
     return sorted(tasks, key=lambda task: (task.files[0].path, task.bus or "")), unreadable
+
+
+def opened(task: Task) -> list[Capture]:
+    """The captures of a task, parts of a recording as one. Raises CaptureError."""
+    return [capture for _, capture in joined([(file.path, _bus_of(task, read(file.path))) for file in task.files])]
+
+
+def _bus_of(task: Task, capture: Capture) -> Capture:
+    """The bus that a task is about."""
+    return next(bus for bus in buses_in(capture) if task.bus in (None, bus.session.bus))
 
 
 def _why(error: CaptureError, file: FileState) -> str:

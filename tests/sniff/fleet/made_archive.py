@@ -13,6 +13,7 @@ from sniff.engine.session import LineEvent, Session
 from sniff.fleet.answer import Answer
 from sniff.fleet.bus_day import Archive
 from sniff.recording.writer import create
+from sniff.simulation.tap import TapModel
 from tests.faults.case import Case, Said
 from tests.faults.cases import CASES
 from tests.faults.clean_cases import clean_cases
@@ -86,10 +87,10 @@ def plans(count: int, faults: Iterable[str], days: int, seconds: float, kinds: S
     return made
 
 
-def write(folder: Path, plan: Plan, day: int, seconds: float) -> Path:
-    """One day of a bus as a recording: some seconds of it, in the morning."""
+def write(folder: Path, plan: Plan, day: int, seconds: float, tap: TapModel | None = None) -> Path:
+    """One day of a bus as a recording: some seconds of it, in the morning, through `tap` (default: as the case has)."""
     of_day = plan.on(day)
-    session, items = of_day.hear(of_day.make(seed=100 * day + hash_of(plan.bus)), seconds, of_day.tap)
+    session, items = of_day.hear(of_day.make(seed=100 * day + hash_of(plan.bus)), seconds, tap or of_day.tap)
     begin = FIRST_DAY + day * 86_400 * NS_PER_S + 8 * 3600 * NS_PER_S
     listed = list(items)
     shift = begin - (listed[0].time if listed else 0)
