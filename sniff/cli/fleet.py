@@ -20,7 +20,7 @@ from sniff.cli import UNREADABLE, USAGE, Failure, arguments, json_output, writin
 from sniff.engine.capture import CaptureError
 from sniff.fleet import running
 from sniff.fleet.answer import Answer, answer, marks
-from sniff.fleet.archive import FileState, Task, files_below, is_being_written, tasks_of
+from sniff.fleet.archive import FileState, Task, Unreadable, files_below, is_being_written, tasks_of
 from sniff.fleet.bus_day import Archive, BusDay
 from sniff.fleet.index import NAME, Index
 from sniff.fleet.pieces import cut
@@ -67,11 +67,10 @@ def run(args: argparse.Namespace) -> int:
 def _once(args: argparse.Namespace, index: Index | None) -> int:
     now = time.time_ns()
     found = [one for one in _find(args) if not is_being_written(one[1], now)]
-    tasks, unreadable = tasks_of(found, args.since)
+    tasks, unreadable = tasks_of(found, args.since) if index is None else _known_tasks(index, found, args.since)
     archive = Archive(unreadable={one.file.path: one.why for one in unreadable})
     missing = []
-    for task in tasks:
-        known = index.get(task) if index is not None else None
+    for task, known in index.known(tasks) if index is not None else ((task, None) for task in tasks):
         if known is None:
             missing.append(task)
         for day in known or ():
@@ -87,6 +86,14 @@ def _once(args: argparse.Namespace, index: Index | None) -> int:
     if archive.unreadable:
         return UNREADABLE
     return int(any(bus.troubles or bus.is_silent for bus in said.buses))
+
+
+def _known_tasks(
+    index: Index, found: list[tuple[str, FileState]], since: int | None
+) -> tuple[list[Task], list[Unreadable]]:
+    grouped = tasks_of(found, since, index.look())
+    index.keep_looks()
+    return grouped
 
 
 def _add(args: argparse.Namespace, archive: Archive, day: BusDay) -> None:
@@ -118,6 +125,8 @@ def _read(args: argparse.Namespace, index: Index | None, archive: Archive, missi
                 index.put(done.task, list(done.days))
             for day in done.days:
                 _add(args, archive, day)
+    if index is not None:
+        index.flush()
     progress.clear()
 
 

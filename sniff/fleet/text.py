@@ -32,7 +32,7 @@ def page(found: Answer, shown: int = SHOWN, width: int | None = None, height: in
     foot = list(_foot(found, shown))
     room = None if height is None else max(1, height - len(head) - len(foot) - 1)
     told, used = 0, 0
-    blocks = []
+    blocks: list[list[str]] = []
     for bus in found.buses[:shown]:
         block = list(_bus(bus, _days(found)))
         used += len(block)

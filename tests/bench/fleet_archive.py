@@ -93,8 +93,8 @@ def _judged(folder: Path, planned: list[Plan], args: argparse.Namespace) -> int:
     spent = resource.getrusage(resource.RUSAGE_CHILDREN)
     print(f"judged in {spent.ru_utime + spent.ru_stime:.0f} s of cores, exit code {done.returncode}")
     archive, index = Archive(), Index(folder / NAME)
-    for task in tasks_of(files_below([str(folder)]))[0]:
-        for day in index.get(task) or ():
+    for _, days in index.known(tasks_of(files_below([str(folder)]))[0]):
+        for day in days or ():
             archive.add(day)
     wrong = [*wrong_in(answer(archive), archive, planned), *wrong_in_json(done.stdout, planned)]
     for sentence in wrong:

@@ -27,7 +27,7 @@ from sniff.engine.session import Session
 from sniff.fleet import codec, running
 from sniff.fleet import index as index_module
 from sniff.fleet.answer import Answer, Change, Fresh, answer, marks
-from sniff.fleet.archive import files_below, tasks_of
+from sniff.fleet.archive import FileState, Task, files_below, tasks_of
 from sniff.fleet.bus_day import Archive, BusDay, Judged, empty_summary
 from sniff.fleet.drift import Sure
 from sniff.fleet.html import page as html_page
@@ -123,12 +123,15 @@ def test_a_second_run_reads_only_what_is_new(
     first = capsys.readouterr().out
     assert len(read) == 4
     read.clear()
+    looked: list[str] = []
+    whole_look = index_module.look
+    monkeypatch.setattr(index_module, "look", lambda file: looked.append(file.path) or whole_look(file))
     main(asked)
-    assert read == []
+    assert (read, looked) == ([], [])
     assert _without_freshness(capsys.readouterr().out) == _without_freshness(first)
     shutil.copy(made[0] / "north/trunk-00/day-3.mcap", folder / "north/trunk-00/day-3.mcap")
     main(asked)
-    assert read == [str(folder / "north/trunk-00/day-3.mcap")]
+    assert read == looked == [str(folder / "north/trunk-00/day-3.mcap")]
     said = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     fresh = {one["since_last_run"] for bus in said for one in bus.get("findings", ())}
     assert fresh == {"new"}
@@ -184,7 +187,7 @@ def test_workers_load_no_scapy(made: Made) -> None:
     """Its licence and Dask's libraries stay in processes of their own."""
     program = (
         "import sys\n"
-        "from sniff.fleet.archive import files_below, tasks_of\n"
+        "from sniff.fleet.archive import FileState, Task, files_below, tasks_of\n"
         "from sniff.fleet.running import do\n"
         f"tasks, _ = tasks_of(files_below([{str(made[0])!r}]))\n"
         "assert all(do(task).failed is None for task in tasks[::5])\n"
@@ -293,6 +296,24 @@ def test_buses_that_record_nothing(days: list[BusDay]) -> None:
     assert "no capture since 2026-03-04, while other buses go on" in text
 
 
+def test_what_is_known_of_a_file_is_forgotten_when_it_changes(made: Made, tmp_path: Path) -> None:
+    index = Index(tmp_path / "x.sqlite")
+    (site, file), *_ = files_below([str(made[0] / "north/trunk-00")])
+    first = tasks_of([(site, file)], look=index.look())
+    index.keep_looks()
+    assert tasks_of([(site, file)], look=index.look()) == first
+    changed = FileState(str(tmp_path / "not there"), file.size, file.changed)
+    assert tasks_of([(site, changed)], look=index.look())[1][0].why.startswith("no such file")
+    with index._reach() as base:
+        base.execute("UPDATE file SET begins = 'nonsense'")
+    assert tasks_of([(site, file)], look=index.look()) == first
+
+
+def known(index: Index, task: Task) -> list[BusDay] | None:
+    ((_, days),) = index.known([task])
+    return days
+
+
 def test_an_index_of_somebody_else_is_refused_or_read_again(made: Made, tmp_path: Path) -> None:
     (tmp_path / "x.sqlite").write_bytes(b"this is no data base at all, " * 100)
     with pytest.raises(CaptureError, match="cannot be used"):
@@ -300,10 +321,11 @@ def test_an_index_of_somebody_else_is_refused_or_read_again(made: Made, tmp_path
     tasks, _ = tasks_of(files_below([str(made[0] / "north/trunk-00")]))
     index = Index(tmp_path / "y.sqlite")
     index.put(tasks[0], read_task(tasks[0]))
-    assert index.get(tasks[0]) is not None
+    index.flush()
+    assert known(index, tasks[0]) is not None
     with index._reach() as base:
         base.execute("""UPDATE task SET days = '[{"site": 1}]'""")
-    assert index.get(tasks[0]) is None
+    assert known(index, tasks[0]) is None
 
 
 def test_a_recording_of_several_buses_is_several_buses(made: Made, tmp_path: Path) -> None:
