@@ -31,8 +31,9 @@ _SURE = {Sure.SURE: "sure", Sure.LIKELY: "likely", Sure.OPEN: "open"}
 
 @dataclass(frozen=True, slots=True)
 class GuessedPoint:
-    """What one register of a point may be. `is_itself`: the register as it is, a whole number; `value`: of the latest samples, so read; `is_covered`: it is a further part
-    of the value that begins before it. `history`: times, ns, and values so read. The others as in `RegisterGuess`."""
+    """What one register of a point may be. `value`: of the latest samples, so read; `is_itself`: the register as it is,
+    a whole number; `is_covered`: it is a further part of the value that begins before it. `history`: times, ns, and
+    values so read. The others as in `RegisterGuess`."""
 
     words: str
     value: float | None
