@@ -60,14 +60,12 @@ def rows(sniff485: Callable[..., Any], path: Path, protocol: str, device: str, f
     return shown
 
 
-@pytest.mark.parametrize(
-    ("device", "printed"),
-    [("teco-e510", RTU), ("teco-f510", RTU), ("automationdirect-acn", ACN)],
-    ids=["E", "F", "ACN"],
-)
-def test_rtu_frames(
-    device: str, printed: tuple[tuple[str, str], ...], sniff485: Callable[..., Any], tmp_path: Path
-) -> None:
+PRINTED = {"teco-e510": RTU, "teco-f510": RTU, "automationdirect-acn": ACN}
+
+
+@pytest.mark.parametrize("device", PRINTED)
+def test_rtu_frames(device: str, sniff485: Callable[..., Any], tmp_path: Path) -> None:
+    printed = PRINTED[device]
     frames = [bytes.fromhex(octets) for octets, _ in printed]
     for row, (octets, said) in zip(
         rows(sniff485, tmp_path / "printed.cap.txt", "modbus-rtu", device, frames), printed, strict=True
