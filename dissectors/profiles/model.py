@@ -254,14 +254,9 @@ class Profile:
         return self.limits.get(family, Limits())
 
     def lacks(self, space: str, part: str) -> bool:
-        """Whether the maker says that objects of this kind do not have a property."""
-        kinds = self.properties.get(part.partition(".")[0])
-        return (
-            bool(part)
-            and kinds is not None
-            and space not in kinds
-            and any(space in k for k in self.properties.values())
-        )
+        """Whether the maker says that objects of this kind do not have a property; without a `part`, a value."""
+        kinds = self.properties.get(part.partition(".")[0] or "present-value")
+        return kinds is not None and space not in kinds and any(space in k for k in self.properties.values())
 
     def exception(self, family: str, code: int) -> str:
         """The maker's words for an exception code; empty when there are none."""

@@ -185,7 +185,8 @@ def _print_codes(profile: Profile) -> None:
         for bit in entry.bits:
             print(f"  bit {bit.number:X}  {bit.on}" + (f", else {bit.off}" if bit.off else ""))
         if entry.reserved_bits:
-            print(f"  bits {' '.join(f'{bit:X}' for bit in entry.reserved_bits)}  reserved, to be written as 0")
+            bits = " ".join(f"{bit:X}" for bit in entry.reserved_bits)
+            print(f"  bits {bits}  reserved" + (", to be written as 0" if entry.access.writable else ""))
         for part in entry.parts:
             print(f"  bits {part.low:X}…{part.high:X}  {part.name}")
             for code, words in part.states.items():

@@ -42,6 +42,9 @@ from sniff.recording.topics import (
     topics_of,
 )
 
+FAR = (1 << 63) - 1
+"""ns; after everything."""
+
 MOST_PROFILE = 1 << 20
 """Octets of an attached device profile; a longer one is passed over."""
 MOST_PROFILES = 64
@@ -168,6 +171,14 @@ class McapCapture:
             for head, batch in self.batches_of(one, joiner):
                 joiner.skip(head[1], batch)
             return self._note(one, joiner)
+
+    def chunk_index(self) -> scan.ChunkIndex:
+        """Where the chunks of the file are; none of them is read. Raises CaptureError."""
+        with self._pass(FAR) as one:
+            for _ in one.messages():
+                pass
+            self._index = one.report.chunks
+        return self._index
 
     # what else is in the file
 
