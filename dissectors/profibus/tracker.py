@@ -104,6 +104,8 @@ class ProfibusTracker:
     def _repeats(self, asked: _Asked, earlier: _Asked) -> bool:
         if asked.frame.octets != earlier.frame.octets or asked.header.role is Role.POLL:
             return False
+        if earlier is not self._past:  # a master repeats at once, or not at all: this one asks anew
+            return False
         if not earlier.is_answered:
             return True
         counts = asked.control is not None and asked.control.fcv
@@ -134,10 +136,10 @@ class ProfibusTracker:
         if not frame.ok:
             verdict = Verdict.DATA
         elif past is not None and self._open is None and _is_of(header, past):
-            of = past.id
+            of = past.id if self._is_clear or not past.is_answered else None
             if not past.is_answered:
                 verdict = Verdict.LATE
-            else:
+            elif of is not None:  # else it may answer a request that was lost among damaged octets
                 verdict = Verdict.ECHO if frame.octets == past.answer else Verdict.ANSWERED_TWICE
         elif past is not None and not past.is_answered and header.source is not None and _is_of(header, past):
             verdict, of = Verdict.LATE, past.id
