@@ -3,7 +3,7 @@
     request ──► open ──► answer of that station to that master, or SC          answered; after a repeat: retry
                   │ ───► answer that refuses (UE, RR, RS)                      exception
                   │ ───► damaged telegram or rubbish in its place              damaged answer
-                  │ ───► next request, token, silence                          no answer
+                  │ ───► next request, token, silence                          no answer; a poll: one-way
     SDN, to one or to all                                                      data, broadcast
     token                                                                      one-way
     answer without a request                  late after no answer; answered twice, echo after an answer; else unasked
@@ -169,6 +169,8 @@ class ProfibusTracker:
         self._past = asked
         if not asked.frame.ok:
             verdict = Verdict.DAMAGED_REQUEST
+        elif asked.header.role is Role.POLL:
+            verdict = Verdict.DATA  # nobody need be there
         else:
             verdict = Verdict.DAMAGED_ANSWER if asked.disturbed else Verdict.NO_RESPONSE
         return (closed_exchange(asked, verdict),)
