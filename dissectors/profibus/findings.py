@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 from dissectors.findings import Finding, Severity, Tally, counted, times
 from dissectors.frame import Event, Frame, Header, Role
@@ -37,7 +37,9 @@ class ProfibusFindings:
 
     def __init__(self, timing: Timing) -> None:
         self._watch = BusWatch(timing, self._noticed)
-        self._slow = timing.line.bits(usual_tsdr(timing.line.baud) + _TOLERANCE)
+        self._usual, self._tolerance = timing.line.bits(usual_tsdr(timing.line.baud)), timing.line.bits(_TOLERANCE)
+        self._most: Callable[[int], int | None] | None = None
+        self._limits: dict[int, int] = {}
         self._records: dict[int, Record] = defaultdict(Record)
         self._noted: dict[tuple[Notice, int], Tally] = defaultdict(Tally)
         self._diagnosed: dict[int, dict[str, Tally]] = defaultdict(lambda: defaultdict(Tally))
@@ -66,7 +68,19 @@ class ProfibusFindings:
     def settle(self, transaction: Transaction) -> None:
         """Take a transaction that closed."""
         if transaction.station is not None and not transaction.is_passing:
-            self._records[transaction.station].settle(transaction, self._slow)
+            self._records[transaction.station].settle(transaction, self._slow_of(transaction.station))
+
+    def know_response_times(self, most: Callable[[int], int | None]) -> None:
+        """Let a device's GSD say how long it may take, where there is one."""
+        self._most = most
+
+    def _slow_of(self, address: int) -> int:
+        """ns above which an answer of a station is slow."""
+        limit = self._limits.get(address)
+        if limit is None:
+            said = None if self._most is None else self._most(address)
+            limit = self._limits[address] = self._usual if said is None else said
+        return limit + self._tolerance
 
     def ring(self) -> Ring:
         """The ring so far."""
@@ -127,7 +141,9 @@ class ProfibusFindings:
             yield record.refused.found(RULES["PB017"], who, seen, _grave(record.put_off, record.exchanged))
         if record.slow.count >= _LEAST and record.slow.count >= _SLOW_SHARE * total:
             slowest = milliseconds(record.slowest)
-            seen = f"{record.slow.count} of {total} answers later than usual; the slowest after {slowest}"
+            limit = self._limits.get(who.station or 0, self._usual)
+            allowed = "usual" if limit == self._usual else f"its GSD allows ({milliseconds(limit)})"
+            seen = f"{record.slow.count} of {total} answers later than {allowed}; the slowest after {slowest}"
             yield record.slow.found(RULES["PB018"], who, seen)
 
     def _of_repeats(self) -> Iterator[Finding]:

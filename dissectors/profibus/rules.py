@@ -178,9 +178,10 @@ RULES: dict[str, Rule] = {
             "PB018",
             Severity.NOTE,
             "slower than usual",
-            "Even the smallest reading of the answer time is above the usual longest station delay (max TSDR): 60 bit "
-            "times up to 187.5 kBd, 100 at 500 kBd, 150 at 1.5 MBd, 250 at 3 MBd, 450 at 6 MBd, 800 at 12 MBd. Only "
-            "where the adapter tells times that exactly; the device's GSD may allow more.",
+            "Even the smallest reading of one answer in ten or more is above the longest station delay (max TSDR) of "
+            "the device's GSD, or where none is given above the usual one: 60 bit times up to 187.5 kBd, 100 at 500 "
+            "kBd, 150 at 1.5 MBd, 250 at 3 MBd, 450 at 6 MBd, 800 at 12 MBd. Only where the adapter tells times that "
+            "exactly.",
             "a slow device, a repeater or a converter in between",
             "MaxTsdr in the GSD file of the device, and the slot time of the project",
         ),

@@ -4,10 +4,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from dissectors.histogram import Histogram
 from dissectors.line import MS
 from dissectors.profibus.control import Status
-from dissectors.profibus.diagnosis import EXTENDED, LOCKED, NO_MASTER, Diagnosis, parse_diagnosis
+from dissectors.profibus.diagnosis import (
+    CONFIGURATION_FAULT,
+    EXTENDED,
+    LOCKED,
+    NO_MASTER,
+    PARAMETER_FAULT,
+    Diagnosis,
+    parse_diagnosis,
+)
 from dissectors.profibus.parameters import UNLOCK, Parameters, parse_parameters
+from dissectors.profibus.ring import SlaveCounts
 from dissectors.profibus.services import Service
 from dissectors.profibus.slave_state import SlaveState
 from dissectors.profibus.telegram import Telegram
@@ -45,6 +55,17 @@ class SlaveView:
     asked: int | None = None  # when its master asked it last, ns
     silence: int = 0  # the longest pause between requests of its master since it answered well
     survived: int = 0  # the longest such pause after which it still exchanged data
+    cycle: Histogram = field(default_factory=Histogram)
+    begun: int | None = None  # when its newest exchange of data began, ns; None after a disturbance
+    lost: int = 0
+    syncs: int = 0
+    repeats: int = 0
+    longest: int = 0
+    run: int = 0
+    illegal: int = 0
+    rejects: int = 0
+    diagnoses: int = 0
+    faults: int = 0
     is_blurred: bool = False  # octets were damaged since it last answered: what its master told it may be lost here
 
     def ask(self, time: int, master: int) -> None:
@@ -53,6 +74,38 @@ class SlaveView:
             return
         self.silence = max(self.silence, 0 if self.asked is None else time - self.asked)
         self.asked = time
+
+    def request(self, asked: Telegram, is_exchange: bool, is_repeat: bool, time: int) -> None:
+        """Count a request to it. `is_repeat`: it is the one directly before once more."""
+        control = asked.control
+        if is_repeat:
+            self.repeats, self.run = self.repeats + 1, self.run + 1
+            self.longest = max(self.longest, self.run)
+            return
+        self.run = 0
+        if control is not None and control.fcb and not control.fcv:
+            self.syncs += 1
+            self.lost += self.state is SlaveState.EXCHANGE and self.unanswered > 0
+            if self.unanswered and self.state is SlaveState.EXCHANGE:
+                self.become(SlaveState.OFFLINE, time)
+        if is_exchange:
+            if self.begun is not None:
+                self.cycle.add(time - self.begun)
+            self.begun = time
+
+    @property
+    def counts(self) -> SlaveCounts:
+        """What went otherwise than smoothly."""
+        return SlaveCounts(
+            self.lost,
+            self.syncs,
+            self.repeats,
+            self.longest,
+            self.illegal,
+            self.rejects,
+            self.diagnoses,
+            self.faults,
+        )
 
     def heard(self, is_exchange: bool) -> None:
         """It has answered."""
@@ -91,6 +144,7 @@ class SlaveView:
         """Take an answer; whether it shows that the slave left data exchange by itself."""
         self.unanswered = 0
         status = None if answer.control is None else answer.control.status
+        self.rejects += status is not None and status.refuses
         if service is Service.DATA_EXCHANGE:
             return self._exchanged(status, time)
         if status is not None and status.refuses:
@@ -126,6 +180,8 @@ class SlaveView:
 
     def _diagnosed(self, said: Diagnosis, time: int) -> bool:
         self.told, self.urgent = said, 0
+        self.diagnoses += 1
+        self.faults += bool(said.first & (EXTENDED | CONFIGURATION_FAULT | PARAMETER_FAULT))
         if said.master != NO_MASTER:
             self.owner = said.master
         if not said.wants_parameters:

@@ -88,6 +88,7 @@ class BusWatch:
         self._least_claim = timing.line.bits(_LEAST_CLAIM)
         self._holder: int | None = None
         self._robbed: int | None = None  # who lost the token to another one that gave it up; until it speaks in turn
+        self._newest = b""  # the newest request, while no token or other request came after it
         self._longest_clear: dict[int, int] = {}
         self._token: tuple[int, int] | None = None  # source and destination of the last token, nothing after it
         self._asked: tuple[Telegram, Service, int] | None = None  # an open request and its end
@@ -113,13 +114,17 @@ class BusWatch:
 
     def miss(self, time: int) -> None:
         """Octets were lost or damaged: what is missing there says nothing."""
+        if self._asked is not None and self._asked[0].destination in self.slaves:
+            slave = self.slaves[self._asked[0].destination]
+            slave.illegal += 1
+            slave.unanswered += 1
         self._asked = self._token = self._holder = None
         for master in self._masters.values():
             master.got = None
             if master.clear is not None:
                 master.clear.is_blurred = True
         for slave in self.slaves.values():
-            slave.is_blurred = True
+            slave.is_blurred, slave.begun = True, None
 
     def longest_clear(self, master: int) -> int:
         """For how long a master exchanged data in Clear without a break, at most, ns."""
@@ -136,7 +141,15 @@ class BusWatch:
             for address, one in self._masters.items()
         }
         slaves = {
-            address: SlaveRow(view.state, view.changes[-1][0], view.changed, view.exchanges, tuple(view.changes))
+            address: SlaveRow(
+                view.state,
+                view.changes[-1][0],
+                view.changed,
+                view.exchanges,
+                tuple(view.changes),
+                view.counts,
+                view.cycle.copy(),
+            )
             for address, view in self.slaves.items()
             if view.state is not None
         }
@@ -150,6 +163,7 @@ class BusWatch:
         if source is None or to is None:
             return
         self._unanswered(frame.start)
+        self._newest = b""
         giver = self._master(source)
         is_again = self._token == (source, to) and source != to
         by_another = self._token is None or self._token[0] != source  # else its taker is gone, and it goes on alone
@@ -213,8 +227,11 @@ class BusWatch:
             master.clear = None  # outputs that are not zero: the end of Clear was not heard
         if asked.control is not None and asked.control.wants_answer and to <= HIGHEST:
             self._asked = asked, service, frame.end
-            if not is_poll and to in self.slaves:
-                self.slaves[to].ask(frame.start, source)
+            if not is_poll:
+                slave = self.slaves.setdefault(to, SlaveView())
+                slave.ask(frame.start, source)
+                slave.request(asked, service is Service.DATA_EXCHANGE, frame.octets == self._newest, frame.start)
+        self._newest = frame.octets
 
     def _answer(self, no: int, answer: Telegram, frame: Frame) -> None:
         if self._asked is None:
