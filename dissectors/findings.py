@@ -150,6 +150,15 @@ class WordsExceptions(Protocol):
         ...
 
 
+@runtime_checkable
+class KnowsResponseTimes(Protocol):
+    """A judge that can be told how long each station may take to answer by the papers of its device."""
+
+    def know_response_times(self, most: Callable[[int], int | None]) -> None:
+        """`most(station)`: ns, None where nobody says. Use it from here on."""
+        ...
+
+
 @dataclass(slots=True)
 class Tally:
     """How often, when (ns) and in which frames one thing was seen; the first EVIDENCE_MAX frames are kept."""

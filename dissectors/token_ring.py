@@ -62,12 +62,21 @@ class WatchesRing(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
+class StationTable:
+    """Stations that do not pass the token, a row each, counted as the protocol's people count them."""
+
+    headings: tuple[str, ...]
+    rows: Callable[[Any], list[tuple[Cell, ...]]]
+
+
+@dataclass(frozen=True, slots=True)
 class TokenRing:
     """How a protocol's ring is watched and shown; `ring` is what its observer gives.
 
     `observer(timing)`: watches a bus. `window(before, after)`: what changed between two looks.
     `order(ring)`: its masters in the order of the token; empty when no closed ring was seen.
-    `headings`, `rows(ring)`: a table, one row a master. `sentences(ring)`: what it comes to.
+    `headings`, `rows(ring)`: a table, one row a master. `sentences(ring)`: what it comes to. `stations`: of who answers
+    only, where the protocol has such.
     """
 
     observer: Callable[[Timing], RingObserver]
@@ -76,3 +85,4 @@ class TokenRing:
     headings: tuple[str, ...]
     rows: Callable[[Any], list[tuple[Cell, ...]]]
     sentences: Callable[[Any], list[str]]
+    stations: StationTable | None = None

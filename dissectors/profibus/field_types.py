@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dissectors.field_types import FieldType, FieldTypes, Kind, texts
 from dissectors.profibus.control import REQUESTS, StationType, Status
+from dissectors.profibus.diagnosis import DIAGNOSIS_BITS
+from dissectors.profibus.dpv1 import FUNCTIONS
 from dissectors.profibus.services import Service
 from dissectors.profibus.telegram import SC, SD1, SD2, SD3, SD4
 
@@ -40,14 +42,29 @@ def types() -> FieldTypes:
         "pb.diag.words": FieldType(text, "a diagnosis in words", several=False),
         "pb.diag.master": FieldType(number, "master that parameterised the slave, 255 for none"),
         "pb.diag.ident": FieldType(number, "ident number"),
+        **{f"pb.diag.{name}": FieldType(Kind.TRUTH, words) for name, (_, _, words) in DIAGNOSIS_BITS.items()},
+        "pb.diag.blocks": FieldType(text, "extended diagnosis in words", several=False),
+        "pb.diag.module": FieldType(number, "module of the first channel diagnosis"),
+        "pb.diag.channel": FieldType(number, "channel of the first channel diagnosis"),
+        "pb.diag.error": FieldType(text, "what is wrong at that channel", several=False),
+        "pb.v1.function": FieldType(number, "function of DP-V1", {words: code for code, words in FUNCTIONS.items()}),
+        "pb.v1.function.name": FieldType(text, "the same in words", texts(FUNCTIONS.values())),
+        "pb.v1.slot": FieldType(number, "slot read, written or told of"),
+        "pb.v1.index": FieldType(number, "index read or written"),
+        "pb.v1.length": FieldType(number, "octets asked for or told"),
+        "pb.v1.data": FieldType(octets, "data of DP-V1"),
+        "pb.v1.error": FieldType(text, "why it is refused", several=False),
+        "pb.malformed": FieldType(text, "what is wrong with the content", several=False),
         "pb.diag.extended": FieldType(octets, "extended diagnosis"),
         "pb.prm.status": FieldType(number, "station status of Set_Prm"),
+        "pb.prm.words": FieldType(text, "the same in words", several=False),
         "pb.prm.watchdog_ms": FieldType(Kind.DURATION, "watchdog", unit="ms"),
         "pb.prm.tsdr": FieldType(number, "min TSDR, bit times"),
         "pb.prm.ident": FieldType(number, "ident number"),
         "pb.prm.groups": FieldType(number, "groups, a bit each"),
         "pb.prm.user": FieldType(octets, "user parameters"),
         "pb.cfg": FieldType(octets, "configuration"),
+        "pb.cfg.words": FieldType(text, "modules in words", several=False),
         "pb.cfg.inputs": FieldType(number, "octets of inputs"),
         "pb.cfg.outputs": FieldType(number, "octets of outputs"),
         "pb.cfg.modules": FieldType(number, "modules"),

@@ -176,12 +176,14 @@ class Limits:
 
     `frame`: octets; `response`: ns; `stations`: the lowest and the highest number that it can be given; `functions`:
     the codes that it knows; `unexecuted`: what it acknowledges and does not do, as the kind of the exchange, or that
-    and the kind of object: "release-override", "override:AI". `read_only`: attributes and properties that can only be
+    and the kind of object: "release-override", "override:AI". `responses`: ns by rate (Bd), where that differs.
+    `read_only`: attributes and properties that can only be
     read, with their kind of object: "AI:object-status".
     """
 
     frame: int | None = None
     response: int | None = None
+    responses: Mapping[int, int] = field(default_factory=dict)
     stations: tuple[int, int] | None = None
     functions: frozenset[int] | None = None
     unexecuted: frozenset[str] = frozenset()
@@ -282,6 +284,11 @@ class Devices:
         """The maker's words for an exception code of a station; empty when there are none."""
         profile = self.at(address)
         return "" if profile is None else profile.exception(family, code)
+
+    def response_at(self, address: int, family: str, baud: int) -> int | None:
+        """ns that a station may take to answer at a rate, by its papers; None where they do not say."""
+        profile = self.at(address)
+        return None if profile is None else profile.limits_on(family).responses.get(baud)
 
     def __bool__(self) -> bool:
         return bool(self.by_address) or self.default is not None

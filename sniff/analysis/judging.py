@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from dissectors import registry
-from dissectors.findings import Finding, Rule, WordsExceptions
+from dissectors.findings import Finding, KnowsResponseTimes, Rule, WordsExceptions
 from dissectors.frame import Noise, Place, Reason
 from dissectors.manifest import Dissector
 from dissectors.profiles import Devices
@@ -41,6 +41,9 @@ class Judging:
         if devices and isinstance(self.judge, WordsExceptions):
             family = dissector.profile_family
             self.judge.word_exceptions(lambda station, code: devices.exception(station, family, code))
+        if devices and isinstance(self.judge, KnowsResponseTimes):
+            family, baud = dissector.profile_family, session.timing.line.baud
+            self.judge.know_response_times(lambda station: devices.response_at(station, family, baud))
         self._searching = False
         self._hole: int | None = None  # when octets were lost, by the newest line event that says so
         self._first_after: int | None = None  # number of the first row that ends after it

@@ -30,7 +30,7 @@ COMMANDS: dict[str, str] = {
     "open": "terminal UI on captures",
     "show": "frames of captures, one line each, or JSON, tree, hex, fields",
     "info": "what is in a capture: times, counts, nodes, settings, completeness",
-    "stats": "tables: nodes, transactions, latency, load, ring, polls, health",
+    "stats": "tables: nodes, transactions, latency, load, ring, stations, polls, health",
     "points": "values by name: registers and objects of every station, scaled, with unit and quality",
     "profile": "device profiles: list, show, check; guess and draft from a capture, import of register maps",
     "check": "what is wrong with a bus, where, and what to do next: findings with evidence",

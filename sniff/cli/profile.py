@@ -114,6 +114,9 @@ def _show(args: argparse.Namespace) -> int:
             print(f"{family} longest frame: {limits.frame} octets")
         if limits.response is not None:
             print(f"{family} answers within: {limits.response / MS:g} ms")
+        if limits.responses:
+            by_rate = ", ".join(f"{rate} Bd {most / MS:g} ms" for rate, most in sorted(limits.responses.items()))
+            print(f"{family} answers within: {by_rate}")
         if limits.stations is not None:
             print(f"{family} station numbers: {limits.stations[0]} … {limits.stations[1]}")
         if limits.functions is not None:

@@ -20,6 +20,7 @@ from tests.faults.hearing import busy_host, hidden_latency
 from tests.faults.misbehaving import ScansOnce
 from tests.faults.n2_clean_cases import n2_clean_cases
 from tests.faults.profibus_cases import profibus
+from tests.faults.profibus_clean_cases import profibus_clean_cases
 from tests.faults.ring_nodes import TestsItself
 from tests.faults.ring_programs import Lister, Scans, Segmenting, controller, drive
 from tests.faults.uneven_stations import Waits
@@ -256,6 +257,7 @@ def clean_cases(seconds: float) -> Iterator[Case]:
             heard = seconds / 6 if shorter else seconds
             yield Case(f"{kind.name}, {tap.name}", kind.make, (), tap, heard, kind.hear)
     yield from n2_clean_cases(seconds / 6)
+    yield from profibus_clean_cases(seconds / 6)
     yield from unsteady_cases()
 
 
