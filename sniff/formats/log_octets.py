@@ -8,13 +8,16 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 SURELY = 4
 """Octets in a run that are no number of the line, no time and no length."""
 
 PAIRS_ONLY = 0
 """No base: numbers are no octets."""
+
+_MOSTLY = 0.7
+"""Share of a run's tokens that are octets, from which on the others are meant as octets."""
 
 _SEPARATOR = r"(?:[ ]?[,;][ ]?|[:._-]|[ \t]{1,2})"
 CONTROLS = [
@@ -79,12 +82,16 @@ class Spelling:
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """Octets found in a line, and where their text stands."""
+    """Octets found in a line, and where their text stands. `broken`: beside them stands what should be an octet of
+    theirs and is none, so that they are not all. `wordy`: hexadecimal without any decimal digit, as words may be.
+    """
 
     begin: int
     end: int
     octets: bytes
     spelling: str
+    broken: bool = False
+    wordy: bool = False
 
 
 def _by(pattern: str, base: int) -> Callable[[str], bytes]:
@@ -185,7 +192,7 @@ _PATTERNS = [(one, one.pattern()) for one in SPELLINGS]
 
 _DIGITS = re.compile(
     r"(?<![0-9A-Za-z_#.])[0-9A-Fa-f]{1,3}(?![0-9A-Za-z_])"
-    r"(?:(?P<between>[ ]?[,;][ ]?|[:._/-]|[ \t]{1,2})[0-9A-Fa-f]{1,3}(?![0-9A-Za-z_])"
+    r"(?:(?P<between>[ ]?[,;][ ]?|[:._/|-]|[ \t]{1,2})[0-9A-Fa-f]{1,3}(?![0-9A-Za-z_])"
     r"(?:(?P=between)[ \t]?[0-9A-Fa-f]{1,3}(?![0-9A-Za-z_]))*)?"
 )
 """A run of one to three digits with the same between any two (one space more is a column)."""
@@ -207,8 +214,14 @@ def octets_in(line: str, base: int = PAIRS_ONLY) -> Run | None:
             except (ValueError, SyntaxError):
                 continue
             if octets:
-                return Run(match.start(), match.end(), octets, spelling.name)
-    return _digits(line, base) or _words(line) or _single(line)
+                broken = is_broken(line, match.start(), match.end())
+                return Run(match.start(), match.end(), octets, spelling.name, broken)
+    run = _digits(line, base) or _words(line) or _single(line)
+    if run is None or base == 10:
+        return run
+    text = line[run.begin : run.end]
+    wordy = not any(sign.isdigit() for sign in text) and len(set(run.octets)) > 1
+    return replace(run, wordy=True) if wordy else run
 
 
 def numbers_in(line: str) -> tuple[str, ...]:
@@ -222,7 +235,7 @@ def _digits(line: str, base: int) -> Run | None:
     while (match := _DIGITS.search(line, at)) is not None:
         tokens = _TOKEN.findall(match[0])
         at = match.start() + len(tokens[0]) if len(tokens) < 4 else match.end()  # a number may stand before the octets
-        run = _numbers(match, tokens, base) if len(tokens) > 1 else None
+        run = _numbers(line, match, tokens, base) if len(tokens) > 1 else None
         if run is not None and (best is None or len(run.octets) > len(best.octets)):
             best = run
             if len(run.octets) >= SURELY:
@@ -230,16 +243,113 @@ def _digits(line: str, base: int) -> Run | None:
     return best
 
 
-def _numbers(match: re.Match[str], tokens: list[str], base: int) -> Run | None:
-    if base != PAIRS_ONLY:
-        try:
-            octets = bytes(int(token, base) for token in tokens)
-        except ValueError:
+def _numbers(line: str, match: re.Match[str], tokens: list[str], base: int) -> Run | None:
+    begin, end = match.span()
+    if base == PAIRS_ONLY and len(tokens) > SURELY and len(tokens[0]) != 2:
+        begin += len(tokens[0]) + len(match["between"])  # the number of the line, or of octets
+        tokens = tokens[1:]
+    numbers = [_octet(token, base) for token in tokens]
+    octets = bytes(number for number in numbers if number is not None)
+    name = "pairs" if base == PAIRS_ONLY else "numbers"
+    if len(octets) == len(tokens):
+        if _is_number(line, end, match["between"]):
             return None
-        return Run(match.start(), match.end(), octets, "numbers")
-    if all(len(token) == 2 for token in tokens):
-        return Run(match.start(), match.end(), bytes(int(token, 16) for token in tokens), "pairs")
+        return Run(begin, end, octets, name, is_broken(line, begin, end))
+    if len(tokens) > SURELY and len(octets) >= _MOSTLY * len(tokens):
+        return Run(begin, end, octets, name, broken=True)
     return None
+
+
+def _octet(token: str, base: int) -> int | None:
+    """The octet that one writes so; None where it is none."""
+    if base == PAIRS_ONLY:
+        return int(token, 16) if len(token) == 2 else None
+    try:
+        number = int(token, base)
+    except ValueError:
+        return None
+    return number if number < 256 else None
+
+
+_LONG_NUMBER = re.compile(r"[ \t]?\d{4,}")
+
+
+def _is_number(line: str, end: int, between: str | None) -> bool:
+    """Whether two or three numbers go on in one that is no octet: a date, a version."""
+    text = line[end:]
+    return (
+        bool(between) and text.startswith(between or " ") and _LONG_NUMBER.match(text, len(between or "")) is not None
+    )
+
+
+# -- octets that are none --------------------------------------------------------------------------------------
+
+_TOKEN_END = r"(?=[\s,;:|)\]}>\"']|$)"
+_NONE_BEHIND = re.compile(
+    r"[ ]?[\[<({](?=[^\])>}]*[0-9A-Fa-f?*])(?![A-Fa-f]?[G-Zg-z]{2})[^\s\])>}]{1,3}[\])>}]"  # [0G], behind brackets
+    r"|\s?\\x"
+    r"|['\"]?[ ]?[,;:/|]?[ \t]{0,2}['\"]?0[xX][^\s,;]{0,3}"
+)
+_BEHIND = re.compile(
+    rf"(?P<between>[ ]?[,;][ ]?|[:._/|-]|[ \t]{{1,2}})(?P<token>[0-9A-Za-z?*]{{1,3}}){_TOKEN_END}(?P<next>.{{0,4}})"
+)
+_AHEAD = re.compile(
+    r"(?P<before>.{0,4}?)(?<![0-9A-Za-z])(?P<token>[0-9A-Za-z?*]{2})(?P<between>[ ]?[,;][ ]?|[:._/|-]|[ \t])$"
+)
+_PAIR_BEHIND = re.compile(r"[\s,;:._/|-]{1,2}[0-9A-Fa-f]{2}(?![0-9A-Za-z])")
+_PAIR_AHEAD = re.compile(r"(?:^|[\s,;:._/|-])[0-9A-Fa-f]{2}[\s,;:._/|-]{1,2}$")
+_UNIT = re.compile(r"\d(?:[smhSMH]|[.:])")
+
+
+def is_broken(line: str, begin: int, end: int) -> bool:
+    """Whether what stands beside a run of octets, written as they are, is meant as one and is none: 0G, O1, ??."""
+    rest, lead = line[end : end + 24], line[max(0, begin - 8) : begin]
+    inside = line[begin:end]
+    brackets = inside[:1] in ("[", "<", "(", "{") and inside[-1:] in ("]", ">", ")", "}")
+    if (match := _NONE_BEHIND.match(rest)) is not None:
+        sign = match[0].strip(" ,;:|'\"\t")[:2]
+        if (sign[:1] in "[<({" and brackets and sign[:1] == inside[0]) or (
+            sign.startswith(("\\x", "0x", "0X")) and inside.startswith(("\\", "0x", "0X", "b", "'", '"'))
+        ):
+            return True
+    if brackets:
+        return False
+    behind = _BEHIND.match(rest)
+    if behind is not None and behind["between"].strip() == _between(inside):
+        token = behind["token"]
+        follows = _PAIR_BEHIND.match(behind["next"]) is not None
+        if _is_meant(token, follows):
+            return True
+    ahead = _AHEAD.search(lead)
+    if ahead is None or ahead["between"].strip() != _between(inside):
+        return False
+    token = ahead["token"]
+    if _PAIR_AHEAD.search(ahead["before"]):
+        return _is_meant(token, True)
+    return token[0].isdigit() and token[1].isalpha() and not _UNIT.match(token) and token[1] not in _HEX_LETTERS
+
+
+_HEX_LETTERS = "ABCDEFabcdef"
+
+
+def _is_meant(token: str, among: bool) -> bool:
+    """Whether a token was meant as an octet and is none. `among`: octets stand before it and behind it."""
+    if _TOKEN.fullmatch(token) and len(token) == 2:
+        return False
+    if among:
+        return len(token) == 2 and token.lower() not in ("tx", "rx", "to", "in")
+    if any(sign.isdigit() for sign in token):
+        return len(token) <= 2 and (len(token) == 2 or not token.isalpha())
+    return token in ("??", "**")
+
+
+def _between(inside: str) -> str:
+    """What stands between the octets of a run, without spaces."""
+    match = re.search(r"[0-9A-Fa-f]([ ]?[,;][ ]?|[:._/|-]|[ \t]{1,2})", inside)
+    return match[1].strip() if match is not None else ""
+
+
+_DATE = re.compile(r"[0-3]\d [01]\d (?:19|20)\d\d")
 
 
 def _words(line: str) -> Run | None:
@@ -248,6 +358,8 @@ def _words(line: str) -> Run | None:
         digits = match[0].replace(" ", "")
         if len(digits) == len(match[0].split()) * 2 and " " in match[0]:
             continue  # pairs, of which one was cut
+        if _DATE.fullmatch(match[0]):
+            continue
         alone = match.end() == len(line.rstrip())
         before = line[match.start() - 1] if match.start() else ""
         enough = 12 if not alone else 8 if before == " " else 4 if before in "#:=" else 12

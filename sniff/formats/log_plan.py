@@ -10,11 +10,14 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 from sniff.formats.log_lines import Kind, Line, line_of, numbers_of
+from sniff.formats.log_margin import NO_MARGIN, Margin, margin_of
 from sniff.formats.log_octets import PAIRS_ONLY
 from sniff.formats.log_shapes import Role
+from sniff.formats.log_times import AS_WRITTEN, Times, counted, number_ahead, order_of
 
 LOOKED_AT = 2000
 """Lines of a log that are looked at."""
@@ -27,6 +30,8 @@ WINDOW = 2048
 
 _REPEATS = 0.6
 _ROWS_LEAST = 0.7
+_NUMBERED = 0.6
+_BACK = 0.2
 _FIXED_LEAST = 3  # lines of one width, before they are taken for the width of a table
 _WIDTHS = (8, 10, 12, 16, 20, 24, 32, 40, 48, 64)
 
@@ -38,7 +43,8 @@ class Plan:
     with octets say a direction, so that others need a reason to count. `width`: octets of the lines of a table without
     offsets, whose ends say nothing; None where a line is a frame, or part of one that a tool got at once. `octetwise`:
     an octet a line. `bit_samples`: samples of a bit, of a logic analyser; 0 where there are none.
-    `spellings`: how octets are written.
+    `spellings`: how octets are written. `margin`, `times`: what is no part of the lines, how their times are read.
+    `labelled`: whether lines with octets have a label; `lower`: whether their digits are small letters.
     """
 
     kind: str
@@ -50,13 +56,24 @@ class Plan:
     octetwise: bool = False
     bit_samples: float = 0.0
     spellings: frozenset[str] = frozenset()
+    margin: Margin = NO_MARGIN
+    times: Times = AS_WRITTEN
+    labelled: bool = False
+    lower: bool = False
+
+    def line(self, text: str) -> Line:
+        """A line taken apart as this log writes it."""
+        return line_of(self.margin.without(text), self.base, self.offsets is not None, self.times)
 
     def role(self, line: Line, recent: bytes) -> Role | None:
         """What a line with octets is; None: nobody knows. `recent`: the octets told last."""
         if line.role is not None:
             return line.role
+        if line.wordy and line.bare and (line.lower is not self.lower or (self.labelled and len(line.octets) > 2)):
+            return Role.NOTHING  # "be a bad fed"
         if line.family in self.roles and not line.bare:
-            return self.roles[line.family]
+            role = self.roles[line.family]
+            return Role.NOTHING if role is None and line.wordy else role
         if line.bare or line.way:
             return Role.DATA
         if line.octets in recent:
@@ -66,16 +83,48 @@ class Plan:
 
 def plan_of(texts: Sequence[str]) -> Plan | None:
     """The plan for a log that begins so; None when no line of it tells octets."""
+    margin = margin_of(texts)
+    found = _plan([margin.without(text) for text in texts])
+    return replace(found, margin=margin) if found is not None else None
+
+
+def _plan(texts: Sequence[str]) -> Plan | None:
     base = _base([numbers_of(text) for text in texts])
-    lines = [line_of(text, base) for text in texts]
+    times = order_of(texts)
+    lines = [line_of(text, base, times=times) for text in texts]
     offsets = _offsets([line for line in lines if line.kind is Kind.ROW])
     rows = sum(len(line.octets) for line in lines if line.kind is Kind.ROW)
     others = sum(len(line.octets) for line in lines if line.kind is Kind.OCTETS)
     if offsets is not None and rows >= others:
         tools = Counter(line.tool for line in lines if line.tool)
-        return Plan(f"hexdump ({tools.most_common(1)[0][0]})" if tools else "hexdump", base, offsets)
-    lines = [line_of(text, base, rows=False) for text in texts]
-    return _of_labels([line for line in lines if line.kind is not Kind.EMPTY], base)
+        name = f"hexdump ({tools.most_common(1)[0][0]})" if tools else "hexdump"
+        return Plan(name, base, offsets, times=times)
+    lines = [line_of(text, base, False, times) for text in texts]
+    ahead = _times_ahead(texts, lines, times)
+    if ahead.unit:
+        times, lines = ahead, [line_of(text, base, False, ahead) for text in texts]
+    times = _steps(lines, times)
+    plan = _of_labels([line for line in lines if line.kind is not Kind.EMPTY], base)
+    return replace(plan, times=times) if plan is not None else None
+
+
+def _times_ahead(texts: Sequence[str], lines: Sequence[Line], times: Times) -> Times:
+    """The times with those that numbers ahead of the lines tell, where hardly a line has another."""
+    told = [(text, line) for text, line in zip(texts, lines, strict=True) if line.kind is Kind.OCTETS]
+    bare = [(text, line) for text, line in told if line.stamp is None]
+    numbers = [(number, line) for text, line in bare if (number := number_ahead(text)) is not None]
+    if 2 * len(bare) < len(told) or _NUMBERED * len(bare) > len(numbers):
+        return times
+    return counted([number for number, _ in numbers], [len(line.octets) for _, line in numbers], times)
+
+
+def _steps(lines: Sequence[Line], times: Times) -> Times:
+    """Whether times that go back again and again are those since the line before."""
+    stamps = [line.stamp for line in lines if line.stamp is not None and line.kind is Kind.OCTETS]
+    if len(stamps) < _FIXED_LEAST or any(stamp.dated or stamp.daily for stamp in stamps):
+        return times
+    back = sum(later.time < earlier.time for earlier, later in pairwise(stamps))
+    return replace(times, steps=True) if back > _BACK * len(stamps) else times
 
 
 def _of_labels(lines: Sequence[Line], base: int) -> Plan | None:
@@ -113,6 +162,7 @@ def _of_labels(lines: Sequence[Line], base: int) -> Plan | None:
         _name(data, lines), base, None, roles, main in directed, _width(data), octetwise,
         _bit_samples([line.samples for line in data if line.samples is not None]),
         frozenset(line.spelling for line in data),
+        labelled=main != "", lower=2 * sum(line.lower for line in data) > len(data),
     )  # fmt: skip
 
 
