@@ -140,7 +140,8 @@ class ByteLog:
 
     def _adapter(self, lines: list[str], adapter: Adapter) -> Adapter:
         assert self._plan is not None
-        stamps = [line.stamp for line in map(self._plan.line, lines) if line.stamp is not None]
+        read = map(self._plan.line, self._plan.margin.joined(lines))
+        stamps = [line.stamp for line in read if line.stamp is not None]
         if not stamps:
             return replace(adapter, latency=TIMELESS, latency_from="assumed; the log has no times")
         tick = min(stamp.tick for stamp in stamps)
@@ -167,7 +168,7 @@ class ByteLog:
         assert self._plan is not None
         counts = self._counts
         assembly = Assembly(self._plan, self.session.line)
-        for number, text in enumerate(self._lines(), 1):
+        for number, text in enumerate(self._plan.margin.joined(self._lines()), 1):
             line = self._plan.line(text)
             yield from assembly.take(line, text)
             counts.add(assembly.was, line.kind, number)

@@ -84,6 +84,9 @@ def is_written(start: bytes) -> bool:
 def _is_ascii_traffic(start: bytes) -> bool:
     """Whether lines are frames of characters that end with their sum, and hardly anything else is there."""
     body = PUTTY.sub(b"", start)
-    found = [(len(match[0]), sum(bytes.fromhex(match[1].decode())) % 256 == 0) for match in _ASCII_FRAME.finditer(body)]
-    found += [(len(match[0]), sum(match[1]) % 256 == int(match[2], 16)) for match in _N2_FRAME.finditer(body)]
-    return any(fits for _, fits in found) and 2 * sum(length for length, _ in found) >= len(body)
+    frames = [(match, sum(bytes.fromhex(match[1].decode())) % 256 == 0) for match in _ASCII_FRAME.finditer(body)]
+    frames += [(match, sum(match[1]) % 256 == int(match[2], 16)) for match in _N2_FRAME.finditer(body)]
+    labelled = sum(body[match.start() - 1 : match.start()] not in (b"", b"\r", b"\n") for match, _ in frames)
+    if not any(fits for _, fits in frames) or 2 * labelled > len(frames):
+        return False
+    return 2 * sum(len(match[0]) for match, _ in frames) >= len(body)

@@ -137,7 +137,7 @@ CLOCKS: tuple[Clock, ...] = (
 
 _HEAD = 160
 """Characters at the begin of a line in which a time is looked for."""
-_ONLY_BRACKETS = re.compile(r"[\s\[({<#*|]*(?:\[?[A-Z]\]?[ ]?)?")
+_ONLY_BRACKETS = re.compile(r"(?:\s*\d{1,7}\s+)?[\s\[({<#*|]*(?:\[?[A-Z]\]?[ ]?)?")
 
 
 def stamp_of(line: str, times: Times = AS_WRITTEN) -> Stamp | None:

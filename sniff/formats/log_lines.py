@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from sniff.formats.log_clock import Stamp, stamp_of
-from sniff.formats.log_octets import PAIRS_ONLY, Run, numbers_in, octets_in
+from sniff.formats.log_octets import PAIRS_ONLY, Run, number_in, numbers_in, octets_in
 from sniff.formats.log_shapes import COLOURS, REMARK, STAMP, WAYS, Role, shape_of
 from sniff.formats.log_times import AS_WRITTEN, Times
 
@@ -146,7 +146,8 @@ def numbers_of(text: str) -> tuple[str, ...]:
     text = _SPACES.sub("   ", COLOURS.sub("", text))[:LONGEST].rstrip()
     if text.lstrip().startswith(REMARK):
         return ()
-    return numbers_in(_without_stamps(text)[1])
+    text = _without_stamps(text)[1]
+    return numbers_in(text) or ((alone,) if (alone := number_in(text)) else ())
 
 
 def _general(text: str, stamp: Stamp | None, base: int) -> Line:
@@ -161,9 +162,14 @@ def _general(text: str, stamp: Stamp | None, base: int) -> Line:
     goes_on = text.rstrip().endswith((",", "\\"))
     return Line(
         Kind.OCTETS, stamp, way, run.octets, label if not bare else "", bare, None, "", run.spelling,
+        cut=len(run.octets) > 3 and _LEFT_OUT.fullmatch(text, run.end) is not None,
         broken=run.broken, wordy=run.wordy, lower=text[run.begin : run.end].upper() != text[run.begin : run.end],
         goes_on=goes_on, more=_more(text, run, base),
     )  # fmt: skip
+
+
+_LEFT_OUT = re.compile(r" ?(?:\.\.\.|…)\s*(?:[\[(<]?\d+ more.*)?")
+"""What stands behind octets of which a tool left out the rest."""
 
 
 def _more(text: str, run: Run, base: int) -> tuple[tuple[str, bytes], ...]:
@@ -199,7 +205,9 @@ def _way(lead: str) -> str:
 def _looks(text: str) -> bool:
     """Whether a line that tells no octets looks as if it did, or is no words either."""
     found = len(_HEXLIKE.findall(text))
-    if found >= 3 or (found > 0 and not _WORDS.search(text) and (STAMP not in text or bool(_way(text)))):
+    if found >= max(3, len(_WORDS.findall(text))) or (
+        found > 0 and not _WORDS.search(text) and (STAMP not in text or bool(_way(text)))
+    ):
         return True
     joined = _JOINED.search(text)  # digits without space, of which a few are none
     return joined is not None and sum(sign in _HEX for sign in joined[1]) >= 0.8 * len(joined[1])

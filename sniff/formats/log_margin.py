@@ -6,9 +6,10 @@ Told by the first lines together, then taken away from each line. Pure.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
+from itertools import pairwise
 
 from sniff.formats.log_times import LEAST, is_count
 
@@ -21,6 +22,13 @@ _SPACES = str.maketrans(
 _ENTITIES = {"&gt;": ">", "&lt;": "<", "&amp;": "&", "&nbsp;": " ", "&quot;": '"', "&#39;": "'"}
 _QUOTE = re.compile(r"(?:> ?){1,8}(?=\S|$)")
 _NUMBER = re.compile(r"\s*[\[(#|]?\s*(?P<number>\d{1,9})(?P<behind>\s*[\])}:.|,;]+\s*|\t|\s+)(?=\S)")
+_NAMES = re.compile(
+    r"(?:(?<![0-9A-Za-z.:-])(?:\d{1,3}\.){3}\d{1,3}(?::\d{1,5})?(?![0-9.])"
+    r"|(?<![0-9A-Za-z.:-])[0-9A-Fa-f]{2}(?P<sign>[:-])(?:[0-9A-Fa-f]{2}(?P=sign)){4}[0-9A-Fa-f]{2}(?![0-9A-Za-z:-])"
+    r"|(?<![0-9A-Za-z-])[0-9A-Fa-f]{8}-(?:[0-9A-Fa-f]{4}-){3}[0-9A-Fa-f]{12}(?![0-9A-Za-z-]))"
+    r"(?=.*(?:[0-9A-Fa-f]{2}[\s,;:-]?){3})"
+)
+"""Addresses of hosts and network cards, and identities, before octets of the same line."""
 _RUN = re.compile(
     r"(?<![0-9A-Za-z_#.,:])(?P<ahead>\d{1,4})?(?(ahead)[ \t]+)(?P<run>[0-9A-Fa-f]{2}(?:[ ][0-9A-Fa-f]{2}){2,})"
     r"(?:[ ](?P<behind>\d{1,3})(?=\s+[^\W\d_]{3,}|\s*$))?(?![0-9A-Za-z])"
@@ -30,17 +38,39 @@ _RUN = re.compile(
 @dataclass(frozen=True, slots=True)
 class Margin:
     """What is taken away from each line. `quotes`: `> ` of an answer to a letter; `numbers`: the number of the line;
-    `ahead`, `behind`: the number of its octets, before and behind them.
+    `ahead`, `behind`: the number of its octets, before and behind them. `width`: characters after which lines were
+    broken off, within octets too; 0: they were not.
     """
 
     quotes: bool = False
     numbers: bool = False
     ahead: bool = False
     behind: bool = False
+    width: int = 0
+
+    def joined(self, texts: Iterable[str]) -> Iterator[str]:
+        """Lines, those put together that a terminal or a letter broke off where they were full; "" for each that went
+        into the one before, so that lines keep their numbers.
+        """
+        if not self.width:
+            yield from texts
+            return
+        held, length, after = "", -2, 0
+        for text in texts:
+            if self.width - length in (0, 1) and _GOES_ON.match(text) and len(held) < _LONGEST:
+                held += " " * (self.width - length) + text
+                after += 1
+            else:
+                if length >= 0:
+                    yield from (held, *[""] * after)
+                held, after = text, 0
+            length = len(text)
+        if length >= 0:
+            yield held
 
     def without(self, text: str) -> str:
         """A line without it."""
-        text = plain_signs(text)
+        text = _NAMES.sub(_blank, plain_signs(text))
         if self.quotes:
             text = _QUOTE.sub("", text, count=1) if _QUOTE.match(text) else text
         if self.numbers and (match := _NUMBER.match(text)) is not None:
@@ -73,7 +103,28 @@ def margin_of(texts: Sequence[str]) -> Margin:
     numbers = _are_numbered(lines)
     lines = [Margin(False, numbers).without(text) for text in lines]
     ahead, behind = (_have_counts(lines, before) for before in (True, False))
-    return Margin(quotes, numbers, ahead, behind)
+    return Margin(quotes, numbers, ahead, behind, _width(texts))
+
+
+def _width(texts: Sequence[str]) -> int:
+    """Where lines were broken off: all end there at most, and one of those goes on within an octet."""
+    widest = max(map(len, texts), default=0)
+    broken = sum(
+        len(text) == widest and _HALF_END.search(text) is not None and _HALF_BEGIN.match(after) is not None
+        for text, after in pairwise(texts)
+    )
+    return widest if broken and widest > _NARROWEST else 0
+
+
+_LONGEST = 4096
+_NARROWEST = 30
+_HALF_END = re.compile(r"[0-9A-Fa-f]{2}[ :,-][0-9A-Fa-f]$")
+_HALF_BEGIN = re.compile(r"[0-9A-Fa-f](?:[ :,-]|$)")
+_GOES_ON = re.compile(r"[ :,-]?[0-9A-Fa-f]{1,2}(?:[ :,-]|$)")
+
+
+def _blank(match: re.Match[str]) -> str:
+    return " " * len(match[0])
 
 
 def _are_quoted(lines: Sequence[str]) -> bool:

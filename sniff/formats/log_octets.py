@@ -145,6 +145,14 @@ def _explained(text: str) -> bytes:
     return bytes(found)
 
 
+def _codes(text: str) -> bytes:
+    """Numbers of characters, as Pascal writes them: `#1#3#123`; two digits in each are hexadecimal."""
+    tokens = text.split("#")[1:]
+    if all(len(token) == 2 for token in tokens):
+        raise ValueError("pairs")
+    return bytes(int(token) for token in tokens)
+
+
 def _controls(text: str) -> bytes:
     """Characters, and names in angle brackets for those that are none: `<SOH><ETX>A`."""
     found = bytearray()
@@ -184,6 +192,7 @@ SPELLINGS: tuple[Spelling, ...] = (
     Spelling("0x and digits", r"0[xX][0-9A-Fa-f]{1,2}(?![0-9A-Za-z])", r"['\"]?[ ]?[,;:/|]?[ \t]{0,2}['\"]?",
              _by(r"0[xX]([0-9A-Fa-f]{1,2})", 16), 2),
     Spelling("digits and h", rf"{_H2}[hH]", _SEPARATOR, _by(rf"({_H2})[hH]", 16), 2),
+    Spelling("character codes", r"#\d{1,3}", "", _codes, SURELY, before=r"(?<![0-9A-Za-z_])"),
     Spelling("digits after a sign", rf"[$%&#]{_H2}", r"[ ,;]{0,2}", _HEX, 2, before=r"(?<![0-9A-Za-z_])"),
 )  # fmt: skip
 """Those whose digits need no guess, the most special first."""
@@ -198,7 +207,7 @@ _DIGITS = re.compile(
 """A run of one to three digits with the same between any two (one space more is a column)."""
 _WORDS = re.compile(
     r"(?<![0-9A-Za-z_#.])(?:[0-9A-Fa-f]{2}){1,8}(?: (?:[0-9A-Fa-f]{2}){1,8})+(?![0-9A-Za-z_])"
-    r"|(?<![0-9A-Za-z_.])(?:[0-9A-Fa-f]{2}){2,4096}(?![0-9A-Za-z_])"
+    r"|(?:(?<![0-9A-Za-z_.])|(?<=0[xX]))(?:[0-9A-Fa-f]{2}){2,4096}(?![0-9A-Za-z_])"
 )
 _TOKEN = re.compile(r"[0-9A-Fa-f]{1,3}")
 
@@ -216,7 +225,7 @@ def octets_in(line: str, base: int = PAIRS_ONLY) -> Run | None:
             if octets:
                 broken = is_broken(line, match.start(), match.end())
                 return Run(match.start(), match.end(), octets, spelling.name, broken)
-    run = _digits(line, base) or _words(line) or _single(line)
+    run = _digits(line, base) or _words(line) or _single(line, base)
     if run is None or base == 10:
         return run
     text = line[run.begin : run.end]
@@ -363,18 +372,33 @@ def _words(line: str) -> Run | None:
         alone = match.end() == len(line.rstrip())
         before = line[match.start() - 1] if match.start() else ""
         enough = 12 if not alone else 8 if before == " " else 4 if before in "#:=" else 12
+        if before in ("x", "X"):  # a shorter one is an address
+            enough = 10 if alone else 18
         if len(digits) >= enough and (best is None or len(digits) > 2 * len(best.octets)):
             best = Run(match.start(), match.end(), bytes.fromhex(digits), "digits without space")
     return best
 
 
-_ALONE = re.compile(rf"(?:^|.*[\s:>\]|#,-])(?P<octet>(?:0[xX])?{_H2})\s*(?:\(\S{{1,6}}\)|'.'|\".\"|[|;].*)?\s*")
+_BEHIND_ONE = r"\s*(?:\(\S{1,6}\)|'.'|\".\"|[|;].*)?\s*"
+_ALONE = re.compile(rf"(?:^|.*[\s:>\]|#,-])(?P<octet>(?:0[xX])?{_H2}){_BEHIND_ONE}")
+_ALONE_UNPADDED = re.compile(rf"(?:^|.*[\s:>\]|#,=-])(?P<octet>[0-9A-Fa-f]{{1,3}}){_BEHIND_ONE}")
 
 
-def _single(line: str) -> Run | None:
+def _single(line: str, base: int) -> Run | None:
     """One octet, as the last word of a line."""
-    match = _ALONE.fullmatch(line)
+    match = _ALONE.fullmatch(line) if base == PAIRS_ONLY else None
+    if base != PAIRS_ONLY:
+        match = _ALONE_UNPADDED.fullmatch(line)
     if match is None:
         return None
-    octet = bytes((int(match["octet"], 16),))
+    try:
+        octet = bytes((int(match["octet"], base or 16),))
+    except ValueError:
+        return None
     return Run(match.start("octet"), match.end("octet"), octet, "one octet")
+
+
+def number_in(line: str) -> str:
+    """The token that one octet would be, as the last word of a line; "" where there is none."""
+    match = _ALONE_UNPADDED.fullmatch(line)
+    return match["octet"] if match is not None else ""

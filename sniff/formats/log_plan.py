@@ -31,6 +31,8 @@ WINDOW = 2048
 _REPEATS = 0.6
 _ROWS_LEAST = 0.7
 _NUMBERED = 0.6
+_MOSTLY = 0.8
+_TELLING = 3
 _BACK = 0.2
 _FIXED_LEAST = 3  # lines of one width, before they are taken for the width of a table
 _WIDTHS = (8, 10, 12, 16, 20, 24, 32, 40, 48, 64)
@@ -73,7 +75,7 @@ class Plan:
             return Role.NOTHING  # "be a bad fed"
         if line.family in self.roles and not line.bare:
             role = self.roles[line.family]
-            return Role.NOTHING if role is None and line.wordy else role
+            return Role.NOTHING if role is None and (line.wordy or len(line.octets) < _TELLING) else role
         if line.bare or line.way:
             return Role.DATA
         if line.octets in recent:
@@ -84,12 +86,12 @@ class Plan:
 def plan_of(texts: Sequence[str]) -> Plan | None:
     """The plan for a log that begins so; None when no line of it tells octets."""
     margin = margin_of(texts)
-    found = _plan([margin.without(text) for text in texts])
+    found = _plan([margin.without(text) for text in margin.joined(texts)])
     return replace(found, margin=margin) if found is not None else None
 
 
 def _plan(texts: Sequence[str]) -> Plan | None:
-    base = _base([numbers_of(text) for text in texts])
+    base = _base([numbers_of(text) for text in texts if text.strip()])
     times = order_of(texts)
     lines = [line_of(text, base, times=times) for text in texts]
     offsets = _offsets([line for line in lines if line.kind is Kind.ROW])
@@ -132,10 +134,15 @@ def _of_labels(lines: Sequence[Line], base: int) -> Plan | None:
     written = sum(line.kind is not Kind.REMARK for line in lines)
     singles = [line for line in with_octets if line.spelling == "one octet"]
     known = [line for line in with_octets if line.tool]
+    ways = {line.family for line in singles if line.way}
     multiple = {line.family for line in with_octets if line.spelling != "one octet"}
     # words that end in "be" or "20" are no octets, but the rest of a frame is, and so is what is nothing but octets
-    many = Counter(line.family for line in singles if not line.family or line.way)
-    trusted = {family for family, count in many.items() if 2 * count >= written} | (multiple - {""})
+    many = Counter(line.family for line in singles)
+    trusted = {
+        family
+        for family, count in many.items()
+        if 2 * count >= written and (not family or family in ways or count > max(2, _MOSTLY * written))
+    } | (multiple - {""})
     with_octets = [line for line in with_octets if line.spelling != "one octet" or line.tool or line.family in trusted]
     if not with_octets:
         return None
@@ -146,8 +153,7 @@ def _of_labels(lines: Sequence[Line], base: int) -> Plan | None:
         if line.way or line.tool:
             directed.add(line.family)
     main = max(amounts, key=lambda name: amounts[name])
-    ways = [name for name in amounts if name in directed]
-    best = max(ways, key=lambda name: amounts[name], default=None)
+    best = max((name for name in amounts if name in directed), key=lambda name: amounts[name], default=None)
     if best is not None and 4 * amounts[best] >= amounts[main]:
         main = best
     roles = _roles(with_octets, main, directed)
@@ -177,16 +183,19 @@ def _roles(lines: Sequence[Line], main: str, directed: set[str]) -> dict[str, Ro
         if line.family == main:
             at += len(line.octets)
             continue
-        count = seen.setdefault(line.family, [0, 0])
+        count = seen.setdefault(line.family, [0, 0, 0])
         count[0] += 1
         count[1] += line.octets in text[max(0, at - WINDOW) : at + WINDOW]
+        count[2] += len(line.octets)
     roles: dict[str, Role | None] = {main: Role.DATA}
-    for family, (many, found) in seen.items():
+    said = {line.way for line in lines if line.family == main}
+    one_way = main in directed and len(said) == 1  # what goes the other way has another label
+    for family, (many, found, octets) in seen.items():
         if family == "":
             roles[family] = Role.DATA
-        elif found >= _REPEATS * many:
+        elif found >= _REPEATS * many and (octets >= _TELLING * many or many >= _FIXED_LEAST):  # a few are anywhere
             roles[family] = Role.SAME
-        elif family in directed or (main not in directed and family in alike):
+        elif family in directed or ((main not in directed or (one_way and octets > 4 * many)) and family in alike):
             roles[family] = Role.DATA
         else:
             roles[family] = None
@@ -197,7 +206,10 @@ def _base(numbers: Sequence[Sequence[str]]) -> int:
     """How numbers are written: in pairs of hexadecimal digits in most lines, or in as many digits as they have; then
     in decimal where one has three of them, or none is a letter.
     """
-    runs = [tokens for tokens in numbers if tokens]
+    alone = [tokens[0] for tokens in numbers if len(tokens) == 1]
+    runs = [tokens for tokens in numbers if len(tokens) > 1]
+    if len(alone) > _MOSTLY * len(numbers) and not runs:  # an octet a line
+        runs = [alone]
     mixed = [tokens for tokens in runs if len(tokens) > 3 and _is_unpadded(tokens)]
     if 2 * len(mixed) <= len(runs):
         return PAIRS_ONLY
