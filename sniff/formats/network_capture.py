@@ -98,10 +98,10 @@ def protocol_of(sample: list[Chunk]) -> str | None:
     """The protocol whose good frames say most for it; None where none says enough."""
     octets = sum(len(chunk.octets) for chunk in sample)
     best: tuple[float, str] | None = None
-    for one in registry.usable():
+    for one in (*registry.usable(), *registry.relatives()):
         framer = one.framer(Timing(LineSettings.parse(one.default_line), FOREIGN_LATENCY))
         events = [event for chunk in sample for event in framer.feed(chunk)] + framer.close()
-        good = [event for event in events if isinstance(event, Frame) and _is_good(event)]
+        good = [event for event in events if isinstance(event, Frame) and _is_good(event, one.name)]
         bits = sum(min(_MOST_BITS, one.bits(frame)) for frame in good)
         covered = sum(len(frame.octets) for frame in good)
         if bits >= LEAST_BITS and covered >= COVERED_LEAST * octets and (best is None or bits > best[0]):
@@ -109,8 +109,9 @@ def protocol_of(sample: list[Chunk]) -> str | None:
     return best[1] if best is not None else None
 
 
-def _is_good(frame: Frame) -> bool:
-    return frame.damage is None and frame.check is Check.GOOD
+def _is_good(frame: Frame, protocol: str) -> bool:
+    """A check may be absent only where the network has one."""
+    return frame.damage is None and (frame.check is Check.GOOD or (frame.ok and protocol in registry.RELATIVES))
 
 
 # -- the first look --------------------------------------------------------------------------------------------
