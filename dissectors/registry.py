@@ -27,6 +27,7 @@ BUILT_IN: Mapping[str, str] = {
 
 RELATIVES: Mapping[str, str] = {
     "modbus-tcp": "dissectors.modbus:TCP",
+    "bacnet-ip": "dissectors.bacnet:BACNET_IP",
 }
 """Relatives on networks of the protocols of lines: known by name, looked for in captures of networks, on no line."""
 
