@@ -1,6 +1,6 @@
 """The command line: one command, one file a subcommand. Only the chosen subcommand is imported.
 
-Exit codes: 0 fine · 1 findings at or above --fail-on · 2 usage · 3 unreadable input, or output that was not written ·
+Exit codes: 0 fine · 1 findings at or above --fail-on · 2 usage · 3 unreadable or cut input, or output not written ·
 4 port trouble · 70 a defect of this program · 130 interrupted.
 """
 
@@ -19,6 +19,7 @@ from typing import cast
 from dissectors import registry
 from sniff.cli import standard_streams
 from sniff.engine.capture import CaptureError
+from sniff.formats import cut_capture
 from sniff.formats.several_buses import chosen as bus_chosen
 from sniff.version import __version__
 
@@ -71,7 +72,7 @@ class Failure(Exception):
         self.code = code
 
 
-USAGE, UNREADABLE, PORT_TROUBLE, INTERNAL, INTERRUPTED = 2, 3, 4, 70, 130
+FOUND, USAGE, UNREADABLE, PORT_TROUBLE, INTERNAL, INTERRUPTED = 1, 2, 3, 4, 70, 130
 
 TRACEBACK = "--traceback"
 """For developers, anywhere on the command line: where an internal error came from."""
@@ -86,9 +87,12 @@ def main(argv: list[str] | None = None) -> int:
     arguments = [word for word in arguments if word != TRACEBACK]
     standard_streams.prepare()
     try:
+        cut_capture.forget()
         code = _run(arguments)
         sys.stdout.flush()
-        return code
+        for path, damage in cut_capture.unsaid():
+            standard_streams.say(_plain(f"{path}: {damage}; all before it was read"))
+        return UNREADABLE if code in (0, FOUND) and cut_capture.was_cut() else code
     except SystemExit:  # argparse, after --help, --version or a line of its own
         broken = standard_streams.output_error()
         if broken is None:

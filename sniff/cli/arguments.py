@@ -120,8 +120,8 @@ def line_settings(token: str) -> LineSettings:
 
 def protocol(name: str) -> str:
     """argparse type for -p."""
-    if name not in registry.names():
-        raise argparse.ArgumentTypeError(f"unknown protocol {name!r}; expected one of {', '.join(registry.names())}")
+    if name not in registry.known():
+        raise argparse.ArgumentTypeError(f"unknown protocol {name!r}; expected one of {', '.join(registry.known())}")
     return name
 
 
