@@ -136,6 +136,7 @@ class Keeper:
         rotation: Rotation | None,
         keep: int | None,
         keep_free: int | None = None,
+        keep_of_all: bool = False,
     ) -> None:
         self.orders: SimpleQueue[Parcel | Order | Changed] = SimpleQueue()
         self.paths: list[Path] = []
@@ -148,7 +149,7 @@ class Keeper:
         self._sessions = list(sessions)
         self._to_close = len(sessions)
         self._rotation = rotation
-        self._newest = NewestParts(keep)
+        self._newest = NewestParts(keep, [self._start / old for _, old in parts(path)] if keep_of_all else ())
         self._free = FreeSpace(path, keep_free) if keep_free is not None else None
         self._finished_size = 0
         self._count = self._number = 0  # of parts begun; of the newest, as its name has it
