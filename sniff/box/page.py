@@ -77,6 +77,7 @@ class _Limited(socketserver.ThreadingMixIn):
 
     daemon_threads = True
     block_on_close = False
+    request_queue_size = 4 * READERS
 
     def process_request(self, request: Any, client_address: Any) -> None:
         if not _PLACES.acquire(blocking=False):
