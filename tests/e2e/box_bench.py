@@ -77,6 +77,7 @@ class Bench:
         self.sockets = {name: Socket(folder / name) for name in names}
         self.manager = Manager(folder)
         self.said = ""
+        self.more: dict[str, str] = {}  # of the environment
         self._running: list[subprocess.Popen[str]] = []
         (folder / "sniff485.toml").write_text(
             "".join(
@@ -92,7 +93,7 @@ class Bench:
 
     def environment(self) -> dict[str, str]:
         told = {"RUNTIME_DIRECTORY": str(self.folder / "run"), "NOTIFY_SOCKET": str(self.manager.path)}
-        return {**os.environ, **told, "WATCHDOG_USEC": "60000000", "PYTHONPATH": str(ROOT)}
+        return {**os.environ, **told, "WATCHDOG_USEC": "60000000", "PYTHONPATH": str(ROOT), **self.more}
 
     def start(self, *words: str) -> subprocess.Popen[str]:
         """Start it; it records by then."""

@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import textwrap
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -19,7 +20,7 @@ from sniff.recording.rotation import parts
 
 pytest.importorskip("termios")
 
-from tests.e2e.box_bench import Bench, bench
+from tests.e2e.box_bench import ROOT, Bench, bench
 from tests.e2e.recording_bus import capture_processes, wait_until
 from tests.e2e.running import rest_of
 
@@ -113,6 +114,42 @@ def test_a_capture_that_dies_is_begun_anew(box: Bench) -> None:
     assert "SIGKILL" in box.status().last_restart
     boiler.send(ANSWER)
     wait_until(lambda: box.bus("boiler").octets == len(boiler.sent), "what came before is not counted any more")
+    assert box.end(process) == 0, box.said
+
+
+CLOCK = """
+    import os, time
+
+    real = time.time_ns
+
+    def time_ns():
+        return real() + (86_400_000_000_000 if os.path.exists(os.environ["CLOCK_IS_SET"]) else 0)
+
+    time.time_ns = time_ns
+"""
+
+
+def test_a_clock_that_is_set_costs_nothing(box: Bench) -> None:
+    boiler, roof = box.sockets.values()
+    roof.plug()
+    (box.folder / "sitecustomize.py").write_text(textwrap.dedent(CLOCK))
+    box.more = {"CLOCK_IS_SET": str(box.folder / "set"), "PYTHONPATH": os.pathsep.join((str(box.folder), str(ROOT)))}
+    process = box.start()
+    for one in (boiler, roof):
+        one.send(POLL + ANSWER)
+    wait_until(lambda: box.status().is_well, "not all is well")
+    before = box.status()
+    (box.folder / "set").touch()  # the first answer of a time server
+    wait_until(lambda: box.status().clock_offset > 86_000 * 10**9, "nobody noticed")
+    for one in (boiler, roof):
+        one.send(POLL + ANSWER)
+    box.until_written()
+    wait_until(lambda: box.bus("roof").octets == len(roof.sent), "the octets are not on the status page")
+    after = box.status()
+    assert after.is_well
+    assert after.now - before.now > 86_000 * 10**9
+    assert after.since - before.since > 86_000 * 10**9
+    assert {one.code for bus in after.buses for one in bus.findings} <= {"LN007"}
     assert box.end(process) == 0, box.said
 
 
