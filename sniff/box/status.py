@@ -85,6 +85,7 @@ class BoxStatus:
     while all is well. `restarts`: how often the capture had to be started anew, and `last_restart`: why. `current`: the
     part being written; `parts`, `parts_size`: how many there are, and their octets. `free`, `keep_free`: octets of the
     disk. `behind`: s by which the disk is late. `clock_offset`: ns by which the clock was set since this capture began.
+    `site`: what its buses say together.
     """
 
     name: str
@@ -110,6 +111,7 @@ class BoxStatus:
     alerts_failed: int = 0
     alerts_dropped: int = 0
     recovered: tuple[Recovered, ...] = ()
+    site: tuple[FindingLine, ...] = ()
     buses: tuple[BusStatus, ...] = field(default_factory=tuple)
 
     @property
@@ -139,8 +141,9 @@ class BoxStatus:
             )
             for bus in value["buses"]
         )
+        site = tuple(FindingLine(**_known(FindingLine, one)) for one in value.get("site", ()))
         recovered = tuple(Recovered(**_known(Recovered, one)) for one in value["recovered"])
-        return cls(**{**_known(cls, value), "buses": buses, "recovered": recovered})
+        return cls(**{**_known(cls, value), "buses": buses, "recovered": recovered, "site": site})
 
 
 def _known(kind: type, value: Mapping[str, Any]) -> dict[str, Any]:

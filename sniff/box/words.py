@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 
 from dissectors.line import NS_PER_S
 from sniff.analysis.plain import plain
-from sniff.box.status import BoxStatus, BusStatus, State
+from sniff.box.status import BoxStatus, BusStatus, FindingLine, State
 
 _WORDS = {State.HEARD: "heard", State.SILENT: "SILENT", State.DOWN: "DOWN", State.OVER: "NOT HEARD"}
 _HEADINGS = ("bus", "state", "since", "octets", "lost", "frames", "damaged", "load", "health")
@@ -101,16 +101,22 @@ def _reasons(box: BoxStatus) -> Iterator[str]:
 
 
 def _findings(box: BoxStatus) -> Iterator[str]:
-    if not any(bus.findings for bus in box.buses):
+    if not box.site and not any(bus.findings for bus in box.buses):
         yield from ("", "no findings")
         return
     yield from ("", "findings since the capture began")
+    for one in box.site:
+        yield _finding("", one, box.now)
     for bus in box.buses:
         for one in bus.findings:
-            last = "" if one.last is None else f" (last {clock(one.last, box.now)})"
-            yield plain(f"  {bus.name}: {one.severity} {one.code} {one.subject}: {one.seen}{last}")
+            yield _finding(f"{bus.name}: ", one, box.now)
         if bus.more_findings:
             yield plain(f"  {bus.name}: {bus.more_findings} more")
+
+
+def _finding(bus: str, one: FindingLine, now: int) -> str:
+    last = "" if one.last is None else f" (last {clock(one.last, now)})"
+    return plain(f"  {bus}{one.severity} {one.code} {one.subject}: {one.seen}{last}")
 
 
 def clock(time: int, now: int) -> str:

@@ -18,6 +18,7 @@ from dissectors.manifest import Dissector
 from dissectors.profiles import Devices
 from sniff.analysis.autodetect import Detecting
 from sniff.analysis.points import PointReader
+from sniff.analysis.site_ear import SiteEar
 from sniff.bus.autodetect import Progress, Search
 from sniff.bus.derived_topics import NODES_A_SECOND, NODES_AT_ONCE, BusChannels, DerivedMessage
 from sniff.bus.model import BusModel
@@ -54,7 +55,8 @@ class LiveBus:
     """One bus of a running capture. Not thread-safe; nothing here can hold up the recording.
 
     `session`: of the bus; `status`: the newest report; `ended`: why it is over, None while it runs. `model`: what is
-    known of the bus; its values and findings go back into the recording. `search`: finds what `session.unknown` names,
+    known of the bus; its values and findings go back into the recording. `ear`: what is kept to hold it against the
+    other buses of the capture, where there are any (`beside_others`). `search`: finds what `session.unknown` names,
     None when everything is given; its octets are recorded like all others. When it ends, `session`, `dissector` and
     the model's become others, before the event and the outputs that this gives are handed out. `unseen`: octets that
     came here, or were on their way, and were never looked at.
@@ -84,6 +86,7 @@ class LiveBus:
         self.ended: Ended | None = None
         self.devices = devices or Devices()
         self._pending: deque[Batch] = deque()
+        self.beside_others = False
         self._gathering = Gathering()  # reads that wait for the engine
         self._gathered_since = 0  # when the first of them came, ns
         self._now: int | None = None  # up to when all that was heard has come here
@@ -94,6 +97,7 @@ class LiveBus:
         self._values = RecordedValues(self.session.bus, self.dissector, self.devices) if link.paths else None
         self._nodes_budget = Budget(NODES_A_SECOND, NODES_AT_ONCE)
         self.model = BusModel(self.session, self.dissector, self.devices, with_points=watched)
+        self.ear = SiteEar()
         self._settle()
 
     @property
@@ -268,6 +272,7 @@ class LiveBus:
                 self._values.settle(self.dissector)
             self._settle()
         self.model.add_line_event(event)
+        self.ear.add_line_event(event)
         return [*items, event, *self._some([table])]
 
     def _some(self, made: Iterable[Output | Table]) -> list[LiveTables]:
@@ -276,7 +281,7 @@ class LiveBus:
             if not one:
                 continue
             items.append(one)
-            for observer in (self.model, self._bus_channels):
+            for observer in (self.model, self._bus_channels, self.ear if self.beside_others else None):
                 if observer is not None and isinstance(one, Table):
                     observer.add_table(one)
                 elif observer is not None and isinstance(one, Output):

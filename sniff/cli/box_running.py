@@ -11,8 +11,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from dissectors.findings import Severity
+from dissectors.findings import Finding, Severity
 from sniff.analysis.plain import plain
+from sniff.analysis.site_findings import SiteJudgement, judged
+from sniff.analysis.site_rules import SITE
 from sniff.box import notify, words
 from sniff.box.notify import Notifier
 from sniff.box.page import HAS_UNIX, SUFFIX, RunsAlready, StatusPage, runtime_folders
@@ -21,12 +23,14 @@ from sniff.box.progress import Progress
 from sniff.box.status import BoxStatus, BusStatus, FindingLine, Recovered
 from sniff.box.watch import BusWatch
 from sniff.bus.live import LiveBus
+from sniff.bus.site import site_bus
 from sniff.capture.config import RecordSpec
 from sniff.capture.wire import Status
 from sniff.cli import UNREADABLE, USAGE, Failure, arguments, listening, printing, targets, telling
 from sniff.cli.interruption import until_interrupted
 from sniff.cli.targets import Target
 from sniff.engine.session import LineEvent
+from sniff.outlets.news import NewsDesk
 from sniff.recording.rotation import FreeSpace, parts
 from sniff.sources.clock import Clock
 from sniff.version import __version__
@@ -41,6 +45,9 @@ BACKOFF = (0.5, 1, 2, 5, 10, 30)
 
 LASTED = 60.0
 """A capture that ran for so many seconds did not fail at once."""
+
+JUDGED_EVERY = 10.0
+"""Seconds between looks at what the buses say together."""
 
 MOST_FINDINGS = 20
 """Findings of a bus on the status page; more are counted."""
@@ -137,6 +144,9 @@ class Box:
         self._ready = False
         self._next_page = 0.0
         self._next_word = 0.0
+        self._judged: SiteJudgement | None = None
+        self._judge_at = 0.0
+        self._desk: NewsDesk | None = None
 
     def run(self) -> int:
         """Until a signal comes; the exit code says whether all that was heard is in files."""
@@ -193,6 +203,7 @@ class Box:
         link = lives[0].link
         self._pid.remember(link.pid)
         self._begun = link.clock.now()
+        self._judged = None
         self._progress = Progress(time.monotonic_ns())
         for watch in self._watches:
             watch.begin(self._begun)
@@ -303,6 +314,7 @@ class Box:
         there = parts(path)
         stuck = self._progress.trouble(time.monotonic_ns()) if running else None
         newest = live.status if live is not None else None
+        site = self._site(now) if running else None
         told = [printer.alerts[0] for printer in self._printers[:1] if printer.alerts is not None]
         return BoxStatus(
             name=self._told.name,
@@ -328,10 +340,28 @@ class Box:
             alerts_failed=sum(one.failed for one in told),
             alerts_dropped=sum(one.dropped for one in told),
             recovered=tuple(self._recovered),
-            buses=tuple(self._bus(number, now, drift) for number in range(len(self._watches))),
+            site=tuple(_line(one, drift) for one in site.findings) if site is not None else (),
+            buses=tuple(
+                self._bus(number, now, drift, None if site is None else site.buses[number])
+                for number in range(len(self._watches))
+            ),
         )
 
-    def _bus(self, number: int, now: int, drift: int) -> BusStatus:
+    def _site(self, now: int) -> SiteJudgement | None:
+        """What the buses say together; looked at now and then, and told to whoever is to be."""
+        if len(self._printers) < 2:
+            return None
+        if self._judged is None or time.monotonic() >= self._judge_at:
+            self._judge_at = time.monotonic() + JUDGED_EVERY
+            self._judged = judged([site_bus(one.live.model, one.live.ear) for one in self._printers])
+            alerts = self._printers[0].alerts
+            if alerts is not None:
+                self._desk = self._desk or alerts[1].another()
+                for news in self._desk.look(self._judged.findings, now):
+                    alerts[0].tell(SITE, str(self._told.path), news)
+        return self._judged
+
+    def _bus(self, number: int, now: int, drift: int, findings: tuple[Finding, ...] | None) -> BusStatus:
         watch, source = self._watches[number], self._targets[number].source
         state, since, why = watch.state(now)
         status = BusStatus(
@@ -349,13 +379,21 @@ class Box:
             watch.downs,
             watch.time_away(now),
         )
-        return _judged(status, self._printers[number].live, drift) if self._printers else status
+        if not self._printers:
+            return status
+        live = self._printers[number].live
+        return _judged(status, live, live.model.findings() if findings is None else findings, drift)
 
 
-def _judged(status: BusStatus, live: LiveBus, drift: int) -> BusStatus:
+def _line(one: Finding, drift: int) -> FindingLine:
+    last = one.last + drift if one.last > 0 else None
+    return FindingLine(one.code, one.severity.label, one.subject, one.seen, last)
+
+
+def _judged(status: BusStatus, live: LiveBus, found: tuple[Finding, ...], drift: int) -> BusStatus:
     """With what was counted and found since the capture began."""
     summary = live.model.summary
-    findings = [one for one in live.model.findings() if one.cause is None and one.severity >= Severity.NOTE]
+    findings = [one for one in found if one.cause is None and one.severity >= Severity.NOTE]
     return replace(
         status,
         line=live.session.line_words,
@@ -365,10 +403,7 @@ def _judged(status: BusStatus, live: LiveBus, drift: int) -> BusStatus:
         load=summary.load.share(),
         health=live.model.health().bus.score if summary.frames else None,
         searching=live.searching is not None,
-        findings=tuple(
-            FindingLine(one.code, one.severity.label, one.subject, one.seen, one.last + drift if one.last > 0 else None)
-            for one in findings[:MOST_FINDINGS]
-        ),
+        findings=tuple(_line(one, drift) for one in findings[:MOST_FINDINGS]),
         more_findings=max(0, len(findings) - MOST_FINDINGS),
     )
 

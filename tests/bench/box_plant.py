@@ -64,7 +64,8 @@ class Wire:
     due: int
     number: int = 0
     plugged: bool = True
-    unplugged_at: int = 0
+    unplugged_at: int = 0  # or plugged in again
+    down_from: int = 0
     heard: set[int] = field(default_factory=set)
     sent_at: list[int] = field(default_factory=list)
 

@@ -129,6 +129,8 @@ class Week:
         wire = self.dice.choice(self.world.wires)
         if wire.plugged:
             self.told.counts["unplugged"] += 1
+            if self.world.now - wire.unplugged_at > 10 * S:  # else nobody may have seen that it was back
+                wire.down_from = self.world.now
             wire.plugged, wire.unplugged_at = False, self.world.now
             self.world.at(self.world.now + self.dice.randint(20, 900) * S, lambda: self.plug(wire))
 
@@ -183,7 +185,8 @@ class Week:
                 assert bus.state is State.DOWN, (bus, now)
                 self.told.counts["seen down"] += 1
                 since, began = bus.since - world.clock_wrong, link.clock.monotonic
-                assert min(abs(since - wire.unplugged_at), abs(since - began)) < 12 * S  # it may have been gone before
+                known = wire.unplugged_at, wire.down_from, began  # it may have been gone before that
+                assert min(abs(since - one) for one in known) < 12 * S
             if wire.plugged and min(for_long, now - link.clock.monotonic) > 60 * S:
                 assert bus.state is State.HEARD, (bus, now)
             heard = len(wire.heard) - begun
