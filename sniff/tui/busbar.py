@@ -117,7 +117,7 @@ class BusBar(Widget):
         if bus.is_here:
             styles.append("here")
         found = (self.get_component_rich_style(f"bus-bar--{name}", partial=True) for name in styles)
-        return Style.combine(list(found))
+        return Style.combine([Style(), *found])
 
     def on_click(self, event: events.Click) -> None:
         """Show the bus that was clicked."""

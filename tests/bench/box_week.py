@@ -115,14 +115,15 @@ class Week:
     # -- what happens ----------------------------------------------------------------------------------------------
 
     def plan_the_worst(self) -> None:
-        """Put what happens into the calendar: each kind about twice in an eighth of the time."""
+        """Put what happens into the calendar: of each kind some, and so many each day."""
         dice, length = self.dice, self.end - BASE
+        days = max(1, length // (86_400 * S))
         for kind, least in ((self.unplug, 10), (self.fill, 6), (self.kill, 6), (self.cut, 6)):
-            for _ in range(least):
+            for _ in range(least * days):
                 self.world.at(BASE + dice.randrange(length // 50, length * 9 // 10), kind)
         self.world.at(BASE + length // 100, self.set_clock)
-        for number in range(1, 200):
-            self.world.at(BASE + length * number // 200, self.look)
+        for number in range(1, 200 * days):
+            self.world.at(BASE + length * number // (200 * days), self.look)
         self.world.at(self.end, self.stop)
 
     def unplug(self) -> None:
