@@ -16,8 +16,8 @@ from sniff.tui.columns import fit
 from sniff.tui.plain import plain
 from sniff.tui.seats import BusLine, BusState
 
-LEAST_NAME = 4
-"""Cells that are left of a name."""
+BEYOND = "…!"
+"""Stands for buses that do not fit, some of them in trouble."""
 
 POOR = 70
 """Health below which a bus is marked."""
@@ -47,26 +47,25 @@ def _short(bus: BusLine) -> str:
     return f"{plain(bus.name)} {_trouble(bus) or _health(bus)}"
 
 
-def _least(bus: BusLine) -> str:
-    mark = "!" if _trouble(bus) or is_poor(bus) else ""
-    return f"{mark}{fit(plain(bus.name), min(LEAST_NAME, cell_len(plain(bus.name))))}"
-
-
 def is_poor(bus: BusLine) -> bool:
     """Whether its health is worth a mark."""
     return bus.health is not None and bus.health < POOR
 
 
 def labels(buses: Sequence[BusLine], width: int) -> list[tuple[str, BusLine]]:
-    """Text for each bus, as much of it as fits for all; where not even that does, those around the one shown."""
+    """Text for each bus, as much of it as fits for all; where not even that does, those around the one shown, and
+    whether there is trouble beyond."""
     made: list[tuple[str, BusLine]] = []
-    for say in (_full, _close, _short, _least):
+    for say in (_full, _close, _short):
         made = [(f"[{say(bus)}]" if bus.is_here else f" {say(bus)} ", bus) for bus in buses]
         if sum(cell_len(text) for text, _ in made) <= width:
             return made
-    here = next((place for place, bus in enumerate(buses) if bus.is_here), 0)
-    begin = end = here
-    room = width - cell_len(made[here][0]) - 2
+    begin = end = next((place for place, bus in enumerate(buses) if bus.is_here), 0)
+    most = max(0, width - 2 * len(BEYOND))
+    text, here = made[begin]
+    if cell_len(text) > most:
+        made[begin] = f"[{fit(_short(here), max(1, most - 2))}]", here
+    room = most - cell_len(made[begin][0])
     while True:
         after = cell_len(made[end + 1][0]) if end + 1 < len(made) else width
         before = cell_len(made[begin - 1][0]) if begin else width
@@ -76,9 +75,15 @@ def labels(buses: Sequence[BusLine], width: int) -> list[tuple[str, BusLine]]:
             begin, room = begin - 1, room - before
         else:
             break
-    left = [("…", buses[begin])] if begin else []
-    right = [("…", buses[end])] if end + 1 < len(made) else []
-    return [*left, *made[begin : end + 1], *right]
+    return [*_beyond(buses[:begin], -1), *made[begin : end + 1], *_beyond(buses[end + 1 :], 0)]
+
+
+def _beyond(buses: Sequence[BusLine], nearest: int) -> list[tuple[str, BusLine]]:
+    """What stands for buses that do not fit; a click shows the nearest of them."""
+    if not buses:
+        return []
+    is_bad = any(_trouble(bus) or is_poor(bus) for bus in buses)
+    return [(BEYOND if is_bad else BEYOND[0], buses[nearest])]
 
 
 class BusBar(Widget):
