@@ -141,7 +141,7 @@ class Box:
         self._last_restart = self._trouble = ""
         self._begun: int | None = None
         self._progress = Progress(time.monotonic_ns())
-        self._ready = False
+        self._ready = self._stopping = False  # whether it was told, and is to be
         self._next_page = 0.0
         self._next_word = 0.0
         self._judged: SiteJudgement | None = None
@@ -160,7 +160,6 @@ class Box:
                     self._listen(caught)
             finally:
                 closing.stop()
-        self._notifier.tell(notify.STOPPING)
         listening.say_end(self._printers)
         return UNREADABLE if any(listening.lost_something(printer.live) for printer in self._printers) else 0
 
@@ -210,8 +209,6 @@ class Box:
         self._say(f"recording {len(lives)} buses to {link.paths[0]}")
         self._next_page = 0.0
         self._tell()
-        if not self._ready:
-            self._ready = self._notifier.tell(notify.READY)
 
     def _fail(self, why: str) -> None:
         """No capture runs, and why."""
@@ -265,8 +262,8 @@ class Box:
                         watch.event(item)
                 printer.take(items)
             if len(caught) > heeded:
-                if not heeded:
-                    self._notifier.tell(notify.STOPPING)
+                self._stopping = not heeded
+                self._next_page = 0.0
                 heeded = len(caught)
                 lives[0].end()
             self._tell()
@@ -298,7 +295,10 @@ class Box:
         status = self.status()
         self._page.json, self._page.words = _json(status), words.text(status)
         if self._begun is not None and self._progress.trouble(time.monotonic_ns()) is None:
+            self._ready = self._ready or self._notifier.tell(notify.READY)
             self._notifier.tell(notify.WATCHDOG)
+        if self._stopping:
+            self._stopping = not self._notifier.tell(notify.STOPPING)
         if now >= self._next_word:
             self._next_word = now + 10 * PAGE_EVERY
             self._notifier.status(words.headline(status))

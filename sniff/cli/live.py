@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 
 from sniff.analysis.plain import plain
 from sniff.bus.live import LiveBus
@@ -21,7 +22,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "ports", nargs="*", metavar="PORT", help="ports, gateways, or configured buses; not needed for one"
     )
-    parser.add_argument("--all", action="store_true", help="every bus of the configuration that has a port")
+    parser.add_argument(
+        "--all", action="store_true", help="every configured bus that has a port; one not there is waited for"
+    )
     arguments.add_line(parser, auto=True)
     arguments.add_devices(parser)
     parser.add_argument("-w", "--write", metavar="FILE", help="recording (.mcap); default: a new name in this folder")
@@ -41,6 +44,8 @@ def run(args: argparse.Namespace) -> int:
     path = None if args.no_record else args.write or configured or targets.new_recording(named)
     if path:
         targets.refuse_recording(path)
+    if args.all:  # one that is not there yet is waited for; one that was named must be there
+        buses = [replace(one, source=replace(one.source, patient=True)) for one in buses]
     lives = listening.start_all(buses, RecordSpec(path) if path else None, args.duration)
     if path and not args.ports:
         print(f"sniff485: recording to {plain(path)}", file=sys.stderr)

@@ -122,6 +122,7 @@ class Bench:
         return pid
 
     def status(self) -> BoxStatus:
+        self.manager.hear()  # its queue is short
         return page.ask(self.page)
 
     def bus(self, name: str) -> BusStatus:

@@ -68,6 +68,7 @@ def test_ports_come_and_go_and_it_says_so(box: Bench) -> None:
     assert second.returncode == 2
     assert f"box site runs already: process {process.pid}" in second.stderr
 
+    box.manager.hear()
     assert box.end(process) == 0, box.said
     assert "STOPPING=1" in box.manager.hear()
     assert all(one.completeness().whole for one in buses_of(box.folder / "parts" / "site-0001.mcap"))
