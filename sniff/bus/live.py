@@ -13,6 +13,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 
+from dissectors.findings import Finding
 from dissectors.line import NS_PER_S
 from dissectors.manifest import Dissector
 from dissectors.profiles import Devices
@@ -45,6 +46,11 @@ PIECE = 8192
 
 UNWATCHED = NS_PER_S // 2
 """ns that reads are gathered for where nobody looks at single rows: so much at once costs a tenth a frame."""
+
+LISTENED = 60 * NS_PER_S
+"""ns before which silence says nothing of a bus."""
+
+NOTHING_HEARD = "LN002"
 
 LiveItem = Output | LineEvent | Status | Ended
 LiveTables = Table | Output | LineEvent | Status | Ended
@@ -114,6 +120,13 @@ class LiveBus:
     def dissector(self) -> Dissector:
         """The protocol; during a search for it a stand-in."""
         return self.engine.dissector
+
+    def findings(self) -> tuple[Finding, ...]:
+        """What the rules found so far; that nothing is heard only once it was listened for a while."""
+        found = self.model.findings()
+        if self.model.summary.octets or self.link.clock.now() - self.session.started >= LISTENED:
+            return found
+        return tuple(one for one in found if one.code != NOTHING_HEARD)
 
     @property
     def searching(self) -> Progress | None:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dissectors.findings import Finding
 from sniff.analysis.site_ear import SiteEar
 from sniff.analysis.site_findings import SiteBus
 from sniff.bus.model import BusModel
 
 
-def site_bus(model: BusModel, ear: SiteEar) -> SiteBus:
-    """What is known of a bus so far; its findings are those of its model."""
+def site_bus(model: BusModel, ear: SiteEar, findings: tuple[Finding, ...] | None = None) -> SiteBus:
+    """What is known of a bus so far; its findings are those of its model, unless others are given."""
     session, summary = model.session, model.summary
     return SiteBus(
         session.bus,
@@ -17,7 +18,7 @@ def site_bus(model: BusModel, ear: SiteEar) -> SiteBus:
         summary.load.first,
         summary.load.last,
         session.timing.latency + session.timing.char,
-        model.findings(),
+        model.findings() if findings is None else findings,
     )
 
 

@@ -353,7 +353,9 @@ class Box:
             return None
         if self._judged is None or time.monotonic() >= self._judge_at:
             self._judge_at = time.monotonic() + JUDGED_EVERY
-            self._judged = judged([site_bus(one.live.model, one.live.ear) for one in self._printers])
+            self._judged = judged(
+                [site_bus(live.model, live.ear, live.findings()) for live in (one.live for one in self._printers)]
+            )
             alerts = self._printers[0].alerts
             if alerts is not None:
                 self._desk = self._desk or alerts[1].another()
@@ -382,7 +384,7 @@ class Box:
         if not self._printers:
             return status
         live = self._printers[number].live
-        return _judged(status, live, live.model.findings() if findings is None else findings, drift)
+        return _judged(status, live, live.findings() if findings is None else findings, drift)
 
 
 def _line(one: Finding, drift: int) -> FindingLine:

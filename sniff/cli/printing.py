@@ -85,7 +85,7 @@ class Printer:
             self.every_second()
         if self.triggers is None and self.alerts is None:
             return
-        findings = self.live.model.findings()
+        findings = self.live.findings()
         if self.triggers is not None:
             self._fire(self.triggers.judge(findings))
         if self.alerts is not None:
