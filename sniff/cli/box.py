@@ -16,6 +16,7 @@ import sys
 from pathlib import Path
 
 from sniff.cli import PORT_TROUBLE, USAGE, Failure, arguments, json_output, targets
+from sniff.config import FILE
 
 DOWN = 1
 """Exit code of `box status` where not all is well."""
@@ -54,6 +55,8 @@ def run(args: argparse.Namespace) -> int:
         return 0
     from sniff.cli import box_running
 
+    if not any(bus.port for bus in targets.configured().buses.values()):
+        raise Failure(f"no bus with a port is configured; name some in {FILE} ([bus.NAME], port = …)", USAGE)
     args.ports, args.all = [], True
     wanted = targets.targets_of(args)
     return box_running.run(box_running.plan(args), wanted)
@@ -65,6 +68,8 @@ def _status(args: argparse.Namespace) -> int:
     where = _where(args)
     try:
         status = page.ask(where)
+    except PermissionError:
+        raise Failure(f"{where}: permission denied; who may read serial ports may ask", PORT_TROUBLE) from None
     except OSError as error:
         at = f"127.0.0.1:{where}" if isinstance(where, int) else where
         raise Failure(f"{at}: {error.strerror or error}: no box answers there", PORT_TROUBLE) from None
@@ -84,8 +89,11 @@ def _where(args: argparse.Namespace) -> Path | int:
         return int(args.status_port)
     if args.socket is not None:
         return Path(args.socket)
-    if not page.HAS_UNIX:
+    configured = targets.configured().box.status
+    if not page.HAS_UNIX and not configured:
         raise Failure("this system has no sockets with names; ask with --status-port PORT", USAGE)
+    if not page.HAS_UNIX and configured:
+        return configured
     folders = page.runtime_folders()
     found = page.sockets(folders)
     if args.name is not None:
