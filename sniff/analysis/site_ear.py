@@ -60,11 +60,12 @@ class Exchanges:
 
 
 class SiteEar:
-    """`unplugged`: when the port went, ns."""
+    """`unplugged`: when the port went, ns; not that it was never there."""
 
     def __init__(self) -> None:
         self.unplugged: list[int] = []
         self._frames = 0
+        self._was_there = False
         self._heard: list[Heard] = []
         self._exchanges: list[Exchanges] = []
         self._open: dict[int, tuple[int, int, int]] = {}  # row of a request: start, end, what it wants
@@ -77,11 +78,13 @@ class SiteEar:
 
     def add_line_event(self, event: LineEvent) -> None:
         """Take something that happened to the line."""
-        if event.kind is LineEventKind.UNPLUGGED and len(self.unplugged) < MOST_EVENTS:
+        if event.kind is LineEventKind.UNPLUGGED and self._was_there and len(self.unplugged) < MOST_EVENTS:
             self.unplugged.append(event.time)
+        self._was_there |= event.kind is LineEventKind.REPLUGGED
 
     def add_table(self, table: Table) -> None:
         """Take rows that follow."""
+        self._was_there |= len(table) > 0
         if self._frames >= MOST_FRAMES or not len(table):
             return
         frames = table.frames

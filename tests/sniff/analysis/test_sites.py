@@ -21,8 +21,8 @@ from sniff.bus.site import site_bus
 from sniff.cli import main
 from sniff.engine.blocks import Block, blocks_of
 from sniff.engine.follow_settings import dissector_for
-from sniff.engine.session import Item, LineEvent
-from tests.sniff.analysis.sites_made import SITES, Site, sessions, write
+from sniff.engine.session import Item, LineEvent, LineEventKind, gone
+from tests.sniff.analysis.sites_made import BASE, SITES, Site, sessions, write
 
 CAPTURES = Path(__file__).parents[3] / "captures" / "sites"
 
@@ -106,6 +106,15 @@ def test_little_is_kept_of_a_long_capture() -> None:
     session = sessions(made)[0]
     survey(Given(made["near"]), session, ear)
     assert len(ear.heard()) == 0
+
+
+def test_ports_that_were_never_there_did_not_go() -> None:
+    """A box that is begun before its adapters are plugged in."""
+    made = SITES["twins"][0](random.Random(1))
+    for name, items in made.items():
+        items.insert(0, LineEvent(BASE, LineEventKind.UNPLUGGED, gone(f"/dev/{name}", "no such port")))
+        items.insert(1, LineEvent(BASE + 1, LineEventKind.REPLUGGED, f"/dev/{name} is back"))
+    assert judge(made).findings == ()
 
 
 def test_nothing_heard_at_all() -> None:
