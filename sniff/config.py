@@ -15,6 +15,13 @@
     at = "error"                             # from which severity on; default warning
     every = 600                              # seconds between two about the same finding
 
+    [box]                                    # what runs unattended (`sniff485 box`)
+    folder = "/var/lib/sniff485"
+    name = "site"                            # site-0001.mcap, site-0002.mcap …
+    rotate = "size:64MB,time:1d"
+    keep = 500
+    keep_free = "1GB"
+
     [filters]
     slow = "latency_ms > 50ms"
 
@@ -45,7 +52,8 @@ FILE = "sniff485.toml"
 AUTO: Final = "auto"
 BUS_KEYS = ("port", "line", "protocol", "record", "devices")
 ALERT_KEYS = ("command", "webhook", "at", "every")
-TOP_KEYS = ("bus", "alert", "filters", "colours")
+BOX_KEYS = ("folder", "name", "rotate", "keep", "keep_free", "metrics", "status")
+TOP_KEYS = ("bus", "alert", "box", "filters", "colours")
 COLOURS = ("red", "green", "yellow", "blue", "magenta", "cyan")
 
 
@@ -81,6 +89,20 @@ class AlertSettings:
 
 
 @dataclass(frozen=True, slots=True)
+class BoxSettings:
+    """What `box` is told; None where the file is silent. `folder`, `name`: of the recording's parts. `rotate`, `keep`,
+    `keep_free`: as options of those names. `metrics`, `status`: ports on the loopback."""
+
+    folder: str | None = None
+    name: str | None = None
+    rotate: str | None = None
+    keep: int | None = None
+    keep_free: str | None = None
+    metrics: int | None = None
+    status: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Config:
     """All buses by name, and the file they are from (None: there is none). `filters`: by name. `colours`: filters by
     the colour that rows get which they accept; the first that does counts."""
@@ -90,6 +112,7 @@ class Config:
     alert: AlertSettings | None = None
     filters: Mapping[str, str] = field(default_factory=dict)
     colours: Mapping[str, str] = field(default_factory=dict)
+    box: BoxSettings = field(default_factory=BoxSettings)
 
 
 def candidates(start: Path) -> list[Path]:
@@ -126,7 +149,8 @@ def parse(path: Path) -> Config:
     alert = reader.alert(reader.table(data["alert"], "alert")) if "alert" in data else None
     filters, colours = (reader.filters(data.get(name, {}), name) for name in ("filters", "colours"))
     reader.check_keys(colours, COLOURS, "colours")
-    return Config(path, named, alert, filters, colours)
+    box = reader.box(reader.table(data.get("box", {}), "box"))
+    return Config(path, named, alert, filters, colours, box)
 
 
 class _Reader:
@@ -193,6 +217,22 @@ class _Reader:
         if isinstance(every, bool) or not isinstance(every, int | float) or every < 0:
             raise self.error("every", "alert", f"expected seconds, not {every!r}")
         return AlertSettings(tuple(command), webhook, levels[level], float(every))
+
+    def box(self, entry: Mapping[str, Any]) -> BoxSettings:
+        self.check_keys(entry, BOX_KEYS, "box")
+        texts = {key: self.text(entry, key, "box") for key in ("folder", "name", "rotate", "keep_free")}
+        if not re.fullmatch(r"[A-Za-z0-9_.-]+", texts["name"] or "site"):
+            raise self.error("name", "box", f"{texts['name']!r}: letters, digits, '-', '_' and '.' name files")
+        keep, metrics, status = (
+            self.number(entry, key, "box", least) for key, least in (("keep", 1), ("metrics", 0), ("status", 0))
+        )
+        return BoxSettings(texts["folder"], texts["name"], texts["rotate"], keep, texts["keep_free"], metrics, status)
+
+    def number(self, entry: Mapping[str, Any], key: str, section: str, least: int) -> int | None:
+        value = entry.get(key)
+        if value is not None and (isinstance(value, bool) or not isinstance(value, int) or value < least):
+            raise self.error(key, section, f"expected a whole number from {least} on, not {value!r}")
+        return value
 
     def device(self, devices: Mapping[str, Any], key: str, section: str) -> str:
         """The profile of a station; the key is its address, or "*" for every one."""

@@ -18,6 +18,7 @@ from sniff.analysis.bulk_line_findings import BulkLineFindings
 from sniff.analysis.judgement import Judgement
 from sniff.analysis.line_rules import LINE_RULES
 from sniff.analysis.profile_findings import PROFILE_RULES, ProfileFindings
+from sniff.analysis.site_rules import SITE_RULES
 from sniff.engine.engine import Output
 from sniff.engine.session import LineEvent, LineEventKind, Session, settings_change
 
@@ -173,8 +174,8 @@ def rules_over(dissector: Dissector) -> dict[str, Rule]:
 
 
 def all_rules() -> dict[str, Rule]:
-    """Every rule of every protocol, of the line and of device profiles, by code."""
-    rules = {**LINE_RULES, **PROFILE_RULES}
+    """Every rule of every protocol, of the line, of device profiles and of sites, by code."""
+    rules = {**LINE_RULES, **PROFILE_RULES, **SITE_RULES}
     for name in registry.names():
         rules.update(rules_of(registry.get(name)))
     return rules

@@ -19,7 +19,7 @@ from sniff.analysis.line_use import LineUse
 from sniff.analysis.other_settings import SAMPLE_OCTETS, Fit, other_protocol, what_fits
 from sniff.analysis.sender_findings import BUS, WRONG, Senders
 from sniff.analysis.slower_bus import slower_by
-from sniff.analysis.time_patterns import TimePatterns
+from sniff.analysis.time_patterns import Stop, TimePatterns
 from sniff.analysis.unsure_strays import UnsureStrays
 from sniff.analysis.wording import station_word
 from sniff.engine.engine import Row
@@ -160,6 +160,10 @@ class LineFindings:
             tally = self._counted.setdefault(event.text, Tally())
             tally.add(event.time)
             tally.count += max(0, event.count - 1)
+
+    def stops(self) -> list[Stop]:
+        """What stopped all at once so far."""
+        return self._patterns.stops()
 
     def _see_marks(self, no: int, event: Event) -> None:
         breaks = sum(bool(mark.error & LineError.BREAK) for mark in event.marks)

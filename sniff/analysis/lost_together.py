@@ -94,6 +94,11 @@ class LostTogether:
 
     def findings(self, first: int, now: int) -> Iterator[Finding]:
         """What there is to say so far. `first`, `now`: ns, of the first octet of the capture and the newest."""
+        for together, names, moment in self.losses(first, now):
+            yield self._lost(together, names, moment, first)
+
+    def losses(self, first: int, now: int) -> Iterator[tuple[list[tuple[int, int, int, int]], list[int], int]]:
+        """The same as values: losses (last answer, first miss, back or 0: ns; station), stations, the moment."""
         losses: list[tuple[int, int, int, int]] = []  # last answer, first miss, back, station
         for number, station in self._stations.items():
             losses += [(*loss, number) for loss in station.losses]
@@ -108,7 +113,12 @@ class LostTogether:
             window = max(loss[1] for loss in together) - min(loss[0] for loss in together)
             losses = [loss for loss in losses if loss not in together]
             if len(names) >= 2 and window < span and (window / span) ** (len(names) - 1) <= BY_CHANCE:
-                yield self._lost(together, names, moment, first)
+                yield together, names, moment
+
+    @property
+    def present(self) -> int:
+        """Stations that answered now and then."""
+        return sum(station.answered >= ANSWERED_BEFORE for station in self._stations.values())
 
     def _lost(self, together: list[tuple[int, int, int, int]], names: list[int], moment: int, first: int) -> Finding:
         tally = Tally()

@@ -99,6 +99,18 @@ class _Stretch:
     asked: bool = False
 
 
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """`alive`: until when somebody was heard, `seen`: when it was missed first, `back`: when it was there again, None
+    for not; ns. `stations`: those that stopped; none: the whole bus. `is_all`: whether that is everybody."""
+
+    alive: int
+    seen: int
+    back: int | None
+    stations: tuple[int, ...] = ()
+    is_all: bool = True
+
+
 class TimePatterns:
     """Fed rows, transactions and line events of one bus; `findings` may be asked at any time."""
 
@@ -265,6 +277,21 @@ class TimePatterns:
         yield from self._unreadable()
         yield from self._silences.findings()
         yield from self._lost.findings(self._silences.first or 0, self._silences.now)
+
+    def stops(self) -> list[Stop]:
+        """What stopped all at once so far: the whole bus, or stations of it."""
+        silent = [Stop(begin, begin, end) for begin, end, _ in self._silences.whole()]
+        lost = self._lost.losses(self._silences.first or 0, self._silences.now)
+        return silent + [
+            Stop(
+                max(loss[0] for loss in together),
+                moment,
+                max(loss[2] for loss in together) if all(loss[2] for loss in together) else None,
+                tuple(names),
+                len(names) == self._lost.present,
+            )
+            for together, names, moment in lost
+        ]
 
     def _in_step_with_mains(self) -> Iterator[Finding]:
         if self._steps < HUM_LEAST:

@@ -46,12 +46,14 @@ Piece = Prepared | LineEvent
 
 
 class FileFeed:
-    """A capture file, read on until its end."""
+    """A capture file, read on until its end. `buses`: how many share the memory."""
 
-    def __init__(self, path: str, capture: Capture, session: Session, devices: Devices | None = None) -> None:
+    def __init__(
+        self, path: str, capture: Capture, session: Session, devices: Devices | None = None, buses: int = 1
+    ) -> None:
         self.path = path
         self.capture = capture
-        self._store = Store(session, dissector_for(session), rows_that_fit(), devices, judge_later=True)
+        self._store = Store(session, dissector_for(session), rows_that_fit(buses), devices, judge_later=True)
         self._pieces = self._read(session)
         self._thread: threading.Thread | None = None
         self._queue: queue.Queue[Piece | BaseException | None] = queue.Queue(WAITING)

@@ -13,11 +13,13 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 
+from dissectors.findings import Finding
 from dissectors.line import NS_PER_S
 from dissectors.manifest import Dissector
 from dissectors.profiles import Devices
 from sniff.analysis.autodetect import Detecting
 from sniff.analysis.points import PointReader
+from sniff.analysis.site_ear import SiteEar
 from sniff.bus.autodetect import Progress, Search
 from sniff.bus.derived_topics import NODES_A_SECOND, NODES_AT_ONCE, BusChannels, DerivedMessage
 from sniff.bus.model import BusModel
@@ -45,6 +47,11 @@ PIECE = 8192
 UNWATCHED = NS_PER_S // 2
 """ns that reads are gathered for where nobody looks at single rows: so much at once costs a tenth a frame."""
 
+LISTENED = 60 * NS_PER_S
+"""ns before which silence says nothing of a bus."""
+
+NOTHING_HEARD = "LN002"
+
 LiveItem = Output | LineEvent | Status | Ended
 LiveTables = Table | Output | LineEvent | Status | Ended
 """Few rows come as objects, many as a table."""
@@ -54,7 +61,8 @@ class LiveBus:
     """One bus of a running capture. Not thread-safe; nothing here can hold up the recording.
 
     `session`: of the bus; `status`: the newest report; `ended`: why it is over, None while it runs. `model`: what is
-    known of the bus; its values and findings go back into the recording. `search`: finds what `session.unknown` names,
+    known of the bus; its values and findings go back into the recording. `ear`: what is kept to hold it against the
+    other buses of the capture, where there are any (`beside_others`). `search`: finds what `session.unknown` names,
     None when everything is given; its octets are recorded like all others. When it ends, `session`, `dissector` and
     the model's become others, before the event and the outputs that this gives are handed out. `unseen`: octets that
     came here, or were on their way, and were never looked at.
@@ -84,6 +92,7 @@ class LiveBus:
         self.ended: Ended | None = None
         self.devices = devices or Devices()
         self._pending: deque[Batch] = deque()
+        self.beside_others = False
         self._gathering = Gathering()  # reads that wait for the engine
         self._gathered_since = 0  # when the first of them came, ns
         self._now: int | None = None  # up to when all that was heard has come here
@@ -94,6 +103,7 @@ class LiveBus:
         self._values = RecordedValues(self.session.bus, self.dissector, self.devices) if link.paths else None
         self._nodes_budget = Budget(NODES_A_SECOND, NODES_AT_ONCE)
         self.model = BusModel(self.session, self.dissector, self.devices, with_points=watched)
+        self.ear = SiteEar()
         self._settle()
 
     @property
@@ -110,6 +120,13 @@ class LiveBus:
     def dissector(self) -> Dissector:
         """The protocol; during a search for it a stand-in."""
         return self.engine.dissector
+
+    def findings(self) -> tuple[Finding, ...]:
+        """What the rules found so far; that nothing is heard only once it was listened for a while."""
+        found = self.model.findings()
+        if self.model.summary.octets or self.link.clock.now() - self.session.started >= LISTENED:
+            return found
+        return tuple(one for one in found if one.code != NOTHING_HEARD)
 
     @property
     def searching(self) -> Progress | None:
@@ -268,6 +285,7 @@ class LiveBus:
                 self._values.settle(self.dissector)
             self._settle()
         self.model.add_line_event(event)
+        self.ear.add_line_event(event)
         return [*items, event, *self._some([table])]
 
     def _some(self, made: Iterable[Output | Table]) -> list[LiveTables]:
@@ -276,7 +294,7 @@ class LiveBus:
             if not one:
                 continue
             items.append(one)
-            for observer in (self.model, self._bus_channels):
+            for observer in (self.model, self._bus_channels, self.ear if self.beside_others else None):
                 if observer is not None and isinstance(one, Table):
                     observer.add_table(one)
                 elif observer is not None and isinstance(one, Output):

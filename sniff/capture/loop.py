@@ -109,6 +109,13 @@ class CaptureLoop:
 
     def run(self) -> str:
         """Capture; why it ended, in words."""
+        self.begin()
+        while self.reason is None:
+            self.step()
+        return self.rest()
+
+    def begin(self) -> None:
+        """Take what is there at first; `step` does one turn from then on, until there is a `reason` to end."""
         self._waiting = Waiting()
         recorders: list[Recorder | None] = [*self.recorders] or [None] * len(self.sources)
         self._buses = [
@@ -135,14 +142,15 @@ class CaptureLoop:
                 self._settings(bus, SettingsChange(session.line, searching=True))
         for bus in self._buses:
             self._take(bus)
-        while self.reason is None:
-            self._step()
+
+    def rest(self) -> str:
+        """After the last turn: what arrived meanwhile; why it ended, in words."""
         until = time.monotonic() + DRAIN
-        for bus in self._buses:  # what arrived meanwhile
+        for bus in self._buses:
             while not bus.ended and self._take(bus) and time.monotonic() < until:
                 pass
         self._beat(self.clock.now())
-        return self.reason
+        return self.reason or "stopped"
 
     def _ring(self, recorder: Recorder | None) -> TriggerRing | None:
         return TriggerRing(recorder, *self.round_triggers) if self.round_triggers and recorder is not None else None
@@ -184,7 +192,8 @@ class CaptureLoop:
 
     # -- one turn ----------------------------------------------------------------------------------------------
 
-    def _step(self) -> None:
+    def step(self) -> None:
+        """One turn: wait for whatever comes first, and take it."""
         wait = min(self._beat_at, self._due) - self.clock.now()
         for _, call in self._waiting.wait(max(0, wait) / 1e9):
             call()

@@ -49,7 +49,7 @@ def main() -> int:
     sources: list[Source] = []
     try:
         for spec in config.sources:
-            sources.append(open_source(spec.spec, spec.line, clock))
+            sources.append(_opened(spec, clock))
         sessions = [session_of(*pair, clock) for pair in zip(config.sources, sources, strict=True)]
         recorders = open_recorders(config, sessions)
     except (PortError, CaptureError, OSError, ValueError) as error:
@@ -59,6 +59,15 @@ def main() -> int:
         connection.sendall(encode_json(IpcKind.FAILED, {"kind": kind, "text": str(error)}))
         return 4
     return _capture(config, clock, sources, sessions, recorders, connection, priority)
+
+
+def _opened(spec: SourceSpec, clock: Clock) -> Source:
+    """The source of a bus. Raises PortError."""
+    if not spec.patient:
+        return open_source(spec.spec, spec.line, clock)
+    from sniff.sources.awaited import AwaitedSource
+
+    return AwaitedSource(spec.spec, spec.line, clock, open_source)
 
 
 def session_of(spec: SourceSpec, source: Source, clock: Clock) -> Session:
@@ -83,7 +92,8 @@ def open_recorders(config: CaptureConfig, sessions: list[Session]) -> list[Recor
     if record is None:
         return []
     rotation = None if record.rotation is None else Rotation.parse(record.rotation)
-    return SharedFile(record.path, sessions, rotation, record.keep, record.keep_free).recorders()
+    shared = SharedFile(record.path, sessions, rotation, record.keep, record.keep_free, record.keep_of_all)
+    return shared.recorders()
 
 
 def round_triggers(record: RecordSpec | None) -> tuple[int, int] | None:

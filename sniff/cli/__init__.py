@@ -28,6 +28,7 @@ COMMANDS: dict[str, str] = {
     "detect": "baud rate, format and protocol of a bus, by listening only",
     "live": "listen to a port: terminal UI (frames as lines where there is no terminal); records",
     "record": "listen to a port and record, without a UI",
+    "box": "unattended: records all configured buses for ever, says how it stands; systemd unit, udev rules",
     "open": "terminal UI on captures",
     "show": "frames of captures, one line each, or JSON, tree, hex, fields",
     "info": "what is in a capture: times, counts, nodes, settings, completeness",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 import time
 from collections.abc import Callable, Iterable
@@ -40,6 +41,7 @@ class Printer:
         self.triggers: Triggers | None = None
         self.alerts: tuple[Alerts, NewsDesk] | None = None
         self.every_second: Callable[[], None] | None = None
+        self.names_bus = False  # whether each frame says of which bus it is
         self._judge_at = 0.0
         self._session = live.session
         self._trouble = ""
@@ -83,7 +85,7 @@ class Printer:
             self.every_second()
         if self.triggers is None and self.alerts is None:
             return
-        findings = self.live.model.findings()
+        findings = self.live.findings()
         if self.triggers is not None:
             self._fire(self.triggers.judge(findings))
         if self.alerts is not None:
@@ -132,10 +134,13 @@ class Printer:
     def _print(self, settled: JudgedRow) -> None:
         if self.quiet:
             return
+        session = self.live.session
         if self.as_json:
-            print(rows.json_line(settled, self.live.dissector, self.live.session))
+            line = rows.json_line(settled, self.live.dissector, session)
+            print(f'{{"bus": {json.dumps(session.bus)}, {line[1:]}' if self.names_bus else line)
         else:
-            print(rows.text_line(settled, self.live.dissector, self.live.session, self.colour))
+            line = rows.text_line(settled, self.live.dissector, session, self.colour)
+            print(f"{plain(session.bus)}  {line}" if self.names_bus else line)
 
     def _say(self, text: str) -> None:
         self.before_saying()

@@ -21,6 +21,9 @@ from sniff.cli.searching import Unknowns
 from sniff.config import AUTO, FILE, Config, ConfigError, load
 from sniff.engine.session import DEVICES_NOTE
 
+NAMED = 3
+"""Buses that the name of a new file names."""
+
 
 @dataclass(frozen=True, slots=True)
 class Target:

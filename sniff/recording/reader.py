@@ -52,10 +52,14 @@ MOST_PROFILES = 64
 
 def read(path: str | Path) -> McapCapture | SeveralBuses:
     """Open a recording, of one bus or of several. Raises CaptureError."""
+    buses = buses_of(path)
+    return buses[0] if len(buses) == 1 else SeveralBuses(buses[0].path, buses)
+
+
+def buses_of(path: str | Path) -> list[McapCapture]:
+    """Every bus of a recording, at least one. Raises CaptureError."""
     first = McapCapture(Path(path))
-    if len(first.sessions) < 2:
-        return first
-    return SeveralBuses(first.path, [first, *(McapCapture(first.path, bus) for bus in range(1, len(first.sessions)))])
+    return [first, *(McapCapture(first.path, bus) for bus in range(1, len(first.sessions)))]
 
 
 class McapCapture:

@@ -12,7 +12,7 @@ from __future__ import annotations
 import threading
 from collections import deque
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -63,13 +63,34 @@ def create(path: str | Path, session: Session) -> McapWriter:
     return McapWriter(NewFile(Path(path)), session)
 
 
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where in a recording a part stands: its number, and what the parts before it held of each bus (number of the
+    first read, octets)."""
+
+    number: int = 1
+    first_chunks: tuple[int, ...] = (0,)
+    octets_before: tuple[int, ...] = (0,)
+
+    def before(self) -> list[dict[str, int]]:
+        """As `PartFile` takes it."""
+        pairs = zip(self.first_chunks, self.octets_before, strict=True)
+        return [{"first_chunk": first, "octets_before": octets} for first, octets in pairs]
+
+
+def create_part(path: str | Path, sessions: Sequence[Session], place: Place) -> McapWriter:
+    """The same for a part of a recording, of one bus or of several. Raises CaptureError."""
+    return McapWriter(NewFile(Path(path)), *sessions, place=place)
+
+
 class McapWriter:
     """Writes a capture that is already there. An empty chunk says nothing and is not written."""
 
-    def __init__(self, file: NewFile, session: Session) -> None:
+    def __init__(self, file: NewFile, *sessions: Session, place: Place | None = None) -> None:
         self._file = file
-        self._batcher = Batcher()
-        self._part = PartFile(file.stream, [session])
+        place = place or Place(1, (0,) * len(sessions), (0,) * len(sessions))
+        self._batchers = [Batcher(first) for first in place.first_chunks]
+        self._part = PartFile(file.stream, sessions, place.number, place.before())
         self._sequences: dict[str, int] = {}
 
     def derived(
@@ -88,23 +109,24 @@ class McapWriter:
         self._sequences[topic] = (sequence + 1) % (1 << 32)
         self._part.add(Message(topic, stamp(log_time), stamp(publish_time), sequence, data), schema_name, metadata)
 
-    def write(self, item: Item) -> None:
+    def write(self, item: Item, bus: int = 0) -> None:
         """Add a chunk or line event. Raises CaptureError."""
         if isinstance(item, LineEvent):
-            self._batcher.add_event(item)
+            self._batchers[bus].add_event(item)
         else:
-            self._add(self._batcher.add(item))
+            self._add(self._batchers[bus].add(item), bus)
 
-    def write_block(self, block: Block) -> None:
+    def write_block(self, block: Block, bus: int = 0) -> None:
         """Add reads; the same file as one after the other. Raises CaptureError."""
-        for messages in add_block(self._batcher, block):
-            self._add(messages)
+        for messages in add_block(self._batchers[bus], block):
+            self._add(messages, bus)
 
     def close(self) -> None:
         """Finish the file and give it its name; again is harmless. Raises CaptureError."""
         if self._file.stream.closed:
             return
-        self._add(self._batcher.close())
+        for bus, batcher in enumerate(self._batchers):
+            self._add(batcher.close(), bus)
         try:
             self._part.finish()
         except OSError as error:
@@ -112,9 +134,9 @@ class McapWriter:
             raise explain(self._file.path, error) from None
         self._file.close()
 
-    def _add(self, messages: list[Message]) -> None:
+    def _add(self, messages: list[Message], bus: int = 0) -> None:
         for message in messages:
-            self._part.add(message)
+            self._part.add(message, bus=bus)
         if self._part.waiting > 1 << 20:
             try:
                 self._part.flush()
@@ -147,9 +169,11 @@ class SharedFile:
         rotation: Rotation | None = None,
         keep: int | None = None,
         keep_free: int | None = None,
+        keep_of_all: bool = False,
     ) -> None:
-        """`keep_free`: octets of the disk that stay free; the oldest parts of this name go for them."""
-        self.keeper = Keeper(Path(path), sessions, rotation, keep, keep_free)
+        """`keep_free`: octets of the disk that stay free; the oldest parts of this name go for them. `keep_of_all`:
+        `keep` counts the parts of earlier recordings of this name, too."""
+        self.keeper = Keeper(Path(path), sessions, rotation, keep, keep_free, keep_of_all)
         self._sessions = sessions
         self._thread = threading.Thread(target=self.keeper.run, name="recorder", daemon=True)
         self._thread.start()

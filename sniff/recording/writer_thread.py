@@ -136,6 +136,7 @@ class Keeper:
         rotation: Rotation | None,
         keep: int | None,
         keep_free: int | None = None,
+        keep_of_all: bool = False,
     ) -> None:
         self.orders: SimpleQueue[WriteBatch | WriterCommand | Changed] = SimpleQueue()
         self.paths: list[Path] = []
@@ -148,7 +149,7 @@ class Keeper:
         self._sessions = list(sessions)
         self._to_close = len(sessions)
         self._rotation = rotation
-        self._newest = NewestParts(keep)
+        self._newest = NewestParts(keep, [self._start / old for _, old in parts(path)] if keep_of_all else ())
         self._free = FreeSpace(path, keep_free) if keep_free is not None else None
         self._finished_size = 0
         self._count = self._number = 0  # of parts begun; of the newest, as its name has it
@@ -187,20 +188,29 @@ class Keeper:
 
     def run(self) -> None:
         """Do what comes through `orders`, until every bus has told it to close. Never raises."""
+        while not self.closed:
+            self.do(self.orders.get())
+
+    @property
+    def closed(self) -> bool:
+        """Whether every bus has told it to close."""
+        return self._to_close == 0
+
+    def do(self, order: WriteBatch | WriterCommand | Changed) -> None:
+        """Do one thing. Never raises."""
         steps = {SYNC: self._sync, CHECK: self._check, CLOSE: self._finish}
-        while self._to_close:
-            order = self.orders.get()
-            if isinstance(order, WriteBatch):
-                self._try("take", partial(self._take, order), order.octets, order.bus)
-            elif isinstance(order, Changed):
-                self._sessions[order.bus] = order.session
-            elif isinstance(order, Flush):
-                self._try("flush", partial(self._flush, order))
-            else:
-                self._to_close -= order is CLOSE
-                if order is not CLOSE or not self._to_close:
-                    self._try(order.name, steps[order])
-        self._syncer.end()
+        if isinstance(order, WriteBatch):
+            self._try("take", partial(self._take, order), order.octets, order.bus)
+        elif isinstance(order, Changed):
+            self._sessions[order.bus] = order.session
+        elif isinstance(order, Flush):
+            self._try("flush", partial(self._flush, order))
+        else:
+            self._to_close -= order is CLOSE
+            if order is not CLOSE or not self._to_close:
+                self._try(order.name, steps[order])
+        if self.closed:
+            self._syncer.end()
 
     def _try(self, name: str, step: Callable[[], None], octets: int = 0, bus: int = 0) -> None:
         """Do one thing; when it fails say so, until it succeeds again. `octets`: of the bus that are lost then."""
