@@ -15,6 +15,9 @@
     at = "error"                             # from which severity on; default warning
     every = 600                              # seconds between two about the same finding
 
+    [mqtt]                                   # and [influx], [json], [foxglove], [metrics]: outlet_settings.py
+    broker = "mqtts://broker.example"
+
     [filters]
     slow = "latency_ms > 50ms"
 
@@ -40,12 +43,14 @@ from typing import Any, Final, Literal
 from dissectors import registry
 from dissectors.findings import Severity
 from dissectors.line import LineSettings
+from sniff import outlet_settings
+from sniff.outlet_settings import OutletSettings
 
 FILE = "sniff485.toml"
 AUTO: Final = "auto"
 BUS_KEYS = ("port", "line", "protocol", "record", "devices")
 ALERT_KEYS = ("command", "webhook", "at", "every")
-TOP_KEYS = ("bus", "alert", "filters", "colours")
+TOP_KEYS = ("bus", "alert", "filters", "colours", *outlet_settings.TABLES)
 COLOURS = ("red", "green", "yellow", "blue", "magenta", "cyan")
 
 
@@ -90,6 +95,7 @@ class Config:
     alert: AlertSettings | None = None
     filters: Mapping[str, str] = field(default_factory=dict)
     colours: Mapping[str, str] = field(default_factory=dict)
+    outlets: OutletSettings = field(default_factory=OutletSettings)
 
 
 def candidates(start: Path) -> list[Path]:
@@ -126,7 +132,7 @@ def parse(path: Path) -> Config:
     alert = reader.alert(reader.table(data["alert"], "alert")) if "alert" in data else None
     filters, colours = (reader.filters(data.get(name, {}), name) for name in ("filters", "colours"))
     reader.check_keys(colours, COLOURS, "colours")
-    return Config(path, named, alert, filters, colours)
+    return Config(path, named, alert, filters, colours, outlets=outlet_settings.outlets(reader, data))
 
 
 class _Reader:
@@ -215,6 +221,7 @@ class _Reader:
                 raise self.error(key, section, f"unknown key {key!r}{nearest(key, known)}")
 
     def error(self, key: str, section: str, what: str) -> ConfigError:
+        """What names file, line and section."""
         return ConfigError(
             f"{self.path}:{self.line_of(key, section)}: [{section}] {what}"
             if section

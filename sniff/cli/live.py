@@ -10,7 +10,7 @@ import sys
 from sniff.analysis.plain import plain
 from sniff.bus.live import LiveBus
 from sniff.capture.config import RecordSpec
-from sniff.cli import UNREADABLE, USAGE, Failure, arguments, listening, printing, targets
+from sniff.cli import UNREADABLE, USAGE, Failure, arguments, listening, outlets, printing, targets
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -23,8 +23,11 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("-w", "--write", metavar="FILE", help="recording (.mcap); default: a new name in this folder")
     parser.add_argument("--no-record", action="store_true", help="do not record")
     parser.add_argument("--duration", type=arguments.duration, metavar="TIME", help="stop after: 90, 90s, 5m, 2h")
-    parser.add_argument("--json", action="store_true", help="JSON lines instead of the terminal UI")
+    parser.add_argument(
+        "--json", action="store_true", help="JSON lines instead of the terminal UI: frames, values, findings, health"
+    )
     parser.add_argument("--lines", action="store_true", help="lines of text instead of the terminal UI")
+    outlets.add_outlets(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -35,16 +38,22 @@ def run(args: argparse.Namespace) -> int:
     path = None if args.no_record else args.write or target.record or targets.new_recording(target.source.bus)
     if path:
         targets.refuse_recording(path)
+    told_to = outlets.prepare(outlets.settings_of(args), [outlets.Printed()] if args.json else ())
     live = listening.start(
         target.source, RecordSpec(path) if path else None, args.duration, target.devices, target.search
     )
     if path and not args.port:
         print(f"sniff485: recording to {plain(path)}", file=sys.stderr)
-    return show(live, args.json, args.lines)
+    return show(live, args.json, args.lines, told_to)
 
 
-def show(live: LiveBus, as_json: bool, as_lines: bool) -> int:
-    """The terminal UI on a terminal; else frames as lines and a summary."""
+def show(live: LiveBus, as_json: bool, as_lines: bool, told_to: outlets.Telling | None) -> int:
+    """The terminal UI on a terminal; else frames as lines and a summary. `told_to`: who is told of it meanwhile."""
+    with outlets.telling([live], told_to) as telling:
+        return _show(live, as_json, as_lines, telling)
+
+
+def _show(live: LiveBus, as_json: bool, as_lines: bool, telling: outlets.Telling | None) -> int:
     if not as_json and not as_lines and arguments.on_terminal():
         from sniff.bus.row_source import LiveFeed
         from sniff.tui import run as run_tui
@@ -62,6 +71,7 @@ def show(live: LiveBus, as_json: bool, as_lines: bool) -> int:
         listening.say_recorded(live, where=False)
         return UNREADABLE if listening.lost_something(live) else 0
     printer = printing.Printer(live, as_json=as_json, colour=arguments.colour())
+    printer.telling = telling
     code = listening.run([printer])
     listening.say_end([printer])
     return code

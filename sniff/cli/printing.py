@@ -19,6 +19,7 @@ from sniff.engine.table import Table
 from sniff.engine.verdict_join import Settled, Settling
 
 if TYPE_CHECKING:
+    from sniff.cli.outlets import Telling
     from sniff.outlets.alerts import Alerts
     from sniff.outlets.news import NewsDesk
 
@@ -40,6 +41,7 @@ class Printer:
         self.triggers: Triggers | None = None
         self.alerts: tuple[Alerts, NewsDesk] | None = None
         self.every_second: Callable[[], None] | None = None
+        self.telling: Telling | None = None
         self._judge_at = 0.0
         self._session = live.session
         self._trouble = ""
@@ -74,6 +76,9 @@ class Printer:
         if asked and time.monotonic() >= self._judge_at:
             self._judge_at = time.monotonic() + JUDGED_EVERY
             self._judge()
+        for text in self.telling.take_said() if self.telling is not None else ():
+            self.before_saying()
+            print(f"sniff485: {plain(text)}", file=sys.stderr)
         if not self.quiet:
             sys.stdout.flush()
 
