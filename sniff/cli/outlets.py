@@ -213,10 +213,17 @@ def _made(settings: OutletSettings, also: Sequence[Hearer]) -> Telling:
             server.page = exposition(now, outlets)
 
     teller = Teller([*outlets, *also], None if server is None else publish)
-    told = Telling(teller, outlets, said, server)
+    return Telling(teller, outlets, said, server, list(_addresses(settings, outlets, server)))
+
+
+def _addresses(settings: OutletSettings, outlets: Sequence[Outlet], server: MetricsServer | None) -> Iterator[str]:
+    """What listens, and where."""
     if server is not None and settings.metrics is not None:
-        told.where.append(f"http://{replace(settings.metrics, port=server.port).address}/metrics")
-    return told
+        yield f"http://{replace(settings.metrics, port=server.port).address}/metrics"
+    for outlet in outlets:
+        port = getattr(outlet, "port", None)
+        if port is not None and settings.foxglove is not None:
+            yield f"Foxglove: ws://{replace(settings.foxglove, port=port).address}"
 
 
 def _metrics(there: ListenSettings) -> MetricsServer:
@@ -239,6 +246,10 @@ def _outlets(settings: OutletSettings, said: deque[str]) -> list[Outlet]:
         local = ListenSettings(settings.mqtt.host, 0).is_local
         if not settings.mqtt.tls and not local and settings.mqtt.password.read() is not None:
             said.append(f"mqtt: the password goes to {settings.mqtt.host} unencrypted; mqtts:// does better")
+    if settings.foxglove is not None:
+        from sniff.outlets.foxglove import FoxgloveOutlet
+
+        made.append(FoxgloveOutlet(settings.foxglove, said.append))
     if settings.influx is not None:
         from sniff.outlets import line_protocol
         from sniff.outlets.stream import StreamOutlet
