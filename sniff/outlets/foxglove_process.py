@@ -31,7 +31,7 @@ def main() -> int:
 
     told = json.loads(sys.stdin.readline())
     context, loop = foxglove.Context(), asyncio.new_event_loop()
-    standing = Standing(loop)
+    standing: Any = Standing(loop)  # as much of its protocol as a server without capabilities calls
     server = foxglove.start_server(
         name="sniff485",
         host="127.0.0.1",
@@ -83,9 +83,10 @@ class Standing:
         """Called by the SDK."""
 
     def _again(self, topic: str) -> None:
-        channel, said = self._said.get(topic, (None, ()))
-        for content, time in tuple(said):
-            channel.log(content, log_time=time)
+        if topic in self._said:
+            channel, said = self._said[topic]
+            for content, time in tuple(said):
+                channel.log(content, log_time=time)
 
 
 def _say(value: object) -> None:
