@@ -21,6 +21,8 @@
     rotate = "size:64MB,time:1d"
     keep = 500
     keep_free = "1GB"
+    [mqtt]                                   # and [influx], [json], [foxglove], [metrics]: outlet_settings.py
+    broker = "mqtts://broker.example"
 
     [filters]
     slow = "latency_ms > 50ms"
@@ -47,13 +49,15 @@ from typing import Any, Final, Literal
 from dissectors import registry
 from dissectors.findings import Severity
 from dissectors.line import LineSettings
+from sniff import outlet_settings
+from sniff.outlet_settings import OutletSettings
 
 FILE = "sniff485.toml"
 AUTO: Final = "auto"
 BUS_KEYS = ("port", "line", "protocol", "record", "devices")
 ALERT_KEYS = ("command", "webhook", "at", "every")
 BOX_KEYS = ("folder", "name", "rotate", "keep", "keep_free", "metrics", "status")
-TOP_KEYS = ("bus", "alert", "box", "filters", "colours")
+TOP_KEYS = ("bus", "alert", "box", "filters", "colours", *outlet_settings.TABLES)
 COLOURS = ("red", "green", "yellow", "blue", "magenta", "cyan")
 
 
@@ -113,6 +117,7 @@ class Config:
     filters: Mapping[str, str] = field(default_factory=dict)
     colours: Mapping[str, str] = field(default_factory=dict)
     box: BoxSettings = field(default_factory=BoxSettings)
+    outlets: OutletSettings = field(default_factory=OutletSettings)
 
 
 def candidates(start: Path) -> list[Path]:
@@ -150,7 +155,7 @@ def parse(path: Path) -> Config:
     filters, colours = (reader.filters(data.get(name, {}), name) for name in ("filters", "colours"))
     reader.check_keys(colours, COLOURS, "colours")
     box = reader.box(reader.table(data.get("box", {}), "box"))
-    return Config(path, named, alert, filters, colours, box)
+    return Config(path, named, alert, filters, colours, box, outlet_settings.outlets(reader, data))
 
 
 class _Reader:
@@ -255,6 +260,7 @@ class _Reader:
                 raise self.error(key, section, f"unknown key {key!r}{nearest(key, known)}")
 
     def error(self, key: str, section: str, what: str) -> ConfigError:
+        """What names file, line and section."""
         return ConfigError(
             f"{self.path}:{self.line_of(key, section)}: [{section}] {what}"
             if section

@@ -9,13 +9,15 @@ from functools import lru_cache
 from ipaddress import IPv4Address
 from typing import Any
 
-from dissectors.bacnet import fields as mstp_fields
-from dissectors.bacnet import readings as mstp_readings
-from dissectors.bacnet import summary
 from dissectors.bacnet.envelope import npdu_frame
+from dissectors.bacnet.fields import fields as mstp_fields
 from dissectors.bacnet.header import peek as peek_mstp
 from dissectors.bacnet.ip_framing import ENDS, IP_NAME
 from dissectors.bacnet.message import read
+from dissectors.bacnet.readings import asks as mstp_asks
+from dissectors.bacnet.readings import readings as mstp_readings
+from dissectors.bacnet.text import meant as mstp_meant
+from dissectors.bacnet.text import text as mstp_text
 from dissectors.field_types import FieldType, FieldTypes, Kind
 from dissectors.frame import Check, Event, Frame, Header, Role
 from dissectors.line import NS_PER_S, Timing
@@ -91,7 +93,7 @@ def ip_text(frame: Frame, header: Header, role: Role) -> str:
     """One line about a frame. Total."""
     same = twin(frame)
     if same is not None:
-        return f"{summary.text(same, header, role)}{_behind(frame)}"
+        return f"{mstp_text(same, header, role)}{_behind(frame)}"
     error = f" [{header.error}]" if header.error else ""
     return f"{header.source} → {header.destination} {header.kind.replace('-', ' ')}{error}{_behind(frame)}"
 
@@ -101,7 +103,7 @@ def ip_meant(frame: Frame, header: Header, role: Role, meaning: Meaning) -> str:
     same = twin(frame)
     if same is None:
         return ip_text(frame, header, role)
-    return f"{summary.meant(same, header, role, meaning)}{_behind(frame)}"
+    return f"{mstp_meant(same, header, role, meaning)}{_behind(frame)}"
 
 
 def _behind(frame: Frame) -> str:
@@ -119,7 +121,7 @@ def ip_fields(frame: Frame, role: Role) -> Fields:
         if len(octets) >= ENDS + end:
             found[f"bvlc.{name}"] = int.from_bytes(octets[ENDS + begin : ENDS + end], "big")
     same = twin(frame)
-    told = mstp_fields.fields(same, role) if same is not None else {}
+    told = mstp_fields(same, role) if same is not None else {}
     return found | {name: value for name, value in told.items() if not name.startswith("mstp.")}
 
 
@@ -143,13 +145,13 @@ def ip_readings(request: Frame | None, response: Frame | None) -> tuple[Reading,
     second = None if response is None else twin(response)
     if (request is not None and first is None) or (response is not None and second is None):
         return ()
-    return mstp_readings.readings(first, second)
+    return mstp_readings(first, second)
 
 
 def ip_asks(frame: Frame) -> tuple[Reading, ...]:
     """See `dissectors.readings.Asks`."""
     same = twin(frame)
-    return () if same is None else mstp_readings.asks(same)
+    return () if same is None else mstp_asks(same)
 
 
 def ip_bits(frame: Frame) -> float:

@@ -12,13 +12,14 @@ import os
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
+from typing import Protocol
 
 from dissectors.findings import Finding
 from dissectors.line import NS_PER_S
 from dissectors.manifest import Dissector
 from dissectors.profiles import Devices
 from sniff.analysis.autodetect import Detecting
-from sniff.analysis.points import PointReader
+from sniff.analysis.points import PointReader, Sample
 from sniff.analysis.site_ear import SiteEar
 from sniff.bus.autodetect import Progress, Search
 from sniff.bus.derived_topics import NODES_A_SECOND, NODES_AT_ONCE, BusChannels, DerivedMessage
@@ -55,6 +56,25 @@ NOTHING_HEARD = "LN002"
 LiveItem = Output | LineEvent | Status | Ended
 LiveTables = Table | Output | LineEvent | Status | Ended
 """Few rows come as objects, many as a table."""
+
+
+class BusListener(Protocol):
+    """Somebody who is told what becomes known of running buses. Called by whoever polls: must not wait for anything."""
+
+    def on_samples(self, live: LiveBus, samples: list[Sample]) -> None:
+        """Values were read."""
+
+    def on_derived(self, live: LiveBus, messages: list[DerivedMessage]) -> None:
+        """A second is over; its statistics, and findings every few seconds, as they go into a recording."""
+
+    def on_event(self, live: LiveBus, event: LineEvent) -> None:
+        """Something happened to the line."""
+
+    def on_time(self, live: LiveBus, now: int) -> None:
+        """It is `now` (ns) on the capture's clock; comes some times a second."""
+
+    def on_end(self, live: LiveBus) -> None:
+        """The capture is over."""
 
 
 class LiveBus:
@@ -99,11 +119,17 @@ class LiveBus:
         self._patience = 0 if watched else UNWATCHED
         self._leave_at: float | None = None  # when what is pending is not looked at any more
         self._skipped = 0
-        self._watched = watched
         self._values = RecordedValues(self.session.bus, self.dissector, self.devices) if link.paths else None
         self._nodes_budget = Budget(NODES_A_SECOND, NODES_AT_ONCE)
+        self._listener: BusListener | None = None
         self.model = BusModel(self.session, self.dissector, self.devices, with_points=watched)
         self.ear = SiteEar()
+        self._settle()
+
+    def tell(self, listener: BusListener) -> None:
+        """From now on tell somebody what becomes known, values too; call it before the first `poll`."""
+        self._listener = listener
+        self.model.read_points()
         self._settle()
 
     @property
@@ -238,8 +264,8 @@ class LiveBus:
 
     def _settle(self) -> None:
         """What depends on the settings, anew."""
-        recorded = self.link.paths and not self.engine.searching
-        self._bus_channels = BusChannels(self.model) if recorded else None
+        told = (self.link.paths or self._listener is not None) and not self.engine.searching
+        self._bus_channels = BusChannels(self.model) if told else None
 
     def _take(self, message: Batch) -> list[LiveTables]:
         """Take anything but reads."""
@@ -249,7 +275,10 @@ class LiveBus:
             items = self._look()
             self.ended = message
             self.link.let_go()
-            return [*items, *self._some([self.engine.close()]), message]
+            items += self._some([self.engine.close()])
+            if self._listener is not None:
+                self._listener.on_end(self)
+            return [*items, message]
         if message.bus != self.bus:
             return []
         if isinstance(message, Status):
@@ -266,12 +295,14 @@ class LiveBus:
         self._now = now
         if self._values is not None:
             self._values.pass_time(now)
-        if self._bus_channels is None:
-            return []
-        items = [*self._look(), *self._advance()] if self._bus_channels.is_due(now) else []
-        messages = self._bus_channels.due(now, self._nodes_budget.take)
-        if messages:
-            self._send(messages)
+        items: list[LiveTables] = []
+        if self._bus_channels is not None:
+            items = [*self._look(), *self._advance()] if self._bus_channels.is_due(now) else []
+            messages = self._bus_channels.due(now, self._nodes_budget.take)
+            if messages:
+                self._send(messages)
+        if self._listener is not None:
+            self._listener.on_time(self, now)
         return items
 
     def _happen(self, event: LineEvent) -> list[LiveTables]:
@@ -286,6 +317,8 @@ class LiveBus:
             self._settle()
         self.model.add_line_event(event)
         self.ear.add_line_event(event)
+        if self._listener is not None:
+            self._listener.on_event(self, event)
         return [*items, event, *self._some([table])]
 
     def _some(self, made: Iterable[Output | Table]) -> list[LiveTables]:
@@ -300,9 +333,11 @@ class LiveBus:
                 elif observer is not None and isinstance(one, Output):
                     observer.add(one)
             if self._values is not None:
-                told = self._values.of_samples(self.model.samples) if self._watched else self._values.of_rows(one)
-                for value in told:
+                read = self.model.reads_points
+                for value in self._values.of_samples(self.model.samples) if read else self._values.of_rows(one):
                     self._record(value)
+            if self._listener is not None and self.model.samples:
+                self._listener.on_samples(self, self.model.samples)
         return items
 
     def _record(self, value: ValueMessage) -> None:
@@ -311,8 +346,10 @@ class LiveBus:
         self.link.derived(self.bus, value.topic, value.schema, time, time, value.data, value.metadata)
 
     def _send(self, messages: list[DerivedMessage]) -> None:
-        """Send statistics and findings back into the file, best effort."""
-        for one in messages:
+        """Send statistics and findings back into the file, best effort; tell them to whoever listens."""
+        if self._listener is not None:
+            self._listener.on_derived(self, messages)
+        for one in messages if self.link.paths else ():
             self.link.derived(self.bus, one.topic, one.schema, one.log_time, one.publish_time, one.data, one.metadata)
 
 

@@ -246,6 +246,9 @@ class _Meter:
             return
         self.next = now + 0.5
         lines = [self._line(printer, now) for printer in self.printers]
+        told = self.printers[0].telling
+        if told is not None and told.counted:
+            lines[0] += f"  {plain(told.counted)}"
         print(self._up() + "\n".join(f"\r\x1b[K{line}" for line in lines), end="", file=sys.stderr, flush=True)
         self._shown = len(lines)
 

@@ -13,8 +13,8 @@ from dataclasses import replace
 from sniff.analysis.plain import plain
 from sniff.bus.live import LiveBus
 from sniff.capture.config import RecordSpec
-from sniff.capture.wire import Status
-from sniff.cli import UNREADABLE, USAGE, Failure, arguments, listening, printing, targets
+from sniff.capture.ipc import Status
+from sniff.cli import UNREADABLE, USAGE, Failure, arguments, listening, outlets, printing, targets
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -30,8 +30,11 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("-w", "--write", metavar="FILE", help="recording (.mcap); default: a new name in this folder")
     parser.add_argument("--no-record", action="store_true", help="do not record")
     parser.add_argument("--duration", type=arguments.duration, metavar="TIME", help="stop after: 90, 90s, 5m, 2h")
-    parser.add_argument("--json", action="store_true", help="JSON lines instead of the terminal UI")
+    parser.add_argument(
+        "--json", action="store_true", help="JSON lines instead of the terminal UI: frames, values, findings, health"
+    )
     parser.add_argument("--lines", action="store_true", help="lines of text instead of the terminal UI")
+    outlets.add_outlets(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -46,19 +49,26 @@ def run(args: argparse.Namespace) -> int:
         targets.refuse_recording(path)
     if args.all:  # one that is not there yet is waited for; one that was named must be there
         buses = [replace(one, source=replace(one.source, patient=True)) for one in buses]
+    told_to = outlets.prepare(outlets.settings_of(args), [outlets.Printed()] if args.json else ())
     lives = listening.start_all(buses, RecordSpec(path) if path else None, args.duration)
     if path and not args.ports:
         print(f"sniff485: recording to {plain(path)}", file=sys.stderr)
-    return show(lives, args.json, args.lines)
+    return show(lives, args.json, args.lines, told_to)
 
 
-def show(lives: Sequence[LiveBus], as_json: bool, as_lines: bool) -> int:
-    """The terminal UI on a terminal; else frames as lines and a summary."""
+def show(lives: Sequence[LiveBus], as_json: bool, as_lines: bool, told_to: outlets.Telling | None) -> int:
+    """The terminal UI on a terminal; else frames as lines and a summary. `told_to`: who is told of it meanwhile."""
+    with outlets.telling(lives, told_to) as telling:
+        return _show(lives, as_json, as_lines, telling)
+
+
+def _show(lives: Sequence[LiveBus], as_json: bool, as_lines: bool, telling: outlets.Telling | None) -> int:
     if not as_json and not as_lines and arguments.on_terminal():
         return _on_screen(lives)
     printers = [printing.Printer(live, as_json=as_json, colour=arguments.colour()) for live in lives]
     for printer in printers:
         printer.names_bus = len(printers) > 1
+    printers[0].telling = telling
     code = listening.run(printers)
     listening.say_end(printers)
     return code

@@ -20,6 +20,7 @@ from sniff.engine.table import Table
 from sniff.engine.verdict_join import JudgedRow, VerdictJoin
 
 if TYPE_CHECKING:
+    from sniff.cli.outlets import Telling
     from sniff.outlets.alerts import Alerts
     from sniff.outlets.news import NewsDesk
 
@@ -42,6 +43,7 @@ class Printer:
         self.alerts: tuple[Alerts, NewsDesk] | None = None
         self.every_second: Callable[[], None] | None = None
         self.names_bus = False  # whether each frame says of which bus it is
+        self.telling: Telling | None = None
         self._judge_at = 0.0
         self._session = live.session
         self._trouble = ""
@@ -76,6 +78,9 @@ class Printer:
         if asked and time.monotonic() >= self._judge_at:
             self._judge_at = time.monotonic() + JUDGED_EVERY
             self._judge()
+        for text in self.telling.take_said() if self.telling is not None else ():
+            self.before_saying()
+            print(f"sniff485: {plain(text)}", file=sys.stderr)
         if not self.quiet:
             sys.stdout.flush()
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from datetime import UTC, datetime
 from typing import Any
 
 from dissectors.frame import Frame, Role
 from dissectors.line import MS, NS_PER_S
 from dissectors.manifest import Dissector
+from sniff.analysis.json_text import iso as iso
 from sniff.analysis.plain import ascii_of
 from sniff.analysis.wording import describe, duration, is_error
 from sniff.cli import json_output
@@ -31,16 +31,6 @@ COLUMNS = {
 """The same as columns with types."""
 
 GOOD_VERDICTS = {"answered", "broadcast", "data", "open"}
-
-
-def iso(time: int) -> str:
-    """ns since the epoch as ISO 8601 in UTC with nine decimals."""
-    seconds, rest = divmod(time, NS_PER_S)
-    try:
-        stamp = datetime.fromtimestamp(seconds, UTC)
-    except (OverflowError, ValueError, OSError):  # a hostile file's time
-        return f"{time} ns"
-    return f"{stamp:%Y-%m-%dT%H:%M:%S}.{rest:09d}Z"
 
 
 def to_json(item: JudgedRow, dissector: Dissector, session: Session, with_fields: bool = False) -> dict[str, Any]:

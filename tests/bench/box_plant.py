@@ -22,17 +22,17 @@ from sniff.bus.live import LiveBus
 from sniff.bus.router import Router
 from sniff.capture import loop as capture_loop
 from sniff.capture.config import RecordSpec
+from sniff.capture.ipc import Batch, Derived, Ended, MessageSplitter, decode_message
+from sniff.capture.ipc_sender import Outlet
 from sniff.capture.loop import CaptureLoop
-from sniff.capture.outlet import Outlet
 from sniff.capture.process import session_of
-from sniff.capture.wire import Batch, Derived, Ended, MessageSplitter, decode_message
 from sniff.cli import UNREADABLE, Failure
 from sniff.cli.targets import Target
 from sniff.engine.capture import CaptureError
 from sniff.engine.session import Adapter, Item, LineEvent, LineEventKind, Session, gone
-from sniff.recording.keeper import SYNC, Keeper
 from sniff.recording.rotation import Rotation
 from sniff.recording.writer import SharedFile
+from sniff.recording.writer_thread import SYNC, Keeper
 from sniff.sources import PortError
 from sniff.sources.awaited import AwaitedSource
 
