@@ -24,7 +24,8 @@ from sniff.engine.follow_settings import dissector_for
 from sniff.engine.observer import Observer
 from sniff.engine.session import LineEvent, Session
 from sniff.engine.table import Table
-from sniff.filter.told import TYPES, Told, told
+from sniff.filter.scope import Told
+from sniff.filter.told import TYPES, told
 
 Fields = Mapping[str, int | float | str]
 Kept = TypeVar("Kept")

@@ -4,14 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from dissectors.profiles import Devices
 from sniff.engine.engine import Row
 
 if TYPE_CHECKING:
     from dissectors.columns import Masks
-    from sniff.filter.told import Told
+
+
+class Told(NamedTuple):
+    """One value of a frame: the name of its point, what it is, its unit, and that in words."""
+
+    name: str
+    value: int | float | str
+    unit: str
+    words: str
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from dissectors.field_types import FieldType, Kind, plain_word
 from dissectors.profiles import Devices
@@ -21,13 +21,13 @@ from sniff.filter.errors import FilterError, nearest
 from sniff.filter.expressions import Expression
 from sniff.filter.literals import number_of
 from sniff.filter.plan import Leaf
+from sniff.filter.scope import Scope, Told
 from sniff.filter.syntax import Quoted, Word
 
 if TYPE_CHECKING:
     from dissectors.columns import Masks
     from sniff.engine.table import Table
     from sniff.filter.columns import Closed, Columns
-    from sniff.filter.scope import Scope
 
 POINT, VALUE = "point", "value"
 TYPES = {
@@ -39,15 +39,6 @@ TYPES = {
 _PLAIN = re.compile(r"[A-Za-z][\w-]*/\d+(?:/.+)?")
 """How points without a profile are named."""
 _NUMBER_AND_UNIT = re.compile(r"(?P<number>[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?)\s*(?P<unit>[^\d\s].*)")
-
-
-class Told(NamedTuple):
-    """One value of a frame: the name of its point, what it is, its unit, and that in words."""
-
-    name: str
-    value: int | float | str
-    unit: str
-    words: str
 
 
 def told(value: Decoded) -> Told:
