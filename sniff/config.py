@@ -188,13 +188,13 @@ class _Reader:
 
     def filters(self, value: Any, section: str) -> dict[str, str]:
         """Filters by name; each is read, so that a wrong one is found before it is wanted."""
-        from sniff.filter import FilterError, compile_filter  # few configurations have any
+        from sniff.filter import FilterError, check_filter  # few configurations have any
 
         entry, found = self.table(value, section), dict[str, str]()
         for name in entry:
             found[name] = self.text(entry, name, section) or ""
             try:
-                compile_filter(found[name], registry.get(registry.DEFAULT))
+                check_filter(found[name])
             except FilterError as error:
                 raise self.error(name, section, f"{name}: {error}") from None
         return found

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from contextvars import ContextVar
 from dataclasses import replace
 
 from dissectors import registry
@@ -200,11 +201,20 @@ def open_buses(path: str) -> list[tuple[str, Capture]]:
 def open_captures(paths: Sequence[str]) -> list[tuple[str, Capture]]:
     """Open captures by name, the parts of one recording as one; ends as `open_capture` does."""
     opened = [one for path in paths for one in open_buses(path)]
-    if len(opened) < 2:
-        return opened
-    from sniff.recording.rotated import joined
+    if len(opened) > 1:
+        from sniff.recording.rotated import joined
 
-    return joined(opened)
+        opened = joined(opened)
+    _opened_last.set(len(opened))
+    return opened
+
+
+_opened_last: ContextVar[int] = ContextVar("_opened_last", default=1)
+
+
+def captures_open() -> int:
+    """How many captures this command reads."""
+    return _opened_last.get()
 
 
 def settings_of(args: argparse.Namespace, session: Session, path: str) -> Session:

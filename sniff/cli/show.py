@@ -23,6 +23,7 @@ from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import Session
 from sniff.engine.verdict_join import JudgedRow, Wanted
 from sniff.filter import Filter
+from sniff.filter.fields import types_of
 from sniff.formats.parquet import ParquetWriter
 
 if TYPE_CHECKING:
@@ -77,7 +78,9 @@ def _show_all(args: argparse.Namespace, table: ParquetWriter | None) -> int:
         if args.explain:
             print(wanted.explain())
             continue
-        named = args.tree or args.fields  # then every register is named, with a profile or without
+        named = (
+            args.tree or args.fields or _by_request(args.names, session)
+        )  # then every register is named, with a profile or without
         spoken = devices if named or (devices and (not args.table or "text" in args.names)) else None
         ours = filtering.FieldCells(args.names, session, devices)
         if args.reference or spoken or named or ours or args.hex:
@@ -90,6 +93,12 @@ def _show_all(args: argparse.Namespace, table: ParquetWriter | None) -> int:
         if left == 0:
             break
     return 0
+
+
+def _by_request(names: list[str], session: Session) -> bool:
+    """Whether answers have any of these fields by their request."""
+    types = types_of(dissector_for(session))
+    return any(types[name].by_request for name in names if name in types)
 
 
 def _settled(
