@@ -62,6 +62,7 @@ RING = TokenRing(
     headings=ring_words.HEADINGS,
     rows=ring_words.rows,
     sentences=ring_words.sentences,
+    identities=lambda ring: {mac: node.devices for mac, node in ring.nodes.items() if node.devices},
 )
 
 MSTP = Dissector(

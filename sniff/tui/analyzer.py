@@ -9,16 +9,18 @@ from textual.message_pump import MessagePump
 
 from sniff.bus.feed import FeedStatus
 from sniff.bus.rows import Store
+from sniff.tui.health_meter import HealthMeter
 from sniff.tui.viewing import Viewing
 
 
 class Analyzer(App[None]):
     """`status`: of the feed, ten times a second. `viewing`: how the user looks at things.
-    `tabs`: key and title of each screen."""
+    `tabs`: key and title of each screen. `health`: of the bus, a look every now and then."""
 
     status: FeedStatus
     viewing: Viewing
     tabs: tuple[tuple[str, str], ...]
+    health: HealthMeter
 
     @property
     @abstractmethod

@@ -18,6 +18,7 @@ from sniff.config import load as load_config
 from sniff.filter import FilterError
 from sniff.tui.analyzer import Analyzer
 from sniff.tui.header import StatusHeader, why_ended
+from sniff.tui.health_meter import HealthMeter
 from sniff.tui.help import HelpScreen
 from sniff.tui.palette import ActionCommands
 from sniff.tui.plain import plain
@@ -69,6 +70,7 @@ class SnifferApp(Analyzer):
         self.status: FeedStatus = feed.status()
         self.viewing = Viewing(feed.store, follow=self.status.live)
         self.tabs = tuple((entry.key, entry.title) for entry in SCREENS)
+        self.health = HealthMeter()
         self.visited = [start_screen]
         self._worker: Timer | None = None
         self._told_end = False
@@ -167,6 +169,9 @@ class SnifferApp(Analyzer):
             self._worker.pause()
 
     def _draw_header(self) -> None:
+        status = self.status
+        if not self.viewing.frozen and not status.reading:
+            self.health.look(self.store, final=status.judged >= 1 and not status.live)
         for header in self.screen.query(StatusHeader):
             header.bring_up()
 

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from dissectors.histogram import Histogram
+from dissectors.line import MS
+
 BARS = " ▁▂▃▄▅▆▇█"
 _PARTS = " ▏▎▍▌▋▊▉█"
 
@@ -25,3 +28,30 @@ def bar(share: float, width: int) -> str:
         eighths = max(1, eighths)
     whole, part = divmod(eighths, 8)
     return ("█" * whole + (_PARTS[part] if part else "")).ljust(width)
+
+
+EDGES = tuple(edge * MS // 10 for edge in (1, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000))
+"""0.1 ms … 1 s."""
+
+
+def spread(times: Histogram, room: int) -> list[str]:
+    """How times are spread, a line a range from the first to the last that occurred: the range, a bar of at most
+    `room` cells, how many, and their share."""
+    counts = times.spread(EDGES)
+    seen = [position for position, count in enumerate(counts) if count]
+    return [
+        f"{_range(at):>13} {bar(counts[at] / max(counts), room)} {counts[at]:>8} {counts[at] / times.count:>6.1%}"
+        for at in (range(seen[0], seen[-1] + 1) if seen else ())
+    ]
+
+
+def _range(position: int) -> str:
+    if position == 0:
+        return f"< {_edge(EDGES[0])} ms"
+    if position == len(EDGES):
+        return f"≥ {_edge(EDGES[-1])} ms"
+    return f"{_edge(EDGES[position - 1])} … {_edge(EDGES[position])} ms"
+
+
+def _edge(value: int) -> str:
+    return f"{value / MS:g}"

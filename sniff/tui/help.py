@@ -30,10 +30,11 @@ LEGEND: tuple[tuple[str, str], ...] = (
 
 HEADER: tuple[tuple[str, str], ...] = (
     ("load", "share of the time in which the bus was busy"),
+    ("health", "0 to 100 by a formula that the manual has; Nodes says what it is made of"),
     ("err", "rows that are damaged or noise, or whose exchange went wrong"),
     ("LOST", "octets or rows that were lost before they could be shown"),
     ("FOLLOW", "the newest row is under the cursor (f)"),
-    ("STILL", "rows come at the end, the cursor stays (f follows)"),
+    ("FOLLOW OFF", "rows come at the end, the cursor stays where it is (f follows)"),
     ("FROZEN +n", "the view stands, n rows came since (space lets it go on)"),
 )
 

@@ -12,19 +12,17 @@ from textual.containers import VerticalScroll
 from textual.widgets import Static
 
 from dissectors.frame import LineError
-from dissectors.line import MS, NS_PER_S
+from dissectors.line import NS_PER_S
 from dissectors.words import milliseconds
 from sniff.bus.feed import FeedStatus
 from sniff.bus.rows import Store
 from sniff.engine.session import LineEvent
 from sniff.tui.analyzer import analyzer
-from sniff.tui.charts import bar, sparkline
+from sniff.tui.charts import sparkline, spread
 from sniff.tui.plain import plain
 from sniff.tui.screens.base import ViewScreen
 from sniff.tui.times import clock, date_and_clock, size
 
-GAP_EDGES = tuple(edge * MS // 10 for edge in (1, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000))
-"""0.1 ms … 1 s."""
 EVENTS_SHOWN = 200
 LABEL = 7
 REPORTABLE = (
@@ -133,29 +131,12 @@ def load(store: Store, width: int) -> list[Part]:
 
 def gaps(store: Store, width: int) -> list[Part]:
     """How long the line was silent between frames, from first to last range that occurred."""
-    counts = store.gaps.spread(GAP_EDGES)
     held = store.session.adapter.latency
     doubt = f", right to ±{milliseconds(held)}" if held else ""
     text = Text(f"between frames, {store.gaps.count} times{doubt}")
-    seen = [position for position, count in enumerate(counts) if count]
-    room = max(8, width - 31)
-    for position in range(seen[0], seen[-1] + 1) if seen else ():
-        count = counts[position]
-        share = f"{count / store.gaps.count:.1%}"
-        text.append(f"\n{_range(position):>13} {bar(count / max(counts), room)} {count:>8} {share:>6}")
+    for line in spread(store.gaps, max(8, width - 31)):
+        text.append(f"\n{line}")
     return [("silence", text)]
-
-
-def _range(position: int) -> str:
-    if position == 0:
-        return f"< {_edge(GAP_EDGES[0])} ms"
-    if position == len(GAP_EDGES):
-        return f"≥ {_edge(GAP_EDGES[-1])} ms"
-    return f"{_edge(GAP_EDGES[position - 1])} … {_edge(GAP_EDGES[position])} ms"
-
-
-def _edge(value: int) -> str:
-    return f"{value / MS:g}"
 
 
 def events(happened: list[LineEvent]) -> list[Part]:

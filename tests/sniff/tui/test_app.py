@@ -17,6 +17,7 @@ from sniff.tui.header import SHORTEST
 from sniff.tui.help import HelpScreen
 from sniff.tui.keybar import explanation, working_keys
 from sniff.tui.palette import ActionCommands
+from sniff.tui.header import SHORT_TITLES
 from sniff.tui.screens import SCREENS, load
 from sniff.tui.screens.base import ViewScreen
 
@@ -29,7 +30,8 @@ def test_every_screen_of_the_table_is_there(look: Any, busy_bus: Any) -> None:
             assert entry.title == screen.TITLE
             await see.press(entry.key)
             assert see.app.current_mode == entry.name
-            assert f"[{entry.key} {entry.title}]" in see.lines()[1]
+            shown = SHORT_TITLES.get(entry.title, entry.title)
+            assert f"[{entry.key} {shown}]" in see.lines()[1]
             for other in SCREENS:
                 assert f"{other.key} {other.title}"[:SHORTEST] in see.lines()[1]
             assert see.app.focused is see.main

@@ -116,7 +116,7 @@ def test_following_ends_with_a_move_and_begins_with_f(look: Any, busy_bus: Any) 
         busy_bus.ask(1)
         await see.poll()
         assert see.main.cursor == 14
-        assert "FOLLOW" not in see.lines()[0]
+        assert "FOLLOW OFF" in see.lines()[0]
         await see.press("f")
         assert see.main.cursor == 17
         busy_bus.ask(1)
