@@ -63,6 +63,7 @@ RING = TokenRing(
     rows=ring_words.rows,
     sentences=ring_words.sentences,
     identities=lambda ring: {mac: node.devices for mac, node in ring.nodes.items() if node.devices},
+    shares=lambda ring: {mac: node.held / ring.span for mac, node in ring.nodes.items() if node.held and ring.span},
 )
 
 MSTP = Dissector(

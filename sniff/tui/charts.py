@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from dissectors.histogram import Histogram
@@ -55,3 +56,20 @@ def _range(position: int) -> str:
 
 def _edge(value: int) -> str:
     return f"{value / MS:g}"
+
+
+def tall_bars(values: Sequence[float | None], top: float, height: int) -> list[str]:
+    """A chart `height` lines high, the upper line first: one character a value, 0 … top; above 0 is never empty."""
+    lines = []
+    eighths = [0 if not value or top <= 0 else max(1, round(min(1.0, value / top) * height * 8)) for value in values]
+    for below in range(height - 1, -1, -1):
+        lines.append("".join(BARS[min(8, max(0, one - below * 8))] for one in eighths))
+    return lines
+
+
+def round_up(value: float) -> float:
+    """The next of 1, 2, 5, 10, 20 … that is not less: where an axis ends."""
+    if value <= 0:
+        return 1.0
+    power = 10.0 ** math.floor(math.log10(value))
+    return next(step * power for step in (1, 2, 5, 10, 20) if step * power >= value * 0.999_999)

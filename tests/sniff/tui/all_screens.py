@@ -24,8 +24,12 @@ from rich.style import Style
 from rich.terminal_theme import DEFAULT_TERMINAL_THEME, TerminalTheme
 
 from sniff.bus.capture_writer import create
-from sniff.bus.file_source import FileFeed
+from sniff.bus.feed import FeedStatus, StoreFeed
+from sniff.bus.offline import outputs
+from sniff.bus.rows import Store
 from sniff.devices import devices
+from sniff.engine.follow_settings import dissector_for
+from sniff.engine.observer import observe
 from sniff.formats import read
 from sniff.simulation.scenarios import scenario, simulate
 from sniff.simulation.tap import TapModel
@@ -33,7 +37,8 @@ from sniff.tui.app import SnifferApp
 from sniff.tui.screens import SCREENS
 
 STARTED = 1_772_359_200_000_000_000  # 2026-03-01T10:00:00Z
-SECONDS = 300
+SECONDS = {"mstp": 30, "profibus": 15}
+"""How long a demo runs: they bring as many frames then as the others do in five minutes."""
 ADAPTER = TapModel("FT232R", timer=1_000_000, packet=62, usb_frame=1_000_000, reports=("parity", "framing", "break"))
 PROTOCOLS = ("modbus-rtu", "modbus-ascii", "n2", "mstp", "profibus")
 SIZES = ((80, 24), (200, 60))
@@ -46,7 +51,7 @@ def capture_of(name: str, folder: Path) -> Path:
     path = folder / f"{name}.mcap"
     if not path.exists():
         plan = scenario(name, seed=485)
-        session, items = simulate(plan, SECONDS, ADAPTER, STARTED)
+        session, items = simulate(plan, SECONDS.get(name, 300), ADAPTER, STARTED)
         with create(path, session) as writer:
             for item in items:
                 writer.write(item)
@@ -90,23 +95,31 @@ def _colours(style: Style, theme: TerminalTheme) -> tuple[tuple[int, int, int], 
     return front, back  # type: ignore[return-value]
 
 
+@cache
+def store_of(path: Path) -> Store:
+    """What is in a capture, read once for all its pictures."""
+    capture = read(path)
+    known = devices({str(at): made for at, made in scenario(path.stem).devices.items()})
+    store = Store(capture.session, dissector_for(capture.session), devices=known)
+    observe(outputs(capture.items(), capture.session), store)
+    return store
+
+
 async def take(path: Path, size: tuple[int, int], light: bool, target: Path, words: tuple[str, ...]) -> None:
     """All screens of one capture in one size."""
-    capture = read(path)
-    known = scenario(path.stem).devices
-    feed = FileFeed(str(path), capture, capture.session, devices({str(at): made for at, made in known.items()}))
-    app = SnifferApp(feed)
+    store = store_of(path)
+    session = store.session
+    status = FeedStatus(path.name, str(session.line), session.protocol, file_size=path.stat().st_size)
+    app = SnifferApp(StoreFeed(store, status))
     async with app.run_test(size=size) as pilot:
         if light:
             app.action_theme()
-        while feed.status().reading or feed.status().judged < 1:
-            await pilot.pause(0.05)
         for entry in SCREENS:
             name = f"{path.stem}-{entry.key}-{entry.name}-{size[0]}x{size[1]}-{'light' if light else 'dark'}"
             if not all(word in name for word in words):
                 continue
             await pilot.press(entry.key)
-            await pilot.pause(0.3)
+            await pilot.pause(0.1)
             if entry.name in ("frames", "transactions"):
                 await pilot.press("home", "e", "e", "e")
             app.poll()
@@ -117,7 +130,6 @@ async def take(path: Path, size: tuple[int, int], light: bool, target: Path, wor
             picture(lines).save(target / f"{name}.png")
             text = "\n".join("".join(segment.text for segment in line).rstrip() for line in lines)
             (target / f"{name}.txt").write_text(text + "\n", "utf-8")
-    feed.close()
 
 
 def main(folder: str, words: tuple[str, ...]) -> None:

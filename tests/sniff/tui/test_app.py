@@ -13,11 +13,10 @@ from textual.widgets import Static
 from sniff.bus.feed import FeedStatus, StoreFeed
 from sniff.tui import run
 from sniff.tui.app import PATH, with_step
-from sniff.tui.header import SHORTEST
+from sniff.tui.header import SHORT_TITLES, SHORTEST
 from sniff.tui.help import HelpScreen
 from sniff.tui.keybar import explanation, working_keys
 from sniff.tui.palette import ActionCommands
-from sniff.tui.header import SHORT_TITLES
 from sniff.tui.screens import SCREENS, load
 from sniff.tui.screens.base import ViewScreen
 
