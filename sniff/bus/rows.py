@@ -154,6 +154,21 @@ class Store:
         self.heard += 1
         self.line_events.append(event)
 
+    def add_mark(self, event: LineEvent) -> None:
+        """Take a mark made while one looks: it says nothing of the line, and no rule asks for it."""
+        self.version += 1
+        self.line_events.append(event)
+
+    def row_marked(self, time: int) -> int | None:
+        """Number of the row that a mark of that moment (ns) is about; None where it has not come yet."""
+        no = self.row_at(time)
+        here, before = self.by_no(no), self.by_no(no - 1)
+        if here is not None and here.event.start == time:
+            return no
+        if before is not None and before.event.end >= time:
+            return no - 1
+        return no if here is not None else None
+
     def _take(self, table: Table, prepared: Prepared | None = None) -> None:
         prepared = prepare(table) if prepared is None else prepared
         self.version += 1

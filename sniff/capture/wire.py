@@ -47,6 +47,8 @@ class Kind(IntEnum):
     STOP = 35
     FOUND = 36  # text: the settings that a search came to, as in `SettingsChange`
     TRIGGER = 37  # i64: when, ns; text: on what
+    MARK = 38  # i64: which moment, ns; text
+    UNMARK = 39  # the same, without text
 
 
 class Received(NamedTuple):
@@ -215,9 +217,9 @@ def encode_derived(derived: Derived) -> bytes:
     return encode(Kind.DERIVED, derived.bus, head + topic + schema + metadata + derived.data)
 
 
-def encode_trigger(bus: int, time: int, text: str) -> bytes:
-    """A trigger that fired at some time, ns."""
-    return encode(Kind.TRIGGER, bus, _TICK.pack(time) + text.encode("utf-8", "replace"))
+def encode_trigger(bus: int, time: int, text: str, kind: Kind = Kind.TRIGGER) -> bytes:
+    """A trigger that fired at some time, ns; a mark of a moment is alike."""
+    return encode(kind, bus, _TICK.pack(time) + text.encode("utf-8", "replace"))
 
 
 def decode_trigger(body: bytes) -> tuple[int, str]:

@@ -40,6 +40,10 @@ class Analyzer(App[None]):
         """Show only what a filter accepts, on all lists."""
 
     @abstractmethod
+    def mark_row(self, no: int, text: str | None) -> None:
+        """Keep what a person wrote about a row, None to take it away."""
+
+    @abstractmethod
     def show_row(self, no: int) -> None:
         """Put the cursor of the frame list on a row and show it."""
 

@@ -13,13 +13,14 @@ from textual.timer import Timer
 
 from sniff.bus.feed import Feed, FeedStatus
 from sniff.bus.rows import Store
-from sniff.config import ConfigError
+from sniff.config import ConfigError, nearest
 from sniff.config import load as load_config
 from sniff.filter import FilterError
 from sniff.tui.analyzer import Analyzer
 from sniff.tui.header import StatusHeader, why_ended
 from sniff.tui.health_meter import HealthMeter
 from sniff.tui.help import HelpScreen
+from sniff.tui.key_names import KNOWN, named
 from sniff.tui.palette import ActionCommands
 from sniff.tui.plain import plain
 from sniff.tui.prompt import Prompt
@@ -46,18 +47,20 @@ class SnifferApp(Analyzer):
     CSS_PATH = "app.tcss"
     COMMANDS = Analyzer.COMMANDS | {ActionCommands}
     ENABLE_COMMAND_PALETTE = True
-    BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("space", "freeze", "freeze", tooltip="freeze the view, or let it go on; the capture never stops"),
-        Binding("question_mark", "help", "help", tooltip="this page"),
-        Binding("q", "go_back", "back", tooltip="go back to the screen before; quit at the first one"),
-        *(
-            Binding(entry.key, f"switch('{entry.name}')", entry.title, tooltip=f"screen {entry.title}", show=False)
-            for entry in SCREENS
-        ),
-        Binding("T", "theme", "theme", tooltip="dark or light theme", show=False),
-        Binding("ctrl+p", "command_palette", "commands", tooltip="all commands by name", show=False),
-        Binding("ctrl+q,ctrl+c", "quit", "quit", tooltip="quit at once", show=False),
-    ]
+    BINDINGS: ClassVar[list[BindingType]] = named(
+        [
+            Binding("space", "freeze", "freeze", tooltip="freeze the view, or let it go on; the capture never stops"),
+            Binding("question_mark", "help", "help", tooltip="this page"),
+            Binding("q", "go_back", "back", tooltip="go back to the screen before; quit at the first one"),
+            *(
+                Binding(entry.key, f"switch('{entry.name}')", entry.title, tooltip=f"screen {entry.title}", show=False)
+                for entry in SCREENS
+            ),
+            Binding("T", "theme", "theme", tooltip="dark or light theme", show=False),
+            Binding("ctrl+p", "command_palette", "commands", tooltip="all commands by name", show=False),
+            Binding("ctrl+q,ctrl+c", "quit", "quit", tooltip="quit at once", show=False),
+        ]
+    )
 
     def __init__(self, feed: Feed, start_screen: str = "frames") -> None:
         if start_screen not in {entry.name for entry in SCREENS}:
@@ -69,6 +72,7 @@ class SnifferApp(Analyzer):
         self.feed = feed
         self.status: FeedStatus = feed.status()
         self.viewing = Viewing(feed.store, follow=self.status.live)
+        self.viewing.take_marks()
         self.tabs = tuple((entry.key, entry.title) for entry in SCREENS)
         self.health = HealthMeter()
         self.visited = [start_screen]
@@ -98,9 +102,25 @@ class SnifferApp(Analyzer):
             self.viewing.colour_rules(load_config().colours)
         except (ConfigError, FilterError) as error:
             self.notify(plain(error), severity="error", markup=False)
+        self._take_keys()
         self._worker = self.set_interval(WORK_SECONDS, self._work, pause=True)
         self.set_interval(POLL_SECONDS, self.poll)
         self.poll()
+
+    def _take_keys(self) -> None:
+        """Other keys, as the configuration says."""
+        try:
+            keys = load_config().keys
+        except ConfigError:  # said already
+            return
+        for entry in SCREENS:
+            load(entry)  # names of keys are known with their screens
+        known = tuple(sorted(KNOWN))
+        for name in keys:
+            if name not in known:
+                said = plain(f"[keys] unknown name {name!r}{nearest(name, known)}")
+                self.notify(said, severity="error", markup=False)
+        self.set_keymap({name: key for name, key in keys.items() if name in known and key})
 
     def poll(self) -> None:
         """Take what the feed has and show it."""
@@ -114,6 +134,7 @@ class SnifferApp(Analyzer):
         if self._worker is not None and (self.status.reading or self.status.judged < 1):
             self._worker.resume()
         if changed:
+            self.viewing.take_marks()
             self.draw_screen()
         if was_reading and not self.status.reading:  # there is nothing to follow any more
             self.viewing.follow = False
@@ -239,6 +260,21 @@ class SnifferApp(Analyzer):
         except FilterError as error:
             self.notify(plain(error), severity="error", markup=False)
             return
+        self.draw_screen()
+
+    def mark_row(self, no: int, text: str | None) -> None:
+        """Keep what a person wrote about a row, None to take it away, and say where it is kept."""
+        row = self.store.by_no(no)
+        if row is None:
+            self.notify(f"row {no} is no longer in memory", timeout=3)
+            return
+        try:
+            where = self.feed.mark(row.event.start, text)
+        except OSError as error:
+            where = f"until this view ends: {error.strerror or error}"
+        if text is not None:
+            self.notify(f"mark on row {no}, kept {plain(where)}", timeout=3, markup=False)
+        self.viewing.take_marks()
         self.draw_screen()
 
     def show_row(self, no: int) -> None:

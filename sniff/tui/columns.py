@@ -44,6 +44,12 @@ LONGEST_NUMBER = 12
 """Characters of a word that may be one; longer ones are octets in hex, of which any part says something."""
 
 
+def chosen(columns: Sequence[Column], names: Sequence[str]) -> list[Column]:
+    """The columns of these names in their order, at any width; all of them, as usual, for no names."""
+    by_name = {column.name: column for column in columns}
+    return [replace(by_name[name], needs=0) for name in names if name in by_name] or list(columns)
+
+
 def fit(text: str, width: int, right: bool = False) -> str:
     """Text in exactly `width` cells; what is cut off ends in "…", and no number is cut in the middle: what is left
     of it would read as another number."""

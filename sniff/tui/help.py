@@ -17,7 +17,7 @@ from sniff.tui.keybar import explanation, working_keys
 LEGEND: tuple[tuple[str, str], ...] = (
     (">", "the row under the cursor"),
     ("=", "the row that belongs to it: its request or response"),
-    ("*", "a row that you marked"),
+    ("*  [words]", "a row that was marked (m), and what was written about it"),
     ("!", "damaged frame"),
     ("~", "noise: octets that are no frame"),
     ("P F B O", "line error on an octet: parity, framing, break, overrun"),

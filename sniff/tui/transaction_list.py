@@ -27,6 +27,7 @@ class TransactionList(StoreList):
     """Closed transactions by the number of their closing."""
 
     COLUMNS = COLUMNS
+    NAME = "transactions"
     SCROLLED = "kind"
 
     def row_of(self, number: int) -> int | None:

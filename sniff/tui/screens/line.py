@@ -19,6 +19,7 @@ from sniff.bus.rows import Store
 from sniff.engine.session import LineEvent
 from sniff.tui.analyzer import analyzer
 from sniff.tui.charts import sparkline, spread
+from sniff.tui.key_names import named
 from sniff.tui.plain import plain
 from sniff.tui.screens.base import ViewScreen
 from sniff.tui.times import clock, date_and_clock, size
@@ -143,9 +144,9 @@ def events(happened: list[LineEvent]) -> list[Part]:
     """What happened to the line, the newest first."""
     lines = []
     for event in reversed(happened[-EVENTS_SHOWN:]):
-        count = f" {event.count}" if event.count > 0 else " (how many is unknown)" if event.count < 0 else ""
+        count = f" {event.number}" if event.number > 0 else " (how many is unknown)" if event.number < 0 else ""
         words = f": {plain(event.text)}" if event.text else ""
-        lines.append(f"{clock(event.time)}  {event.kind.value}{count}{words}")
+        lines.append(f"{clock(event.moment)}  {event.kind.value}{count}{words}")
     if len(happened) > EVENTS_SHOWN:
         lines.append(f"and {len(happened) - EVENTS_SHOWN} earlier ones")
     return [("events", Text("\n".join(lines or ["nothing happened to the line"])))]
@@ -163,14 +164,16 @@ def _table(parts: list[Part]) -> Table:
 class Page(VerticalScroll, can_focus=True, inherit_bindings=False):
     """Scrolls with the keys of the lists."""
 
-    BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("up,k", "scroll_up", "line up", show=False),
-        Binding("down,j", "scroll_down", "line down", show=False),
-        Binding("pageup", "page_up", "page up", show=False),
-        Binding("pagedown", "page_down", "page down", show=False),
-        Binding("home,g", "scroll_home", "first line", show=False),
-        Binding("end,G", "scroll_end", "last line", show=False),
-    ]
+    BINDINGS: ClassVar[list[BindingType]] = named(
+        [
+            Binding("up,k", "scroll_up", "line up", show=False),
+            Binding("down,j", "scroll_down", "line down", show=False),
+            Binding("pageup", "page_up", "page up", show=False),
+            Binding("pagedown", "page_down", "page down", show=False),
+            Binding("home,g", "scroll_home", "first line", show=False),
+            Binding("end,G", "scroll_end", "last line", show=False),
+        ]
+    )
 
 
 class LineScreen(ViewScreen):
