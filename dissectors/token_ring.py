@@ -76,7 +76,8 @@ class TokenRing:
     `observer(timing)`: watches a bus. `window(before, after)`: what changed between two looks.
     `order(ring)`: its masters in the order of the token; empty when no closed ring was seen.
     `headings`, `rows(ring)`: a table, one row a master. `sentences(ring)`: what it comes to. `stations`: of who answers
-    only, where the protocol has such.
+    only, where the protocol has such. `identities(ring)`: the numbers by which stations called themselves, by address;
+    one that called itself by two has both. `shares(ring)`: for how much of the time each master has the token, 0 … 1.
     """
 
     observer: Callable[[Timing], RingObserver]
@@ -86,3 +87,5 @@ class TokenRing:
     rows: Callable[[Any], list[tuple[Cell, ...]]]
     sentences: Callable[[Any], list[str]]
     stations: StationTable | None = None
+    identities: Callable[[Any], Mapping[int, tuple[int, ...]]] = lambda ring: {}
+    shares: Callable[[Any], Mapping[int, float]] = lambda ring: {}

@@ -63,6 +63,8 @@ RING = TokenRing(
     headings=ring_table.HEADINGS,
     rows=ring_table.rows,
     sentences=ring_table.sentences,
+    identities=lambda ring: {mac: node.devices for mac, node in ring.nodes.items() if node.devices},
+    shares=lambda ring: {mac: node.held / ring.span for mac, node in ring.nodes.items() if node.held and ring.span},
 )
 
 MSTP = Dissector(

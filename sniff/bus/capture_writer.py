@@ -23,9 +23,11 @@ def create(
     session: Session,
     options: Mapping[str, str] | None = None,
     notes: Mapping[int, str] | None = None,
+    marks: Mapping[int, str] | None = None,
 ) -> CaptureWriter:
     """Create a capture by its suffix. `options` are the format's own ("link-type" of packet files); `notes`, by row
-    number, are said in the comments of packets where the format has such. Raises CaptureError."""
+    number, are said in the comments of packets where the format has such, and `marks`, what a person wrote about them.
+    Raises CaptureError."""
     if formats.keeps_frames(path):
         link_type = _link_type(path, session, (options or {}).get("link-type"))
         file = (
@@ -34,7 +36,7 @@ def create(
             else formats.create_of_frames(path, session, link_type)
         )
         return FrameWriter(
-            file, RecordMaker(session, link_type, notes=notes), _not_dissected(session.protocol, link_type)
+            file, RecordMaker(session, link_type, notes=notes, marks=marks), _not_dissected(session.protocol, link_type)
         )
     if options:
         raise CaptureError(f"{path}: this format has no option {', '.join(options)}")

@@ -25,8 +25,9 @@ from sniff.engine.blocks import in_pieces
 from sniff.engine.bulk import tables
 from sniff.engine.capture import Capture, CaptureError
 from sniff.engine.follow_settings import dissector_for
-from sniff.engine.session import LineEvent, Session
+from sniff.engine.session import LineEvent, LineEventKind, Session
 from sniff.formats.files import watched
+from sniff.formats.mark_file import add_mark, mark_file
 
 FIRST_READS, READS = 512, 16_384
 """Reads that are taken together, at first and later."""
@@ -167,6 +168,15 @@ class FileFeed:
             read=min(0.99, self._progress.octets / max(1, self._size)) if self._reading else 1.0,
             judged=1.0 if store.all_judged and not self._reading else min(0.99, store.judged / max(1, store.last_no)),
         )
+
+    def mark(self, time: int, text: str | None) -> str:
+        """Write it beside the file, which stays as it is."""
+        kind = LineEventKind.UNMARK if text is None else LineEventKind.MARK
+        self._store.add_mark(LineEvent(time, kind, text or ""))
+        if not Path(self.path).is_file():
+            return "until this view ends: no single file is shown"
+        add_mark(self.path, time, text)
+        return f"in {mark_file(self.path)}"
 
     def close(self) -> None:
         """Have the thread end."""

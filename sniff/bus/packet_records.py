@@ -20,17 +20,23 @@ class RecordMaker:
     """Items → records of one link type, a frame each; verdict and doubts go into the comment.
 
     `live`: give each frame at once instead of waiting for its verdict. `notes`: by row number, what else to say in the
-    comment.
+    comment. `marks`: by row number, what a person wrote.
     """
 
     def __init__(
-        self, session: Session, link_type: int, live: bool = False, notes: Mapping[int, str] | None = None
+        self,
+        session: Session,
+        link_type: int,
+        live: bool = False,
+        notes: Mapping[int, str] | None = None,
+        marks: Mapping[int, str] | None = None,
     ) -> None:
         self.session = session
         self.link_type = link_type
         self.engine = engine_for(session)
         self.live = live
         self.notes: Mapping[int, str] = notes or {}
+        self.marks: Mapping[int, str] = marks or {}
         self._settling = VerdictJoin()
 
     def add(self, item: Item) -> Iterator[Record]:
@@ -68,14 +74,14 @@ class RecordMaker:
                         yield Record(time, RTAC, rtac_record(time - self.session.started, number, b""))
         comment = self._comment(item)
         if not isinstance(event, Frame) or not _readable(event):
-            yield Record(time, USER1, event.octets, comment, searched=row.searched)
+            yield Record(time, USER1, event.octets, comment, searched=row.searched, mark=self.marks.get(row.no))
             return
         header, placement = row.header, row.placement
         assert header is not None
         role = placement.role if placement is not None else header.role
         station = header.destination if header.destination is not None else header.source
         data = LINK_TYPES[self.link_type].write(event, role, station, time - self.session.started)
-        yield Record(time, self.link_type, data, comment, not event.ok)
+        yield Record(time, self.link_type, data, comment, not event.ok, mark=self.marks.get(row.no))
 
     def _comment(self, item: JudgedRow) -> str:
         row, transaction = item.row, item.transaction

@@ -89,6 +89,11 @@ class LiveFeed:
             searching="" if searching is None else f"{searching.line}",
         )
 
+    def mark(self, time: int, text: str | None) -> str:
+        """Have it written into the recording."""
+        self.live.link.mark(self.live.bus, time, text)
+        return f"in {self.live.status.path}" if self.live.status.path else "until this view ends: nothing is recorded"
+
     def close(self) -> None:
         """End the capture and close its file; where a slow disk takes its time, say so, and let Ctrl-C end that."""
         told = False

@@ -47,6 +47,8 @@ class IpcKind(IntEnum):
     STOP = 35
     FOUND = 36  # text: the settings that a search came to, as in `SettingsChange`
     TRIGGER = 37  # i64: when, ns; text: on what
+    MARK = 38  # i64: which moment, ns; text
+    UNMARK = 39  # the same, without text
 
 
 class ReceivedMessage(NamedTuple):
@@ -217,9 +219,9 @@ def encode_derived(derived: Derived) -> bytes:
     return encode(IpcKind.DERIVED, derived.bus, head + topic + schema + metadata + derived.data)
 
 
-def encode_trigger(bus: int, time: int, text: str) -> bytes:
-    """A trigger that fired at some time, ns."""
-    return encode(IpcKind.TRIGGER, bus, _TICK.pack(time) + text.encode("utf-8", "replace"))
+def encode_trigger(bus: int, time: int, text: str, kind: IpcKind = IpcKind.TRIGGER) -> bytes:
+    """A trigger that fired at some time, ns; a mark of a moment is alike."""
+    return encode(kind, bus, _TICK.pack(time) + text.encode("utf-8", "replace"))
 
 
 def decode_trigger(body: bytes) -> tuple[int, str]:

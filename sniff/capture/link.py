@@ -284,6 +284,11 @@ class CaptureLink:
         self._unsent += encode_trigger(bus, time, text)
         self._send()
 
+    def mark(self, bus: int, time: int, text: str | None) -> None:
+        """Have a MARK event say in the recording what a person wrote about a moment (ns); None takes it away."""
+        self._unsent += encode_trigger(bus, time, text or "", IpcKind.UNMARK if text is None else IpcKind.MARK)
+        self._send()
+
     def _send(self) -> None:
         while self._unsent and self._sending:
             try:

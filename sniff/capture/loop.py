@@ -375,6 +375,8 @@ class CaptureLoop:
             self._settings(self._buses[bus], replace(change, searching=False, found=True))
         elif kind == IpcKind.TRIGGER and bus < len(self._buses):
             self._fire(bus, *decode_trigger(body))
+        elif kind in (IpcKind.MARK, IpcKind.UNMARK) and bus < len(self._buses):
+            self._mark(bus, LineEventKind.MARK if kind == IpcKind.MARK else LineEventKind.UNMARK, *decode_trigger(body))
         elif kind == IpcKind.DERIVED and bus < len(self.recorders):
             derived = decode_derived(bus, body)
             ring = self._buses[bus].ring
@@ -397,6 +399,11 @@ class CaptureLoop:
             except (PortError, ValueError) as error:
                 self._keep(bus, LineEvent(self.clock.now(), LineEventKind.REFUSED, refusal(line, str(error))))
             self._take(self._buses[bus])
+
+    def _mark(self, bus: int, what: LineEventKind, time: int, text: str) -> None:
+        """What a person wrote about a moment; events stand in order of time, so it says how long ago that was."""
+        now = self._buses[bus].source.now()
+        self._keep(bus, LineEvent(now, what, text, max(0, now - time)))
 
     def _fire(self, bus: int, time: int, text: str) -> None:
         """A trigger: of a recording that keeps only what surrounds such, that of all buses; else a mark on its own."""

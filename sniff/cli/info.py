@@ -162,7 +162,7 @@ def _print(path: str, capture: Capture, session: Session, summary: Summary, even
     _print_traffic(summary, adapter)
     _print_nodes(summary)
     for event in events[:20]:
-        _line("event", f"{iso(event.time)} {event.kind.value} {event.text} {event.count or ''}".rstrip())
+        _line("event", f"{iso(event.moment)} {event.kind.value} {event.text} {event.number or ''}".rstrip())
     if len(events) > 20:
         _line("event", f"and {sum(summary.events.values()) - 20} more")
     sys.stdout.flush()

@@ -19,6 +19,7 @@ from sniff.engine.session import Item, LineEventKind, Session
 from sniff.formats import compressed, table
 from sniff.formats.cut_capture import cut_short
 from sniff.formats.files import explain, open_capture
+from sniff.formats.mark_file import with_marks
 from sniff.formats.records import FrameFile
 from sniff.formats.several_buses import buses_in
 
@@ -37,7 +38,8 @@ def read(path: str | Path) -> Capture:
         return _with_reads(standard_input.read())
     if Path(path).is_dir():
         raise CaptureError(f"{path}: a directory, not a capture; name a file in it")
-    return _with_reads(_opened(Path(path)))
+    opened = _with_reads(_opened(Path(path)))
+    return opened if len(buses_in(opened)) > 1 else with_marks(opened, path)
 
 
 def _opened(path: Path) -> Capture:

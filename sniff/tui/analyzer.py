@@ -10,6 +10,7 @@ from textual.message_pump import MessagePump
 
 from sniff.bus.feed import FeedStatus
 from sniff.bus.rows import Store
+from sniff.tui.health_meter import HealthMeter
 from sniff.tui.seats import BusLine
 from sniff.tui.viewing import Viewing
 
@@ -23,6 +24,11 @@ class Analyzer(App[None]):
     @abstractmethod
     def status(self) -> FeedStatus:
         """Of the feed, ten times a second."""
+
+    @property
+    @abstractmethod
+    def health(self) -> HealthMeter:
+        """Health of the bus, a look every now and then."""
 
     @property
     @abstractmethod
@@ -54,6 +60,10 @@ class Analyzer(App[None]):
     @abstractmethod
     def filter(self, text: str) -> None:
         """Show only what a filter accepts, on all lists."""
+
+    @abstractmethod
+    def mark_row(self, no: int, text: str | None) -> None:
+        """Keep what a person wrote about a row, None to take it away."""
 
     @abstractmethod
     def show_row(self, no: int) -> None:

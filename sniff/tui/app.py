@@ -14,13 +14,15 @@ from textual.timer import Timer
 
 from sniff.bus.feed import Feed, FeedStatus
 from sniff.bus.rows import Store
-from sniff.config import ConfigError
+from sniff.config import ConfigError, nearest
 from sniff.config import load as load_config
 from sniff.filter import FilterError
 from sniff.tui.analyzer import Analyzer
 from sniff.tui.busbar import BusBar
 from sniff.tui.header import StatusHeader, why_ended
+from sniff.tui.health_meter import HealthMeter
 from sniff.tui.help import HelpScreen
+from sniff.tui.key_names import KNOWN, named
 from sniff.tui.palette import ActionCommands
 from sniff.tui.plain import plain
 from sniff.tui.prompt import Prompt
@@ -48,20 +50,22 @@ class SnifferApp(Analyzer):
     CSS_PATH = "app.tcss"
     COMMANDS = Analyzer.COMMANDS | {ActionCommands}
     ENABLE_COMMAND_PALETTE = True
-    BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("space", "freeze", "freeze", tooltip="freeze the view, or let it go on; the capture never stops"),
-        Binding("question_mark", "help", "help", tooltip="this page"),
-        Binding("q", "go_back", "back", tooltip="go back to the screen before; quit at the first one"),
-        *(
-            Binding(entry.key, f"switch('{entry.name}')", entry.title, tooltip=f"screen {entry.title}", show=False)
-            for entry in SCREENS
-        ),
-        Binding("b", "bus(1)", "bus", tooltip="the next bus, of several; the others are listened to meanwhile"),
-        Binding("B", "bus(-1)", "bus", tooltip="the bus before", show=False),
-        Binding("T", "theme", "theme", tooltip="dark or light theme", show=False),
-        Binding("ctrl+p", "command_palette", "commands", tooltip="all commands by name", show=False),
-        Binding("ctrl+q,ctrl+c", "quit", "quit", tooltip="quit at once", show=False),
-    ]
+    BINDINGS: ClassVar[list[BindingType]] = named(
+        [
+            Binding("space", "freeze", "freeze", tooltip="freeze the view, or let it go on; the capture never stops"),
+            Binding("question_mark", "help", "help", tooltip="this page"),
+            Binding("q", "go_back", "back", tooltip="go back to the screen before; quit at the first one"),
+            *(
+                Binding(entry.key, f"switch('{entry.name}')", entry.title, tooltip=f"screen {entry.title}", show=False)
+                for entry in SCREENS
+            ),
+            Binding("b", "bus(1)", "bus", tooltip="the next bus, of several; the others are listened to meanwhile"),
+            Binding("B", "bus(-1)", "bus", tooltip="the bus before", show=False),
+            Binding("T", "theme", "theme", tooltip="dark or light theme", show=False),
+            Binding("ctrl+p", "command_palette", "commands", tooltip="all commands by name", show=False),
+            Binding("ctrl+q,ctrl+c", "quit", "quit", tooltip="quit at once", show=False),
+        ]
+    )
 
     def __init__(self, feed: Feed | Sequence[Feed], start_screen: str = "frames") -> None:
         """`feed`: of one bus, or those of several; the first is shown first."""
@@ -102,6 +106,11 @@ class SnifferApp(Analyzer):
     def status(self) -> FeedStatus:
         """How its feed is doing."""
         return self.seat.status
+
+    @property
+    def health(self) -> HealthMeter:
+        """Its health, a look every now and then."""
+        return self.seat.health
 
     @property
     def viewing(self) -> Viewing:
@@ -154,9 +163,25 @@ class SnifferApp(Analyzer):
                 seat.viewing.colour_rules(colours)
         except (ConfigError, FilterError) as error:
             self.notify(plain(error), severity="error", markup=False)
+        self._take_keys()
         self._worker = self.set_interval(WORK_SECONDS, self._work, pause=True)
         self.set_interval(POLL_SECONDS, self.poll)
         self.poll()
+
+    def _take_keys(self) -> None:
+        """Other keys, as the configuration says."""
+        try:
+            keys = load_config().keys
+        except ConfigError:  # said already
+            return
+        for entry in SCREENS:
+            load(entry)  # names of keys are known with their screens
+        known = tuple(sorted(KNOWN))
+        for name in keys:
+            if name not in known:
+                said = plain(f"[keys] unknown name {name!r}{nearest(name, known)}")
+                self.notify(said, severity="error", markup=False)
+        self.set_keymap({name: key for name, key in keys.items() if name in known and key})
 
     def poll(self) -> None:
         """Take what the feed has and show it."""
@@ -167,6 +192,7 @@ class SnifferApp(Analyzer):
         if self._worker is not None and any(seat.is_still_read for seat in self.seats):
             self._worker.resume()
         if changed:
+            self.viewing.take_marks()
             self.draw_screen()
         self._draw_header()
 
@@ -248,6 +274,9 @@ class SnifferApp(Analyzer):
         return any(seat.feed.work() for seat in (self.seat, *others))
 
     def _draw_header(self) -> None:
+        status = self.status
+        if not self.viewing.frozen and not status.reading:
+            self.health.look(self.store, final=status.judged >= 1 and not status.live)
         for header in self.screen.query(StatusHeader):
             header.bring_up()
         for bar in self.screen.query(BusBar):
@@ -317,6 +346,21 @@ class SnifferApp(Analyzer):
         except FilterError as error:
             self.notify(plain(error), severity="error", markup=False)
             return
+        self.draw_screen()
+
+    def mark_row(self, no: int, text: str | None) -> None:
+        """Keep what a person wrote about a row, None to take it away, and say where it is kept."""
+        row = self.store.by_no(no)
+        if row is None:
+            self.notify(f"row {no} is no longer in memory", timeout=3)
+            return
+        try:
+            where = self.feed.mark(row.event.start, text)
+        except OSError as error:
+            where = f"until this view ends: {error.strerror or error}"
+        if text is not None:
+            self.notify(f"mark on row {no}, kept {plain(where)}", timeout=3, markup=False)
+        self.viewing.take_marks()
         self.draw_screen()
 
     def show_row(self, no: int) -> None:

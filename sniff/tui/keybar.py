@@ -38,7 +38,7 @@ FIRST = ("bus", "filter", "", "freeze", "follow", "error", "pair", "mark", "time
 
 def key_name(key: str) -> str:
     """A key as people read it."""
-    return NAMES.get(key, key.removeprefix("upper_"))
+    return NAMES.get(key, key.removeprefix("upper_").replace("ctrl+", "^"))
 
 
 def explanation(active: ActiveBinding) -> str:

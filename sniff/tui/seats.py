@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass, field
 from enum import Enum
 
 from sniff.bus.feed import Feed, FeedStatus
 from sniff.engine.session import LineEventKind
+from sniff.tui.health_meter import HealthMeter
 from sniff.tui.viewing import Viewing
-
-JUDGED_EVERY = 2.0
-"""Seconds between looks at the health of a bus, for the bar."""
 
 
 class BusState(Enum):
@@ -49,9 +46,7 @@ class Seat:
     told_end: bool = False
     told_dropped: bool = False
     told_trouble: str = ""
-    _health: float | None = None
-    _judge_at: float = 0.0
-    _version: int = field(default=-1)
+    health: HealthMeter = field(default_factory=HealthMeter)
 
     @classmethod
     def of(cls, feed: Feed, start_screen: str) -> Seat:
@@ -84,13 +79,11 @@ class Seat:
     def line(self, is_here: bool) -> BusLine:
         """What the bar says of it now."""
         store = self.feed.store
-        now = time.monotonic()
-        if now >= self._judge_at and store.version != self._version and not self.is_still_read:
-            self._judge_at, self._version = now + JUDGED_EVERY, store.version
-            heard = store.model.summary.frames
-            self._health = store.model.health().bus.score if heard else None
+        if not self.is_still_read:
+            self.health.look(store, final=not self.status.live)
+        health = None if self.health.bus is None else self.health.bus.score
         load = store.load.share() if self.status.live else store.load.overall()
-        return BusLine(self.name, self.state, self._health, load, store.error_total, self.status.dropped, is_here)
+        return BusLine(self.name, self.state, health, load, store.error_total, self.status.dropped, is_here)
 
 
 _OF_PORT = (LineEventKind.UNPLUGGED, LineEventKind.REPLUGGED)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bisect import bisect_right, insort
+from bisect import bisect_right
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -12,6 +12,7 @@ from dissectors.tracker import Transaction
 from sniff.bus.row_masks import RowMasks
 from sniff.bus.rows import Store
 from sniff.engine.engine import Row
+from sniff.engine.session import LineEvent, LineEventKind
 from sniff.filter import Filter, FilterError, Scope, compile_filter
 from sniff.filter.compiling import field_of
 from sniff.filter.completion import shown_value
@@ -37,7 +38,10 @@ class Viewing:
     accepts: Filter | None = None
     masks: RowMasks | None = None  # the same for many rows at once, where columns say something of it
     filter_version: int = 0  # changes with the filter, so that lists know when to begin anew
-    marks: list[int] = field(default_factory=list)  # row numbers, ascending
+    columns: dict[str, tuple[str, ...]] = field(default_factory=dict)  # chosen, by list
+    marks: dict[int, str] = field(default_factory=dict)  # what was written, by row number
+    _events_seen: int = 0  # of the store
+    _unplaced: list[LineEvent] = field(default_factory=list)  # marks whose row has not come yet
     filters: list[str] = field(default_factory=list)  # that were set, the latest last
     search: str = ""  # what was looked for last
     colours: list[tuple[str, Filter]] = field(default_factory=list)  # rows that a filter accepts have its colour
@@ -145,17 +149,25 @@ class Viewing:
             return False
         return any(self.accepts_row(row) for row in (transaction.request, transaction.response) if row is not None)
 
-    def toggle_mark(self, no: int) -> bool:
-        """Mark a row or take its mark away; whether it is marked now."""
-        if no in self.marks:
-            self.marks.remove(no)
-            return False
-        insort(self.marks, no)
-        return True
+    def take_marks(self) -> bool:
+        """Take the marks that came among the events of the line since; whether there were any."""
+        events = self.store.line_events
+        came = [one for one in events[self._events_seen :] if one.is_mark]
+        self._events_seen = len(events)
+        waiting, self._unplaced = [*self._unplaced, *came], []
+        for event in waiting:
+            no = self.store.row_marked(event.moment)
+            if no is None:
+                self._unplaced.append(event)
+            elif event.kind is LineEventKind.MARK:
+                self.marks[no] = event.text
+            else:
+                self.marks.pop(no, None)
+        return len(self._unplaced) < len(waiting)
 
     def next_mark(self) -> int | None:
         """The marked row after the cursor, round to the first; None without marks."""
-        kept = [no for no in self.marks if self.store.by_no(no) is not None]
+        kept = [no for no in sorted(self.marks) if self.store.by_no(no) is not None]
         if not kept:
             return None
         position = bisect_right(kept, self.row)
