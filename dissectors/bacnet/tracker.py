@@ -419,7 +419,7 @@ class MstpTracker(OpenExchanges):
         if self._previous is None or self._latency >= T_USAGE_DELAY:
             return False
         before = self._previous[0]
-        gap = frame.start - before.end
+        gap = frame.start - before.end + before.slack  # by its largest reading
         return frame.ok and before.octets == frame.octets and gap < self._turnaround and before.end < frame.end
 
     def _echo(self, no: int, frame: Frame, header: Header, closed: list[Transaction]) -> Placement:
