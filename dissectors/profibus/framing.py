@@ -4,7 +4,7 @@
       ─► checked telegram (SD1, SD2, SD3): its sum and end are right; with line errors only where it is expected
       ─► token (SD4), no check: between known masters, or by one to somebody who then sends; where none is known, in a
          chain of tokens or in front of a request by the new holder
-      ─► short acknowledgement (SC), no check: directly after a request that wants an answer
+      ─► short acknowledgement (SC), no check: directly after a request that wants an answer, and no answer behind it
       ─► what lies between two of them: damaged, if its form tells so, and once a good one was seen; else noise
 
 A stretch that is no telegram is given out when the next good one is found behind it, after MOST_HELD octets, or when
@@ -20,6 +20,7 @@ from dataclasses import replace
 from dissectors.frame import Check, Event, Found, Frame, LineError, Reason
 from dissectors.line import MS, Timing
 from dissectors.plain_framers import PlainFramer
+from dissectors.profibus.control import REQUEST
 from dissectors.profibus.envelope import damaged, is_sound, length_of
 from dissectors.profibus.telegram import HIGHEST, LONGEST, SC, SD1, SD2, SD3, SD4, parse
 
@@ -81,7 +82,7 @@ class ProfibusFramer(PlainFramer):
         """Octets of the telegram at `at`; 0: none begins there; None: too few octets yet to tell."""
         octet = self._window.octets[at]
         if octet == SC:
-            return int(self._is_open and self._may_acknowledge(at))
+            return self._acknowledgement(at, last)
         length = self._token(at) if octet == SD4 else self._checked(at)
         return 0 if length is None and last else length
 
@@ -103,6 +104,28 @@ class ProfibusFramer(PlainFramer):
         if telegram.is_request:
             return telegram.source in self._masters
         return (telegram.source, telegram.destination) == self._asked
+
+    def _acknowledgement(self, at: int, last: bool) -> int | None:
+        """1 where a short acknowledgement stands; with the answer that is due right behind it is a stray octet."""
+        if not (self._is_open and self._may_acknowledge(at)):
+            return 0
+        answers = [self._answers(at + 1 + skip) for skip in range(_STRAY_MOST + 1)]
+        if True in answers:
+            return 0
+        return None if None in answers and not last else 1
+
+    def _answers(self, at: int) -> bool | None:
+        """Whether the answer that is due begins there, by its head; None: too few octets yet to tell."""
+        octets = self._window.octets
+        if len(octets) <= at:
+            return None
+        if octets[at] not in _CHECKED:
+            return False
+        begin = at + (4 if octets[at] == SD2 else 1)
+        if len(octets) < begin + 3:
+            return None
+        to, source, control = octets[begin : begin + 3]
+        return (source & 0x7F, to & 0x7F) == self._asked and not control & REQUEST
 
     def _may_acknowledge(self, at: int) -> bool:
         return not at or (at <= _STRAY_MOST and not _STARTS.search(self._window.octets, 0, at))

@@ -182,11 +182,11 @@ class Limits:
 
     frame: int | None = None
     response: int | None = None
-    responses: Mapping[int, int] = field(default_factory=dict)
     stations: tuple[int, int] | None = None
     functions: frozenset[int] | None = None
     unexecuted: frozenset[str] = frozenset()
     read_only: frozenset[str] = frozenset()
+    responses: Mapping[int, int] = field(default_factory=dict)
 
     def ignores(self, kind: str, space: str = "") -> bool:
         """Whether an exchange of that kind is acknowledged and not done."""

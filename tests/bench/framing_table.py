@@ -286,7 +286,7 @@ def main(words: Sequence[str] | None = None) -> int:
     parser.add_argument("--failed", type=int, default=0, help="print so many failing inputs of each line")
     options = parser.parse_args(words)
     columns = ("conserved", "found", "invented", "attributed", "direction", "verdict")
-    print(f"{'':38}" + "".join(f"{column:>12}" for column in columns))
+    print(f"{'':41}" + "".join(f"{column:>12}" for column in columns))
     for name in options.protocols or TRAFFIC:
         traffic = TRAFFIC[name](Random(options.seed), options.frames)
         truth = undisturbed(traffic)
@@ -299,7 +299,7 @@ def main(words: Sequence[str] | None = None) -> int:
                     "all" if got.conserved else "LOST",
                     *map(str, (got.found, got.invented, got.attributed, got.direction, got.verdict)),
                 ]
-                print(f"{name:6}{row.name:24}  {delivery:6}" + "".join(f"{c:>12}" for c in cells), flush=True)
+                print(f"{name:9}{row.name:24}  {delivery:6}" + "".join(f"{c:>12}" for c in cells), flush=True)
                 for line in got.failed[: options.failed]:
                     print(f"    {line}")
     return 0

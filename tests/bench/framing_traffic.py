@@ -148,11 +148,29 @@ def mstp(dice: Random, frames: int) -> Traffic:
     return Traffic("mstp", MSTP_LINE, said)
 
 
+def profibus(dice: Random, frames: int) -> Traffic:
+    """A ring of two masters with two drives and a valve."""
+    from tests.faults.profibus_cases import profibus as bus
+
+    plan = bus(seed=dice.randrange(1000))
+    stations = {"controller": 1, "second master": 2, "drive 5": 5, "drive 6": 6, "valve": 12}
+    said: list[Said] = []
+    end = 0
+    for burst in plan.wire().run(600 * S):
+        for sent in burst.sent:
+            said.append(Said(sent.octets, max(0, sent.start - end), stations[sent.party]))
+            end = sent.end
+        if len(said) >= frames:
+            break
+    return Traffic("profibus", plan.line, said)
+
+
 TRAFFIC: dict[str, Callable[[Random, int], Traffic]] = {
     "rtu": modbus_rtu,
     "ascii": modbus_ascii,
     "n2": n2,
     "mstp": mstp,
+    "profibus": profibus,
 }
 """Name on the command line → what makes about so many frames of traffic."""
 

@@ -17,7 +17,8 @@ MS = 1_000_000
 def exchanges(*telegrams: bytes) -> tuple[list[Transaction], NodeTable]:
     """The transactions of telegrams 1 ms apart, and the stations that they show."""
     engine = Engine(PROFIBUS, Timing(LINE))
-    nodes, closed, now = NodeTable(), [], 10**12
+    nodes, now = NodeTable(), 10**12
+    closed: list[Transaction] = []
     for octets in telegrams:
         now += MS + len(octets) * LINE.char
         output = engine.feed(Chunk(now, octets))

@@ -152,3 +152,10 @@ def test_renamed_telegrams_stay_good_and_damaged_ones_damaged() -> None:
     renamed = read(first, second)
     assert [one.damage for one in renamed] == [None, Damage.CHECK]
     assert renamed[0].octets[1:3] == renamed[1].octets[1:3]
+
+
+def test_a_stray_octet_in_front_of_the_answer_is_no_acknowledgement() -> None:
+    asked, answer = telegram(8, 2, 0x5D, b"\1"), telegram(2, 8, 0x08, b"\2")
+    assert [one.octets for one in read(asked, b"\xe5" + answer)] == [asked, answer]
+    assert [one.octets for one in read(asked, b"\xe5\x55" + answer)] == [asked, answer]
+    assert [one.octets for one in read(asked, b"\xe5", telegram(9, 2, 0x5D, b"\1"))][1] == b"\xe5"
