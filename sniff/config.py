@@ -15,6 +15,12 @@
     at = "error"                             # from which severity on; default warning
     every = 600                              # seconds between two about the same finding
 
+    [box]                                    # what runs unattended (`sniff485 box`)
+    folder = "/var/lib/sniff485"
+    name = "site"                            # site-0001.mcap, site-0002.mcap …
+    rotate = "size:64MB,time:1d"
+    keep = 500
+    keep_free = "1GB"
     [mqtt]                                   # and [influx], [json], [foxglove], [metrics]: outlet_settings.py
     broker = "mqtts://broker.example"
 
@@ -24,6 +30,15 @@
     [colours]
     magenta = "kind contains write"
 
+    [view.writes]                            # of the terminal UI: V shows it by its name, and saves what is shown
+    frames = ["no", "time", "text", "verdict"]
+    transactions = ["tx", "kind", "latency"]
+    time = "relative"                        # absolute, relative, delta
+    filter = "kind contains write"
+
+    [keys]
+    mark = "ctrl+b"                          # other keys for the terminal UI; names: sniff/tui/README.md
+
 The first file found counts: in the working folder or one above it, then the user's configuration folder. Flags win
 over the file.
 """
@@ -31,6 +46,7 @@ over the file.
 from __future__ import annotations
 
 import difflib
+import json
 import os
 import re
 import sys
@@ -50,7 +66,10 @@ FILE = "sniff485.toml"
 AUTO: Final = "auto"
 BUS_KEYS = ("port", "line", "protocol", "record", "devices")
 ALERT_KEYS = ("command", "webhook", "at", "every")
-TOP_KEYS = ("bus", "alert", "filters", "colours", *outlet_settings.TABLES)
+BOX_KEYS = ("folder", "name", "rotate", "keep", "keep_free", "metrics", "status")
+VIEW_KEYS = ("frames", "transactions", "time", "filter")
+TIMES = ("absolute", "relative", "delta")
+TOP_KEYS = ("bus", "alert", "box", "filters", "colours", "view", "keys", *outlet_settings.TABLES)
 COLOURS = ("red", "green", "yellow", "blue", "magenta", "cyan")
 
 
@@ -86,16 +105,44 @@ class AlertSettings:
 
 
 @dataclass(frozen=True, slots=True)
+class BoxSettings:
+    """What `box` is told; None where the file is silent. `folder`, `name`: of the recording's parts. `rotate`, `keep`,
+    `keep_free`: as options of those names. `metrics`, `status`: ports on the loopback."""
+
+    folder: str | None = None
+    name: str | None = None
+    rotate: str | None = None
+    keep: int | None = None
+    keep_free: str | None = None
+    metrics: int | None = None
+    status: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """How the lists of the terminal UI look. `columns`: by list ("frames", "transactions") the names of its columns in
+    order; a list that is not there has its usual ones. `time`: one of TIMES, "" as it is. `filter`: "" for none."""
+
+    columns: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    time: str = ""
+    filter: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class Config:
     """All buses by name, and the file they are from (None: there is none). `filters`: by name. `colours`: filters by
-    the colour that rows get which they accept; the first that does counts."""
+    the colour that rows get which they accept; the first that does counts. `views`: by name. `keys`: what they do by
+    name → the keys for it."""
 
     path: Path | None
     buses: Mapping[str, Bus]
     alert: AlertSettings | None = None
     filters: Mapping[str, str] = field(default_factory=dict)
     colours: Mapping[str, str] = field(default_factory=dict)
+    box: BoxSettings = field(default_factory=BoxSettings)
     outlets: OutletSettings = field(default_factory=OutletSettings)
+    views: Mapping[str, View] = field(default_factory=dict)
+    keys: Mapping[str, str] = field(default_factory=dict)
 
 
 def candidates(start: Path) -> list[Path]:
@@ -132,7 +179,34 @@ def parse(path: Path) -> Config:
     alert = reader.alert(reader.table(data["alert"], "alert")) if "alert" in data else None
     filters, colours = (reader.filters(data.get(name, {}), name) for name in ("filters", "colours"))
     reader.check_keys(colours, COLOURS, "colours")
-    return Config(path, named, alert, filters, colours, outlets=outlet_settings.outlets(reader, data))
+    listed = reader.table(data.get("view", {}), "view")
+    views = {name: reader.view(name, reader.table(entry, f"view.{name}")) for name, entry in listed.items()}
+    entry = reader.table(data.get("keys", {}), "keys")
+    keys = {name: reader.text(entry, name, "keys") or "" for name in entry}
+    box = reader.box(reader.table(data.get("box", {}), "box"))
+    told = outlet_settings.outlets(reader, data)
+    return Config(path, named, alert, filters, colours, box, told, views, keys)
+
+
+def save_view(name: str, view: View, start: Path | None = None) -> Path:
+    """Write a view into the configuration that is in force, else the user's; where that is. Raises ConfigError, also
+    where the name is taken, and OSError."""
+    if not re.fullmatch(r"[A-Za-z0-9_-]+", name):
+        raise ConfigError(f"{name!r}: a name of letters, digits, - and _")
+    held = load(start)
+    if name in held.views:
+        raise ConfigError(f"{held.path}: [view.{name}] is there already")
+    path = held.path or candidates((start or Path.cwd()).resolve())[-1]
+    path.parent.mkdir(parents=True, exist_ok=True)
+    lines = [f"[view.{name}]"]
+    lines += [f"{which} = {json.dumps(list(words))}" for which, words in view.columns.items()]
+    lines += [f"time = {json.dumps(view.time)}"] if view.time else []
+    lines += [f"filter = {json.dumps(view.filter)}"] if view.filter else []
+    before = path.read_text("utf-8") if path.exists() else ""
+    gap = "" if not before else "\n" if before.endswith("\n") else "\n\n"
+    with path.open("a", encoding="utf-8") as stream:
+        stream.write(gap + "\n".join(lines) + "\n")
+    return path
 
 
 class _Reader:
@@ -165,16 +239,33 @@ class _Reader:
 
     def filters(self, value: Any, section: str) -> dict[str, str]:
         """Filters by name; each is read, so that a wrong one is found before it is wanted."""
-        from sniff.filter import FilterError, compile_filter  # few configurations have any
+        from sniff.filter import FilterError, check_filter  # few configurations have any
 
         entry, found = self.table(value, section), dict[str, str]()
         for name in entry:
             found[name] = self.text(entry, name, section) or ""
             try:
-                compile_filter(found[name], registry.get(registry.DEFAULT))
+                check_filter(found[name])
             except FilterError as error:
                 raise self.error(name, section, f"{name}: {error}") from None
         return found
+
+    def view(self, name: str, entry: Mapping[str, Any]) -> View:
+        """Columns are only known to the lists, which say what is wrong with them."""
+        section = f"view.{name}"
+        self.check_keys(entry, VIEW_KEYS, section)
+        columns: dict[str, tuple[str, ...]] = {}
+        for which in ("frames", "transactions"):
+            words = entry.get(which)
+            if words is None:
+                continue
+            if not isinstance(words, list) or not words or not all(isinstance(word, str) for word in words):
+                raise self.error(which, section, f'{which}: expected names of columns, such as ["no", "time"]')
+            columns[which] = tuple(words)
+        time = self.text(entry, "time", section) or ""
+        if time and time not in TIMES:
+            raise self.error("time", section, f"unknown time {time!r}{nearest(time, TIMES)}")
+        return View(columns, time, self.filters({"filter": entry.get("filter", "")}, section).get("filter", ""))
 
     def text(self, entry: Mapping[str, Any], key: str, section: str) -> str | None:
         value = entry.get(key)
@@ -199,6 +290,22 @@ class _Reader:
         if isinstance(every, bool) or not isinstance(every, int | float) or every < 0:
             raise self.error("every", "alert", f"expected seconds, not {every!r}")
         return AlertSettings(tuple(command), webhook, levels[level], float(every))
+
+    def box(self, entry: Mapping[str, Any]) -> BoxSettings:
+        self.check_keys(entry, BOX_KEYS, "box")
+        texts = {key: self.text(entry, key, "box") for key in ("folder", "name", "rotate", "keep_free")}
+        if not re.fullmatch(r"[A-Za-z0-9_.-]+", texts["name"] or "site"):
+            raise self.error("name", "box", f"{texts['name']!r}: letters, digits, '-', '_' and '.' name files")
+        keep, metrics, status = (
+            self.number(entry, key, "box", least) for key, least in (("keep", 1), ("metrics", 0), ("status", 0))
+        )
+        return BoxSettings(texts["folder"], texts["name"], texts["rotate"], keep, texts["keep_free"], metrics, status)
+
+    def number(self, entry: Mapping[str, Any], key: str, section: str, least: int) -> int | None:
+        value = entry.get(key)
+        if value is not None and (isinstance(value, bool) or not isinstance(value, int) or value < least):
+            raise self.error(key, section, f"expected a whole number from {least} on, not {value!r}")
+        return value
 
     def device(self, devices: Mapping[str, Any], key: str, section: str) -> str:
         """The profile of a station; the key is its address, or "*" for every one."""

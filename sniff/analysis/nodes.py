@@ -1,4 +1,4 @@
-"""Who is on the bus and how each station fares; mergeable."""
+"""The stations on a bus and how each fares; mergeable."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from dissectors.frame import Frame
 from dissectors.histogram import Histogram, add_grouped
-from dissectors.tracker import PASSING, Transaction, Verdict
+from dissectors.tracker import PASSING, Passing, Transaction, Verdict
 from sniff.engine.engine import Row
 
 if TYPE_CHECKING:
@@ -119,7 +119,7 @@ class NodeTable:
         node = self._node(transaction.station)
         if transaction.is_passing:
             node.passed += 1
-            node.unused += transaction.verdict is Verdict.NO_RESPONSE
+            node.unused += transaction.kind == Passing.TOKEN and transaction.verdict is Verdict.NO_RESPONSE
         else:
             node.verdicts[transaction.verdict] += 1
         node.kinds[transaction.kind] += 1
@@ -175,7 +175,7 @@ class NodeTable:
             node, name = self._node(address), closed.names[kind]
             if name in PASSING:
                 node.passed += count
-                node.unused += count * (VERDICTS[verdict] is Verdict.NO_RESPONSE)
+                node.unused += count * (name == Passing.TOKEN and VERDICTS[verdict] is Verdict.NO_RESPONSE)
             else:
                 node.verdicts[VERDICTS[verdict]] += count
             node.kinds[name] += count

@@ -1,4 +1,4 @@
-"""Where the terminal UI gets its rows from: a live capture, a file, or memory. No UI in here."""
+"""The feeds of the terminal UI: a live capture, a file, or memory. No UI in here."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from sniff.bus.rows import Store
+from sniff.engine.session import LineEvent, LineEventKind
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +68,11 @@ class Feed(Protocol):
         """How things stand now."""
         ...
 
+    def mark(self, time: int, text: str | None) -> str:
+        """Keep what a person wrote about a moment (ns), None to take it away; where it is kept, in words. It comes back
+        as an event of the store. Raises OSError."""
+        ...
+
     def close(self) -> None:
         """Stop; called once, when the UI has ended."""
         ...
@@ -99,6 +105,12 @@ class StoreFeed:
     def status(self) -> FeedStatus:
         """What `current` was set to."""
         return self.current
+
+    def mark(self, time: int, text: str | None) -> str:
+        """Only here."""
+        kind = LineEventKind.UNMARK if text is None else LineEventKind.MARK
+        self._store.add_mark(LineEvent(time, kind, text or ""))
+        return "until this view ends"
 
     def close(self) -> None:
         """Remember that it was closed."""

@@ -1,4 +1,4 @@
-"""What fills the terminal UI from a capture file: its first rows at once, the others while one looks at them.
+"""The source of rows from a capture file: its first rows at once, the others while one looks at them.
 
 A thread reads, takes frames out and packs them; the store takes what it has made in small bites, between two keys. The
 rules come last: what they find is final when all rows are judged.
@@ -25,8 +25,9 @@ from sniff.engine.blocks import in_pieces
 from sniff.engine.bulk import tables
 from sniff.engine.capture import Capture, CaptureError
 from sniff.engine.follow_settings import dissector_for
-from sniff.engine.session import LineEvent, Session
+from sniff.engine.session import LineEvent, LineEventKind, Session
 from sniff.formats.files import watched
+from sniff.formats.mark_file import add_mark, mark_file
 
 FIRST_READS, READS = 512, 16_384
 """Reads that are taken together, at first and later."""
@@ -46,12 +47,14 @@ Piece = Prepared | LineEvent
 
 
 class FileFeed:
-    """A capture file, read on until its end."""
+    """A capture file, read on until its end. `buses`: how many share the memory."""
 
-    def __init__(self, path: str, capture: Capture, session: Session, devices: Devices | None = None) -> None:
+    def __init__(
+        self, path: str, capture: Capture, session: Session, devices: Devices | None = None, buses: int = 1
+    ) -> None:
         self.path = path
         self.capture = capture
-        self._store = Store(session, dissector_for(session), rows_that_fit(), devices, judge_later=True)
+        self._store = Store(session, dissector_for(session), rows_that_fit(buses), devices, judge_later=True)
         self._pieces = self._read(session)
         self._thread: threading.Thread | None = None
         self._queue: queue.Queue[Piece | BaseException | None] = queue.Queue(WAITING)
@@ -165,6 +168,15 @@ class FileFeed:
             read=min(0.99, self._progress.octets / max(1, self._size)) if self._reading else 1.0,
             judged=1.0 if store.all_judged and not self._reading else min(0.99, store.judged / max(1, store.last_no)),
         )
+
+    def mark(self, time: int, text: str | None) -> str:
+        """Write it beside the file, which stays as it is."""
+        kind = LineEventKind.UNMARK if text is None else LineEventKind.MARK
+        self._store.add_mark(LineEvent(time, kind, text or ""))
+        if not Path(self.path).is_file():
+            return "until this view ends: no single file is shown"
+        add_mark(self.path, time, text)
+        return f"in {mark_file(self.path)}"
 
     def close(self) -> None:
         """Have the thread end."""

@@ -11,7 +11,7 @@ from sniff.analysis.wording import describe, duration
 from sniff.engine.engine import Output
 from sniff.engine.follow_settings import engine_for
 from sniff.engine.session import Item, LineEvent, LineEventKind, Session
-from sniff.engine.verdict_join import Settled, Settling
+from sniff.engine.verdict_join import JudgedRow, VerdictJoin
 from sniff.formats.linktypes import LINK_TYPES, RTAC, RTAC_ERRORS, USER1, rtac_record
 from sniff.formats.records import Record
 
@@ -20,18 +20,24 @@ class RecordMaker:
     """Items → records of one link type, a frame each; verdict and doubts go into the comment.
 
     `live`: give each frame at once instead of waiting for its verdict. `notes`: by row number, what else to say in the
-    comment.
+    comment. `marks`: by row number, what a person wrote.
     """
 
     def __init__(
-        self, session: Session, link_type: int, live: bool = False, notes: Mapping[int, str] | None = None
+        self,
+        session: Session,
+        link_type: int,
+        live: bool = False,
+        notes: Mapping[int, str] | None = None,
+        marks: Mapping[int, str] | None = None,
     ) -> None:
         self.session = session
         self.link_type = link_type
         self.engine = engine_for(session)
         self.live = live
         self.notes: Mapping[int, str] = notes or {}
-        self._settling = Settling()
+        self.marks: Mapping[int, str] = marks or {}
+        self._settling = VerdictJoin()
 
     def add(self, item: Item) -> Iterator[Record]:
         """Take one item; give the records that it completes."""
@@ -52,12 +58,12 @@ class RecordMaker:
     def _settled(self, output: Output) -> Iterator[Record]:
         if self.live:
             for row in output.rows:
-                yield from self._records(Settled(row, None))
+                yield from self._records(JudgedRow(row, None))
             return
         for item in self._settling.add(output):
             yield from self._records(item)
 
-    def _records(self, item: Settled) -> Iterator[Record]:
+    def _records(self, item: JudgedRow) -> Iterator[Record]:
         row = item.row
         event = row.event
         time = event.end
@@ -68,16 +74,16 @@ class RecordMaker:
                         yield Record(time, RTAC, rtac_record(time - self.session.started, number, b""))
         comment = self._comment(item)
         if not isinstance(event, Frame) or not _readable(event):
-            yield Record(time, USER1, event.octets, comment, searched=row.searched)
+            yield Record(time, USER1, event.octets, comment, searched=row.searched, mark=self.marks.get(row.no))
             return
         header, placement = row.header, row.placement
         assert header is not None
         role = placement.role if placement is not None else header.role
         station = header.destination if header.destination is not None else header.source
         data = LINK_TYPES[self.link_type].write(event, role, station, time - self.session.started)
-        yield Record(time, self.link_type, data, comment, not event.ok)
+        yield Record(time, self.link_type, data, comment, not event.ok, mark=self.marks.get(row.no))
 
-    def _comment(self, item: Settled) -> str:
+    def _comment(self, item: JudgedRow) -> str:
         row, transaction = item.row, item.transaction
         notes = [] if isinstance(row.event, Frame) and row.event.ok else [describe(self.engine.dissector, row)]
         if row.header is not None and row.header.error:

@@ -11,8 +11,9 @@ from collections.abc import Iterable, Sequence
 from typing import overload
 
 import numpy as np
+import numpy.typing as npt
 
-from dissectors.columns import NONE, VERDICTS, Times
+from dissectors.columns import NONE, VERDICTS, Times, TransactionColumns
 from dissectors.findings import Finding
 from dissectors.frame import Frame, LineError
 from dissectors.histogram import Histogram
@@ -20,10 +21,11 @@ from dissectors.line import NS_PER_S
 from dissectors.manifest import Dissector
 from dissectors.meaning import Meaning
 from dissectors.profiles import Devices
-from dissectors.tracker import Transaction, Verdict
+from dissectors.profiles.decoding import Value, decode
+from dissectors.tracker import Passing, Transaction, Verdict
 from sniff.analysis.load import Load
 from sniff.analysis.nodes import NodeTable
-from sniff.analysis.points import PointTable, meaning_of
+from sniff.analysis.points import TELLING, PointTable, meaning_of
 from sniff.analysis.polls import Polls
 from sniff.analysis.summary import Summary
 from sniff.analysis.wording import describe
@@ -52,6 +54,20 @@ BAD_VERDICTS = frozenset(
     }
 )
 _BAD = np.array([verdict in BAD_VERDICTS for verdict in VERDICTS], bool)
+_LOOKING = (Passing.POLL, Passing.STATUS)
+
+
+def is_trouble(transaction: Transaction) -> bool:
+    """Whether it went wrong. A master that looks for another one where there is none is no trouble."""
+    in_vain = transaction.kind in _LOOKING and transaction.verdict is Verdict.NO_RESPONSE
+    return transaction.verdict in BAD_VERDICTS and not in_vain
+
+
+def _looked_in_vain(closed: TransactionColumns) -> npt.NDArray[np.bool_]:
+    """Which looked for a station to pass the token to where there is none: masters do that all day."""
+    kinds = [at for at, name in enumerate(closed.names) if name in _LOOKING]
+    nobody: npt.NDArray[np.bool_] = closed.verdict == VERDICTS.index(Verdict.NO_RESPONSE)
+    return nobody & np.isin(closed.kind, kinds) if kinds else np.zeros(len(closed), bool)
 
 
 class Store:
@@ -139,6 +155,21 @@ class Store:
         self.heard += 1
         self.line_events.append(event)
 
+    def add_mark(self, event: LineEvent) -> None:
+        """Take a mark made while one looks: it says nothing of the line, and no rule asks for it."""
+        self.version += 1
+        self.line_events.append(event)
+
+    def row_marked(self, time: int) -> int | None:
+        """Number of the row that a mark of that moment (ns) is about; None where it has not come yet."""
+        no = self.row_at(time)
+        here, before = self.by_no(no), self.by_no(no - 1)
+        if here is not None and here.event.start == time:
+            return no
+        if before is not None and before.event.end >= time:
+            return no - 1
+        return no if here is not None else None
+
     def _take(self, table: Table, prepared: Prepared | None = None) -> None:
         prepared = prepare(table) if prepared is None else prepared
         self.version += 1
@@ -156,7 +187,7 @@ class Store:
         first = self.last_no - len(table) + 1
         self._fail(first + prepared.bad, prepared.bad_begins)
         closed = table.transactions
-        bad = _BAD[closed.verdict]
+        bad = _BAD[closed.verdict] & ~_looked_in_vain(closed)
         if bad.any():
             numbers = np.where(closed.request[bad] != NONE, closed.request[bad], closed.response[bad])
             self._fail(numbers[numbers != NONE], closed.start[bad][numbers != NONE])
@@ -332,6 +363,22 @@ class Store:
     def meaning(self, row: Row) -> Meaning | None:
         """What is known of a row besides its octets."""
         return meaning_of(self.dissector, self.devices, row, self._request_of(row))
+
+    def told(self, no: int) -> tuple[Value, ...]:
+        """The values that the row of a number carries; none before its exchange is whole."""
+        row = self.by_no(no)
+        transaction = None if row is None else self.transaction(row)
+        if row is None or transaction is None or transaction.verdict not in TELLING:
+            return ()
+        meaning = self.meaning(row)
+        return () if meaning is None else decode(meaning.profile, meaning.readings)
+
+    def answered(self, row: Row) -> dict[str, int | float | str]:
+        """Fields of an answer that only its request tells."""
+        fields, meaning = self.dissector.answer_fields, self.meaning(row)
+        if fields is None or meaning is None or meaning.request is None or not isinstance(row.event, Frame):
+            return {}
+        return fields(meaning.request, row.event)
 
     def _request_of(self, row: Row) -> Frame | None:
         transaction = self.transaction(row)

@@ -9,6 +9,7 @@ import argparse
 from dissectors.profiles import Devices
 from sniff.analysis.judging import Judging
 from sniff.bus.capture_writer import MICROSECONDS
+from sniff.bus.marked_rows import MarkedRows
 from sniff.bus.offline import survey
 from sniff.cli import USAGE, Failure, arguments, filtering, writing
 from sniff.cli.progress import Watched
@@ -61,20 +62,22 @@ def run(args: argparse.Namespace) -> int:
     devices = arguments.noted_devices(args, session)
     session = with_devices(session, devices)
     noted = args.output.lower().endswith(".pcapng") and not args.filter  # of a part the rows have other numbers
-    notes = _evidence(capture, session, devices, args.reference) if noted else None
+    notes, marks = _evidence(capture, session, devices, args.reference) if noted else (None, None)
     source = filtering.sifted(args, capture, session, devices)
-    writing.write(args, session, source, [args.source], options or None, devices=devices, notes=notes)
+    writing.write(args, session, source, [args.source], options or None, devices=devices, notes=notes, marks=marks)
     writing.say_incomplete(args.source, capture)
     return 0
 
 
-def _evidence(capture: Capture, session: Session, devices: Devices, reference: bool) -> dict[int, str]:
-    """The findings in words, by the rows that show them."""
-    judging = Judging(session, dissector_for(session), devices)
-    survey(Watched(capture), session, judging, reference=reference)
+def _evidence(
+    capture: Capture, session: Session, devices: Devices, reference: bool
+) -> tuple[dict[int, str], dict[int, str]]:
+    """The findings in words, and what people wrote, by the rows that they are about."""
+    judging, marked = Judging(session, dissector_for(session), devices), MarkedRows()
+    survey(Watched(capture), session, judging, marked, reference=reference)
     notes: dict[int, str] = {}
     for finding in judging.findings():
         said = f"{finding.code} {finding.subject}: {finding.seen}"
         for no in finding.evidence:
             notes[no] = f"{notes[no]}; {said}" if no in notes else said
-    return notes
+    return notes, marked.by_row()

@@ -54,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
             record = RecordSpec(args.write) if args.write else None
             live = listening.start(source, record, duration, devices)
             bus.begin()  # with the sniffer listening, so that the first words of the bus are heard
-            return show(live, args.json, args.lines, told_to)
+            return show([live], args.json, args.lines, told_to)
     except BrokenPipeError:  # whoever read our output went away
         raise
     except (BusFailed, OSError) as error:

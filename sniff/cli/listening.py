@@ -1,4 +1,4 @@
-"""What `live`, `record` and `demo` share: how a capture is started, run and ended."""
+"""Listening, as `live`, `record` and `demo` share it: how a capture is started, run and ended."""
 
 from __future__ import annotations
 
@@ -52,7 +52,10 @@ def start_all(
     link = start_link([target.source for target in targets], record, duration, count, watched)
     try:
         router = Router(link)
-        return [_live(link, router, bus, target, watched) for bus, target in enumerate(targets)]
+        lives = [_live(link, router, bus, target, watched) for bus, target in enumerate(targets)]
+        for live in lives:
+            live.beside_others = len(lives) > 1
+        return lives
     except BaseException:
         link.stop()  # a capture outlives its starter unless it is told to end
         raise

@@ -10,9 +10,6 @@ import argparse
 from sniff.capture.config import RecordSpec
 from sniff.cli import USAGE, Failure, arguments, listening, outlets, printing, targets, telling
 
-NAMED = 3
-"""Buses that the name of a new file names."""
-
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Options of `record`."""
@@ -64,7 +61,7 @@ def run(args: argparse.Namespace) -> int:
     """Record until the end."""
     buses = targets.targets_of(args)
     path = args.write or (buses[0].record if len(buses) == 1 else None)
-    path = path or targets.new_recording("-".join(target.source.bus for target in buses[:NAMED]))
+    path = path or targets.new_recording("-".join(target.source.bus for target in buses[: targets.NAMED]))
     targets.refuse_recording(path)
     if (args.keep or args.keep_free) and not args.rotate:
         raise Failure(

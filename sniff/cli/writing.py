@@ -23,7 +23,7 @@ from sniff.engine.capture import BlockWriter, Capture, CaptureError, CaptureWrit
 from sniff.engine.engine import Output
 from sniff.engine.follow_settings import dissector_for, engine_for
 from sniff.engine.session import Item, LineEvent, Session
-from sniff.formats import parquet
+from sniff.formats import cut_capture, parquet
 from sniff.formats.parquet import Kind, ParquetWriter
 
 if TYPE_CHECKING:
@@ -48,19 +48,21 @@ def write(
     with_frames: bool = False,
     devices: Devices | None = None,
     notes: Mapping[int, str] | None = None,
+    marks: Mapping[int, str] | None = None,
 ) -> int:
     """Write a capture to `args.output`; say on standard error what it holds and what it lost. Gives the octets.
 
     An .mcap gets what a live recording has: /values, /bus, /nodes and /findings. `with_frames`: what the engine finds
     in the octets too, on /frames. `devices`: whose values are written, each of them; None: those of the session.
-    `notes`: by row number, for the comments of packets where OUT has such. Ends with exit code 2 when OUT is there.
+    `notes`, `marks`: by row number, for the comments of packets where OUT has such. Ends with exit code 2 when OUT is
+    there.
     """
     target = Path(args.output)
     refuse_to_overwrite(target, sources, args.force)
     counts = _Counts()
     watched = Watched(with_comments(source))
     try:
-        with create(target, session, options, notes) as writer:
+        with create(target, session, options, notes, marks) as writer:
             takers: list[_Frames | _Values | _Topics] = [_Frames(writer, session)] if with_frames else []
             known = noted_devices(session) if devices is None else devices
             if _is_recording(writer):
@@ -105,6 +107,7 @@ def say_incomplete(path: str, capture: Capture) -> None:
     if not complete.whole:
         sys.stdout.flush()
         print(f"sniff485: {plain(path)}: {plain(complete.text)}", file=sys.stderr)
+        cut_capture.said(path)
 
 
 @dataclass(slots=True)

@@ -1,4 +1,4 @@
-"""What a capture says about itself: the session, the adapter and its limits, and what happened to the line.
+"""A session: what a capture says about itself, the adapter and its limits, and what happened to the line.
 
 Frozen values without I/O; every source makes them, every format keeps as much of them as it can.
 """
@@ -218,6 +218,8 @@ class LineEventKind(Enum):
     NOTE = "note"
     TRIGGER = "trigger"  # what a trigger fired on; `text` says it
     OMITTED = "omitted"  # octets that were heard and not kept, since nothing was triggered; `count` of them
+    MARK = "mark"  # what a person wrote about a moment, which lies `count` ns before `time`
+    UNMARK = "unmark"  # the mark of that moment is taken away
     REFUSED = "refused"  # line settings that were asked for and not taken; `text` as `refusal` makes it
 
     @property
@@ -237,6 +239,21 @@ class LineEvent:
     kind: LineEventKind
     text: str = ""
     count: int = 0
+
+    @property
+    def is_mark(self) -> bool:
+        """Whether a person said it of what was heard; it says nothing of the line."""
+        return self.kind in (LineEventKind.MARK, LineEventKind.UNMARK)
+
+    @property
+    def moment(self) -> int:
+        """When that was which it is about, ns: of a mark, some time before it."""
+        return self.time - self.count if self.is_mark else self.time
+
+    @property
+    def number(self) -> int:
+        """How many there were, as `count` where that is one."""
+        return 0 if self.is_mark else self.count
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, BinaryIO
 
 from dissectors.line import LineSettings
 from sniff.engine.capture import Capture, CaptureError
-from sniff.engine.session import Completeness, Item, LineEvent, Session
+from sniff.engine.session import Completeness, Item, LineEvent, LineEventKind, Session
 from sniff.formats.files import NewFile, open_capture
 from sniff.formats.linktypes import LINK_TYPES, USER1
 from sniff.formats.network import NETWORK
@@ -38,6 +38,8 @@ SEEN_OF_NETWORK = 1000
 LATEST = (1 << 33) * 1_000_000_000
 """ns since the epoch, in the year 2242; a record that says more, or as much before it, is given this time."""
 SESSION_MARK = "sniff485 session: "
+MARK = "mark: "
+"""Begins a comment of a packet that a person wrote; what follows is theirs."""
 SEARCH_MARK = "sniff485 search: "
 """Begins a comment of a packet that was heard in a search for settings; the line settings tried follow."""
 
@@ -119,10 +121,30 @@ class PcapngCapture:
     def _items(self, record: Record, marks: SearchMarks) -> Iterator[Item]:
         found = False
         yield from marks.before(record)
+        said = self._written(record)
+        if said is not None:
+            yield LineEvent(record.time, LineEventKind.MARK, said)
         for item in items_of(record, self.session.protocol):
             found = True
             yield item
         self._other += not found
+
+    def _written(self, record: Record) -> str | None:
+        """What a person wrote about a packet: in a file of another program every comment is somebody's."""
+        return record.mark if record.mark is not None or self._metadata else record.comment or None
+
+    def _commented(self, packets: PlainPackets, interfaces: list[Interface]) -> set[int]:
+        """The places of packets that a person wrote about."""
+        if self._metadata and MARK.encode() not in packets.window:
+            return set()
+        kept = packets.heads[:, 5].astype("i8")
+        options = packets.heads[:, 1] - 32 - kept - -kept % 4
+        found = set()
+        for index in (options > 4).nonzero()[0].tolist():
+            record = _packet(packets.order, ENHANCED, packets.body(index), interfaces)
+            if record is not None and self._written(record) is not None:
+                found.add(index)
+        return found
 
     def _say_what_was_passed_over(self) -> None:
         if self._other and self._complete.whole:
@@ -156,8 +178,10 @@ class PcapngCapture:
         from sniff.formats.packet_columns import LEAST_RUN, pieces_of
         from sniff.formats.pcapng_columns import alike
 
+        commented = self._commented(packets, interfaces)
         for first, end, some in alike(packets, interfaces, self.session.protocol, LATEST):
-            if some is None or end - first < LEAST_RUN or marks.searching:
+            is_said = any(first <= index < end for index in commented)
+            if some is None or end - first < LEAST_RUN or marks.searching or is_said:
                 for index in range(first, end):
                     record = _packet(packets.order, ENHANCED, packets.body(index), interfaces)
                     if record is not None:
@@ -248,17 +272,21 @@ def _packet(order: str, kind: int, body: bytes, interfaces: list[Interface]) -> 
     factor, ticks = interface.resolution
     time = ((high << 32) | low) * factor // ticks + interface.offset * 1_000_000_000
     time = max(-LATEST, min(time, LATEST))
-    comment, crc_error, searched = "", False, None
+    comment, crc_error, searched, mark = "", False, None, None
     for code, value in _options(order, body[20 + kept + (-kept % 4) :]):
         if code == OPT_COMMENT:
             text = value.decode("utf-8", "replace")
             if text.startswith(SEARCH_MARK):
                 searched = _line(text[len(SEARCH_MARK) :])
+            elif text.startswith(MARK):
+                mark = text[len(MARK) :]
+            elif comment:  # we write one at most: another program has added this
+                mark = text
             else:
                 comment = text
         elif code == OPT_FLAGS and len(value) == 4:
             crc_error = bool(struct.unpack(order + "I", value)[0] & CRC_ERROR_FLAG)
-    return Record(time, interface.link_type, body[20 : 20 + kept], comment, crc_error, searched)
+    return Record(time, interface.link_type, body[20 : 20 + kept], comment, crc_error, searched, mark)
 
 
 def _line(text: str) -> LineSettings | None:
@@ -328,6 +356,8 @@ class PcapngWriter:
         options = _option(OPT_FLAGS, struct.pack("<I", CRC_ERROR_FLAG)) if record.crc_error else b""
         if record.comment:
             options += _option(OPT_COMMENT, record.comment.encode()[:60_000])
+        if record.mark is not None:
+            options += _option(OPT_COMMENT, f"{MARK}{record.mark}".encode()[:60_000])
         if record.searched is not None:
             options += _option(OPT_COMMENT, f"{SEARCH_MARK}{record.searched}".encode())
         head = struct.pack("<IIIII", number, time >> 32 & 0xFFFFFFFF, time & 0xFFFFFFFF, size, size)

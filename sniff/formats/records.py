@@ -38,7 +38,8 @@ FOREIGN_LATENCY = 20_000_000
 class Record:
     """One packet of a packet file: `time` ns since the epoch, `comment` "" when none, `crc_error` as flagged.
 
-    `searched`: line settings that a search listened with when these octets were heard; None outside a search.
+    `searched`: line settings that a search listened with when these octets were heard; None outside a search. `mark`:
+    what a person wrote about it, None for nothing.
     """
 
     time: int
@@ -47,6 +48,7 @@ class Record:
     comment: str = ""
     crc_error: bool = False
     searched: LineSettings | None = None
+    mark: str | None = None
 
 
 class FrameFile(Protocol):

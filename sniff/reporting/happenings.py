@@ -1,4 +1,4 @@
-"""What a report tells that no statistic holds: what happened to the line, and what troubles each station."""
+"""Happenings that no statistic holds: what happened to the line, and what troubles each station."""
 
 from __future__ import annotations
 
@@ -47,8 +47,8 @@ class Happenings:
     def add_line_event(self, event: LineEvent) -> None:
         """Keep the first of them."""
         if len(self.happenings) < HAPPENINGS_SHOWN:
-            at = seconds_since(self._session.started, event.time)
-            self.happenings.append(Happening(at, event.kind.value, event.text, event.count))
+            at = seconds_since(self._session.started, event.moment)
+            self.happenings.append(Happening(at, event.kind.value, event.text, event.number))
 
     def merge(self, later: Happenings) -> Happenings:
         """Both together, as a new value; `later` is of the same capture."""

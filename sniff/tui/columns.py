@@ -40,12 +40,32 @@ def lay_out(columns: Iterable[Column], width: int, **widths: int) -> list[Column
     return [column if column.width else replace(column, width=rest) for column in shown]
 
 
+LONGEST_NUMBER = 12
+"""Characters of a word that may be one; longer ones are octets in hex, of which any part says something."""
+
+
+def chosen(columns: Sequence[Column], names: Sequence[str]) -> list[Column]:
+    """The columns of these names in their order, at any width; all of them, as usual, for no names."""
+    by_name = {column.name: column for column in columns}
+    return [replace(by_name[name], needs=0) for name in names if name in by_name] or list(columns)
+
+
 def fit(text: str, width: int, right: bool = False) -> str:
-    """Text in exactly `width` cells; what is cut off ends in "…"."""
+    """Text in exactly `width` cells; what is cut off ends in "…", and no number is cut in the middle: what is left
+    of it would read as another number."""
     length = cell_len(text)
     if length > width:
-        return set_cell_size(text, width - 1) + "…" if width > 0 else ""
+        return _cut(text, width) if width > 0 else ""
     return " " * (width - length) + text if right else text + " " * (width - length)
+
+
+def _cut(text: str, width: int) -> str:
+    kept = set_cell_size(text, width - 1)
+    begin = max(kept.rfind(" "), kept.rfind("(")) + 1
+    behind = text[len(kept) : len(kept) + 1]
+    if 0 < begin < len(kept) <= begin + LONGEST_NUMBER and behind.strip() and any(map(str.isdigit, kept[begin:])):
+        kept = kept[:begin]
+    return set_cell_size(kept.rstrip() + "…", width) if kept.strip() else set_cell_size("…", width)
 
 
 def pieces(columns: Sequence[Column], cells: dict[str, Cell]) -> list[Cell]:

@@ -16,6 +16,7 @@ from textual.scroll_view import ScrollView
 from textual.strip import Strip
 
 from sniff.analysis.packet_tree import Field
+from sniff.tui.key_names import named
 
 FOLDED = ((("frame", 0),), (("transaction", 0),))
 """What is known besides the packet begins folded: its first line says the most."""
@@ -40,17 +41,19 @@ class _Line:
 class FieldTree(ScrollView, can_focus=True, inherit_bindings=False):
     """Moving in it picks a field; place and folds stay when the next frame has the same fields."""
 
-    BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("up,k", "move(-1)", "line up", show=False),
-        Binding("down,j", "move(1)", "line down", show=False),
-        Binding("pageup", "page(-1)", "page up", show=False),
-        Binding("pagedown", "page(1)", "page down", show=False),
-        Binding("home,g", "move(-65536)", "first line", show=False),
-        Binding("end,G", "move(65536)", "last line", show=False),
-        Binding("enter", "fold", "fold", tooltip="fold or unfold the part under the cursor"),
-        Binding("right,l", "right", "right", tooltip="scroll long lines to the right", show=False),
-        Binding("left,h", "left", "left", tooltip="scroll back, then to the part that holds this one", show=False),
-    ]
+    BINDINGS: ClassVar[list[BindingType]] = named(
+        [
+            Binding("up,k", "move(-1)", "line up", show=False),
+            Binding("down,j", "move(1)", "line down", show=False),
+            Binding("pageup", "page(-1)", "page up", show=False),
+            Binding("pagedown", "page(1)", "page down", show=False),
+            Binding("home,g", "move(-65536)", "first line", show=False),
+            Binding("end,G", "move(65536)", "last line", show=False),
+            Binding("enter", "fold", "fold", tooltip="fold or unfold the part under the cursor"),
+            Binding("right,l", "right", "right", tooltip="scroll long lines to the right", show=False),
+            Binding("left,h", "left", "left", tooltip="scroll back, then to the part that holds this one", show=False),
+        ]
+    )
     COMPONENT_CLASSES: ClassVar[set[str]] = {"field-tree--name", "field-tree--cursor", "field-tree--here"}
 
     class Picked(Message):

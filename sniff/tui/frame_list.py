@@ -54,6 +54,7 @@ class FrameList(StoreList):
     """Rows of the store by number."""
 
     COLUMNS = COLUMNS
+    NAME = "frames"
 
     def row_of(self, number: int) -> int | None:
         """The row itself."""
@@ -69,7 +70,7 @@ class FrameList(StoreList):
         """Its verdict may come later; marks come and go; the partner of the cursor is marked."""
         row = self.store.by_no(number)
         transaction = None if row is None else self.store.transaction(row)
-        return transaction, number in self.viewing.marks, self.viewing.time_mode
+        return transaction, self.viewing.marks.get(number), self.viewing.time_mode
 
     def edge(self, number: int) -> Cell:
         """Cursor or partner, and the user's mark."""
@@ -89,6 +90,8 @@ class FrameList(StoreList):
             style = self.viewing.colour_of(row, transaction)
         source, destination = self._addresses(row)
         text = plain(self.store.text(row))
+        said = self.viewing.marks.get(number, "")
+        text = f"[{plain(said)}] {text}" if said else text
         answers = transaction is not None and (transaction.response in (number, None))
         return {
             "no": Cell(str(number), "dim"),

@@ -10,6 +10,7 @@ from rich.style import Style
 from rich.text import Text
 from textual.widget import Widget
 
+from sniff.analysis.health import Health
 from sniff.bus.feed import FeedStatus
 from sniff.bus.rows import Store
 from sniff.engine.session import LineEventKind, gone_why
@@ -21,6 +22,10 @@ from sniff.tui.viewing import Viewing
 
 ROOMY = 100
 """Width from which two spaces stand between the pieces; by the width alone, so that nothing jumps."""
+POOR, FAIR = 50, 80
+"""Below these a health stands out."""
+SHORT_TITLES = {"Transactions": "Trans."}
+"""Titles that a narrow screen has no room for."""
 REASON = 20
 """Cells for why the capture has ended."""
 SHORTEST = 6
@@ -89,7 +94,9 @@ def why_ended(status: FeedStatus, store: Store) -> tuple[str, str]:
     return gone_why(of_port[-1]) or said, f"{said}; {status.ended}"
 
 
-def status_line(status: FeedStatus, store: Store, viewing: Viewing, width: int) -> list[tuple[str, str]]:
+def status_line(
+    status: FeedStatus, store: Store, viewing: Viewing, width: int, health: Health | None = None
+) -> list[tuple[str, str]]:
     """Pieces of text with a style name each, together at most `width` cells: the port gives way first."""
     state, words = record_state(status), state_words(status)
     reason = plain(why_ended(status, store)[0])
@@ -98,6 +105,7 @@ def status_line(status: FeedStatus, store: Store, viewing: Viewing, width: int) 
         *([(f"searching {plain(status.searching)} …", "doubt")] if status.searching else []),
         *([] if status.searching else [(plain(status.line), ""), (plain(status.protocol), "")]),
         (f"load {store.load.share():.0%}", ""),
+        *([] if health is None else [(f"health {health.score}", _health_style(health.score))]),
         (f"err {store.error_total}", "bad" if store.error_total else ""),
         (shown_state, STATE_STYLES.get(state, "")),
         *([(progress, "")] if (progress := progress_of(status)) else []),
@@ -110,7 +118,7 @@ def status_line(status: FeedStatus, store: Store, viewing: Viewing, width: int) 
     elif viewing.follow:
         pieces.append(("FOLLOW", ""))
     elif status.live and not status.ended:
-        pieces.append(("STILL", ""))
+        pieces.append(("FOLLOW OFF", "dim"))
     gap = "  " if width >= ROOMY else " "
     room = width - sum(cell_len(text) + len(gap) for text, _ in pieces)
     port = plain(status.port)
@@ -122,8 +130,12 @@ def status_line(status: FeedStatus, store: Store, viewing: Viewing, width: int) 
     return line
 
 
+def _health_style(score: int) -> str:
+    return "bad" if score < POOR else "doubt" if score < FAIR else ""
+
+
 class StatusHeader(Widget):
-    """Port, line, protocol, load, errors, record state, file size; below it the screens and what is shown."""
+    """Port, line, protocol, load, health, errors, record state, file size; below it the screens and what is shown."""
 
     COMPONENT_CLASSES: ClassVar[set[str]] = {
         "status-header--port",
@@ -141,7 +153,8 @@ class StatusHeader(Widget):
 
     def bring_up(self) -> None:
         """Draw again if anything changed."""
-        pieces = status_line(analyzer(self).status, analyzer(self).store, analyzer(self).viewing, self.size.width)
+        app = analyzer(self)
+        pieces = status_line(app.status, app.store, app.viewing, self.size.width, app.health.bus)
         if pieces != self._pieces:
             self._pieces = pieces
             self.refresh()
@@ -163,8 +176,12 @@ class StatusHeader(Widget):
 
     def _tabs(self, width: int) -> Text:
         tabs = [(f"{key} {title}", title == self.here) for key, title in analyzer(self).tabs]
+        short = [(f"{key} {SHORT_TITLES.get(title, title)}", title == self.here) for key, title in analyzer(self).tabs]
         if sum(len(label) + 2 for label, _ in tabs) <= width:
             labels = [f"[{label}]" if here else f" {label} " for label, here in tabs]
+        elif sum(len(label) + 1 for label, _ in short) + 1 <= width:
+            labels = [f"[{label}]" if here else label for label, here in short]
+            labels = [*(label + " " for label in labels[:-1]), labels[-1]]
         else:  # closer together, then as much of each as fits, then the numbers alone
             for most in range(max(len(label) for label, _ in tabs), SHORTEST, -1):
                 labels = [f"[{label}]" if here else label[:most] for label, here in tabs]

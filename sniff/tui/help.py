@@ -17,7 +17,7 @@ from sniff.tui.keybar import explanation, working_keys
 LEGEND: tuple[tuple[str, str], ...] = (
     (">", "the row under the cursor"),
     ("=", "the row that belongs to it: its request or response"),
-    ("*", "a row that you marked"),
+    ("*  [words]", "a row that was marked (m), and what was written about it"),
     ("!", "damaged frame"),
     ("~", "noise: octets that are no frame"),
     ("P F B O", "line error on an octet: parity, framing, break, overrun"),
@@ -30,10 +30,11 @@ LEGEND: tuple[tuple[str, str], ...] = (
 
 HEADER: tuple[tuple[str, str], ...] = (
     ("load", "share of the time in which the bus was busy"),
+    ("health", "0 to 100 by a formula that the manual has; Nodes says what it is made of"),
     ("err", "rows that are damaged or noise, or whose exchange went wrong"),
     ("LOST", "octets or rows that were lost before they could be shown"),
     ("FOLLOW", "the newest row is under the cursor (f)"),
-    ("STILL", "rows come at the end, the cursor stays (f follows)"),
+    ("FOLLOW OFF", "rows come at the end, the cursor stays where it is (f follows)"),
     ("FROZEN +n", "the view stands, n rows came since (space lets it go on)"),
 )
 

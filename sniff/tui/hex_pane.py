@@ -16,6 +16,7 @@ from textual.strip import Strip
 from dissectors.frame import Mark
 from sniff.analysis.wording import mark_names
 from sniff.tui.frame_list import mark_letter
+from sniff.tui.key_names import named
 from sniff.tui.plain import ascii_of
 
 WIDE = 72
@@ -27,14 +28,16 @@ NAMED_MARKS = 64
 class HexPane(ScrollView, can_focus=True, inherit_bindings=False):
     """A line error is a letter after its octet; the octets of the field are in reverse video."""
 
-    BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("left,h", "move(-1)", "octet left", show=False),
-        Binding("right,l", "move(1)", "octet right", show=False),
-        Binding("up,k", "move_line(-1)", "line up", show=False),
-        Binding("down,j", "move_line(1)", "line down", show=False),
-        Binding("home,g", "move(-65536)", "first octet", show=False),
-        Binding("end,G", "move(65536)", "last octet", show=False),
-    ]
+    BINDINGS: ClassVar[list[BindingType]] = named(
+        [
+            Binding("left,h", "move(-1)", "octet left", show=False),
+            Binding("right,l", "move(1)", "octet right", show=False),
+            Binding("up,k", "move_line(-1)", "line up", show=False),
+            Binding("down,j", "move_line(1)", "line down", show=False),
+            Binding("home,g", "move(-65536)", "first octet", show=False),
+            Binding("end,G", "move(65536)", "last octet", show=False),
+        ]
+    )
     COMPONENT_CLASSES: ClassVar[set[str]] = {
         "hex-pane--title",
         "hex-pane--offset",

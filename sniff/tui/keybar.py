@@ -32,13 +32,13 @@ NOT_OURS = {"screen.copy_text", "help_quit", "app.focus_next", "app.focus_previo
 """Actions that the framework binds; they count here only where a screen explains them (a binding with a tooltip)."""
 ALWAYS = ("help", "back")
 """Descriptions of the keys that the bar never leaves out."""
-FIRST = ("filter", "", "freeze", "follow", "error", "pair", "mark", "time", "open", "go to")
+FIRST = ("bus", "filter", "", "freeze", "follow", "error", "pair", "mark", "time", "open", "go to")
 """The order of wanting by description; "" stands for all that are not named here."""
 
 
 def key_name(key: str) -> str:
     """A key as people read it."""
-    return NAMES.get(key, key.removeprefix("upper_"))
+    return NAMES.get(key, key.removeprefix("upper_").replace("ctrl+", "^"))
 
 
 def explanation(active: ActiveBinding) -> str:

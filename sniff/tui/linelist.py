@@ -23,6 +23,7 @@ from sniff.config import COLOURS
 from sniff.tui.analyzer import analyzer
 from sniff.tui.columns import Cell, Column, pieces
 from sniff.tui.index import Index
+from sniff.tui.key_names import named
 from sniff.tui.viewing import Viewing
 
 SHIFT = 16
@@ -32,17 +33,19 @@ SHIFT = 16
 class LineList(ScrollView, can_focus=True, inherit_bindings=False):
     """Shows the numbers of an index, one a line, below a line of column titles that stays."""
 
-    BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("up,k", "move(-1)", "line up", show=False),
-        Binding("down,j", "move(1)", "line down", show=False),
-        Binding("pageup", "page(-1)", "page up", show=False),
-        Binding("pagedown", "page(1)", "page down", show=False),
-        Binding("home,g", "first", "first line", show=False),
-        Binding("end,G", "last", "last line", show=False),
-        Binding("right,l", "shift(1)", "right", tooltip="scroll the text to the right", show=False),
-        Binding("left,h", "shift(-1)", "left", tooltip="scroll the text back to the left", show=False),
-        Binding("enter", "choose", "open", tooltip="open the line: show what belongs to it"),
-    ]
+    BINDINGS: ClassVar[list[BindingType]] = named(
+        [
+            Binding("up,k", "move(-1)", "line up", show=False),
+            Binding("down,j", "move(1)", "line down", show=False),
+            Binding("pageup", "page(-1)", "page up", show=False),
+            Binding("pagedown", "page(1)", "page down", show=False),
+            Binding("home,g", "first", "first line", show=False),
+            Binding("end,G", "last", "last line", show=False),
+            Binding("right,l", "shift(1)", "right", tooltip="scroll the text to the right", show=False),
+            Binding("left,h", "shift(-1)", "left", tooltip="scroll the text back to the left", show=False),
+            Binding("enter", "choose", "open", tooltip="open the line: show what belongs to it"),
+        ]
+    )
     SCROLLED: ClassVar[str] = "text"
     """The column that may be wider than the screen."""
 

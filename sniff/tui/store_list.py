@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import ClassVar
 
 from sniff.bus.rows import Store
-from sniff.tui.columns import Column, lay_out
+from sniff.tui.columns import Column, chosen, lay_out
 from sniff.tui.linelist import LineList
 from sniff.tui.times import TimeMode, clock, seconds
 from sniff.tui.verdicts import latency_title
@@ -22,9 +22,10 @@ DAY = 10**14
 
 
 class StoreList(LineList):
-    """A list of what a store holds; the first of `COLUMNS` holds the numbers."""
+    """A list of what a store holds; the first of `COLUMNS` holds the numbers. `NAME`: of the list in a view."""
 
     COLUMNS: ClassVar[tuple[Column, ...]]
+    NAME: ClassVar[str] = ""
 
     def __init__(self, store: Store, viewing: Viewing, *, id: str | None = None) -> None:
         super().__init__(viewing, id=id)
@@ -34,19 +35,20 @@ class StoreList(LineList):
         """What is needed least gives way first; the one column without a width takes what is left."""
         latency = latency_title(self.store.session.adapter.latency, roomy=width >= WIDE)
         titles = {"time": self.viewing.time_mode.title, "latency": latency}
+        names = self.viewing.columns.get(self.NAME, ())
         shown = lay_out(
-            self.COLUMNS,
+            chosen(self.COLUMNS, names),
             width,
             verdict=15 if width >= WIDE else 9,
-            latency=0 if width < NO_LATENCY else max(LATENCY, len(latency)),
-            time=0 if width < NO_TIME else 12,
+            latency=0 if width < NO_LATENCY and not names else max(LATENCY, len(latency)),
+            time=0 if width < NO_TIME and not names else 12,
             **{self.COLUMNS[0].name: max(4, len(str(self.index.last)))},
         )
         return [replace(column, title=titles.get(column.name, column.title)) for column in shown]
 
     def width_of(self, name: str) -> int:
         """Cells that a column has now."""
-        return next(column.width for column in self.columns if column.name == name)
+        return next((column.width for column in self.columns if column.name == name), 0)
 
     def time_text(self, start: int, before: int | None) -> str:
         """A time in the way the user counts; `before`: when the line above began, None at the top."""

@@ -9,19 +9,23 @@ from rich.text import Text
 from textual.binding import Binding, BindingType
 from textual.widgets import DataTable
 
+from sniff.tui.key_names import named
+
 
 class StationTable(DataTable[Text], inherit_bindings=False):
     """A table whose rows have keys; `fill` brings it to what it should be."""
 
-    BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("enter", "select_cursor", "open", tooltip="open the row: show what belongs to it"),
-        Binding("up,k", "cursor_up", "line up", show=False),
-        Binding("down,j", "cursor_down", "line down", show=False),
-        Binding("pageup", "page_up", "page up", show=False),
-        Binding("pagedown", "page_down", "page down", show=False),
-        Binding("g,home", "scroll_top", "first line", show=False),
-        Binding("G,end", "scroll_bottom", "last line", show=False),
-    ]
+    BINDINGS: ClassVar[list[BindingType]] = named(
+        [
+            Binding("enter", "select_cursor", "open", tooltip="open the row: show what belongs to it"),
+            Binding("up,k", "cursor_up", "line up", show=False),
+            Binding("down,j", "cursor_down", "line down", show=False),
+            Binding("pageup", "page_up", "page up", show=False),
+            Binding("pagedown", "page_down", "page down", show=False),
+            Binding("g,home", "scroll_top", "first line", show=False),
+            Binding("G,end", "scroll_bottom", "last line", show=False),
+        ]
+    )
 
     def fill(self, rows: Iterable[tuple[str, Sequence[Text]]]) -> None:
         """Show these rows in this order; the cursor stays on its key."""

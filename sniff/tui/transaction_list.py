@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dissectors.tracker import Transaction, Verdict
-from sniff.bus.rows import BAD_VERDICTS
+from sniff.bus.rows import is_trouble
 from sniff.tui.analyzer import analyzer
 from sniff.tui.columns import Cell, Column
 from sniff.tui.plain import plain
@@ -27,6 +27,7 @@ class TransactionList(StoreList):
     """Closed transactions by the number of their closing."""
 
     COLUMNS = COLUMNS
+    NAME = "transactions"
     SCROLLED = "kind"
 
     def row_of(self, number: int) -> int | None:
@@ -41,7 +42,7 @@ class TransactionList(StoreList):
     def edge(self, number: int) -> Cell:
         """Cursor, and trouble."""
         transaction = self.store.closed_by_no(number)
-        bad = transaction is not None and transaction.verdict in BAD_VERDICTS
+        bad = transaction is not None and is_trouble(transaction)
         return Cell((">" if number == self.cursor else " ") + ("!" if bad else " "), "bad" if bad else "")
 
     def cells(self, number: int, line: int) -> dict[str, Cell]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dissectors.tracker import Interval, Transaction, Verdict
 from dissectors.words import bare_milliseconds
+from sniff.bus.rows import is_trouble
 from sniff.tui.columns import Cell
 
 SHORT: dict[Verdict, str] = {
@@ -41,7 +42,8 @@ def verdict_cell(transaction: Transaction | None, width: int, attempts: bool = T
     text = verdict.words if width >= len(verdict.words) else SHORT.get(verdict, verdict.words)
     if attempts and transaction.attempt > 1 and width >= len(text) + 3:
         text += f" ×{transaction.attempt}"
-    return Cell(text, STYLE.get(verdict, ""))
+    style = STYLE.get(verdict, "")
+    return Cell(text, "dim" if style == "bad" and not is_trouble(transaction) else style)
 
 
 def latency_cell(latency: Interval | None, held: int) -> Cell:

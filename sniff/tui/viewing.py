@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bisect import bisect_right, insort
+from bisect import bisect_right
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -12,9 +12,11 @@ from dissectors.tracker import Transaction
 from sniff.bus.row_masks import RowMasks
 from sniff.bus.rows import Store
 from sniff.engine.engine import Row
+from sniff.engine.session import LineEvent, LineEventKind
 from sniff.filter import Filter, FilterError, Scope, compile_filter
 from sniff.filter.compiling import field_of
 from sniff.filter.completion import shown_value
+from sniff.filter.told import told
 from sniff.tui.times import TimeMode
 
 COUNTED = 2000
@@ -36,7 +38,10 @@ class Viewing:
     accepts: Filter | None = None
     masks: RowMasks | None = None  # the same for many rows at once, where columns say something of it
     filter_version: int = 0  # changes with the filter, so that lists know when to begin anew
-    marks: list[int] = field(default_factory=list)  # row numbers, ascending
+    columns: dict[str, tuple[str, ...]] = field(default_factory=dict)  # chosen, by list
+    marks: dict[int, str] = field(default_factory=dict)  # what was written, by row number
+    _events_seen: int = 0  # of the store
+    _unplaced: list[LineEvent] = field(default_factory=list)  # marks whose row has not come yet
     filters: list[str] = field(default_factory=list)  # that were set, the latest last
     search: str = ""  # what was looked for last
     colours: list[tuple[str, Filter]] = field(default_factory=list)  # rows that a filter accepts have its colour
@@ -83,13 +88,13 @@ class Viewing:
         if text:
             self.filters = [*(one for one in self.filters if one != text), text][-MOST_FILTERS:]
 
-    def compiled(self, text: str) -> Filter:
-        """A filter for these rows. Raises FilterError."""
-        return compile_filter(text, self.store.dissector, self._scope(text))
+    def compiled(self, text: str, others: bool = False) -> Filter:
+        """A filter for these rows. `others`: what other protocols have is no mistake in it. Raises FilterError."""
+        return compile_filter(text, self.store.dissector, self._scope(text), others)
 
     def colour_rules(self, colours: Mapping[str, str]) -> None:
         """Take the filters by colour. Raises FilterError."""
-        self.colours = [(colour, self.compiled(text)) for colour, text in colours.items()]
+        self.colours = [(colour, self.compiled(text, others=True)) for colour, text in colours.items()]
 
     def colour_of(self, row: Row, transaction: Transaction | None) -> str:
         """The colour of a row; "" for none."""
@@ -117,7 +122,16 @@ class Viewing:
             for one in store.findings():
                 for no in one.evidence:
                     findings[no] = findings.get(no, frozenset()) | {one.code}
-        return Scope(store.session.started, store.devices, {}, findings, self._begin_of)
+        return Scope(
+            store.session.started,
+            store.devices,
+            {},
+            findings,
+            self._begin_of,
+            told=lambda no: [told(value) for value in store.told(no)],
+            says=store.text,
+            answered=store.answered,
+        )
 
     def _begin_of(self, no: int) -> int | None:
         row = self.store.by_no(no)
@@ -135,17 +149,25 @@ class Viewing:
             return False
         return any(self.accepts_row(row) for row in (transaction.request, transaction.response) if row is not None)
 
-    def toggle_mark(self, no: int) -> bool:
-        """Mark a row or take its mark away; whether it is marked now."""
-        if no in self.marks:
-            self.marks.remove(no)
-            return False
-        insort(self.marks, no)
-        return True
+    def take_marks(self) -> bool:
+        """Take the marks that came among the events of the line since; whether there were any."""
+        events = self.store.line_events
+        came = [one for one in events[self._events_seen :] if one.is_mark]
+        self._events_seen = len(events)
+        waiting, self._unplaced = [*self._unplaced, *came], []
+        for event in waiting:
+            no = self.store.row_marked(event.moment)
+            if no is None:
+                self._unplaced.append(event)
+            elif event.kind is LineEventKind.MARK:
+                self.marks[no] = event.text
+            else:
+                self.marks.pop(no, None)
+        return len(self._unplaced) < len(waiting)
 
     def next_mark(self) -> int | None:
         """The marked row after the cursor, round to the first; None without marks."""
-        kept = [no for no in self.marks if self.store.by_no(no) is not None]
+        kept = [no for no in sorted(self.marks) if self.store.by_no(no) is not None]
         if not kept:
             return None
         position = bisect_right(kept, self.row)

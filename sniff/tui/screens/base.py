@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from textual.app import ComposeResult
 from textual.screen import Screen
@@ -10,7 +10,9 @@ from textual.widget import Widget
 
 from sniff.bus.rows import Store
 from sniff.tui.analyzer import analyzer
+from sniff.tui.busbar import BusBar
 from sniff.tui.header import StatusHeader
+from sniff.tui.key_names import named
 from sniff.tui.keybar import KeyBar
 from sniff.tui.prompt import Prompt
 from sniff.tui.viewing import Viewing
@@ -28,9 +30,17 @@ class ViewScreen(Screen[None]):
     LEGEND: ClassVar[tuple[tuple[str, str], ...]] = ()  # marks and titles of this screen, for its help page
     AUTO_FOCUS: ClassVar[str] = "#main"
 
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        """Keys have names, so that a configuration can give others."""
+        if "BINDINGS" in cls.__dict__:
+            cls.BINDINGS = named(cls.BINDINGS)
+        super().__init_subclass__(**kwargs)
+
     def compose(self) -> ComposeResult:
-        """Header, the view, prompt, keys."""
+        """Header, the bar of buses where there are several, the view, prompt, keys."""
         yield StatusHeader(self.TITLE)
+        if analyzer(self).buses:
+            yield BusBar()
         yield from self.compose_view()
         yield Prompt()
         yield KeyBar()

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from typing import ClassVar
 
 from rich.text import Text
+from textual import events
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import VerticalScroll
@@ -15,18 +16,26 @@ from textual.widgets import DataTable, Static
 from dissectors.findings import Finding, Severity, under_causes
 from sniff.analysis.judging import rules_over
 from sniff.tui.analyzer import analyzer
+from sniff.tui.columns import fit
 from sniff.tui.plain import plain
 from sniff.tui.screens.base import ViewScreen
 from sniff.tui.still_judging import still_judging
 from sniff.tui.tables import StationTable
 from sniff.tui.times import clock
 
+EVIDENCE = 6
+"""Frames that are named."""
 PERIOD = 1.0
 """Seconds between two looks at the findings while rows keep coming."""
 
-COLUMNS = ("severity", "code", "subject", "n", "what")
-_SIGNS = {Severity.ERROR: "E!", Severity.WARNING: "W", Severity.NOTE: "n", Severity.INFO: "i"}
+COLUMNS = ("how grave", "about", "what was seen", "times", "last", "code")
+_WORDS = {Severity.ERROR: "ERROR", Severity.WARNING: "warning", Severity.NOTE: "note", Severity.INFO: "fact"}
 _STYLES = {Severity.ERROR: "bold red", Severity.WARNING: "yellow", Severity.NOTE: "", Severity.INFO: "dim"}
+OTHERS = 46
+"""Cells that the other columns take at most, those between them too; what was seen has the rest."""
+LEAST_SEEN = 30
+ROOMY = 110
+"""Width from which there is a column for when it was seen last."""
 
 
 class FindingsScreen(ViewScreen):
@@ -52,19 +61,39 @@ class FindingsScreen(ViewScreen):
         self._under: set[str] = set()  # keys of those that one above explains
         self._evidence: dict[str, int] = {}  # place in the evidence of each finding that was shown last
         self._titles: dict[str, str] = {}
+        self._width = 0
 
     def compose_view(self) -> ComposeResult:
         """The table, and the finding under the cursor in full."""
         yield StationTable(id="main", cursor_type="row", zebra_stripes=True)
         with VerticalScroll(id="detail"):
             yield Static(id="words", markup=False)
+            yield Static(id="advice", markup=False)  # what to do is what one came for: the brightest text
+            yield Static(id="places", markup=False)
 
     def on_mount(self) -> None:
         """Columns."""
         table = self.query_one(StationTable)
-        for name in COLUMNS:
-            table.add_column(Text("" if name == "severity" else name), key=name)
         table.cell_padding = 1
+        self._lay_out(self.app.size.width)
+
+    def on_resize(self, event: events.Resize) -> None:
+        """Other width, more or less of what was seen."""
+        self._lay_out(event.size.width)
+
+    def _lay_out(self, width: int) -> None:
+        if width == self._width:
+            return
+        self._width = width
+        table = self.query_one(StationTable)
+        table.clear(columns=True)
+        for name in self._columns():
+            table.add_column(Text(name, justify="right" if name == "times" else "left"), key=name)
+        if self._found:
+            self._look()
+
+    def _columns(self) -> tuple[str, ...]:
+        return COLUMNS if self._width >= ROOMY else tuple(name for name in COLUMNS if name != "last")
 
     # -- keeping up --------------------------------------------------------------------------------------------
 
@@ -96,14 +125,20 @@ class FindingsScreen(ViewScreen):
     # -- showing -----------------------------------------------------------------------------------------------
 
     def _cells(self, finding: Finding, under: bool) -> list[Text]:
-        style = _STYLES[finding.severity]
-        title = self._titles.get(finding.code, "")
-        subject = f"└ {finding.subject}" if under else finding.subject
-        cells = (_SIGNS[finding.severity], finding.code, subject, str(finding.count), title)
-        return [Text(plain(cell), style=style if at in (0, 1) else "") for at, cell in enumerate(cells)]
+        """Those under a cause begin with "└"."""
+        room = max(LEAST_SEEN, self._width - OTHERS - (15 if self._width >= ROOMY else 0))
+        cells = {
+            "how grave": Text(("└ " if under else "") + _WORDS[finding.severity], style=_STYLES[finding.severity]),
+            "about": Text(plain(finding.subject)),
+            "what was seen": Text(fit(plain(finding.seen), room).rstrip()),
+            "times": Text("" if finding.is_once else str(finding.count), justify="right"),
+            "last": Text(clock(finding.last)),
+            "code": Text(finding.code, style="dim"),
+        }
+        return [cells[name] for name in self._columns()]
 
     def _describe(self) -> None:
-        words = self.query_one("#words", Static)
+        words, advice, places = (self.query_one(name, Static) for name in ("#words", "#advice", "#places"))
         finding = self._here()
         open_end = still_judging(analyzer(self).status, self.store)
         text = Text()
@@ -111,21 +146,36 @@ class FindingsScreen(ViewScreen):
             text.append(f"{open_end}; more may be found, or found to be otherwise\n", style="yellow")
         if finding is None:
             words.update(text if open_end else "nothing was found")
+            advice.display = False
+            places.update("")
             return
-        text.append(f"{finding.severity.label} {finding.code} ", style=_STYLES[finding.severity])
-        text.append(plain(f"{finding.subject}: {finding.seen}") + "\n")
-        for word, said in (("means", finding.means), ("next", finding.next)):
-            if said:
-                text.append(f"{word}: ", style="bold")
-                text.append(plain(said) + "\n")
+        text.append(f"{_WORDS[finding.severity]} ", style=_STYLES[finding.severity])
+        title = self._titles.get(finding.code, "")
+        text.append(plain(f"{finding.subject}: {title}" if title else finding.subject), style="bold")
+        text.append(f"  {finding.code}\n", style="dim")
+        text.append(plain(finding.seen) + "\n")
+        if finding.means:
+            text.append("means  ", style="dim").append(plain(finding.means) + "\n")
+        words.update(text)
+        advice.update(f"next   {plain(finding.next)}" if finding.next else "")
+        advice.display = bool(finding.next)
+        places.update(self._places(finding))
+
+    def _places(self, finding: Finding) -> Text:
+        text = Text()
+        if finding.cause is not None:
+            text.append("comes from  ", style="dim").append(plain(" ".join(reversed(finding.cause))) + "\n")
         if finding.evidence:
-            text.append("frames: ", style="bold")
-            text.append(", ".join(self._place(no) for no in finding.evidence[:8]) + " (enter, e, E)\n")
+            text.append("frames  ", style="dim")
+            text.append(", ".join(self._place(no) for no in finding.evidence[:EVIDENCE]))
+            text.append(" …" if len(finding.evidence) > EVIDENCE else "").append(
+                "  enter, e, E go there\n", style="dim"
+            )
         span = (
             clock(finding.first) if finding.first == finding.last else f"{clock(finding.first)} … {clock(finding.last)}"
         )
-        text.append(f"seen: {span}", style="dim")
-        words.update(text)
+        text.append("seen  ", style="dim").append(span)
+        return text
 
     def _place(self, no: int) -> str:
         row = self.store.by_no(no)

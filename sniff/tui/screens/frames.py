@@ -25,6 +25,7 @@ from sniff.tui.frame_list import FrameList
 from sniff.tui.hex_pane import HexPane
 from sniff.tui.index import Known
 from sniff.tui.linelist import LineList
+from sniff.tui.marks import MarksScreen
 from sniff.tui.plain import plain
 from sniff.tui.prompt import Prompt
 from sniff.tui.saving import save, why_not
@@ -51,8 +52,12 @@ class FramesScreen(ListingScreen):
     ]
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("x", "partner", "pair", tooltip="jump between request and response"),
-        Binding("m", "mark", "mark", tooltip="mark this row, or take the mark away"),
+        Binding(
+            "m", "mark", "mark", tooltip="mark this row and write about it (kept in the recording, or beside a file)"
+        ),
+        Binding("M", "unmark", "unmark", tooltip="take the mark of this row away", show=False),
         Binding("apostrophe", "next_mark", "mark", tooltip="next marked row"),
+        Binding("quotation_mark", "list_marks", "marks", tooltip="all marks; enter goes to one", show=False),
         Binding("colon", "go_to", "go to", tooltip="go to a row number or a time"),
         Binding("tab", "app.focus_next", "pane", tooltip="next pane: list, fields, octets", show=False),
         Binding("shift+tab", "app.focus_previous", "pane", tooltip="pane before", show=False),
@@ -71,6 +76,7 @@ class FramesScreen(ListingScreen):
         super().__init__()
         self._detail: tuple[Row, Transaction | None] | None = None  # what tree and hex show
         self._detail_timer: Timer | None = None
+        self._marked = 0  # row that is written about
         self.zoomed: Widget | None = None  # the one pane that is shown, None while all are
 
     def compose_view(self) -> ComposeResult:
@@ -193,11 +199,31 @@ class FramesScreen(ListingScreen):
             self.lines.go_to(partner)
 
     def action_mark(self) -> None:
-        """Mark the row or take its mark away."""
+        """Ask what to write about the row."""
         row = self._row()
         if row is not None:
-            self.viewing.toggle_mark(row.no)
-            self.lines.refresh()
+            self._marked = row.no
+            said = self.viewing.marks.get(row.no, "")
+            self.query_one(Prompt).ask("mark", said, f"about row {row.no}: a few words, or none", lambda text: "")
+
+    def action_unmark(self) -> None:
+        """Take the mark of the row away."""
+        row = self._row()
+        if row is not None and row.no in self.viewing.marks:
+            analyzer(self).mark_row(row.no, None)
+        else:
+            self.notify("this row is not marked", timeout=2)
+
+    def action_list_marks(self) -> None:
+        """All marks; enter goes to one."""
+        if not self.viewing.marks:
+            self.notify("no row is marked", timeout=2)
+            return
+        self.app.push_screen(MarksScreen(self.store, self.viewing.marks), self._go_to_mark)
+
+    def _go_to_mark(self, no: int | None) -> None:
+        if no is not None:
+            self.lines.go_to(no)
 
     def action_next_mark(self) -> None:
         """Go to the next mark."""
@@ -230,6 +256,9 @@ class FramesScreen(ListingScreen):
             message.stop()
             self.viewing.search = message.text.strip()
             self.action_find_on(1)
+        elif message.purpose == "mark":
+            message.stop()
+            analyzer(self).mark_row(self._marked, message.text.strip())
         elif message.purpose == "save":
             message.stop()
             self._save(message.text.strip())

@@ -12,19 +12,18 @@ from textual.containers import VerticalScroll
 from textual.widgets import Static
 
 from dissectors.frame import LineError
-from dissectors.line import MS, NS_PER_S
+from dissectors.line import NS_PER_S
 from dissectors.words import milliseconds
 from sniff.bus.feed import FeedStatus
 from sniff.bus.rows import Store
 from sniff.engine.session import LineEvent
 from sniff.tui.analyzer import analyzer
-from sniff.tui.charts import bar, sparkline
+from sniff.tui.charts import sparkline, spread
+from sniff.tui.key_names import named
 from sniff.tui.plain import plain
 from sniff.tui.screens.base import ViewScreen
 from sniff.tui.times import clock, date_and_clock, size
 
-GAP_EDGES = tuple(edge * MS // 10 for edge in (1, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000))
-"""0.1 ms … 1 s."""
 EVENTS_SHOWN = 200
 LABEL = 7
 REPORTABLE = (
@@ -133,38 +132,21 @@ def load(store: Store, width: int) -> list[Part]:
 
 def gaps(store: Store, width: int) -> list[Part]:
     """How long the line was silent between frames, from first to last range that occurred."""
-    counts = store.gaps.spread(GAP_EDGES)
     held = store.session.adapter.latency
     doubt = f", right to ±{milliseconds(held)}" if held else ""
     text = Text(f"between frames, {store.gaps.count} times{doubt}")
-    seen = [position for position, count in enumerate(counts) if count]
-    room = max(8, width - 31)
-    for position in range(seen[0], seen[-1] + 1) if seen else ():
-        count = counts[position]
-        share = f"{count / store.gaps.count:.1%}"
-        text.append(f"\n{_range(position):>13} {bar(count / max(counts), room)} {count:>8} {share:>6}")
+    for line in spread(store.gaps, max(8, width - 31)):
+        text.append(f"\n{line}")
     return [("silence", text)]
-
-
-def _range(position: int) -> str:
-    if position == 0:
-        return f"< {_edge(GAP_EDGES[0])} ms"
-    if position == len(GAP_EDGES):
-        return f"≥ {_edge(GAP_EDGES[-1])} ms"
-    return f"{_edge(GAP_EDGES[position - 1])} … {_edge(GAP_EDGES[position])} ms"
-
-
-def _edge(value: int) -> str:
-    return f"{value / MS:g}"
 
 
 def events(happened: list[LineEvent]) -> list[Part]:
     """What happened to the line, the newest first."""
     lines = []
     for event in reversed(happened[-EVENTS_SHOWN:]):
-        count = f" {event.count}" if event.count > 0 else " (how many is unknown)" if event.count < 0 else ""
+        count = f" {event.number}" if event.number > 0 else " (how many is unknown)" if event.number < 0 else ""
         words = f": {plain(event.text)}" if event.text else ""
-        lines.append(f"{clock(event.time)}  {event.kind.value}{count}{words}")
+        lines.append(f"{clock(event.moment)}  {event.kind.value}{count}{words}")
     if len(happened) > EVENTS_SHOWN:
         lines.append(f"and {len(happened) - EVENTS_SHOWN} earlier ones")
     return [("events", Text("\n".join(lines or ["nothing happened to the line"])))]
@@ -182,14 +164,16 @@ def _table(parts: list[Part]) -> Table:
 class Page(VerticalScroll, can_focus=True, inherit_bindings=False):
     """Scrolls with the keys of the lists."""
 
-    BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("up,k", "scroll_up", "line up", show=False),
-        Binding("down,j", "scroll_down", "line down", show=False),
-        Binding("pageup", "page_up", "page up", show=False),
-        Binding("pagedown", "page_down", "page down", show=False),
-        Binding("home,g", "scroll_home", "first line", show=False),
-        Binding("end,G", "scroll_end", "last line", show=False),
-    ]
+    BINDINGS: ClassVar[list[BindingType]] = named(
+        [
+            Binding("up,k", "scroll_up", "line up", show=False),
+            Binding("down,j", "scroll_down", "line down", show=False),
+            Binding("pageup", "page_up", "page up", show=False),
+            Binding("pagedown", "page_down", "page down", show=False),
+            Binding("home,g", "scroll_home", "first line", show=False),
+            Binding("end,G", "scroll_end", "last line", show=False),
+        ]
+    )
 
 
 class LineScreen(ViewScreen):

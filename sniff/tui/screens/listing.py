@@ -8,15 +8,18 @@ from typing import ClassVar
 
 from textual.binding import Binding, BindingType
 
-from sniff.config import FILE, ConfigError, load
+from sniff.config import FILE, ConfigError, View, load, save_view
 from sniff.filter import FilterError
 from sniff.filter.completion import Completion, completions
 from sniff.tui.analyzer import analyzer
 from sniff.tui.filter_line import FilterLine
 from sniff.tui.index import Index, Known
 from sniff.tui.linelist import LineList
+from sniff.tui.plain import plain
 from sniff.tui.prompt import Prompt
 from sniff.tui.screens.base import ViewScreen
+from sniff.tui.store_list import StoreList
+from sniff.tui.views import use, view_of, wrong_columns
 
 SLICE_SECONDS = 0.012
 """How long one piece of searching may take: short enough that a key never waits for it."""
@@ -35,6 +38,8 @@ class ListingScreen(ViewScreen):
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("slash", "filter", "filter", tooltip="filter: show only what an expression accepts"),
         Binding("F", "saved", "saved", tooltip="a filter of the configuration by its name", show=False),
+        Binding("C", "columns", "columns", tooltip="choose the columns of this list and their order", show=False),
+        Binding("V", "view", "view", tooltip="a view by its name, or save what is shown as one", show=False),
         Binding("f", "app.follow", "follow", tooltip="follow the newest row, or stay"),
         Binding("t", "app.time", "time", tooltip="time of day, since the first row, or since the row before"),
         Binding("d", "data", "data", tooltip="data only: hide tokens and polls, or show them again", show=False),
@@ -47,6 +52,7 @@ class ListingScreen(ViewScreen):
         super().__init__()
         self._filter_version = 0
         self._saved: dict[str, str] = {}
+        self._views: dict[str, View] = {}
         self._closed_seen = 0  # closed transactions that the index took into account
         self._lines_seen = 0  # and the last line then
 
@@ -154,8 +160,48 @@ class ListingScreen(ViewScreen):
             return ""
         return f"no filter of that name: {', '.join(self._saved)}"
 
+    def action_columns(self) -> None:
+        """Ask for the columns."""
+        lines = self.query_one("#main", StoreList)
+        usual = tuple(column.name for column in lines.COLUMNS)
+        shown = " ".join(self.viewing.columns.get(lines.NAME, usual))
+        check = lambda text: wrong_columns(lines.NAME, text.split())  # noqa: E731
+        self.query_one(Prompt).ask("columns", shown, f"empty: the usual ones: {' '.join(usual)}", check, usual)
+
+    def action_view(self) -> None:
+        """Ask for a view by its name; a new name saves what is shown."""
+        try:
+            self._views = dict(load().views)
+        except ConfigError as error:
+            self.notify(str(error), severity="error", markup=False)
+            return
+        there = f"{', '.join(self._views)}; a new name saves what is shown" if self._views else "a name for this view"
+        self.query_one(Prompt).ask("view", "", there, lambda text: "", tuple(self._views))
+
+    def _view(self, name: str) -> None:
+        try:
+            if name in self._views:
+                use(self.viewing, name, self._views[name])
+                self.query_one("#main", LineList).refresh(layout=True)
+            else:
+                path = save_view(name, view_of(self.viewing))
+                self.notify(f"view {name} saved in {plain(path)}", timeout=4, markup=False)
+        except (ConfigError, FilterError, OSError) as error:
+            self.notify(plain(str(error)), severity="error", markup=False)
+        analyzer(self).draw_screen()
+
     def on_prompt_answered(self, message: Prompt.Answered) -> None:
-        """Set the filter of that name."""
+        """Set the filter of that name, columns, or a view."""
+        if message.purpose == "columns":
+            message.stop()
+            name = self.query_one("#main", StoreList).NAME
+            self.viewing.columns.pop(name, None)
+            if message.text.split():
+                self.viewing.columns[name] = tuple(message.text.split())
+            self.draw()
+        elif message.purpose == "view" and message.text.strip():
+            message.stop()
+            self._view(message.text.strip())
         if message.purpose == "saved filter":
             message.stop()
             if message.text.strip():

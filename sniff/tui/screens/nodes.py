@@ -1,23 +1,34 @@
-"""Screen 3: who is on the bus, and who fails."""
+"""Screen 3: who is on the bus, and who fails: the worst first."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 from rich.text import Text
+from textual import events
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
+from textual.containers import VerticalScroll
 from textual.widgets import DataTable, Static
 
-from dissectors.tracker import Verdict
+from dissectors.findings import Finding
+from dissectors.tracker import PASSING, Verdict
 from dissectors.words import milliseconds
+from sniff.analysis.health import Health, station_of
 from sniff.analysis.nodes import Node
 from sniff.tui.analyzer import analyzer
+from sniff.tui.charts import spread
+from sniff.tui.plain import plain
 from sniff.tui.screens.base import ViewScreen
+from sniff.tui.still_judging import still_judging
 from sniff.tui.tables import StationTable
 
 ANSWERS = (Verdict.ANSWERED, Verdict.RETRY, Verdict.EXCEPTION)
+FEW, SOME = 3, 8
+"""Frame types in the table, and below it."""
 
 
 def answered(node: Node) -> float | None:
@@ -36,79 +47,214 @@ def _time(value: int | None) -> str:
     return "–" if value is None else milliseconds(value)
 
 
-COLUMNS: tuple[tuple[str, Callable[[Node], str]], ...] = (
-    ("stn", lambda node: str(node.address)),
-    ("sent", lambda node: str(node.sent)),
-    ("recv", lambda node: str(node.received)),
-    ("asked", lambda node: str(node.asked)),
-    ("answ.", lambda node: _percent(answered(node))),
-    ("none", lambda node: str(node.unanswered)),
-    ("exc.", lambda node: str(node.verdicts[Verdict.EXCEPTION])),
-    ("dam.", lambda node: str(node.damaged)),
-    ("p50", lambda node: _time(node.latency.quantile(0.5))),
-    ("p95", lambda node: _time(node.latency.quantile(0.95))),
-    ("max", lambda node: _time(node.latency.most)),
+@dataclass(frozen=True, slots=True)
+class Station:
+    """What a line shows. `device`: name of its profile; `identity`: the numbers by which it calls itself."""
+
+    node: Node
+    health: Health | None = None
+    device: str = ""
+    identity: tuple[int, ...] = ()
+    findings: tuple[Finding, ...] = field(default=(), compare=False)
+
+    @property
+    def score(self) -> float:
+        """Health to sort by; those without one stand last."""
+        return 101 if self.health is None else self.health.score
+
+
+def kinds(node: Node, most: int) -> str:
+    """Frame types of the exchanges with a station, the most frequent first."""
+    named = [f"{kind} {count}" for kind, count in node.kinds.most_common(most)]
+    more = len(node.kinds) - len(named)
+    return ", ".join(named) + (f" and {more} more" if more > 0 else "")
+
+
+COLUMNS: tuple[tuple[str, int, Callable[[Station], str]], ...] = (
+    ("stn", 0, lambda one: str(one.node.address)),
+    ("health", 0, lambda one: "–" if one.health is None else str(one.health.score)),
+    ("device", 0, lambda one: one.device),
+    ("id", 0, lambda one: "/".join(map(str, one.identity))),
+    ("asked", 0, lambda one: str(one.node.asked)),
+    ("answ.", 0, lambda one: _percent(answered(one.node))),
+    ("none", 0, lambda one: str(one.node.unanswered)),
+    ("exc.", 0, lambda one: str(one.node.verdicts[Verdict.EXCEPTION])),
+    ("dam.", 0, lambda one: str(one.node.damaged)),
+    ("p50", 110, lambda one: _time(one.node.latency.quantile(0.5))),
+    ("p95", 0, lambda one: _time(one.node.latency.quantile(0.95))),
+    ("max", 95, lambda one: _time(one.node.latency.most)),
+    ("sent", 110, lambda one: str(one.node.sent)),
+    ("recv", 110, lambda one: str(one.node.received)),
+    ("passed", 110, lambda one: str(one.node.passed)),
+    ("frame types", 150, lambda one: kinds(one.node, FEW)),
 )
+"""Title, width of the screen from which it is shown, text."""
+SELDOM = {"device", "id", "passed"}
+"""Columns that are left out where no station has anything there."""
+LEFT = {"device", "id", "frame types"}
 TROUBLE = {"none", "exc.", "dam."}
 """Columns where anything but 0 is worth a look: such cells get a "!"."""
+POOR = 50
+"""A health below this gets one too."""
 
-Order = Callable[[Node], tuple[float, ...]]
+
+def _least_answered(one: Station) -> tuple[float, ...]:
+    share = answered(one.node)
+    return 2.0 if share is None else share, -one.node.damaged, one.node.address
+
+
+Order = Callable[[Station], tuple[float, ...]]
 ORDERS: tuple[tuple[str, Order], ...] = (
-    ("address", lambda node: (node.address,)),
-    ("least answered", lambda node: (2.0 if (share := answered(node)) is None else share, node.address)),
-    ("slowest", lambda node: (-(node.latency.quantile(0.95) or 0), node.address)),
-    ("most damaged", lambda node: (-node.damaged, node.address)),
+    ("worst health", lambda one: (one.score, *_least_answered(one))),
+    ("address", lambda one: (one.node.address,)),
+    ("least answered", lambda one: _least_answered(one)),
+    ("slowest", lambda one: (-(one.node.latency.quantile(0.95) or 0), one.node.address)),
+    ("most damaged", lambda one: (-one.node.damaged, one.node.address)),
 )
 
 
 class NodesScreen(ViewScreen):
-    """One line a station; enter shows its frames."""
+    """One line a station, and the one under the cursor in full; enter shows its frames."""
 
     TITLE = "Nodes"
     CSS_PATH = "nodes.tcss"
+    LEGEND = (
+        ("health", "0 to 100; below the table stands what it is made of"),
+        ("device id", "profile (-d), and the number by which the station calls itself on the bus"),
+        ("answ.", "share of its requests that were answered in time, exceptions too"),
+        ("none", "requests without answer"),
+        ("exc.  dam.", "exceptions; damaged frames"),
+        ("p50 p95 max", "time to its answers: half are shorter, 95 of 100 are, the longest"),
+        ("sent recv", "frames from it and to it"),
+        ("passed", "tokens and polls for masters that it got"),
+    )
     BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("s", "sort", "sort", tooltip="sort by address, least answered, slowest, most damaged"),
+        Binding("s", "sort", "sort", tooltip="sort by worst health, address, least answered, slowest, most damaged"),
     ]
 
     def __init__(self) -> None:
         super().__init__()
         self._order = 0
-        self._drawn: tuple[int, int] | None = None
+        self._drawn: tuple[object, ...] | None = None
+        self._columns: tuple[str, ...] = ()
+        self._stations: dict[str, Station] = {}
 
     def compose_view(self) -> ComposeResult:
-        """The table, and what its columns mean."""
+        """The table, how it is sorted, and the station under the cursor."""
         yield StationTable(id="main", cursor_type="row", zebra_stripes=True)
         yield Static(id="legend", markup=False)
+        with VerticalScroll(id="detail", can_focus=False):
+            yield Static(id="words", markup=False)
 
     def on_mount(self) -> None:
-        """Columns."""
-        table = self.query_one(StationTable)
-        for title, _ in COLUMNS:
-            table.add_column(Text(title, justify="right"), key=title)
-        table.cell_padding = 1
+        """Close together."""
+        self.query_one(StationTable).cell_padding = 1
+
+    def on_resize(self, event: events.Resize) -> None:
+        """Columns that fit."""
+        self._drawn = None
+        self.call_after_refresh(self.draw)
 
     def draw(self) -> None:
         """Bring the table up to date, unless frozen."""
-        state = (self.store.heard, self._order)
-        if self._drawn == state or (self.viewing.frozen and self._drawn and self._drawn[1] == self._order):
+        report = analyzer(self).health.report
+        state = (self.store.heard, id(report), self._order)
+        if self._drawn == state or (self.viewing.frozen and self._drawn and self._drawn[2] == self._order):
             return
         self._drawn = state
         title, order = ORDERS[self._order]
-        nodes = sorted(self.store.nodes.present(), key=order)
-        self.query_one(StationTable).fill((str(node.address), _cells(node)) for node in nodes)
-        self.query_one("#legend", Static).update(
-            f"{len(nodes)} stations, sorted by {title} · answ.: answered in time, exceptions too · none: no answer · "
-            "exc.: exceptions · dam.: damaged frames · p50, p95, max: latency" + self._doubt()
-        )
-
-    def _doubt(self) -> str:
+        stations = sorted(self._present(), key=order)
+        self._stations = {str(one.node.address): one for one in stations}
+        table = self.query_one(StationTable)
+        self._lay_out(table, stations)
+        table.fill((key, self._cells(one)) for key, one in self._stations.items())
         latency = self.store.session.adapter.latency
-        return f" (±{milliseconds(latency)})" if latency else ""
+        doubt = f" · times ±{milliseconds(latency)}" if latency else ""
+        said = still_judging(analyzer(self).status, self.store)
+        legend = f"{len(stations)} stations, sorted by {title}{doubt}" + (f" · {said}" if said else "")
+        self.query_one("#legend", Static).update(legend)
+        self._describe()
+
+    def _present(self) -> Iterable[Station]:
+        report, devices, ring = analyzer(self).health.report, self.store.devices, self.store.dissector.ring
+        scores: Mapping[int, Health] = {} if report is None else report.stations
+        identities = {} if ring is None else ring.identities(self.store.model.ring())
+        about: dict[int | None, list[Finding]] = {}
+        for finding in self.viewing.findings():
+            about.setdefault(station_of(finding), []).append(finding)
+        for node in self.store.nodes.present():
+            at = node.address
+            profile = devices.at(at)
+            name = "" if profile is None or not node.asked else profile.name
+            yield Station(node, scores.get(at), name, identities.get(at, ()), tuple(about.get(at, ())))
+
+    def _lay_out(self, table: StationTable, stations: list[Station]) -> None:
+        width = self.app.size.width
+        columns = tuple(
+            title
+            for title, needs, text in COLUMNS
+            if needs <= width and (title not in SELDOM or any(text(one) not in ("", "0") for one in stations))
+        )
+        if columns != self._columns:
+            self._columns = columns
+            table.clear(columns=True)
+            for title in columns:
+                table.add_column(Text(title, justify="left" if title in LEFT else "right"), key=title)
+
+    def _cells(self, one: Station) -> list[Text]:
+        return [_cell(title, text(one), one) for title, _, text in COLUMNS if title in self._columns]
+
+    # -- the station under the cursor --------------------------------------------------------------------------
+
+    def _describe(self) -> None:
+        key = self.query_one(StationTable).key_here()
+        one = self._stations.get(key or "")
+        self.query_one("#words", Static).update("" if one is None else self._words(one))
+
+    def _words(self, one: Station) -> Text:
+        node, profile = one.node, self.store.devices.at(one.node.address)
+        text = Text()
+        text.append(f"station {node.address}", style="bold")
+        if one.device and profile is not None:
+            text.append(plain(f" · {profile.title}"))
+        if one.identity:
+            text.append(f" · calls itself device {' and '.join(map(str, one.identity))}")
+        score = "not known yet" if one.health is None else f"{one.health.score} of 100"
+        text.append("\nhealth  ", style="dim").append(score, style="bold")
+        if one.health is not None and one.health.reasons:
+            text.append(plain(": " + "; ".join(one.health.reasons)))
+        for finding in one.findings[:SOME]:
+            text.append(f"\n{finding.severity.label:<8}", style="dim").append(plain(finding.seen))
+        if node.kinds:
+            text.append("\nframes  ", style="dim").append(plain(kinds(node, SOME)))
+        spoilt = Counter({verdict.words: count for verdict, count in node.verdicts.items()})
+        if spoilt:
+            text.append("\nends    ", style="dim").append(
+                ", ".join(f"{words} {count}" for words, count in spoilt.most_common())
+            )
+        if node.errors:
+            named = (f"{error} {count}" for error, count in node.errors.most_common(SOME))
+            text.append("\nerrors  ", style="dim").append(plain(", ".join(named)))
+        if node.passed:
+            text.append("\ntokens  ", style="dim").append(
+                f"{node.passed} tokens and polls ({', '.join(sorted(PASSING))}) passed to it, {node.unused} not used"
+            )
+        if node.latency.count:
+            text.append("\nanswers after\n", style="dim")
+            text.append("\n".join(spread(node.latency, max(10, self.size.width - 34))))
+        return text
+
+    # -- keys --------------------------------------------------------------------------------------------------
 
     def action_sort(self) -> None:
         """Next order."""
         self._order = (self._order + 1) % len(ORDERS)
         self.draw()
+
+    def on_data_table_row_highlighted(self, event: DataTable.RowHighlighted) -> None:
+        """The cursor went to another station."""
+        event.stop()
+        self._describe()
 
     def on_data_table_row_selected(self, event: DataTable.RowSelected) -> None:
         """Enter or click on a station."""
@@ -123,11 +269,9 @@ class NodesScreen(ViewScreen):
             analyzer(self).action_switch("frames")
 
 
-def _cells(node: Node) -> list[Text]:
-    return [_cell(title, text(node)) for title, text in COLUMNS]
-
-
-def _cell(title: str, text: str) -> Text:
-    if title in TROUBLE and text != "0":
-        return Text(f"!{text}", style="bold", justify="right")
-    return Text(text, justify="right")
+def _cell(title: str, text: str, one: Station) -> Text:
+    justify = "left" if title in LEFT else "right"
+    poor = title == "health" and one.health is not None and one.health.score < POOR
+    if poor or (title in TROUBLE and text != "0"):
+        return Text(f"!{text}", style="bold", justify=justify)  # type: ignore[arg-type]  # a literal of two
+    return Text(plain(text), justify=justify)  # type: ignore[arg-type]

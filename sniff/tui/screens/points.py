@@ -13,7 +13,7 @@ from textual.widgets import DataTable, Static
 
 from dissectors.line import MS, NS_PER_S
 from dissectors.profiles.decoding import Quality, Value, number
-from sniff.analysis.guessed_points import GuessedPoint, guess_of
+from sniff.analysis.guessed_points import GuessedPoint, LatestGuesses, guess_of
 from sniff.analysis.points import Point
 from sniff.tui.analyzer import analyzer
 from sniff.tui.charts import BARS
@@ -98,7 +98,7 @@ class PointsScreen(TableScreen):
     LEGEND = (
         ("^", "pinned to the top (p)"),
         ("→", "a command: written to the device"),
-        ("?", "uncertain value"),
+        ("?", "uncertain value, or one that was guessed of registers that nobody described"),
         ("!", "value out of its range"),
         ("*", "before a value: it changed in the last two seconds; then it is bold too"),
         ("age", "how long ago the value was seen, at the time of the newest row"),
@@ -124,6 +124,7 @@ class PointsScreen(TableScreen):
         self._columns: tuple[str, ...] = ()
         self._plotted: bool | None = None
         self._guessed: tuple[tuple[Key, int] | None, GuessedPoint | None] = (None, None)
+        self._guesses = LatestGuesses()
 
     def compose_view(self) -> ComposeResult:
         """The table, and more about the point under the cursor."""
@@ -161,9 +162,12 @@ class PointsScreen(TableScreen):
         self._drawn = state
         newest = self.store.by_no(self.store.last_no)
         now = newest.event.end if newest is not None else 0
-        points = self._chosen()
+        guesses = self._guesses.of(self.store.points, self.store.model.series)
+        told = [(point, guesses.get(_place(point)) if point.entry is None else None) for point in self._chosen()]
+        points = [(point, guess) for point, guess in told if guess is None or not guess.is_covered]
         self.query_one(StationTable).fill(
-            (_key(point), _cells(point, now, self._pinned)[: len(self._columns)]) for point in points[:SHOWN]
+            (_key(point), _cells(point, now, self._pinned, guess)[: len(self._columns)])
+            for point, guess in points[:SHOWN]
         )
         self._hidden = max(0, len(points) - SHOWN)
         self._draw_detail()
@@ -317,21 +321,25 @@ def _key(point: Point) -> str:
     return "/".join(_place(point))
 
 
-def _cells(point: Point, now: int, pinned: list[Key]) -> list[Text]:
+def _cells(point: Point, now: int, pinned: list[Key], guess: GuessedPoint | None) -> list[Text]:
     sample, value = point.sample, point.sample.value
-    mark = ("^" if _place(point) in pinned else "") + ("→" if point.is_command else "") + MARKS.get(point.quality, "")
+    shown, low, high = shown_value(value), point.low, point.high
+    quality = MARKS.get(point.quality, "")
+    if guess is not None and guess.value is not None and not guess.is_itself:
+        shown, low, high, quality = f"{guess.value:.7g}", guess.low, guess.high, MARKS[Quality.UNCERTAIN]
+    mark = ("^" if _place(point) in pinned else "") + ("→" if point.is_command else "") + quality
     fresh = bool(point.changed) and now - point.changed <= FRESH
     style = "bold" if fresh else ""
     return [
         Text(mark),
         Text(sample.station, justify="right"),
         Text(plain(sample.name)),
-        Text(("*" if fresh else "") + shown_value(value), style=style, justify="right"),
+        Text(("*" if fresh else "") + shown, style=style, justify="right"),
         Text(age(now - sample.time), justify="right"),
         Text(str(point.count), justify="right"),
         Text(_ms(point.interval), justify="right"),
         Text(_ms(point.jitter), justify="right"),
-        Text("–" if point.low is None else f"{point.low:.5g}", justify="right"),
-        Text("–" if point.high is None else f"{point.high:.5g}", justify="right"),
+        Text("–" if low is None else f"{low:.5g}", justify="right"),
+        Text("–" if high is None else f"{high:.5g}", justify="right"),
         Text(trend([number for _, number in point.history])),
     ]

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from time import monotonic
+from typing import Any
 
 from rich.text import Text
+from textual import events
 from textual.app import ComposeResult
-from textual.containers import VerticalScroll
+from textual.containers import Container, VerticalScroll
 from textual.widgets import DataTable, Static
 
-from dissectors.token_ring import Cell
+from dissectors.token_ring import Cell, TokenRing
 from sniff.tui.analyzer import analyzer
+from sniff.tui.ring_picture import ring_picture, share_bars
 from sniff.tui.screens.base import ViewScreen
 from sniff.tui.still_judging import still_judging
 from sniff.tui.tables import StationTable
@@ -18,22 +22,35 @@ from sniff.tui.tables import StationTable
 PERIOD = 1.0
 """Seconds between two looks: the ring as a value is made anew each time."""
 
-COLUMNS: tuple[tuple[str, str], ...] = (
-    ("MAC", "mac"),
-    ("next", "next"),
-    ("tokens", "tok."),
-    ("retries", "retr"),
-    ("lost", "lost"),
-    ("loop p50 ms", "loop"),
-    ("loop max ms", "max"),
-    ("use p95 ms", "use95"),
-    ("reply p95 ms", "repl95"),
-    ("postponed", "post"),
-    ("polls unanswered", "poll-"),
-    ("damaged", "dam."),
-)
+SHORT: dict[str, str] = {
+    "MAC": "mac",
+    "master": "master",
+    "next": "next",
+    "tokens": "tok.",
+    "retries": "retr",
+    "repeats": "rep.",
+    "lost": "lost",
+    "claims": "claims",
+    "loop p50 ms": "loop",
+    "loop max ms": "max",
+    "rotation p50 ms": "loop",
+    "rotation max ms": "max",
+    "use p95 ms": "use95",
+    "reply p95 ms": "repl95",
+    "requests": "req.",
+    "postponed": "post",
+    "polls unanswered": "poll-",
+    "GAP polls": "polls",
+    "GAP answers": "answ.",
+    "damaged": "dam.",
+}
 """Columns of a ring's table (`TokenRing.headings`) that fit into 80, with their short titles."""
-TROUBLE = {"retries", "lost", "damaged"}
+ROOMY = 170
+"""Width from which all columns are shown, with their titles in full."""
+BESIDE = 130
+"""Width from which the ring stands beside the table, else above it."""
+TROUBLE = {"retries", "repeats", "lost", "claims", "damaged"}
+LOOPS = ("loop p50 ms", "rotation p50 ms")
 
 
 class RingScreen(ViewScreen):
@@ -41,35 +58,43 @@ class RingScreen(ViewScreen):
 
     TITLE = "Ring"
     LEGEND = (
-        ("MAC  next", "a master, and the one that it passes the token to"),
+        ("mac  next", "a master, and the one that it passes the token to"),
         ("tok.", "tokens that it passed on"),
-        ("retr", "tokens that it had to send again"),
-        ("lost", "tokens that were lost at it"),
+        ("retr rep.", "tokens that it had to send again"),
+        ("lost claims", "tokens that were lost at it; tokens that it made anew"),
         ("loop  max", "round trip of the token, ms: median, longest"),
         ("use95", "from getting the token to its first frame, ms: 95 of 100 are shorter (95th percentile)"),
         ("repl95", "time to its answers, ms: 95th percentile"),
         ("post", "answers that it postponed"),
         ("poll-", "its polls for masters that nobody answered"),
+        ("polls answ.", "its polls for other masters, and how many were answered"),
         ("dam.", "damaged frames"),
+        ("bars", "share of the time in which a master has the token"),
     )
     CSS_PATH = "ring.tcss"
 
     def __init__(self) -> None:
         super().__init__()
         self._drawn = (-1, 0.0, False)
+        self._titles: tuple[str, ...] = ()
 
     def compose_view(self) -> ComposeResult:
-        """The table, and the sentences."""
-        yield StationTable(id="main", cursor_type="row", zebra_stripes=True)
-        with VerticalScroll(id="sentences"):
+        """The ring, its table, and the sentences."""
+        with Container(id="ring"):
+            yield Static(id="picture", markup=False)
+            yield StationTable(id="main", cursor_type="row", zebra_stripes=True)
+        with VerticalScroll(id="sentences", can_focus=False):
             yield Static(id="words", markup=False)
 
     def on_mount(self) -> None:
-        """Columns."""
-        table = self.query_one(StationTable)
-        for name, title in COLUMNS:
-            table.add_column(Text(title, justify="right"), key=name)
-        table.cell_padding = 1
+        """Close together."""
+        self.query_one(StationTable).cell_padding = 1
+
+    def on_resize(self, event: events.Resize) -> None:
+        """The ring beside its table where there is room."""
+        self.set_class(event.size.width >= BESIDE, "-beside")
+        self._drawn = (-1, 0.0, False)
+        self.call_after_refresh(self.draw)
 
     def draw(self) -> None:
         """Bring it up to date once a second, and when all has been judged, unless frozen."""
@@ -81,6 +106,7 @@ class RingScreen(ViewScreen):
         self._drawn = (self.store.version, monotonic(), bool(open_end))
         words = self.query_one("#words", Static)
         shown = self.store.dissector.ring
+        self.query_one("#ring").display = shown is not None
         if shown is None:
             session = self.store.session
             unknown = "protocol" in session.unknown
@@ -88,17 +114,34 @@ class RingScreen(ViewScreen):
             words.update(f"{why}: there is no ring to show")
             return
         ring = self.store.model.ring()
-        places = [shown.headings.index(name) for name, _ in COLUMNS if name in shown.headings]
         rows = shown.rows(ring)
-        self.query_one(StationTable).fill(
-            (str(row[0]), [_cell(COLUMNS[at][0], row[place]) for at, place in enumerate(places)]) for row in rows
+        self._fill(shown.headings, rows)
+        self.query_one("#picture", Static).update("\n".join(self._picture(shown, ring, rows)))
+        words.update(
+            "\n".join((*([open_end] if open_end else []), *shown.sentences(ring), "", "?: what the titles mean"))
         )
-        legend = (
-            "tok.: tokens passed · retr: sent again · times in ms, 95: 95th percentile · loop, max: round trip of the "
-            "token · use: from token to first frame · repl: answers · post: postponed · poll-: unanswered polls for "
-            "masters · dam.: damaged frames"
-        )
-        words.update("\n".join((*([open_end] if open_end else []), *shown.sentences(ring), "", legend)))
+
+    def _fill(self, headings: Sequence[str], rows: list[tuple[Cell, ...]]) -> None:
+        roomy = self.app.size.width >= ROOMY
+        places = [at for at, name in enumerate(headings) if roomy or name in SHORT]
+        titles = tuple(headings[at] if roomy else SHORT[headings[at]] for at in places)
+        table = self.query_one(StationTable)
+        if titles != self._titles:
+            self._titles = titles
+            table.clear(columns=True)
+            for title in titles:
+                table.add_column(Text(title, justify="right"), key=title)
+        table.fill((str(row[0]), [_cell(headings[at], row[at]) for at in places]) for row in rows)
+
+    def _picture(self, shown: TokenRing, ring: Any, rows: list[tuple[Cell, ...]]) -> list[str]:
+        width = self.app.size.width // (2 if self.has_class("-beside") else 1) - 4
+        loops = [shown.headings.index(name) for name in LOOPS if name in shown.headings]
+        times = sorted(time for row in rows for at in loops if isinstance(time := row[at], float))
+        said = f"a round takes {times[len(times) // 2]:.1f} ms" if times else ""
+        order, noun = shown.order(ring), self.store.dissector.noun
+        drawn = ring_picture(order, noun, width, said) or ["no closed ring was seen"]
+        bars = share_bars(shown.shares(ring), noun, width)
+        return [*drawn, *(["has the token", *bars] if bars else [])]
 
     def on_data_table_row_selected(self, event: DataTable.RowSelected) -> None:
         """Enter or click on a master: its frames."""

@@ -14,14 +14,20 @@ from dissectors.line import NS_PER_S
 from sniff.analysis.load import Second
 from sniff.bus.rows import Store
 from sniff.tui.analyzer import analyzer
-from sniff.tui.charts import sparkline
+from sniff.tui.charts import round_up
+from sniff.tui.exchanges import Exchanges
 from sniff.tui.screens.base import ViewScreen
+from sniff.tui.timeline_picture import LABEL, Chart, Row, axis, draw_charts, draw_rows
 from sniff.tui.times import clock
 
 ZOOMS = (1, 2, 5, 10, 30, 60, 300, 600, 1800, 3600)
 """Seconds that one column may stand for."""
 
-LABEL = 14
+LOADS = (0.02, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5, 0.75, 1.0)
+"""Where the axis of the load may end."""
+OTHER_LINES = 7
+"""Header, keys, axis, times and what is said of the cursor."""
+LEAST_STATIONS = 3
 
 
 class Column(NamedTuple):
@@ -59,7 +65,7 @@ def _failed(store: Store, begin: int, end: int) -> int:
 
 
 class TimelineScreen(ViewScreen):
-    """Three charts over the same seconds, a cursor, and a selection."""
+    """Charts over the same seconds and a line a station, a cursor, and a selection."""
 
     TITLE = "Timeline"
     CSS_PATH = "timeline.tcss"
@@ -91,6 +97,7 @@ class TimelineScreen(ViewScreen):
         self._anchor: int | None = None  # where the selection began
         self._begin = 0
         self._drawn: tuple[object, ...] = ()
+        self._exchanges = Exchanges()
 
     def compose_view(self) -> ComposeResult:
         """The charts."""
@@ -98,7 +105,7 @@ class TimelineScreen(ViewScreen):
 
     def draw(self) -> None:
         """Bring the charts up to date, unless frozen."""
-        width = max(10, self.size.width - LABEL - 2)
+        width = max(10, self.size.width - LABEL - 2)  # and a cell at both sides
         state = (self.store.heard, width, self.size.height, self._zoom, self._cursor, self._anchor)
         frozen = self.viewing.frozen and self._drawn and self._drawn[1:] == state[1:]
         if state == self._drawn or frozen:
@@ -116,7 +123,8 @@ class TimelineScreen(ViewScreen):
         cursor = last if self._cursor is None else min(max(self._cursor, first), last)
         self._begin = self._scrolled(first, last, cursor, width, zoom)
         width = min(width, (last - self._begin) // zoom + 1)  # none after the end
-        chart.update(self._text(columns(self.store, self._begin, width, zoom), cursor, zoom, last))
+        self._exchanges.bring_up(self.store, self.viewing.last_closed)
+        chart.update(self._text(columns(self.store, self._begin, width, zoom), cursor, zoom))
 
     def _scrolled(self, first: int, last: int, cursor: int, width: int, zoom: int) -> int:
         """Second at which the charts begin, a whole number of columns after the first; the cursor is inside."""
@@ -127,42 +135,59 @@ class TimelineScreen(ViewScreen):
             begin = first + ((cursor - first) // zoom - width + 1) * zoom
         return begin
 
-    def _text(self, made: list[Column], cursor: int, zoom: int, last: int) -> Text:
+    def _text(self, made: list[Column], cursor: int, zoom: int) -> Text:
         at = (cursor - self._begin) // zoom
         chosen = self._chosen(cursor, zoom)
         text = Text(no_wrap=True)
-        peak = max((column.load for column in made), default=0.0)
-        top = next((step for step in (0.1, 0.25, 0.5, 1.0) if peak <= step), 1.0)
-        rows = (
-            (f"load {top:.0%}", [column.load for column in made], top, ""),
-            ("frames", [float(column.frames) for column in made], 0.0, ""),
-            ("errors", [float(column.failed) for column in made], 0.0, "bold red"),
-            ("damaged", [float(column.damaged) for column in made], 0.0, "red"),
-            ("noise", [float(column.noise) for column in made], 0.0, "yellow"),
-        )
-        for name, values, most, style in rows:
-            label = name if most else f"{name} {max(values, default=0):.0f}"
-            text.append(f"{label:<{LABEL}}"[:LABEL], style="bold")
-            for place, bar in enumerate(sparkline(values, most or max(values, default=0.0))):
-                begin = made[place].begin
-                marked = chosen is not None and chosen[0] <= begin < chosen[1]
-                text.append(bar, style="reverse" if place == at else f"{style} on blue" if marked else style)
-            text.append("\n")
-        text.append(" " * LABEL + " " * max(0, at) + "▲\n")
-        text.append(self._axis(made, zoom, last) + "\n")
-        text.append("full height: the number at the left\n\n", style="dim")
+
+        def paint(place: int, style: str) -> str:
+            if place == at:
+                return "reverse"
+            begin = made[place].begin
+            return f"{style} on blue" if chosen is not None and chosen[0] <= begin < chosen[1] else style
+
+        rows = self._rows(len(made), zoom)
+        charts = self._charts(made, zoom)
+        room = self.size.height - OTHER_LINES - (1 if rows else 0)
+        stations = rows[: max(LEAST_STATIONS, (room - 2 * len(charts)) // 3)] if room > 2 * len(charts) else []
+        draw_charts(text, charts, room - len(stations), paint)
+        if stations:
+            hidden = len(rows) - len(stations)
+            more = f", {hidden} more have fewer" if hidden else ""
+            text.append(f"{'stations':<14}", style="bold").append("│", style="dim")
+            text.append(f" · asked, bars: went wrong{more}\n", style="dim")
+            draw_rows(text, stations, paint)
+        for line in axis(self._begin, len(made), zoom, at):
+            text.append(line + "\n")
         text.append(self._words(made[at] if 0 <= at < len(made) else None, zoom, chosen))
         return text
 
-    def _axis(self, made: list[Column], zoom: int, last: int) -> str:
-        """Time at both ends, where there is room for them below the charts; `last`: s, what was heard last."""
-        ends = (made[0].begin, min(made[-1].begin + zoom, last))
-        left, right = (clock(second * NS_PER_S)[:8] for second in ends)
-        middle = f"one column {_duration(zoom)}"
-        space = len(made) - len(left) - len(right) - len(middle)
-        if space < 2:
-            return " " * LABEL + f"{left} … {right}, {middle}"
-        return " " * LABEL + left + " " * (space // 2) + middle + " " * (space - space // 2) + right
+    def _charts(self, made: list[Column], zoom: int) -> list[Chart]:
+        peak = max((column.load for column in made), default=0.0)
+        load = next((step for step in LOADS if peak <= step), 1.0)
+        median, most = self._exchanges.latencies(self._begin, len(made), zoom, (0.5, 0.95))
+        slowest = round_up(max((value for value in most if value is not None), default=0.0))
+        charts = [
+            Chart("load", [column.load for column in made], load, f"{load:.0%}", 3, "color(67)"),
+            _counted("frames", [column.frames for column in made], 2, "color(103)"),
+            _counted("errors", [column.failed for column in made], 2, "bold red"),
+            _counted("damaged", [column.damaged for column in made], 0, "red"),
+            _counted("noise", [column.noise for column in made], 0, "yellow"),
+        ]
+        if any(value is not None for value in most):
+            said = f"{slowest:g} ms"
+            charts += [
+                Chart("p95", most, slowest, said, 3, "cyan"),
+                Chart("p50", median, slowest, said, 2, "cyan"),
+            ]
+        return charts
+
+    def _rows(self, width: int, zoom: int) -> list[Row]:
+        """Stations, those where most went wrong first."""
+        found = self._exchanges.stations(self._begin, width, zoom)
+        noun = self.store.dissector.noun
+        ordered = sorted(found.items(), key=lambda item: (-sum(item[1][1]), item[0]))
+        return [Row(f"{noun} {at}  {sum(failed)}", asked, failed) for at, (asked, failed) in ordered]
 
     def _words(self, column: Column | None, zoom: int, chosen: tuple[int, int] | None) -> str:
         if column is None:
@@ -172,10 +197,17 @@ class TimelineScreen(ViewScreen):
             f"{counted(column.frames, 'frame')}, {counted(column.failed, 'error')}, {column.damaged} damaged, "
             f"{counted(column.noise, 'octet')} of noise"
         )
+        words += self._answers(column, zoom) + f" · one column {_duration(zoom)}"
         if self._anchor is not None and chosen is not None:
             span = f"{clock(chosen[0] * NS_PER_S)[:8]} … {clock(chosen[1] * NS_PER_S)[:8]}"
             words += f"\nselected: {span}; enter shows its frames, escape lets it go"
         return words
+
+    def _answers(self, column: Column, zoom: int) -> str:
+        median, most = self._exchanges.latencies(column.begin, 1, zoom, (0.5, 0.95))
+        if median[0] is None or most[0] is None:
+            return ", nothing answered"
+        return f", answers after {median[0]:.2g} ms (p50), {most[0]:.2g} ms (p95)"
 
     # -- time --------------------------------------------------------------------------------------------------
 
@@ -273,6 +305,11 @@ class TimelineScreen(ViewScreen):
             self._anchor = None
             self.app.notify("a filter shows these frames only; esc removes it", timeout=5)
         analyzer(self).show_row(min(first, self.store.last_no))
+
+
+def _counted(name: str, values: list[int], weight: int, style: str = "") -> Chart:
+    top = max(values, default=0)
+    return Chart(name, values, float(top), str(top), weight, style)
 
 
 class _Chart(Static, can_focus=True):

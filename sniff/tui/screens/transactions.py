@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from textual.app import ComposeResult
 
-from sniff.bus.rows import BAD_VERDICTS
+from sniff.bus.rows import is_trouble
 from sniff.tui.analyzer import analyzer
 from sniff.tui.filter_line import FilterLine
 from sniff.tui.index import Known
@@ -61,7 +61,7 @@ class TransactionsScreen(ListingScreen):
             if not 0 <= line < len(lines.index):
                 break
             transaction = self.store.closed_by_no(lines.index[line])
-            if transaction is not None and transaction.verdict in BAD_VERDICTS:
+            if transaction is not None and is_trouble(transaction):
                 lines.go_to(lines.index[line])
                 return
             line += direction

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
 from sniff.bus.live import LiveBus
-from sniff.capture.wire import Ended, Heard, Received, Tick
+from sniff.capture.ipc import Ended, HeardOctets, ReceivedMessage, Tick
 from sniff.engine.blocks import Block, reads_of
 from sniff.engine.session import LineEvent, LineEventKind
 from sniff.outlets.teller import Teller
@@ -56,8 +56,8 @@ def told(outlets: list[Heardall], messages: list, ended: bool = True) -> LiveBus
     return live
 
 
-def heard(chunks: list[Chunk]) -> Heard:
-    return Heard(0, Block(reads_of(chunks)))
+def heard(chunks: list[Chunk]) -> HeardOctets:
+    return HeardOctets(0, Block(reads_of(chunks)))
 
 
 def test_one_gets_each_value_the_other_the_newest_at_its_pace_and_the_last() -> None:
@@ -85,8 +85,8 @@ def test_numbers_come_each_second_and_nobody_is_told_twice() -> None:
 def test_a_port_that_goes_and_comes_is_told_and_the_end_too() -> None:
     outlet = Heardall()
     events = [
-        Received(0, LineEvent(100 * MS, LineEventKind.UNPLUGGED, "x: gone")),
-        Received(0, LineEvent(200 * MS, LineEventKind.REPLUGGED, "x: back")),
+        ReceivedMessage(0, LineEvent(100 * MS, LineEventKind.UNPLUGGED, "x: gone")),
+        ReceivedMessage(0, LineEvent(200 * MS, LineEventKind.REPLUGGED, "x: back")),
     ]
     told([outlet], events)
     assert [one.listening for one in outlet.of(StateTold)] == [True, False, True, False]

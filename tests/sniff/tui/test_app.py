@@ -13,7 +13,7 @@ from textual.widgets import Static
 from sniff.bus.feed import FeedStatus, StoreFeed
 from sniff.tui import run
 from sniff.tui.app import PATH, with_step
-from sniff.tui.header import SHORTEST
+from sniff.tui.header import SHORT_TITLES, SHORTEST
 from sniff.tui.help import HelpScreen
 from sniff.tui.keybar import explanation, working_keys
 from sniff.tui.palette import ActionCommands
@@ -29,7 +29,8 @@ def test_every_screen_of_the_table_is_there(look: Any, busy_bus: Any) -> None:
             assert entry.title == screen.TITLE
             await see.press(entry.key)
             assert see.app.current_mode == entry.name
-            assert f"[{entry.key} {entry.title}]" in see.lines()[1]
+            shown = SHORT_TITLES.get(entry.title, entry.title)
+            assert f"[{entry.key} {shown}]" in see.lines()[1]
             for other in SCREENS:
                 assert f"{other.key} {other.title}"[:SHORTEST] in see.lines()[1]
             assert see.app.focused is see.main

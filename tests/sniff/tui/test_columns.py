@@ -22,6 +22,15 @@ def test_what_is_cut_says_so() -> None:
     assert fit("12", 4, right=True) == "  12"
 
 
+def test_no_number_is_cut_in_the_middle() -> None:
+    assert fit("DC voltage 324.7 V", 15) == "DC voltage…    "
+    assert fit("DC voltage 324.7 V", 16) == "DC voltage…     "
+    assert fit("DC voltage 324.7 V", 17) == "DC voltage 324.7…"
+    assert fit("inputs (holding/49505 ×4)", 18) == "inputs (…         "
+    assert fit("A → 1010044DAC0001020043E60000", 20) == "A → 1010044DAC00010…"
+    assert fit("1234567", 4) == "123…"
+
+
 @given(st.integers(70, 300), st.sampled_from([FRAMES, TRANSACTIONS]))
 def test_a_line_fills_its_width(width: int, columns: tuple[Column, ...]) -> None:
     shown = lay_out(columns, width)

@@ -51,14 +51,22 @@ def test_partner(look: Any, busy_bus: Any) -> None:
 
 def test_marks(look: Any, busy_bus: Any) -> None:
     async def script(see: Any) -> None:
-        await see.press("home", "m", "down", "down", "m", "down", "apostrophe")
+        await see.press("home", "m", "enter", "down", "down", "m")
+        await see.type("gate opens")
+        await see.press("enter", "down", "apostrophe")
         assert see.main.cursor == 1
         await see.press("apostrophe")
         assert see.main.cursor == 3
         assert see.lines()[3][1] == see.lines()[5][1] == "*"
-        await see.press("m", "apostrophe", "apostrophe")
+        assert "[gate opens] " in see.lines()[5]
+        await see.press("home", "quotation_mark")
+        assert "gate opens" in see.text()
+        assert "2 marks" in see.text()
+        await see.press("down", "enter")
+        assert see.main.cursor == 3
+        await see.press("M", "apostrophe", "apostrophe")
         assert see.main.cursor == 1
-        assert see.app.viewing.marks == [1]
+        assert see.app.viewing.marks == {1: ""}
 
     look(busy_bus.store, script)
 
@@ -116,7 +124,7 @@ def test_following_ends_with_a_move_and_begins_with_f(look: Any, busy_bus: Any) 
         busy_bus.ask(1)
         await see.poll()
         assert see.main.cursor == 14
-        assert "FOLLOW" not in see.lines()[0]
+        assert "FOLLOW OFF" in see.lines()[0]
         await see.press("f")
         assert see.main.cursor == 17
         busy_bus.ask(1)

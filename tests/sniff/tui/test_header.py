@@ -79,7 +79,7 @@ def test_the_port_gives_way(busy_bus: Any, width: int, port: str) -> None:
     ("width", "tabs"),
     [
         (120, " 1 Frames  2 Transactions  3 Nodes  4 Points  5 Findings  6 Timeline  7 Ring  8 Polls [9 Line]"),
-        (80, "1 Frames 2 Transac 3 Nodes 4 Points 5 Finding 6 Timelin 7 Ring 8 Polls [9 Line]"),
+        (80, "1 Frames 2 Trans. 3 Nodes 4 Points 5 Findings 6 Timeline 7 Ring 8 Polls [9 Line]"),
         (40, "1 2 3 4 5 6 7 8 [9 Line]"),
     ],
 )
@@ -96,9 +96,9 @@ def test_nine_screens_fit(look: Any, busy_bus: Any, width: int, tabs: str) -> No
 
 def test_neither_following_nor_frozen_is_said_while_rows_come(busy_bus: Any) -> None:
     viewing = Viewing(busy_bus.store)
-    assert line(LIVE, viewing).endswith(" STILL")
-    assert "STILL" not in line(replace(LIVE, ended="asked to"), viewing)
-    assert "STILL" not in line(FeedStatus("f.mcap", "l", "n2"), viewing)
+    assert line(LIVE, viewing).endswith(" FOLLOW OFF")
+    assert "FOLLOW" not in line(replace(LIVE, ended="asked to"), viewing)
+    assert "FOLLOW" not in line(FeedStatus("f.mcap", "l", "n2"), viewing)
 
 
 def test_no_size_where_nothing_is_recorded(busy_bus: Any) -> None:

@@ -59,25 +59,50 @@ def test_transactions_that_close_while_looking(look: Any, busy_bus: Any) -> None
 # -- nodes -----------------------------------------------------------------------------------------------------------
 
 
-def cells(see: Any, station: int) -> list[str]:
-    return [cell.plain for cell in see.main.get_row(str(station))]
+def cells(see: Any, station: int) -> dict[str, str]:
+    titles = [column.label.plain for column in see.main.ordered_columns]
+    return dict(zip(titles, (cell.plain for cell in see.main.get_row(str(station))), strict=True))
 
 
 def test_nodes_count_by_station(look: Any, busy_bus: Any) -> None:
     async def script(see: Any) -> None:
-        #                            sent recv asked  answ.   none  exc.  dam.
-        assert cells(see, 1)[:8] == ["1", "3", "3", "3", "100.0%", "0", "!1", "0"]
-        assert cells(see, 3)[:8] == ["3", "0", "1", "1", "0.0%", "!1", "0", "0"]
-        assert cells(see, 4)[:8] == ["4", "1", "1", "1", "0.0%", "0", "0", "!1"]
-        assert cells(see, 3)[8:] == ["–", "–", "–"]
-        assert cells(see, 2)[8:] == ["38.0 ms", "38.0 ms", "38.0 ms"]
+        counted = ("stn", "sent", "recv", "asked", "answ.", "none", "exc.", "dam.")
+        times = ("p50", "p95", "max")
+        rows = {station: cells(see, station) for station in (1, 2, 3, 4)}
+        assert [rows[1][title] for title in counted] == ["1", "3", "3", "3", "100.0%", "0", "!1", "0"]
+        assert [rows[3][title] for title in counted] == ["3", "0", "1", "1", "0.0%", "!1", "0", "0"]
+        assert [rows[4][title] for title in counted] == ["4", "1", "1", "1", "0.0%", "0", "0", "!1"]
+        assert [rows[3][title] for title in times] == ["–", "–", "–"]
+        assert [rows[2][title] for title in times] == ["38.0 ms", "38.0 ms", "38.0 ms"]
+        assert rows[1]["frame types"] == "read 3"
 
-    look(busy_bus.store, script, start="nodes")
+    look(busy_bus.store, script, (160, 30), start="nodes")
+
+
+def test_the_worst_station_stands_first_with_what_its_health_is_made_of(look: Any, make_bus: Any) -> None:
+    bus = make_bus()
+    for _ in range(10):
+        bus.ask(1)
+        bus.ask(2, Verdict.NO_RESPONSE)
+        bus.ask(3)
+    bus.ask(3, Verdict.EXCEPTION, error="illegal data address")
+
+    async def script(see: Any) -> None:
+        await see.poll()
+        assert [str(key.value) for key in see.main.rows] == ["2", "3", "1"]
+        assert cells(see, 2)["health"] == "!0"
+        assert cells(see, 1)["health"] == "100"
+        assert "health  0 of 100: 100% of its requests without answer" in see.text()
+        assert "health " in see.lines()[0]
+        await see.press("down")
+        assert "errors  illegal data address 1" in see.text()
+
+    look(bus.store, script, start="nodes")
 
 
 def test_enter_shows_the_frames_of_a_station(look: Any, busy_bus: Any) -> None:
     async def script(see: Any) -> None:
-        await see.press("home", "down", "enter")
+        await see.press("s", "home", "down", "enter")  # by address
         assert see.app.current_mode == "frames"
         assert see.app.viewing.filter == "addr == 2"
         assert [see.main.index[line] for line in range(len(see.main.index))] == [3, 4, 13]
@@ -90,30 +115,30 @@ def test_enter_shows_the_frames_of_a_station(look: Any, busy_bus: Any) -> None:
 def test_sorting(look: Any, busy_bus: Any) -> None:
     async def script(see: Any) -> None:
         orders = []
-        for _ in range(5):
+        for _ in range(6):
             orders.append("".join(str(key.value) for key in see.main.rows))
             await see.press("s")
-        assert orders == ["1234", "3412", "2143", "4123", "1234"]
-        assert "sorted by least answered" in see.text()
+        assert orders == ["4312", "1234", "4312", "2143", "4123", "4312"]
+        assert "sorted by address" in see.text()
 
     look(busy_bus.store, script, start="nodes")
 
 
 def test_nodes_keep_up_and_freeze(look: Any, busy_bus: Any) -> None:
     async def script(see: Any) -> None:
-        await see.press("home", "down")
+        await see.press("s", "home", "down")
         busy_bus.ask(9)
         busy_bus.ask(1)
         await see.poll()
-        assert cells(see, 1)[3] == "4"
-        assert cells(see, 9)[3] == "1"
+        assert cells(see, 1)["asked"] == "4"
+        assert cells(see, 9)["asked"] == "1"
         assert see.main.cursor_row == 1
         await see.press("space")
         busy_bus.ask(1)
         await see.poll()
-        assert cells(see, 1)[3] == "4"
+        assert cells(see, 1)["asked"] == "4"
         await see.press("space")
-        assert cells(see, 1)[3] == "5"
+        assert cells(see, 1)["asked"] == "5"
 
     look(busy_bus.store, script, start="nodes", live=True)
 
@@ -125,7 +150,7 @@ def test_one_failure_in_many_is_not_rounded_away(look: Any, make_bus: Any) -> No
     bus.ask(1, Verdict.NO_RESPONSE)
 
     async def script(see: Any) -> None:
-        assert cells(see, 1)[4] == "99.9%"
+        assert cells(see, 1)["answ."] == "99.9%"
 
     look(bus.store, script, start="nodes")
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from dissectors.frame import LineError, Mark
-from dissectors.tracker import Verdict
+from dissectors.frame import LineError, Mark, Role
+from dissectors.tracker import Passing, Transaction, Verdict
+from sniff.bus.rows import is_trouble
+from sniff.engine.engine import Output
 
 
 def test_numbers_of_rows_and_closings(busy_bus: Any) -> None:
@@ -58,3 +60,14 @@ def test_gaps_are_the_silences_between_rows(make_bus: Any) -> None:
     for _ in range(3):
         bus.ask(1, latency=7)
     assert bus.store.gaps.spread([5_000_000, 10_000_000, 50_000_000]) == [0, 3, 2, 0]
+
+
+def test_looking_for_a_master_where_there_is_none_is_no_trouble(make_bus: Any) -> None:
+    bus = make_bus()
+    for kind, trouble in ((Passing.STATUS, 0), (Passing.POLL, 0), (Passing.TOKEN, 1), ("read", 2)):
+        row = bus.row(bus.frame(b"\x01\x03\x00"), bus.tx + 1, Role.REQUEST)
+        bus.tx += 1
+        closed = Transaction(bus.tx, 1, kind, row.no, None, Verdict.NO_RESPONSE, row.event.start, row.event.end)
+        bus.store.add(Output((row,), (closed,)))
+        assert bus.store.error_total == trouble
+        assert is_trouble(closed) == (kind not in (Passing.STATUS, Passing.POLL))

@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from sniff.engine.session import LineEvent, LineEventKind
 from sniff.filter import FilterError
 from sniff.tui.viewing import Viewing
 
@@ -25,21 +26,37 @@ def test_freeze_stops_the_view_and_counts(busy_bus: Any) -> None:
 def test_marks_go_round(busy_bus: Any) -> None:
     viewing = Viewing(busy_bus.store)
     assert viewing.next_mark() is None
-    assert viewing.toggle_mark(9)
-    assert viewing.toggle_mark(3)
+    begins = {no: busy_bus.store.by_no(no).event.start for no in (3, 9)}
+    for no in (9, 3):
+        busy_bus.store.add_mark(LineEvent(begins[no], LineEventKind.MARK, f"row {no}"))
+    assert viewing.take_marks()
+    assert not viewing.take_marks()
+    assert viewing.marks == {3: "row 3", 9: "row 9"}
     viewing.row = 3
     assert viewing.next_mark() == 9
     viewing.row = 9
     assert viewing.next_mark() == 3
-    assert not viewing.toggle_mark(3)
+    late = LineEvent(begins[3] + 10**12, LineEventKind.UNMARK, count=10**12)  # of a live bus: said long after
+    busy_bus.store.add_mark(late)
+    viewing.take_marks()
     assert viewing.next_mark() == 9
+
+
+def test_a_mark_waits_for_its_row(make_bus: Any) -> None:
+    bus = make_bus()
+    viewing = Viewing(bus.store)
+    bus.store.add_mark(LineEvent(bus.now, LineEventKind.MARK, "here"))
+    assert not viewing.take_marks()
+    bus.ask(1)
+    assert viewing.take_marks()
+    assert viewing.marks == {1: "here"}
 
 
 def test_marks_of_dropped_rows_are_passed_over(make_bus: Any) -> None:
     bus = make_bus(keep=20)
     bus.ask(1)
     viewing = Viewing(bus.store)
-    viewing.toggle_mark(1)
+    viewing.marks[1] = ""
     for _ in range(20):
         bus.ask(1)
     assert bus.store.first_no > 1

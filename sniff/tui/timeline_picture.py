@@ -1,0 +1,109 @@
+"""The picture on the Timeline: charts above each other over the same columns of time, as tall as there is room for.
+Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from rich.text import Text
+
+from dissectors.line import NS_PER_S
+from sniff.tui.charts import BARS, tall_bars
+from sniff.tui.times import clock
+
+LABEL = 15
+"""Cells left of the charts, their axis among them."""
+TICKS = (1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 21_600, 43_200, 86_400)
+"""Seconds that may lie between two times of the axis."""
+APART = 14
+"""Cells between two of them at least."""
+TALLEST = 12
+"""Lines of a chart; what is left over stays empty."""
+
+
+@dataclass(frozen=True, slots=True)
+class Chart:
+    """A quantity over time. `top`: value at full height; `label`: how it is written. `weight`: how much of the height
+    it takes beside others, 0: a single line. `style`: of its bars."""
+
+    name: str
+    values: Sequence[float | None]
+    top: float
+    label: str
+    weight: int = 1
+    style: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A station: a line of "·" where it was asked and bars where exchanges went wrong."""
+
+    name: str
+    asked: Sequence[int]
+    failed: Sequence[int]
+
+
+Paint = Callable[[int, str], str]
+"""The style of a column of that style, with the cursor and what is selected."""
+
+
+def heights(charts: Sequence[Chart], room: int) -> list[int]:
+    """Lines for each chart out of `room`: one at least, the rest by weight."""
+    made = [1] * len(charts)
+    left = room - len(charts)
+    whole = sum(chart.weight for chart in charts)
+    if left <= 0 or not whole:
+        return made
+    for at, chart in enumerate(charts):
+        made[at] += min(TALLEST - 1, left * chart.weight // whole) if chart.weight else 0
+    rest = room - sum(made)
+    for at, chart in enumerate(charts):
+        if rest > 0 and chart.weight and made[at] < TALLEST:
+            made[at] += 1
+            rest -= 1
+    return made
+
+
+def draw_charts(text: Text, charts: Sequence[Chart], room: int, paint: Paint) -> None:
+    """Add the charts: name and full height at the upper end of the axis, 0 at the lower one."""
+    for chart, height in zip(charts, heights(charts, room), strict=True):
+        for line, bars in enumerate(tall_bars(chart.values, chart.top, height)):
+            if height == 1:
+                label = f"{chart.name} {chart.label}"
+                corner = "│"
+            else:
+                ends = {0: f"{chart.name:<8}{chart.label:>6}", height - 1: f"{'0':>14}"}
+                label, corner = ends.get(line, ""), "┤" if line in (0, height - 1) else "│"
+            text.append(f"{label:<14}"[:14], style="bold" if line == 0 else "")
+            text.append(corner, style="dim")
+            for place, bar in enumerate(bars):
+                text.append(bar, style=paint(place, chart.style))
+            text.append("\n")
+
+
+def draw_rows(text: Text, rows: Sequence[Row], paint: Paint) -> None:
+    """Add a line for each station; the highest bar is the most that went wrong in a column of any of them."""
+    most = max((max(row.failed, default=0) for row in rows), default=0)
+    for row in rows:
+        text.append(f"{row.name:<14}"[:14]).append("│", style="dim")
+        for place, (asked, failed) in enumerate(zip(row.asked, row.failed, strict=True)):
+            bar = BARS[max(1, round(failed / most * 8))] if failed else "·" if asked else " "
+            text.append(bar, style=paint(place, "bold red" if failed else "dim"))
+        text.append("\n")
+
+
+def axis(begin: int, count: int, zoom: int, cursor: int) -> tuple[str, str]:
+    """The line below the charts, with ticks and the cursor's place, and the times below that line."""
+    step = next((one for one in TICKS if one >= APART * zoom and one % zoom == 0), TICKS[-1])
+    line, times = ["─"] * count, [" "] * (count + APART)
+    for place in range(count):
+        second = begin + place * zoom
+        if second // step != (second - zoom) // step or place == 0:
+            line[place] = "┴"
+            said = clock(second * NS_PER_S)[:8]
+            if place + len(said) <= count + 4 and not "".join(times[max(0, place - 2) : place + 9]).strip():
+                times[place : place + len(said)] = said
+    if 0 <= cursor < count:
+        line[cursor] = "▲"
+    return " " * (LABEL - 1) + "└" + "".join(line), " " * LABEL + "".join(times).rstrip()

@@ -1,0 +1,111 @@
+"""Marks: beside a capture, in a recording, in the comments of pcapng, and back."""
+
+from __future__ import annotations
+
+import shutil
+import struct
+from pathlib import Path
+
+import pytest
+
+from sniff.bus.marked_rows import MarkedRows
+from sniff.bus.offline import survey
+from sniff.cli import main
+from sniff.engine.blocks import blocks_of
+from sniff.engine.session import LineEvent, LineEventKind
+from sniff.formats import create_of_items, read
+from sniff.formats.mark_file import add_mark, mark_file, marks_beside
+from sniff.formats.pcapng import ENHANCED, OPT_COMMENT, OPT_END, SECTION, _option
+
+CLEAN = Path("captures/rtu-clean.cap.txt")
+
+
+@pytest.fixture
+def capture(tmp_path: Path) -> Path:
+    return Path(shutil.copy(CLEAN, tmp_path / "night.cap.txt"))
+
+
+def rows_of(path: Path, reference: bool = False) -> dict[int, str]:
+    capture, marked = read(path), MarkedRows()
+    survey(capture, capture.session, marked, reference=reference)
+    return marked.by_row()
+
+
+def starts(path: Path) -> list[int]:
+    capture, marked = read(path), MarkedRows()
+    survey(capture, capture.session, marked)
+    return [int(start) for part in marked._starts for start in part]
+
+
+def test_marks_beside_a_file_are_read_with_it(capture: Path) -> None:
+    begins = starts(capture)
+    before = capture.read_bytes()
+    add_mark(capture, begins[4], "gate opens; ü")
+    add_mark(capture, begins[2], "gone again")
+    add_mark(capture, begins[2], None)
+    assert capture.read_bytes() == before
+    assert rows_of(capture) == rows_of(capture, reference=True) == {5: "gate opens; ü"}
+
+
+@pytest.mark.parametrize("text", ["", "no json\n", '{"time": "x"}\n', "[1]\n", '{"time": 1}\n', "[" * 5000, "\x00\xff"])
+def test_what_is_no_mark_is_passed_over(capture: Path, text: str) -> None:
+    mark_file(capture).write_text(text)
+    assert marks_beside(capture) == []
+    assert rows_of(capture) == {}
+
+
+def test_a_recording_holds_marks_that_came_later(capture: Path, tmp_path: Path) -> None:
+    held = read(capture)
+    begins = starts(capture)
+    target = tmp_path / "night.mcap"
+    with create_of_items(target, held.session) as writer:
+        last = 0
+        for item in held.items():
+            writer.write(item)
+            last = item.time
+        writer.write(LineEvent(last, LineEventKind.MARK, "what was that?", last - begins[3]))
+    assert rows_of(target) == {4: "what was that?"}
+
+
+def test_marks_travel_through_pcapng(capture: Path, tmp_path: Path) -> None:
+    begins = starts(capture)
+    add_mark(capture, begins[6], "look at this")
+    target = tmp_path / "night.pcapng"
+    assert main(["convert", str(capture), str(target)]) == 0
+    assert b"mark: look at this" in target.read_bytes()
+    assert rows_of(target) == rows_of(target, reference=True) == {7: "look at this"}
+
+
+def test_comments_of_another_program_are_marks(capture: Path, tmp_path: Path) -> None:
+    """As Wireshark saves them: a file without our section comment, a comment at one packet of many."""
+    target = tmp_path / "other.pcapng"
+    assert main(["convert", str(capture), str(target)]) == 0
+    data = target.read_bytes()
+    foreign, at, seen = b"", 0, 0
+    while at < len(data):
+        kind, length = struct.unpack_from("<II", data, at)
+        body = data[at + 8 : at + length - 4]
+        if kind == SECTION:
+            body = body[:16]
+        elif kind == ENHANCED:
+            seen += 1
+            kept = struct.unpack_from("<I", body, 12)[0]
+            said = _option(OPT_COMMENT, b"seen on site") + _option(OPT_END) if seen == 40 else b""
+            body = body[: 20 + kept + -kept % 4] + said
+        size = struct.pack("<I", len(body) + 12)
+        foreign += struct.pack("<I", kind) + size + body + size
+        at += length
+    target.write_bytes(foreign)
+    marked = rows_of(target)
+    assert list(marked.values()) == ["seen on site"]
+    assert marked == rows_of(target, reference=True)
+    events = [one for one in read(target).items() if isinstance(one, LineEvent)]
+    assert [one for one in read(target).blocks() if isinstance(one, LineEvent)] == events
+    assert list(blocks_of(read(target).items()))
+
+
+def test_a_report_tells_marks(capture: Path, tmp_path: Path) -> None:
+    add_mark(capture, starts(capture)[4], "gate opens")
+    target = tmp_path / "report.html"
+    assert main(["report", str(capture), "-o", str(target)]) == 0
+    assert "gate opens" in target.read_text("utf-8")
