@@ -15,7 +15,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from sniff.cli import PORT_TROUBLE, USAGE, Failure, arguments, json_output, targets
+from sniff.cli import PORT_TROUBLE, USAGE, Failure, arguments, json_output, outlets, targets
 from sniff.config import FILE
 
 DOWN = 1
@@ -33,15 +33,13 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--keep-free", type=arguments.octets, metavar="SIZE", help="keep so much of the disk free; default: 1GB"
     )
     parser.add_argument(
-        "--metrics", type=arguments.whole, metavar="PORT", help="OpenMetrics on the loopback (/metrics)"
-    )
-    parser.add_argument(
         "--status-port", type=arguments.whole, metavar="PORT", help="the status page on the loopback, too (/, /status)"
     )
     parser.add_argument("--socket", metavar="PATH", help="of the status page; default: NAME.sock in /run/sniff485")
     parser.add_argument("--json", action="store_true", help="status as one JSON object")
     arguments.add_line(parser, auto=True)
     arguments.add_devices(parser)
+    outlets.add_outlets(parser)
 
 
 def run(args: argparse.Namespace) -> int:

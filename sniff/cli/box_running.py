@@ -26,10 +26,11 @@ from sniff.bus.live import LiveBus
 from sniff.bus.site import site_bus
 from sniff.capture.config import RecordSpec
 from sniff.capture.ipc import Status
-from sniff.cli import UNREADABLE, USAGE, Failure, arguments, listening, printing, targets, telling
+from sniff.cli import UNREADABLE, USAGE, Failure, arguments, listening, outlets, printing, targets, telling
 from sniff.cli.interruption import until_interrupted
 from sniff.cli.targets import Target
 from sniff.engine.session import LineEvent
+from sniff.outlet_settings import OutletSettings
 from sniff.outlets.news import NewsDesk
 from sniff.recording.rotation import FreeSpace, parts
 from sniff.sources.clock import Clock
@@ -63,7 +64,7 @@ class Plan:
     keep_free: int
     socket: Path | None
     status_port: int | None
-    metrics: int | None
+    outlets: OutletSettings | None = None
 
     @property
     def name(self) -> str:
@@ -87,8 +88,10 @@ def plan(args: argparse.Namespace) -> Plan:
         raise Failure(f"{folder}: {error.strerror}; name another --folder", UNREADABLE) from None
     socket = Path(args.socket) if args.socket else _socket(name)
     port = args.status_port if args.status_port is not None else told.status
-    metrics = args.metrics if args.metrics is not None else told.metrics
-    return Plan(folder / f"{name}.mcap", rotate, args.keep or told.keep, keep_free, socket, port, metrics)
+    if args.metrics is None and told.metrics is not None and targets.configured().outlets.metrics is None:
+        args.metrics = str(told.metrics)
+    wanted = outlets.settings_of(args)
+    return Plan(folder / f"{name}.mcap", rotate, args.keep or told.keep, keep_free, socket, port, wanted)
 
 
 def _socket(name: str) -> Path | None:
@@ -147,6 +150,7 @@ class Box:
         self._judged: SiteJudgement | None = None
         self._judge_at = 0.0
         self._desk: NewsDesk | None = None
+        self._telling = outlets.prepare(told.outlets or OutletSettings())
 
     def run(self) -> int:
         """Until a signal comes; the exit code says whether all that was heard is in files."""
@@ -156,7 +160,7 @@ class Box:
             try:
                 if not self._begin(caught):
                     return 0
-                with telling.alerting(self._printers), telling.serving_metrics(self._printers, self._told.metrics):
+                with telling.alerting(self._printers), outlets.telling((), self._telling):
                     self._listen(caught)
             finally:
                 closing.stop()
@@ -198,7 +202,11 @@ class Box:
         before, self._trouble = list(self._printers), ""
         self._printers[:] = [printing.Printer(live, quiet=True) for live in lives]
         for old, new in zip(before, self._printers, strict=False):
-            new.alerts, new.every_second = old.alerts, old.every_second
+            new.alerts = old.alerts
+        if self._telling is not None:
+            self._printers[0].telling = self._telling
+            for live in lives:
+                self._telling.attach(live)
         link = lives[0].link
         self._pid.remember(link.pid)
         self._begun = link.clock.now()

@@ -10,7 +10,6 @@ from array import array
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dissectors.findings import Finding, Severity
@@ -19,7 +18,17 @@ from sniff.bus.live import LiveItem
 from sniff.bus.model import BusModel
 from sniff.bus.offline import survey
 from sniff.bus.site import site_bus, site_name
-from sniff.cli import INTERRUPTED, PORT_TROUBLE, UNREADABLE, USAGE, Failure, arguments, check_output, filtering
+from sniff.cli import (
+    INTERRUPTED,
+    PORT_TROUBLE,
+    UNREADABLE,
+    USAGE,
+    Failure,
+    arguments,
+    check_output,
+    filtering,
+    watching,
+)
 from sniff.cli.check_output import Checked
 from sniff.cli.interruption import until_interrupted
 from sniff.cli.progress import Watched
@@ -85,25 +94,19 @@ def run(args: argparse.Namespace) -> int:
 
 def _check(args: argparse.Namespace) -> list[Checked]:
     """Every source; the parts of one recording are one."""
-    ports = [source for source in args.sources if not _is_file(source)]
+    ports = [source for source in args.sources if not watching.is_file(source)]
     if not ports:
         opened = arguments.open_captures(args.sources)
         sites = Counter(site_name(name) for name, _ in opened)
         return [_read(name, capture, args, sites[site_name(name)] > 1) for name, capture in opened]
     source = ports[0]
-    named = source.startswith(("/dev/", "COM", "\\\\")) or "://" in source or Path(source).is_char_device()
-    if not named and ("." in source or "/" in source):
+    if not watching.is_port(source) and ("." in source or "/" in source):
         raise Failure(f"{source}: no such file", UNREADABLE)
     if len(args.sources) > 1:
         raise Failure(f"{source}: a port is checked alone; files end in {', '.join(suffixes())}", USAGE)
     if args.filter:
         raise Failure("-Y: a port is checked whole; record it, then check the file", USAGE)
     return [_listen(source, args)]
-
-
-def _is_file(source: str) -> bool:
-    path = Path(source)
-    return source == "-" or source.lower().endswith(suffixes()) or path.is_file() or path.is_fifo()
 
 
 def _with_sites(checked: list[Checked]) -> list[Checked]:

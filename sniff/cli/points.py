@@ -2,7 +2,8 @@
 come from device profiles (-d), else a point is its place: holding/40108, AI/9, and the table says what its values look
 like: "guessed" stands before that, and two registers that are one number are one row then. Quality: 0 good, 1 doubtful,
 2 out of range. every ms: from one sample to the next, half of them are shorter; ±: by how much nine of ten differ,
-halved. Parquet needs `pip install 'sniff485[parquet]'`.
+halved. Parquet needs `pip install 'sniff485[parquet]'`. Of a PORT or a configured bus: the table as it becomes, until
+Ctrl-C or --duration, then as it is; nothing is recorded.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from dissectors.profiles.decoding import Quality, number
 from sniff.analysis.points import Point, PointReader, PointTable, Sample
 from sniff.bus.offline import outputs
 from sniff.bus.sample_row import COLUMNS, sample_row, shown_value
-from sniff.cli import USAGE, Failure, arguments, filtering, tables, writing
+from sniff.cli import USAGE, Failure, arguments, filtering, tables, watching, writing
 from sniff.cli.progress import Watched
 from sniff.cli.rows import iso
 from sniff.cli.tables import Cell
@@ -29,8 +30,9 @@ from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import LineEvent, Session
 
 if TYPE_CHECKING:
-    from sniff.analysis.guessed_points import GuessedPoint
+    from sniff.analysis.guessed_points import GuessedPoint, Guessing
     from sniff.analysis.point_columns import TableSamples
+    from sniff.bus.live import LiveBus
 
 LATEST = (
     "device",
@@ -74,6 +76,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     style.add_argument("--csv", action="store_const", const="csv", dest="style", help="comma-separated values")
     style.add_argument("--parquet", metavar="OUT", help="every sample into a Parquet file: instants, numbers and texts")
     parser.add_argument("-f", "--force", action="store_true", help="overwrite OUT")
+    watching.add_duration(parser)
     which = parser.add_mutually_exclusive_group()
     which.add_argument("--latest", action="store_const", const=True, dest="latest", help="only the latest of each")
     which.add_argument("--all", action="store_const", const=False, dest="latest", help="every sample")
@@ -81,7 +84,10 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print the values of every capture in turn, the parts of one recording as one."""
+    """Print the values of every capture in turn, the parts of one recording as one; or of a port."""
+    port = watching.port_of(args.files)
+    if port is not None:
+        return _listen(args, port)
     if args.parquet is None:
         return _print(args)
     if args.latest:
@@ -174,6 +180,11 @@ def _print_latest(args: argparse.Namespace, capture: Capture, session: Session) 
         samples = _wanted(args, samples)
         add_to(points, samples)
         end = max(end, samples.last or 0)
+    _show_latest(args, points, guessing, end)
+
+
+def _show_latest(args: argparse.Namespace, points: PointTable, guessing: Guessing | None, end: int) -> None:
+    """The table as it is at `end`, ns."""
     shown = [point for point in points if args.bits or args.name or not point.sample.value.bit]
     told = guessing.of(points) if guessing is not None else {}
     rows = []
@@ -188,6 +199,55 @@ def _print_latest(args: argparse.Namespace, capture: Capture, session: Session) 
     changed = LATEST.index("changed s")
     fresh = [_is_fresh(row[changed]) for row in rows] if arguments.colour() else ()
     tables.write([LATEST[at] for at in kept], [[row[at] for at in kept] for row in rows], bold=fresh)
+
+
+def _listen(args: argparse.Namespace, port: str) -> int:
+    """The values of a port: the latest of each as a table drawn anew, or each as it comes."""
+    if args.filter or args.parquet:
+        raise Failure("-Y, --parquet: not of a port; record it, then `points FILE`", USAGE)
+    latest = args.latest if args.latest is not None else args.style == "text"
+    live = watching.start(args, port)
+    values = _Values(args, live, None if latest else tables.Growing(SAMPLES, args.style))
+    if not latest:
+        return watching.follow(live, values, None)
+
+    def show() -> None:
+        _show_latest(args, values.points, values.guessing, values.now)
+
+    return watching.follow(live, values, show, args.style)
+
+
+class _Values(watching.Listener):
+    """Values of a live bus: kept, or printed as they come."""
+
+    def __init__(self, args: argparse.Namespace, live: LiveBus, printed: tables.Growing | None) -> None:
+        self.points = PointTable()
+        self.guessing: Guessing | None = None
+        self._args = args
+        self._printed = printed
+        self._protocol = ""
+        self.now = 0  # ns, until when all is known
+
+    def on_time(self, live: LiveBus, now: int) -> None:
+        """Ages are counted from here."""
+        self.now = now
+
+    def on_samples(self, live: LiveBus, samples: list[Sample]) -> None:
+        """Keep them, or print them."""
+        from sniff.analysis.guessed_points import Guessing
+        from sniff.analysis.point_columns import TableSamples, no_samples
+
+        if self._protocol != live.session.protocol:  # at first, and when one was found
+            self._protocol = live.session.protocol
+            self.guessing = None if self._args.no_guess else Guessing(live.dissector, live.devices)
+        many = TableSamples(no_samples(), [(0, sample) for sample in samples])
+        if self.guessing is not None and self._printed is None:
+            self.guessing.add(many)
+        wanted = _wanted(self._args, many).in_order()
+        if self._printed is None:
+            self.points.add(wanted)
+        else:
+            self._printed.add(map(_sample, wanted))
 
 
 def _latest(point: Point, end: int, style: str, guess: GuessedPoint | None) -> tuple[Cell, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 
 from dissectors.line import MS
+from dissectors.profiles import Devices
 from sniff.analysis.poll import Poll
 from sniff.analysis.poll_words import asked, changes, told
 from sniff.analysis.polls import Polls
@@ -43,6 +44,11 @@ def show(args: argparse.Namespace, source: Source, session: Session) -> None:
     devices = arguments.noted_devices(args, session)
     polls = Polls(dissector_for(session))
     survey(source, session, polls, reference=args.reference)
+    write(args, polls, devices, session)
+
+
+def write(args: argparse.Namespace, polls: Polls, devices: Devices, session: Session) -> None:
+    """Print what was seen of it."""
     held = list(polls)
     begin = min((poll.first for poll in held if poll.first is not None), default=0)
     end = max((poll.last for poll in held if poll.last is not None), default=0)

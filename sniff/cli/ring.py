@@ -30,10 +30,14 @@ def show_stations(
 
 def show(source: Source, session: Session, shown: TokenRing, style: str, reference: bool) -> int:
     """Print the ring; the sentences only as text. `reference`: see `survey`. Raises CaptureError as the source does."""
-    ring = ring_of(source, session, shown, reference)
+    write(ring_of(source, session, shown, reference), shown, style)
+    return 0
+
+
+def write(ring: Any, shown: TokenRing, style: str) -> None:
+    """Print a ring."""
     tables.write(shown.headings, shown.rows(ring), style)
     if style == "text":
         print()
         for sentence in shown.sentences(ring):
             print(sentence)
-    return 0

@@ -1,13 +1,15 @@
 """Tables: nodes (each station), health (bus and stations, and why), transactions (by kind and verdict), latency (each
 station's response times), load (by second or --every), ring (of a protocol that passes a token), stations (that it
-serves: PROFIBUS slaves with lost, syncs, repeats, illegal), polls (the master's programme: each request, how often
+serves: lost, syncs, repeats, illegal), polls (the master's programme: each request, how often
 it is asked, what became of it, and when that changed). Response times are uncertain by what the adapter may hold
-back: see `info`.
+back: see `info`. Of a PORT or a configured bus: the table as it becomes, until Ctrl-C or --duration, then as it is;
+nothing is recorded.
 """
 
 from __future__ import annotations
 
 import argparse
+import sys
 from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -23,21 +25,23 @@ from sniff.analysis.summary import Summary
 from sniff.analysis.wording import station_word
 from sniff.bus.model import BusModel
 from sniff.bus.offline import survey
-from sniff.cli import USAGE, Failure, arguments, filtering, tables
+from sniff.cli import USAGE, Failure, arguments, filtering, tables, watching
 from sniff.cli.progress import Watched
 from sniff.cli.rows import iso
 from sniff.cli.tables import Cell
 from sniff.editing.merging import Merged, merged_session
 from sniff.engine.engine import Output
 from sniff.engine.follow_settings import dissector_for
-from sniff.engine.session import LineEvent
+from sniff.engine.session import LineEvent, Session
 
 TABLES = ("nodes", "health", "transactions", "latency", "load", "ring", "stations", "polls")
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Options of `stats`."""
-    parser.add_argument("words", nargs="+", metavar="FILE", help="captures of one bus; parts of a rotation together")
+    parser.add_argument(
+        "words", nargs="+", metavar="FILE", help="captures of one bus; parts of a rotation together; or a port"
+    )
     arguments.add_bus(parser)
     parser.add_argument("--table", choices=TABLES, help="which table; may also stand after the files (default: nodes)")
     arguments.add_line(parser)
@@ -48,6 +52,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     style.add_argument("--csv", action="store_const", const="csv", dest="style", help="comma-separated values")
     arguments.add_reference(parser)
     filtering.add_filter(parser, "only what matches, and exchanges with a frame that does")
+    watching.add_duration(parser)
     parser.set_defaults(style="text")
 
 
@@ -56,6 +61,9 @@ def run(args: argparse.Namespace) -> int:
     table, files = args.table or "nodes", args.words
     if len(files) > 1 and files[-1] in TABLES:
         table, files = files[-1], files[:-1]
+    port = watching.port_of(files)
+    if port is not None:
+        return _listen(args, port, table)
     stray = [word for word in files if "." not in word and not Path(word).exists() and word != "-"]
     if len(files) > 1 and stray:
         hint = "; values have a command of their own: points" if "points" in stray else ""
@@ -92,6 +100,12 @@ def run(args: argparse.Namespace) -> int:
         return 0
     summary, kinds = Summary(session.line), _Kinds()
     filtering.surveyed(args, source, session, summary, kinds)
+    _write(args, table, summary, kinds, session)
+    return 0
+
+
+def _write(args: argparse.Namespace, table: str, summary: Summary, kinds: _Kinds, session: Session) -> None:
+    """Print a table of what was counted."""
     if table == "nodes":
         nodes = [_node(node) for node in summary.nodes.present()]
         if nodes or args.style != "text":
@@ -108,7 +122,51 @@ def run(args: argparse.Namespace) -> int:
         tables.write(LATENCY_HEADINGS, [(*row, bound) for row in rows], args.style)
     else:
         tables.write(LOAD_HEADINGS, _load(summary, int(args.every * NS_PER_S)), args.style)
-    return 0
+
+
+def _listen(args: argparse.Namespace, port: str, table: str) -> int:
+    """A table of a port, as it becomes."""
+    if args.filter:
+        raise Failure("-Y: a port is counted whole; record it, then `stats FILE -Y`", USAGE)
+    live = watching.start(args, port)
+    kinds = _Kinds()
+
+    def take(item: object) -> None:
+        from sniff.engine.table import Table
+
+        if isinstance(item, Table):
+            kinds.add_table(item)
+        elif isinstance(item, Output):
+            kinds.add(item)
+
+    def show() -> None:
+        model = live.model
+        if table in ("ring", "stations"):
+            _show_ring(model, table, args.style)
+        elif table == "health":
+            tables.write(HEALTH_HEADINGS, _health(model.health(), station_word(live.session.protocol)), args.style)
+        elif table == "polls":
+            from sniff.cli import polls
+
+            polls.write(args, model.polls, model.devices, live.session)
+        else:
+            _write(args, table, model.summary, kinds, live.session)
+
+    return watching.follow(live, watching.Listener(), show, args.style, take)
+
+
+def _show_ring(model: BusModel, table: str, style: str) -> None:
+    from sniff.cli import ring
+
+    shown = model.dissector.ring
+    if shown is None:
+        print(f"{model.session.protocol} passes no token", file=sys.stdout if style == "text" else sys.stderr)
+    elif table == "ring":
+        ring.write(model.ring(), shown, style)
+    elif shown.stations is not None:
+        tables.write(shown.stations.headings, shown.stations.rows(model.ring()), style)
+    else:
+        print(f"{model.session.protocol} has masters only", file=sys.stdout if style == "text" else sys.stderr)
 
 
 if TYPE_CHECKING:

@@ -18,15 +18,28 @@ def write(
 ) -> None:
     """Print a table. `style`: "text" (aligned), "csv", "json" (one object a row, headings as keys). `bold`: rows that
     stand out, for a terminal that can show it."""
-    if style == "json":
-        for row in rows:
-            print(json_output.dumps(dict(zip(headings, row, strict=True))))
-    elif style == "csv":
-        writer = csv.writer(sys.stdout, lineterminator="\n")
-        writer.writerow(headings)
-        writer.writerows([[safe_cell(cell) for cell in row] for row in rows])
-    else:
+    if style == "text":
         _write_text(headings, [[_shown(cell) for cell in row] for row in rows], bold)
+    else:
+        Growing(headings, style).add(rows)
+
+
+class Growing:
+    """A table that is printed as its rows come, as "csv" or "json"."""
+
+    def __init__(self, headings: Sequence[str], style: str) -> None:
+        self._headings = headings
+        self._writer = csv.writer(sys.stdout, lineterminator="\n") if style == "csv" else None
+        if self._writer is not None:
+            self._writer.writerow(headings)
+
+    def add(self, rows: Iterable[Sequence[Cell]]) -> None:
+        """Print more of it."""
+        if self._writer is not None:
+            self._writer.writerows([[safe_cell(cell) for cell in row] for row in rows])
+            return
+        for row in rows:
+            print(json_output.dumps(dict(zip(self._headings, row, strict=True))))
 
 
 def safe_cell(cell: Cell) -> Cell:

@@ -1,4 +1,4 @@
-"""The outlets of a running capture: triggers mark it, alerts and metrics leave it."""
+"""The outlets of a running capture: triggers mark it, alerts leave it."""
 
 from __future__ import annotations
 
@@ -43,31 +43,3 @@ def alerting(printers: Sequence[Printer]) -> Iterator[None]:
         alerts.close()
         if alerts.dropped:
             print(f"sniff485: {alerts.dropped} alerts dropped: nobody took them in time", file=sys.stderr)
-
-
-@contextlib.contextmanager
-def serving_metrics(printers: Sequence[Printer], port: int | None) -> Iterator[None]:
-    """Meanwhile /metrics is served on the loopback at a port; None: it is not. Ends with exit code 2 where it can't."""
-    if port is None:
-        yield
-        return
-    from sniff.outlets.metrics import BusNow, exposition
-    from sniff.outlets.metrics_server import HOST, MetricsServer
-
-    try:
-        server = MetricsServer(port)
-    except OSError as error:
-        printers[0].live.stop()
-        raise Failure(f"--metrics {port}: {error.strerror}", USAGE) from None
-    print(f"sniff485: http://{HOST}:{server.port}/metrics", file=sys.stderr)
-
-    def publish() -> None:
-        server.page = exposition(
-            [BusNow(each.live.model, each.live.status.lost, each.live.ended is None) for each in printers]
-        )
-
-    printers[0].every_second = publish
-    try:
-        yield
-    finally:
-        server.close()

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
 from sniff.bus.live import LiveBus
-from sniff.capture.ipc import Ended, Heard, Received, Tick
+from sniff.capture.ipc import Ended, HeardOctets, ReceivedMessage, Tick
 from sniff.engine.blocks import Block, reads_of
 from sniff.engine.session import LineEvent, LineEventKind
 from sniff.outlets.teller import Teller
@@ -43,21 +43,24 @@ def read(at: int, value: int) -> list[Chunk]:
     ]
 
 
-def told(outlets: list[Heardall], messages: list, ended: bool = True) -> LiveBus:
-    link = GivenLink(messages)
+def told(outlets: list[Heardall], messages: list) -> LiveBus:
+    link = GivenLink([*messages, Ended("done")])
     link.clock = SimpleNamespace(now=lambda: 9000 * MS)  # type: ignore[attr-defined]
     link.line = LineSettings.parse("115200,8N1")
     live = LiveBus(link, watched=False)  # type: ignore[arg-type]
     Teller(outlets).attach(live)
-    live.poll_tables()
-    if ended:
-        link.messages = [Ended("done")]
-        live.poll_tables()
+    to_the_end(live)
     return live
 
 
-def heard(chunks: list[Chunk]) -> Heard:
-    return Heard(0, Block(reads_of(chunks)))
+def to_the_end(live: LiveBus) -> None:
+    """A poll takes only so long: on a busy machine it takes several."""
+    while live.ended is None:
+        live.poll_tables()
+
+
+def heard(chunks: list[Chunk]) -> HeardOctets:
+    return HeardOctets(0, Block(reads_of(chunks)))
 
 
 def test_one_gets_each_value_the_other_the_newest_at_its_pace_and_the_last() -> None:
@@ -85,8 +88,8 @@ def test_numbers_come_each_second_and_nobody_is_told_twice() -> None:
 def test_a_port_that_goes_and_comes_is_told_and_the_end_too() -> None:
     outlet = Heardall()
     events = [
-        Received(0, LineEvent(100 * MS, LineEventKind.UNPLUGGED, "x: gone")),
-        Received(0, LineEvent(200 * MS, LineEventKind.REPLUGGED, "x: back")),
+        ReceivedMessage(0, LineEvent(100 * MS, LineEventKind.UNPLUGGED, "x: gone")),
+        ReceivedMessage(0, LineEvent(200 * MS, LineEventKind.REPLUGGED, "x: back")),
     ]
     told([outlet], events)
     assert [one.listening for one in outlet.of(StateTold)] == [True, False, True, False]
@@ -97,12 +100,12 @@ def test_what_goes_into_a_recording_is_the_same_with_a_listener() -> None:
         messages = []
         for turn in range(20):
             messages += [heard(read(100 * turn, turn)), Tick(0, (100 * turn + 90) * MS)]
-        link = GivenLink(messages, paths=["x"])
+        link = GivenLink([*messages, Ended("done")], paths=["x"])
         link.clock = SimpleNamespace(now=lambda: 9000 * MS)  # type: ignore[attr-defined]
         live = LiveBus(link, watched=False)  # type: ignore[arg-type]
         if outlets:
             Teller(outlets).attach(live)
-        live.poll_tables()
+        to_the_end(live)
         return [one for one in link.told if one[1].startswith("/values")]
 
     alone = recorded([])
