@@ -8,7 +8,7 @@ left, once it costs octets anyway.
 from __future__ import annotations
 
 from dissectors.line import NS_PER_S
-from sniff.capture.wire import Status
+from sniff.capture.ipc import Status
 
 SILENCE = 10 * NS_PER_S
 """A capture speaks once a second; one that has said nothing for so long (ns) hangs."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dissectors.line import NS_PER_S
 from sniff.box.status import State
-from sniff.capture.wire import Ended, Status
+from sniff.capture.ipc import Ended, Status
 from sniff.engine.session import LineEvent, LineEventKind, gone_why
 
 QUIET = 60 * NS_PER_S

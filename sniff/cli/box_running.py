@@ -25,7 +25,7 @@ from sniff.box.watch import BusWatch
 from sniff.bus.live import LiveBus
 from sniff.bus.site import site_bus
 from sniff.capture.config import RecordSpec
-from sniff.capture.wire import Status
+from sniff.capture.ipc import Status
 from sniff.cli import UNREADABLE, USAGE, Failure, arguments, listening, printing, targets, telling
 from sniff.cli.interruption import until_interrupted
 from sniff.cli.targets import Target

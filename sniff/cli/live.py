@@ -13,7 +13,7 @@ from dataclasses import replace
 from sniff.analysis.plain import plain
 from sniff.bus.live import LiveBus
 from sniff.capture.config import RecordSpec
-from sniff.capture.wire import Status
+from sniff.capture.ipc import Status
 from sniff.cli import UNREADABLE, USAGE, Failure, arguments, listening, printing, targets
 
 

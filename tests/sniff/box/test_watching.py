@@ -5,7 +5,7 @@ from __future__ import annotations
 from sniff.box.progress import SILENCE, STUCK, Progress
 from sniff.box.status import State
 from sniff.box.watch import QUIET, BusWatch
-from sniff.capture.wire import Ended, Status
+from sniff.capture.ipc import Ended, Status
 from sniff.engine.session import LineEvent, LineEventKind, gone
 
 S = 1_000_000_000
