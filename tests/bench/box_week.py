@@ -226,6 +226,7 @@ class Week:
             self.world.pass_time(self.world.now + self.dice.randint(20, 600) * S)
             self.world.on = True
         self.told.counts["restarts"] += self.box._restarts
+        self.told.counts["alerts in vain"] += self.box.status().alerts_failed
         self.told.counts["parts closed"] += sum(one.closed for one in self.box._recovered)
         self.told.counts["parts left"] += sum(not one.closed for one in self.box._recovered)
         self.told.lost += sum(watch.lost for watch in self.box._watches)
