@@ -76,6 +76,11 @@ class Closing:
                 return
             told(close_part(part, keep_free))
 
+    @property
+    def done(self) -> bool:
+        """Whether all of them are."""
+        return not self._thread.is_alive()
+
     def stop(self) -> None:
         """Begin no other."""
         self._stopped = True

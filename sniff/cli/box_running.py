@@ -151,31 +151,38 @@ class Box:
         self._judge_at = 0.0
         self._desk: NewsDesk | None = None
         self._telling = outlets.prepare(told.outlets or OutletSettings())
+        self._closing: Closing | None = None
 
     def run(self) -> int:
         """Until a signal comes; the exit code says whether all that was heard is in files."""
         with until_interrupted() as caught:
             self._tell()
-            closing = self._clear_up()
+            self._clear_up()
             try:
                 if not self._begin(caught):
                     return 0
                 with telling.alerting(self._printers), outlets.telling((), self._telling):
                     self._listen(caught)
             finally:
-                closing.stop()
+                if self._closing is not None:
+                    self._closing.stop()
         listening.say_end(self._printers)
         return UNREADABLE if any(listening.lost_something(printer.live) for printer in self._printers) else 0
 
     # -- the begin -----------------------------------------------------------------------------------------------------
 
-    def _clear_up(self) -> Closing:
+    def _clear_up(self) -> None:
         """End what the run before left behind, and begin to close its parts."""
         left = self._pid.left_behind()
         if left is not None:
             self._say(self._pid.end(left))
         remove_half_written(self._told.path)
-        return Closing(cut_parts(self._told.path), self._told.keep_free, self._closed)
+        self._close_cut_parts()
+
+    def _close_cut_parts(self) -> None:
+        """Close what no capture writes to any more, beside everything else."""
+        if self._closing is None or self._closing.done:
+            self._closing = Closing(cut_parts(self._told.path), self._told.keep_free, self._closed)
 
     def _closed(self, one: Recovered) -> None:
         self._recovered.append(one)
@@ -246,6 +253,7 @@ class Box:
             if caught:
                 return
             self._count_end()
+            self._close_cut_parts()
             if time.monotonic() - began >= LASTED:
                 self._failures = 0
             self._wait(caught)

@@ -23,7 +23,7 @@ from sniff.bus.router import Router
 from sniff.capture import loop as capture_loop
 from sniff.capture.config import RecordSpec
 from sniff.capture.ipc import Batch, Derived, Ended, MessageSplitter, decode_message
-from sniff.capture.ipc_sender import Outlet
+from sniff.capture.ipc_sender import IpcSender
 from sniff.capture.loop import CaptureLoop
 from sniff.capture.process import session_of
 from sniff.cli import UNREADABLE, Failure
@@ -258,7 +258,7 @@ class SimLink:
         self._ours, self._splitter = ours, MessageSplitter()
         capture_loop.Waiting = lambda: SimWaiting(world)  # type: ignore[misc,assignment]
         recorders = self.file.recorders()
-        outlet = Outlet(theirs, len(sources))
+        outlet = IpcSender(theirs, len(sources))
         self.loop = CaptureLoop(self.clock, list(sources), recorders, outlet, sessions=self.sessions, watched=False)  # type: ignore[arg-type]
         theirs.close()
         self.loop.begin()

@@ -35,7 +35,7 @@ from sniff.capture.config import SourceSpec
 from sniff.cli import box_running
 from sniff.cli.box_running import Box, Plan
 from sniff.cli.targets import Target
-from sniff.recording import keeper, rotation
+from sniff.recording import rotation, writer_thread
 from sniff.recording.reader import buses_of
 from tests.bench.box_plant import (
     BASE,
@@ -226,6 +226,7 @@ class Week:
             self.world.pass_time(self.world.now + self.dice.randint(20, 600) * S)
             self.world.on = True
         self.told.counts["restarts"] += self.box._restarts
+        self.told.counts["alerts in vain"] += self.box.status().alerts_failed
         self.told.counts["parts closed"] += sum(one.closed for one in self.box._recovered)
         self.told.counts["parts left"] += sum(not one.closed for one in self.box._recovered)
         self.told.lost += sum(watch.lost for watch in self.box._watches)
@@ -261,8 +262,8 @@ class Week:
                 (box_running, "Closing", closing),
                 (box_running, "until_interrupted", interrupted),
                 (box_running.listening, "start_all", starter(world)),
-                (keeper, "open", open_on(world)),
-                (keeper, "MOST_WAITING", 20_000),
+                (writer_thread, "open", open_on(world)),
+                (writer_thread, "MOST_WAITING", 20_000),
                 (rotation, "_free", lambda folder: world.free()),
                 (box_running, "_free", lambda folder: world.free()),
                 (Path, "unlink", removed),

@@ -115,6 +115,7 @@ def test_a_capture_that_dies_is_begun_anew(box: Bench) -> None:
     assert "SIGKILL" in box.status().last_restart
     boiler.send(ANSWER)
     wait_until(lambda: box.bus("boiler").octets == len(boiler.sent), "what came before is not counted any more")
+    wait_until(lambda: [one.closed for one in box.status().recovered] == [True], "its part was left cut")
     assert box.end(process) == 0, box.said
 
 

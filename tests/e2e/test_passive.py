@@ -27,7 +27,7 @@ SENDING = {
 
 ALLOWED = {
     # to the main process and back, never to a port
-    ("sniff/capture/ipc_sender.py", "Outlet.flush", "send"),
+    ("sniff/capture/ipc_sender.py", "IpcSender.flush", "send"),
     ("sniff/capture/link.py", "CaptureLink._send", "send"),
     ("sniff/capture/link.py", "CaptureLink._greet", "sendall"),
     ("sniff/capture/process.py", "main", "sendall"),
