@@ -16,7 +16,7 @@ import numpy.typing as npt
 from dissectors.columns import NONE
 from dissectors.tracker import Transaction
 from sniff.engine.engine import Row
-from sniff.engine.packed_table import PackedTable, TableView
+from sniff.engine.packed_table import PackedTable, TableView, ranks_of, span_of
 from sniff.engine.table import Table, joined
 
 PACKED = 16_384
@@ -36,23 +36,24 @@ class Part:
 
     `first`: number of its first row, or of the row to come where it has none. `closed_first`: number of its first
     closing. `begin`: of its first row, ns. `ids`: least and greatest of its transactions' ids; `rows_closed`: the last
-    row that they name. `verdicts`, `placed_ids`: what a filter remembers of it.
+    row that they name. `placed_ids`: least and greatest of the transactions that its rows belong to.
+    `remembered`: what became of its rows, by name, and the tables that told it; kept once a filter has asked.
     """
 
     def __init__(self, whole: Table | PackedTable, first: int, closed_first: int) -> None:
         self.whole = whole
-        self.verdicts: tuple[list[Table | PackedTable], Values] | None = None  # of rows, and what they were made of
-        self.placed_ids = (1, 1)
+        self.remembered: dict[str, tuple[list[Table | PackedTable], Values]] = {}
         self.first, self.rows = first, len(whole)
         self.closed_first = closed_first
         if isinstance(whole, PackedTable):
             self.closed, self.ids, self.rows_closed = whole.closed, whole.ids, whole.rows_closed
-            self.begin = whole.begin
+            self.begin, self.placed_ids = whole.begin, whole.placed_ids
         else:
             self.begin = int(whole.frames.start[0]) if self.rows else 0
             held = whole.transactions
             self.closed = len(held)
             self.ids = (int(held.id.min()), int(held.id.max())) if self.closed else (0, -1)
+            self.placed_ids = span_of(whole.placed.tx)
             self.rows_closed = max(int(held.request.max(initial=0)), int(held.response.max(initial=0)))
 
     @property
@@ -73,6 +74,11 @@ class Part:
     def closed_column(self, name: str) -> Values:
         """Of its transactions."""
         return self.column(f"closed.{name}")
+
+    def ranks(self) -> tuple[Values, int]:
+        """As `PackedTable.ranks`."""
+        whole = self.whole
+        return whole.ranks() if isinstance(whole, PackedTable) else (ranks_of(whole.placed.tx, self.placed_ids[0]), 0)
 
     def view(self) -> Table | TableView:
         """For filters."""

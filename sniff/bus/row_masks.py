@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import operator
 from collections import OrderedDict
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -28,23 +28,39 @@ FARTHEST = 8
 WIDEST = 1 << 22
 
 States = npt.NDArray[np.uint8]
+Values = npt.NDArray[Any]
 
 
-@dataclass(frozen=True, slots=True)
-class _Verdicts:
-    """Verdicts of rows alone; nobody asks for the rest."""
+class _Remembering:
+    """What became of the rows of a part, as narrow as it is; the part remembers it for other filters."""
 
-    verdict: npt.NDArray[Any]
-
-    @property
-    def latency(self) -> npt.NDArray[Any]:
-        """Not asked for."""
-        raise NotImplementedError
+    def __init__(self, part: Part, closing: list[Part]) -> None:
+        self._part, self._closing = part, closing
 
     @property
-    def attempt(self) -> npt.NDArray[Any]:
-        """Not asked for."""
-        raise NotImplementedError
+    def verdict(self) -> Values:
+        """As of closings."""
+        return self._column("verdict", np.int8)
+
+    @property
+    def latency(self) -> Values:
+        """As of closings."""
+        return self._column("latency", np.int32)
+
+    @property
+    def attempt(self) -> Values:
+        """As of closings."""
+        return self._column("attempt", np.int16)
+
+    def _column(self, name: str, form: type[np.integer[Any]]) -> Values:
+        part, told = self._part, [one.whole for one in self._closing]
+        known = part.remembered.get(name)
+        if known is not None and len(known[0]) == len(told) and all(map(operator.is_, known[0], told)):
+            return known[1]
+        closings = Closings(*part.ranks(), *part.placed_ids, [one.closed_column for one in self._closing], form)
+        values: Values = getattr(closings, name)
+        part.remembered[name] = told, values
+        return values
 
 
 class RowMasks:
@@ -106,21 +122,6 @@ class RowMasks:
         return states
 
     def _closings(self, part: Part) -> Closed | None:
-        """What became of its rows; None where that is not known at once. Verdicts are remembered by the part."""
-        known = part.verdicts
-        if known is not None and not self._filter.names & {"latency_ms", "attempt"}:
-            closing = self._kept.closing_parts(*part.placed_ids)
-            if len(known[0]) == len(closing) and all(a is b.whole for a, b in zip(known[0], closing, strict=True)):
-                return _Verdicts(known[1])
-        tx = part.column("placed.tx")
-        placed = tx[tx > 0]
-        least, most = (int(placed.min()), int(placed.max())) if len(placed) else (1, 1)
-        if most - least > WIDEST:
-            return None
-        part.placed_ids = least, most
-        closing = self._kept.closing_parts(least, most)
-        made = Closings(tx, least, most, [one.closed_column for one in closing])
-        if self._filter.names & {"latency_ms", "attempt"}:
-            return made
-        part.verdicts = [one.whole for one in closing], made.verdict.astype(np.int8)
-        return _Verdicts(part.verdicts[1])
+        """What became of its rows; None where that is not known at once."""
+        least, most = part.placed_ids
+        return None if most - least > WIDEST else _Remembering(part, self._kept.closing_parts(least, most))

@@ -31,6 +31,7 @@ from sniff.filter import Filter, FilterError, Scope, compile_filter
 from sniff.filter.compiling import field_of
 from sniff.filter.errors import OfOthers, nearest
 from sniff.filter.fields import ALIASES, COLUMN_TYPES, column_type, types_of
+from sniff.filter.told import TYPES as POINT_TYPES
 
 MOST_WORDS = 12
 """Words of a field that a list names."""
@@ -242,6 +243,9 @@ def field_lines(protocols: list[Dissector]) -> Iterable[str]:
     yield "of every protocol"
     for name in COLUMN_TYPES:
         yield from _lines(name, column_type(name, protocols[0]))
+    for name, type in POINT_TYPES.items():
+        yield from _lines(name, type)
+    yield f"  {'output-frequency, …':<36} points by the names that profiles give them (-d STATION=PROFILE)"
     for alias, name in ALIASES.items():
         yield f"  {alias:<36} = {name}"
     for one in protocols:
@@ -257,7 +261,9 @@ def field_lines(protocols: list[Dissector]) -> Iterable[str]:
 
 def _lines(name: str, type: FieldType) -> Iterable[str]:
     unit = f" ({type.unit})" if type.kind is Kind.DURATION else ""
-    says = f"  {type.says}" if type.says else ""
+    span = f"{type.least} … {type.most}" if type.most is not None and not type.words else ""
+    says = "never there" if type.never else ", ".join(one for one in (type.says, span) if one)
+    says = f"  {says}" if says else ""
     yield f"  {name:<36} {type.kind.value + unit:<13}{says}".rstrip()
     if type.words:
         words = [word if value == word else f"{word} ({value})" for word, value in type.words.items()]

@@ -17,26 +17,40 @@ ColumnOf = Callable[[str], Values]
 
 
 class Closings:
-    """One entry a row; each column is put together when somebody asks for it."""
+    """One entry a row; each column is put together when somebody asks for it.
 
-    def __init__(self, tx: Times, least: int, most: int, held: Sequence[ColumnOf]) -> None:
-        """`tx`: ids of the rows' transactions, 0 for none, else `least` … `most`. `held`: transactions that closed,
-        theirs among them."""
-        self._count = most - least + 1
-        self._rows = np.where(tx > 0, tx - least, self._count)  # the last place is that of no transaction
+    `ranks`: which of the transactions `least` … `most` a row belongs to, from `shift` on: `ranks + shift` is 1 for the
+    least id, 0 for a row without one. `held`: transactions that closed, theirs among them.
+    `form`: of columns whose values fit, narrower than their own.
+    """
+
+    def __init__(
+        self,
+        ranks: Values,
+        shift: int,
+        least: int,
+        most: int,
+        held: Sequence[ColumnOf],
+        form: type[np.integer[Any]] | None = None,
+    ) -> None:
+        self._count = most - least + 2
+        self._ranks, self._shift, self._form = ranks, shift, form
         self._held: list[tuple[ColumnOf, Values, Masks | None]] = []
         for column in held:
-            places = column("id") - least
-            inside = (places >= 0) & (places < self._count)
+            places = column("id") - (least - 1)
+            inside = (places > 0) & (places < self._count)
             whole = bool(inside.all())
             self._held.append((column, places if whole else places[inside], None if whole else inside))
 
     def _column(self, name: str, none: int, form: type[np.integer[Any]]) -> Values:
-        closed = np.full(self._count + 1, none, form)
-        for column, places, inside in self._held:
-            values = column(name)
+        told = [column(name) for column, _, _ in self._held]
+        if self._form is not None and all(values.max(initial=0) <= np.iinfo(self._form).max for values in told):
+            form = self._form
+        closed = np.full(self._count, none, form)
+        for (_, places, inside), values in zip(self._held, told, strict=True):
             closed[places] = values if inside is None else values[inside]
-        return closed[self._rows]
+        found: Values = np.take(closed[self._shift :] if self._shift else closed, self._ranks)
+        return found
 
     @cached_property
     def verdict(self) -> Small:

@@ -40,10 +40,10 @@ class SettledRows:
     @property
     def closings(self) -> Closings:
         """What became of all rows of the table, as far as it is settled: of the others nothing."""
-        tx, closed = np.zeros(len(self.table), np.int64), self.closed
-        tx[self.begin : self.end] = self.which + 1
+        ranks, closed = np.zeros(len(self.table), np.int64), self.closed
+        ranks[self.begin : self.end] = self.which + 1
         numbers = np.arange(1, len(closed) + 1)
-        return Closings(tx, 1, len(closed), [lambda name: numbers if name == "id" else getattr(closed, name)])
+        return Closings(ranks, 0, 1, len(closed), [lambda name: numbers if name == "id" else getattr(closed, name)])
 
     def item(self, place: int) -> JudgedRow:
         """The row at a place in the table, as an object."""

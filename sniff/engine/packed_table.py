@@ -111,7 +111,8 @@ class PackedTable:
     """A table that is only looked at. `first`, `odd`, `protocol`, and what a row is: as of a table.
 
     `closed`: how many transactions. `ids`: the least and the greatest of theirs. `rows_closed`: the last row that they
-    name. `begin`: of the first row, ns.
+    name. `begin`: of the first row, ns; `begins`: of the first and the last in time. `placed_ids`: least and greatest
+    of the transactions that its rows belong to.
     """
 
     def __init__(self, table: Table) -> None:
@@ -145,6 +146,9 @@ class PackedTable:
         self.ids = (int(ids.min()), int(ids.max())) if len(ids) else (0, -1)
         self.rows_closed = int(numbers.max(initial=0))
         self.begin = int(frames.start[0]) if len(table) else 0
+        self.begins = (int(frames.start.min()), int(frames.start.max())) if len(table) else (0, 0)
+        self.placed_ids = span_of(placed.tx)
+        self._all_placed = bool((placed.tx > 0).all())
 
     def __len__(self) -> int:
         return self._count
@@ -158,9 +162,10 @@ class PackedTable:
         """A column as a table has it: "frames.end", "placed.tx", "closed.verdict", "slack", "is_frame", "closed_by"."""
         held = self._held.get(name)
         if name == "frames.start":
-            made: Values = self.column("frames.end") - (
-                self._held[name].values() + np.int64(self._char) * self.column("frames.length")
-            )
+            made: Values = self.column("frames.end")
+            apart = self._held[name]
+            made = made - (apart.base if apart.narrow is None else apart.values())
+            made -= np.multiply(self.column("frames.length"), self._char, dtype=np.int64)
             return made
         if name == "closed.start":
             return self.column("closed.end") - self._held[name].values()
@@ -171,6 +176,27 @@ class PackedTable:
         if name == "frames.offset":
             return _begins(self.column("frames.length"))
         return _as_headers_say(self.column(name.replace("placed.", "frames.")), self.column("placed.tx"))
+
+    def ranks(self) -> tuple[Values, int]:
+        """Which of `placed_ids` each row belongs to, and what is to be added: 1 is the least then, 0 is none."""
+        column = self._held["placed.tx"]
+        least, _ = self.placed_ids
+        narrow, base, missing = column.narrow, column.base, column.missing
+        if narrow is None or missing not in (None, least - 1) or not (self._all_placed or missing is not None):
+            return ranks_of(column.values(), least), 0
+        if column.step is None:
+            return narrow, base - (least - 1)
+        if missing is not None:
+            return ranks_of(column.values(), least), 0
+        ranks = np.empty(column.count, np.intp)
+        ranks[0] = base - (least - 1)
+        if column.step:
+            np.add(narrow, column.step, out=ranks[1:], dtype=np.intp)
+            np.cumsum(ranks, out=ranks)
+        else:
+            np.cumsum(narrow, out=ranks[1:])
+            ranks[1:] += ranks[0]
+        return ranks, 0
 
     def as_headers_say(self, name: str) -> bool:
         """Whether the tracker says of all rows that have a place what their headers say: "source", "role" …."""
@@ -190,6 +216,18 @@ class PackedTable:
             self.column("closed_by"),
             self.odd,
         )
+
+
+def span_of(tx: Values) -> tuple[int, int]:
+    """Least and greatest id of the rows that have a transaction; (1, 1) where none has."""
+    placed = tx[tx > 0]
+    return (int(placed.min()), int(placed.max())) if len(placed) else (1, 1)
+
+
+def ranks_of(tx: Values, least: int) -> Values:
+    """1 for the least id, 0 for none."""
+    ranks: Values = np.where(tx > 0, tx - (least - 1), 0)
+    return ranks
 
 
 def _begins(lengths: Values) -> Values:
@@ -224,6 +262,7 @@ class TableView:
         self.protocol, self.first = whole.protocol, whole.first
         self.odd: Mapping[int, Row] = whole.odd
         self.octets = whole.octets
+        self.begins = whole.begins
         self.frames = _Columns(whole, "frames", whole.names)
         self.placed = _Columns(whole, "placed")
 

@@ -64,12 +64,12 @@ def pair_of_columns(
     left: ColumnsOf, right: ColumnsOf, compare: Callable[[Any, Any], Any]
 ) -> Callable[[Table, Closed | None], tuple[Masks, Masks] | None]:
     def columns(table: Table, closed: Closed | None) -> tuple[Masks, Masks] | None:
-        from sniff.filter.columns import Numbers
+        from sniff.filter.columns import Numbers, as_numbers
 
         ours, theirs = left(table, closed), right(table, closed)
         if ours is None or theirs is None or len(ours) != 1 or len(theirs) != 1:
             return None
-        a, b = ours[0], theirs[0]
+        a, b = as_numbers(ours[0]), as_numbers(theirs[0])
         if not isinstance(a, Numbers) or not isinstance(b, Numbers):
             return None
         chosen: Masks = compare(a.values, b.values) & a.has() & b.has()

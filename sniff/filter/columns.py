@@ -55,6 +55,15 @@ class AcceptsMany(Protocol):
         ...
 
 
+@runtime_checkable
+class AcceptsRange(Protocol):
+    """A test of values that may know what it says of all between two."""
+
+    def of_all(self, least: int, most: int) -> bool | None:
+        """None: not the same of all of them, or not known."""
+        ...
+
+
 @dataclass(frozen=True, slots=True)
 class Numbers:
     """Numbers by row; `there`: where a row has one, None: everywhere. `unsure`: rows that have to be asked, None: no
@@ -117,7 +126,34 @@ class Texts:
         return there
 
 
-Column = Numbers | Texts
+@dataclass(frozen=True, slots=True)
+class Bounded:
+    """Numbers by row that lie between two, made when those do not decide."""
+
+    make: Callable[[], npt.NDArray[Any]]
+    count: int
+    least: int
+    most: int
+    unsure: Masks | None = None
+
+    def where(self, accepts: Accepts, remembered: Remembered) -> Masks:
+        """Rows whose value is accepted."""
+        if isinstance(accepts, AcceptsRange):
+            said = accepts.of_all(self.least, self.most)
+            if said is not None:
+                return np.full(self.count, said)
+        return self.numbers().where(accepts, remembered)
+
+    def has(self) -> Masks:
+        """All of them."""
+        return np.ones(self.count, bool)
+
+    def numbers(self) -> Numbers:
+        """The values."""
+        return Numbers(self.make())
+
+
+Column = Numbers | Texts | Bounded
 Columns = tuple[Column, ...]
 ColumnsOf = Callable[[Table, Closed | None], Columns | None]
 """The columns of a name; None where this table does not hold them."""
@@ -133,6 +169,14 @@ _DAMAGE_WORDS = tuple(None if one is None else one.value for one in DAMAGES)
 _VERDICT_WORDS = (None, *(verdict.value for verdict in VERDICTS))
 _NO_WORDS = (None,)
 _REMEMBERED = 64
+
+
+def _begins(table: Table, started: int) -> Columns:
+    """When rows began, ns after `started`."""
+    bounds: tuple[int, int] | None = getattr(table, "begins", None)
+    if bounds is None:
+        return (Numbers(table.frames.start - started),)
+    return (Bounded(lambda: table.frames.start - started, len(table), bounds[0] - started, bounds[1] - started),)
 
 
 def _zeros(table: Table) -> Numbers:
@@ -151,8 +195,12 @@ def _error_words(names: tuple[str, ...]) -> tuple[str | None, ...]:
 
 
 _OF_TABLES: Mapping[str, Callable[[Table], Columns]] = {
-    "no": lambda table: (Numbers(table.first + np.arange(len(table))),),
-    "frame.time": lambda table: (Numbers(table.frames.start),),
+    "no": lambda table: (
+        Bounded(
+            lambda: table.first + np.arange(len(table)), len(table), table.first, table.first + max(0, len(table) - 1)
+        ),
+    ),
+    "frame.time": lambda table: _begins(table, 0),
     "src": lambda table: (_optional(table.shown("source")),),
     "dst": lambda table: (_optional(table.shown("destination")),),
     "addr": lambda table: (_optional(table.shown("source")), _optional(table.shown("destination"))),
@@ -177,8 +225,8 @@ _OF_TABLES: Mapping[str, Callable[[Table], Columns]] = {
 
 _OF_CLOSINGS: Mapping[str, Callable[[Closed], Columns]] = {
     "verdict": lambda closed: (Texts(closed.verdict + 1, _VERDICT_WORDS),),
-    "latency_ms": lambda closed: (Numbers(closed.latency, closed.latency != NONE),),
-    "attempt": lambda closed: (Numbers(closed.attempt, closed.verdict >= 0),),
+    "latency_ms": lambda closed: (_optional(closed.latency),),
+    "attempt": lambda closed: (Numbers(closed.attempt, closed.attempt > 0),),
 }
 
 
@@ -190,7 +238,7 @@ def held(name: str, started: int) -> ColumnsOf | None:
     if of_closing is not None:
         return lambda table, closed: None if closed is None else of_closing(closed)
     if name == "frame.time_relative":
-        return lambda table, closed: (Numbers(table.frames.start - started),)
+        return lambda table, closed: _begins(table, started)
     if name in ("start_ns", "end_ns"):
         end = name[:-3]
         return lambda table, closed: (Numbers(np.maximum(getattr(table.frames, end) - started, 0)),)
@@ -238,6 +286,11 @@ def closed_rows(count: int, begin: int, which: Times, closed: Any) -> ClosedRows
     return ClosedRows(verdict, latency, attempt)
 
 
+def as_numbers(column: Column) -> Numbers | Texts:
+    """The values themselves."""
+    return column.numbers() if isinstance(column, Bounded) else column
+
+
 # --- arithmetic -----------------------------------------------------------------------------------------------------
 
 
@@ -249,8 +302,9 @@ def _bounds(values: npt.NDArray[Any]) -> int:
 
 def combined(operator: str, left: Column | int, right: Column | int) -> Numbers | None:
     """Whole numbers reckoned with row by row; None where that cannot be done exactly."""
-    sides = []
-    for one in (left, right):
+    sides: list[Numbers | int] = []
+    for given in (left, right):
+        one = given if isinstance(given, int) else as_numbers(given)
         if isinstance(one, Texts) or (isinstance(one, Numbers) and one.values.dtype.kind not in "iu"):
             return None
         sides.append(one)

@@ -66,6 +66,25 @@ class With:
             chosen = said if joined is None else joined
         return np.zeros(len(values), bool) if chosen is None else chosen
 
+    def of_all(self, least: int, most: int) -> bool | None:
+        """What it says of all numbers from one to another, where that is the same."""
+        said = [_of_all(self.operator, least, most, wanted) for wanted in self.wanted]
+        deciding = self._join() is any
+        if deciding in said:
+            return deciding
+        return None if None in said else not deciding
+
+
+def _of_all(operator: str, least: int, most: int, wanted: Value) -> bool | None:
+    if not isinstance(wanted, int | float):
+        return None
+    compare = COMPARE[operator]
+    if operator in ("==", "===", "!=", "!=="):
+        same = least == most == wanted
+        return compare(least, wanted) if same or not least <= wanted <= most else None
+    low, high = compare(least, wanted), compare(most, wanted)
+    return low if low is high else None
+
 
 @dataclass(frozen=True, slots=True)
 class Between:
@@ -84,6 +103,14 @@ class Between:
         low: Any = self.low
         high: Any = self.high
         return np.asarray((values >= low) & (values <= high), bool)
+
+    def of_all(self, least: int, most: int) -> bool | None:
+        """What it says of all numbers from one to another, where that is the same."""
+        if not isinstance(self.low, int | float) or not isinstance(self.high, int | float):
+            return None
+        if self.low <= least and most <= self.high:
+            return True
+        return False if most < self.low or least > self.high else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,6 +138,20 @@ class When:
             return (time < wanted.time) | (time >= wanted.time + wanted.step)
         return COMPARE[self.operator](time, wanted.time)
 
+    def of_all(self, least: int, most: int) -> bool | None:
+        """What it says of all times from one to another, where that is the same."""
+        if self.wanted.daily and least // DAY != most // DAY:
+            return None
+        shift = least // DAY * DAY if self.wanted.daily else 0
+        first, last = least - shift, most - shift
+        begin, end = self.wanted.time, self.wanted.time + self.wanted.step
+        if self.operator in ("==", "===", "!=", "!=="):
+            if first < end and last >= begin and not (first >= begin and last < end):
+                return None
+        elif bool(self._of(least)) is not bool(self._of(most)):
+            return None
+        return bool(self._of(least))
+
 
 @dataclass(frozen=True, slots=True)
 class During:
@@ -134,6 +175,13 @@ class During:
             return (time >= self.low.time) | (time <= self.high.time)
         return (time >= self.low.time) & (time <= self.high.time)
 
+    def of_all(self, least: int, most: int) -> bool | None:
+        """What it says of all times from one to another, where that is the same."""
+        if self.low.daily and (least // DAY != most // DAY or self.high.time < self.low.time):
+            return None
+        shift = least // DAY * DAY if self.low.daily else 0
+        return Between(self.low.time, self.high.time).of_all(least - shift, most - shift)
+
 
 @dataclass(frozen=True, slots=True)
 class AnyOf:
@@ -156,6 +204,10 @@ class AnyOf:
 
 class There:
     """Every value."""
+
+    def of_all(self, least: int, most: int) -> bool | None:
+        """All of them."""
+        return True
 
     def __call__(self, found: Value) -> bool:
         return True

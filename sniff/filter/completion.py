@@ -9,7 +9,7 @@ from datetime import UTC, datetime
 
 from dissectors.field_types import FieldType, Kind, plain_word
 from dissectors.manifest import Dissector
-from sniff.filter import fields
+from sniff.filter import fields, told
 from sniff.filter.expressions import Expression
 from sniff.filter.grammar import FUNCTIONS, words_of
 
@@ -38,8 +38,10 @@ class Completion:
     rows: int | None = None
 
 
-def completions(text: str, dissector: Dissector, counts: Counts | None = None) -> list[Completion]:
-    """Ways to go on; those that begin as what was typed last."""
+def completions(
+    text: str, dissector: Dissector, counts: Counts | None = None, points: Sequence[str] = ()
+) -> list[Completion]:
+    """Ways to go on; those that begin as what was typed last. `points`: names of points that frames may tell."""
     match = _TYPED.search(text)
     typed = match[0] if match is not None else ""
     before = text[: len(text) - len(typed)]
@@ -56,7 +58,7 @@ def completions(text: str, dissector: Dissector, counts: Counts | None = None) -
     elif _value_ended(words):
         offered = _alone(("contains", "matches", "in {", "and", "or", "xor"))
     else:
-        names = [*fields.known_names(dissector), *fields.layers(dissector)]
+        names = [*fields.known_names(dissector), *fields.layers(dissector), *told.TYPES, *points]
         offered = _alone((*names, *(f"{name}(" for name in FUNCTIONS)))
     bare = typed.lower().lstrip('"')
     found = [
@@ -103,6 +105,8 @@ def _type(name: str, dissector: Dissector) -> FieldType | None:
     name = fields.ALIASES.get(name, name)
     if name in fields.COLUMN_TYPES:
         return fields.column_type(name, dissector)
+    if name in told.TYPES:
+        return told.TYPES[name]
     return fields.types_of(dissector).get(name)
 
 

@@ -11,6 +11,7 @@ from textual.binding import Binding, BindingType
 from sniff.config import FILE, ConfigError, View, load, save_view
 from sniff.filter import FilterError
 from sniff.filter.completion import Completion, completions
+from sniff.filter.told import names as point_names
 from sniff.tui.analyzer import analyzer
 from sniff.tui.filter_line import FilterLine
 from sniff.tui.index import Index, Known
@@ -140,7 +141,7 @@ class ListingScreen(ViewScreen):
         )
 
     def _ways(self, text: str) -> list[Completion]:
-        return completions(text, self.store.dissector, self.viewing.counts)
+        return completions(text, self.store.dissector, self.viewing.counts, point_names(self.store.devices))
 
     def action_saved(self) -> None:
         """Ask for a filter of the configuration by its name."""
