@@ -182,7 +182,10 @@ class Assembly:
             self.was = Kind.SHAPE
             return
         if line.kind is Kind.OCTETS:
-            self.was = Kind.TEXT if not line.bare and not line.broken else Kind.STRANGE
+            is_row = line.broken and (line.bare or not line.stamp)
+            self.was = Kind.STRANGE if (line.bare and not line.stamp) or is_row else Kind.TEXT
+        elif line.kind is Kind.STRANGE and line.stamp is not None:
+            self.was = Kind.TEXT  # what stands above rows: a number, a time, a length
         if line.kind is not Kind.REMARK:
             yield from self._flush()
             self._expected = 0

@@ -29,7 +29,7 @@ _SPACES = re.compile(r"\s{4,}")
 _WORD = re.compile(r"[A-Za-z]{2,}")
 _DIGITS = re.compile(r"\d+")
 _WORDS = re.compile(r"[A-Za-z]{3,}")
-_HEXLIKE = re.compile(r"(?<![0-9A-Za-z])(?:0x)?[0-9A-Fa-f]{2}(?![0-9A-Za-z])")
+_HEXLIKE = re.compile(r"(?<![0-9A-Za-z])(?<!\d\.)(?:0x)?[0-9A-Fa-f]{2}(?![0-9A-Za-z]|\.\d)")
 _ROW = re.compile(
     r"(?P<lead>.{0,120}?)(?<![0-9A-Za-z_:.\0])(?:0[xX])?(?P<offset>[0-9A-Fa-f]{4,16})(?P<mark>[:h]?)"
     r"(?:[ \t]*[|:]?[ \t]+(?P<rest>[0-9A-Fa-f]{2}.*)|\s*)"

@@ -108,6 +108,8 @@ def _escaped(text: str) -> bytes:
         raise ValueError("a quote within")
     found: object = ast.literal_eval(f"b{quote}{inner}{quote}")
     assert isinstance(found, bytes)
+    if found.startswith(b"\x7fELF"):
+        raise ValueError("a program that was read")
     return found
 
 
@@ -259,7 +261,8 @@ def _numbers(line: str, match: re.Match[str], tokens: list[str], base: int) -> R
         tokens = tokens[1:]
     numbers = [_octet(token, base) for token in tokens]
     octets = bytes(number for number in numbers if number is not None)
-    name = "pairs" if base == PAIRS_ONLY else "numbers"
+    sign = (match["between"] or "").strip()
+    name = "pairs" if base == PAIRS_ONLY else f"numbers with {sign}" if sign else "numbers"
     if len(octets) == len(tokens):
         if _is_number(line, end, match["between"]):
             return None
@@ -371,7 +374,7 @@ def _words(line: str) -> Run | None:
             continue
         alone = match.end() == len(line.rstrip())
         before = line[match.start() - 1] if match.start() else ""
-        enough = 12 if not alone else 8 if before == " " else 4 if before in "#:=" else 12
+        enough = 12 if not alone else 8 if before in (" ", "\t", "|", ";") else 4 if before in "#:=" else 12
         if before in ("x", "X"):  # a shorter one is an address
             enough = 10 if alone else 18
         if len(digits) >= enough and (best is None or len(digits) > 2 * len(best.octets)):

@@ -53,8 +53,10 @@ SHAPES: tuple[Shape, ...] = (
     _shape("esphome", rf"\b(?P<way>Read|Wrote|Write):?\s+(?:0b[01]{{8}}\s+)?\(?0x(?P<octets>{_H})\)?(?:\s|$)"),
     _shape("esphome", r"\[uart_debug:\d+\]"),
     _shape("candump", rf"^\s*\({_S}\)\s+\w+\s+(?:[0-9A-Fa-f]+(?:#|\s+\[\d+\]\s+))?(?P<octets>.+)"),
-    _shape("strace", r"\b(?P<way>p?(?:read|write)(?:64|v)?|recv\w*|send\w*)\(\d+(?:<[^>]*>)?, "
+    _shape("strace", r"\b(?P<way>p?(?:read|write)(?:64|v)?|recv\w*|send\w*)\((?:[3-9]|\d{2,})(?:<[^>]*>)?, "
+                     r"(?!\"\\(?:177ELF|x7f\\x45\\x4c\\x46))"  # a program, and what it prints
                      r"(?P<octets>\"(?:[^\"\\]|\\.)*\")(?P<cut>\.\.\.)?.*\)\s*=\s*\d+"),
+    _shape("strace", r"\b(?:read|write)\([0-2], ", Role.NOTHING),
     _shape("strace", r"^(?:[\d\s\0]*\s)?(?:[a-z]\w{0,30}\(.*\)?\s*=\s*-?\d|<\.\.\. |--- SIG|\+\+\+ )", Role.NOTHING),
     _shape("interceptty", rf"^(?P<way>[<>])\s+0x(?P<octets>{_H})\s+\(.{{1,6}}\)"),
     _shape("socat", rf"^(?P<way>[<>]) {_S} +length=\d+ from=\d+ to=\d+", Role.HEADING),
@@ -69,11 +71,14 @@ SHAPES: tuple[Shape, ...] = (
     _shape("minimalmodbus", r"MinimalModbus debug mode\. "
                             r"(?:Clearing|No sleep|Sleeping|Create|Closing|Opening|Will sleep)",
            Role.NOTHING),
+    _shape("node-modbus-serial", r"\bdata: <Buffer (?P<octets>[0-9a-f ]+?)(?P<cut> \.\.\.[^>]*)?>"),
+    _shape("node-modbus-serial", r"\bbuffer: <Buffer", Role.SAME),
     _shape("node-modbus-serial", r"<Buffer (?P<octets>[0-9a-f ]+?)(?P<cut> \.\.\.[^>]*)?>"),
     _shape("node-modbus-serial", r"\"type\":\s*\"Buffer\",\s*\"data\":\s*(?P<octets>\[[\d,\s]+\])"),
     _shape("QModMaster", rf"\[(?:RTU|ASCII|TCP)\]>\s*(?P<way>[TR]x)\s*>\s*{_S}\s*-"),
     _shape("QModMaster", r"^Sys\s*>", Role.NOTHING),
     _shape("Modbus Poll", r"(?P<way>[TR]x):\s?\d{4,9}-"),
+    _shape("mbpoll", r"^\[\d+\]:\s+-?[\d.]+(?:\s\(.*\))?$", Role.NOTHING),
     _shape("libmodbus", r"^(?:Waiting for|ERROR |Request for slave|Opening |Bytes flushed|Connecting|The responding)",
            Role.NOTHING),
     _shape("libmodbus", r"^(?:[\[<][0-9A-F]{2}[\]>]){3,}"),
@@ -93,7 +98,7 @@ SHAPES: tuple[Shape, ...] = (
 """The first that is found in a line counts."""
 
 WAYS = re.compile(
-    r"(?<![A-Za-z0-9_<>=-])(?:>>>|<<<|>>|<<|-->|<--|==>|<==|->|<-|=>|<=|>|<|→|←)(?![<>=-])"
+    r"(?<![A-Za-z0-9_<>=-])(?:>>>|<<<|>>|<<|-->|<--|==>|<==|->|<-|=>|<=|>|<(?![A-Za-z_/]\w*>)|→|←)(?![<>=-])"
     r"|(?<![A-Za-z])(?:tx[d]?|rx[d]?|sen[dt]|sending|recv|rcv[d]?|receiv(?:e[d]?|ing)|writ(?:e|ing|ten)|wrote|read|"
     r"in|out|input|output|incoming|outgoing|request|response|req|re?sp|query|answer|reply|to|from|"
     r"master|slave|host|device|dte|dce|c1|c2|poll)(?![A-Za-z])",

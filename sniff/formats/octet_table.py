@@ -206,13 +206,17 @@ def _short(unit: str) -> str:
 
 def _is_heading(names: Sequence[str], cells: Sequence[Sequence[str]]) -> bool:
     """Whether a line is one of names: nothing in it is a number, and the rows below have as many cells."""
-    if (
-        len(names) < 2
-        or len(cells) < 2
-        or any(name.replace(" ", "").isdigit() or _fits(octets_of, name) for name in names if name)
-    ):
+    if len(names) < 2 or len(cells) < 2 or any(not _is_name(name) for name in names if name):
         return False
     return sum(len(row) == len(names) for row in cells) >= 0.8 * len(cells) and sum(bool(name) for name in names) >= 2
+
+
+_NAME = re.compile(r"[^\W\d][\w .#/()\[\]%°:-]{0,39}")
+
+
+def _is_name(text: str) -> bool:
+    """Whether it may be the name of a column."""
+    return _NAME.fullmatch(text) is not None and not _fits(octets_of, text)
 
 
 def _column(cells: Sequence[Sequence[str]], many: int, wanted: Callable[[Sequence[str]], bool]) -> int | None:
