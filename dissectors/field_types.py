@@ -1,4 +1,4 @@
-"""What the fields of a protocol are: their types, the words of their numbers, and where a plain frame has them.
+"""The fields of a protocol: their types, the words of their numbers, and where a plain frame has them.
 
 Filters, lists of fields and completion ask here. A protocol gives `Dissector.field_types`, a function that makes the
 table of all names that `Dissector.fields` may give; it may also say what the columns `kind` and `func` can hold.

@@ -1,4 +1,4 @@
-"""What the rules of all protocols give: a finding says what was seen, what it is consistent with, what to check next.
+"""Findings, as the rules of all protocols give them: what was seen, what it is consistent with, what to check next.
 
 A rule is catalogued once (`Rule`); a finding is one frozen value that names its rule by code. The codes carry the
 protocol: MB… Modbus, N2… Metasys N2, MS… MS/TP, LN… the line itself.

@@ -1,4 +1,4 @@
-"""What a frame means to its device: its values by name, before the raw numbers. Pure, total.
+"""The meaning of a frame to its device: its values by name, before the raw numbers. Pure, total.
 
 A frame alone often does not say: an answer needs its request, a register its profile. Whoever knows both makes a
 `Meaning` of them; a protocol's `Dissector.line` puts it into the line of the list, `Meaning.items` into the tree.

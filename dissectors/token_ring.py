@@ -1,4 +1,4 @@
-"""What token rings of all protocols show: an observer of frames, and the ring as a value, a table and sentences."""
+"""Token rings, the same for all protocols: an observer of frames, and the ring as a value, a table and sentences."""
 
 from __future__ import annotations
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dissectors.bacnet import ring_words
+from dissectors.bacnet import ring_table
 from dissectors.bacnet.bulk_ring_observer import BulkRingObserver
 from dissectors.bacnet.envelope import frame
 from dissectors.bacnet.fields import fields
@@ -10,13 +10,13 @@ from dissectors.bacnet.findings import MstpFindings, judge
 from dissectors.bacnet.framing import MstpFramer
 from dissectors.bacnet.header import peek
 from dissectors.bacnet.readings import asks, readings
+from dissectors.bacnet.reassembly import Reassembler
 from dissectors.bacnet.renamer import MstpRenamer
 from dissectors.bacnet.ring import Ring
-from dissectors.bacnet.ring_observer import RingObserver
+from dissectors.bacnet.ring_observer import MstpRingObserver
 from dissectors.bacnet.ring_window import ring_window
 from dissectors.bacnet.rules import RULES
-from dissectors.bacnet.segmentation import Reassembler
-from dissectors.bacnet.summary import meant, text
+from dissectors.bacnet.text import meant, text
 from dissectors.bacnet.tracker import MstpTracker
 from dissectors.frame import Frame
 from dissectors.manifest import Dissector, PacketFile, on_first_use
@@ -27,10 +27,10 @@ __all__ = [
     "MSTP",
     "MstpFindings",
     "MstpFramer",
+    "MstpRingObserver",
     "MstpTracker",
     "Reassembler",
     "Ring",
-    "RingObserver",
     "fields",
     "judge",
     "packet",
@@ -59,9 +59,9 @@ RING = TokenRing(
     observer=BulkRingObserver,
     window=ring_window,
     order=lambda ring: ring.order,
-    headings=ring_words.HEADINGS,
-    rows=ring_words.rows,
-    sentences=ring_words.sentences,
+    headings=ring_table.HEADINGS,
+    rows=ring_table.rows,
+    sentences=ring_table.sentences,
 )
 
 MSTP = Dissector(

@@ -1,4 +1,4 @@
-"""Whose damage it is: one sender's where it has far more than its share of the time on the line, else the bus's."""
+"""Blame for damage: one sender's where it has far more than its share of the time on the line, else the bus's."""
 
 from __future__ import annotations
 

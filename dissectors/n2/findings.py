@@ -1,4 +1,4 @@
-"""What is wrong on an N2 bus: the class that gathers it row by row. The words are in `wording.py`.
+"""The observer of an N2 bus: gathers row by row what is wrong. The words are in `wording.py`.
 
 `see` takes every row of the bus, `settle` every transaction that closed; `findings` may be asked at any time and
 gives the same for the same rows. A limit is judged by the bound that the adapter's latency leaves: a station is slow
@@ -15,10 +15,10 @@ from dissectors.frame import Damage, Event, Frame, Header, Noise
 from dissectors.line import Timing
 from dissectors.n2.commands import parse_command
 from dissectors.n2.header import meant
-from dissectors.n2.masters import Asked, Masters
-from dissectors.n2.record import Damages, Override, Station
+from dissectors.n2.masters import Masters, OpenCommand
+from dissectors.n2.record import Damages, N2StationRecord, Override
 from dissectors.n2.torn import TornFrames
-from dissectors.n2.wording import SLOW, Heard, worded
+from dissectors.n2.wording import SLOW, N2Evidence, worded
 from dissectors.tracker import Placement, Transaction, Verdict
 
 __all__ = ["SLOW", "N2Findings"]
@@ -41,9 +41,9 @@ class N2Findings:
         self._timing = timing
         self.first: int | None = None
         self.now = 0
-        self.stations: dict[int, Station] = {}
+        self.stations: dict[int, N2StationRecord] = {}
         self.master = Damages()
-        self._asked: dict[int, Asked] = {}  # by transaction
+        self._asked: dict[int, OpenCommand] = {}  # by transaction
         self.masters = Masters()
         self.torn = TornFrames(timing)
         self._stray = Tally()
@@ -66,7 +66,7 @@ class N2Findings:
             self._see_answer(no, event, header, placement)
 
     def _see_command(self, no: int, event: Frame, header: Header, placement: Placement) -> None:
-        asked = Asked(no, event, parse_command(meant(event)))
+        asked = OpenCommand(no, event, parse_command(meant(event)))
         before = self.masters.last_station
         self.masters.see_command(asked, self.stations.get(before) if before is not None else None)
         self._asked[placement.tx] = asked
@@ -135,7 +135,7 @@ class N2Findings:
         elif asked is not None:
             self._settle_asked(station, asked, code, transaction)
 
-    def _settle_asked(self, station: Station, asked: Asked, code: str, transaction: Transaction) -> None:
+    def _settle_asked(self, station: N2StationRecord, asked: OpenCommand, code: str, transaction: Transaction) -> None:
         station.asked += 1
         station.only_identify &= asked.command.type.kind == "identify"
         verdict = transaction.verdict
@@ -157,19 +157,19 @@ class N2Findings:
     def findings(self) -> tuple[Finding, ...]:
         """All findings so far: the bus first, then station by station."""
         seconds = (self.now - (self.first or 0)) / 1e9
-        heard = Heard(self.now, seconds, self.master, self.stations, self.masters.seen, self._stray)
+        heard = N2Evidence(self.now, seconds, self.master, self.stations, self.masters.seen, self._stray)
         return tuple(worded(heard))
 
     # --- judging ---
 
-    def station(self, address: int) -> Station:
+    def station(self, address: int) -> N2StationRecord:
         """What is known of a station."""
         station = self.stations.get(address)
         if station is None:
-            station = self.stations[address] = Station()
+            station = self.stations[address] = N2StationRecord()
         return station
 
-    def _judge_latency(self, station: Station, transaction: Transaction) -> None:
+    def _judge_latency(self, station: N2StationRecord, transaction: Transaction) -> None:
         latency = transaction.latency
         if latency is None or transaction.verdict is Verdict.DAMAGED_ANSWER:
             return
@@ -178,7 +178,7 @@ class N2Findings:
             station.slow.add(transaction.end, transaction.response)
             station.slowest = max(station.slowest, latency.low)
 
-    def refused(self, station: Station, asked: Asked, code: str, transaction: Transaction) -> None:
+    def refused(self, station: N2StationRecord, asked: OpenCommand, code: str, transaction: Transaction) -> None:
         """A command that was refused, with this code."""
         command, time = asked.command, transaction.end
         if code == "00":
@@ -194,7 +194,7 @@ class N2Findings:
             refused = station.refused.setdefault((code, command.type.title), Tally())
             refused.add(time, transaction.request, transaction.response)
 
-    def obeyed(self, station: Station, asked: Asked, transaction: Transaction) -> None:
+    def obeyed(self, station: N2StationRecord, asked: OpenCommand, transaction: Transaction) -> None:
         """A command that was obeyed."""
         command = asked.command
         kind = command.type.kind

@@ -1,4 +1,4 @@
-"""What a device is, as data: identity, register and object maps, limits, the maker's words for errors. Frozen values.
+"""The model of a device, as data: identity, register and object maps, limits, the maker's words for errors. Frozen.
 
 A profile is made from a TOML document (`parsing.parse`); nothing here reads a file. Places are those of the wire: an
 offset between the manual's numbers and the wire is already applied. README.md has the format.

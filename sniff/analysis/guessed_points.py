@@ -1,4 +1,4 @@
-"""What points of stations without a profile may be: guesses of their registers beside their latest values. Pure."""
+"""Guessed points of stations without a profile: guesses of their registers beside their latest values. Pure."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is wrong with the line itself, whatever runs on it: fed rows, transactions and line events. Pure."""
+"""Findings about the line itself, whatever runs on it: fed rows, transactions and line events. Pure."""
 
 from __future__ import annotations
 

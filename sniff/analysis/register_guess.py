@@ -1,4 +1,4 @@
-"""What registers that nobody has described may hold: width, order and kind, with how sure. Pure.
+"""Guesses of registers that nobody has described: width, order and kind, with how sure. Pure.
 
 A guess is sure only where what was heard excludes the other readings: a carry from one word into the next, a word that
 runs through all its values while its neighbour stays where the exponents of usual numbers are, a step across zero.

@@ -1,4 +1,4 @@
-"""Whose trouble it is: whether one sender is struck more often than its share of the line explains. Pure.
+"""Shares of trouble: whether one sender is struck more often than its share of the line explains. Pure.
 
 Noise that falls anywhere strikes everybody by the share of the time that he sends; only who is struck clearly more
 often than the others is a case of its own. The rest is the bus's. A station is compared with other stations: what all

@@ -1,4 +1,4 @@
-"""When trouble comes: in step with the mains, in bursts at a steady interval, for a while, all at once. Pure, bounded.
+"""Time patterns of trouble: in step with the mains, in bursts at a steady interval, all at once. Pure, bounded.
 
 Each pattern is told once, about the bus, and only where the bus's own rhythm does not explain it: a master that polls
 every 100 ms is in step with 50 Hz by itself, and what is asked every 5 s fails every 5 s.

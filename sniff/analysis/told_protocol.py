@@ -1,4 +1,4 @@
-"""Which protocol a capture is whose file does not say it, told from its first octets, and how sure that is. Pure.
+"""The protocol of a capture whose file does not say it, told from its first octets, and how sure that is. Pure.
 
 Every protocol that is known reads them with the settings that it normally has; a good frame counts bits of evidence as
 in a search on a port (`autodetect.py`). Sure is what that search would be sure of, where no other protocol makes good

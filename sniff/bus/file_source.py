@@ -1,4 +1,4 @@
-"""What fills the terminal UI from a capture file: its first rows at once, the others while one looks at them.
+"""The source of rows from a capture file: its first rows at once, the others while one looks at them.
 
 A thread reads, takes frames out and packs them; the store takes what it has made in small bites, between two keys. The
 rules come last: what they find is final when all rows are judged.

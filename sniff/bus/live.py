@@ -25,8 +25,8 @@ from sniff.bus.recorded_values import RecordedValues
 from sniff.bus.router import Router, octets_of
 from sniff.bus.thinning import Budget
 from sniff.bus.value_topics import ValueMessage
+from sniff.capture.ipc import Batch, Ended, HeardOctets, ReceivedMessage, Status, Tick, one_by_one
 from sniff.capture.link import CaptureLink
-from sniff.capture.wire import Batch, Ended, Heard, Received, Status, Tick, one_by_one
 from sniff.engine.blocks import Block, Gathering, blocks_of
 from sniff.engine.bulk import BulkEngine
 from sniff.engine.engine import Output
@@ -164,10 +164,10 @@ class LiveBus:
             self._skipped += octets
             return []
         if self._values is not None:
-            self._values.hear(octets, len(message.block) if isinstance(message, Heard) else 1)
+            self._values.hear(octets, len(message.block) if isinstance(message, HeardOctets) else 1)
         if self.engine.searching:
             return self._search_on(message)
-        item = message.block if isinstance(message, Heard) else message.item  # type: ignore[union-attr]
+        item = message.block if isinstance(message, HeardOctets) else message.item  # type: ignore[union-attr]
         if not self._gathering.count:
             self._gathered_since = int(item.reads.times[0]) if isinstance(item, Block) else item.time
         self._gathering.add(item)  # type: ignore[arg-type]
@@ -179,7 +179,7 @@ class LiveBus:
         for one in one_by_one([message]):
             if self.search is not None:
                 self.search.take(one)
-            if isinstance(one, Received):
+            if isinstance(one, ReceivedMessage):
                 items += self._some(self.engine.take(block) for block in blocks_of([one.item]))
         return items
 
@@ -226,7 +226,7 @@ class LiveBus:
 
     def _take(self, message: Batch) -> list[LiveTables]:
         """Take anything but reads."""
-        if self.search is not None and self.engine.searching and not isinstance(message, Heard):
+        if self.search is not None and self.engine.searching and not isinstance(message, HeardOctets):
             self.search.take(message)
         if isinstance(message, Ended):
             items = self._look()
@@ -240,7 +240,7 @@ class LiveBus:
             return [message]
         if isinstance(message, Tick):
             return self._pass_time(message.now)
-        if isinstance(message, Received) and isinstance(message.item, LineEvent):
+        if isinstance(message, ReceivedMessage) and isinstance(message.item, LineEvent):
             return self._happen(message.item)
         return []
 

@@ -1,4 +1,4 @@
-"""What fills the terminal UI from a live bus."""
+"""The source of rows from a live bus."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collections.abc import Callable
 from sniff.bus.feed import FeedStatus
 from sniff.bus.live import LiveBus
 from sniff.bus.rows import KEPT_ROWS, Store
-from sniff.capture.wire import Status
+from sniff.capture.ipc import Status
 from sniff.engine.engine import Output
 from sniff.engine.session import LineEvent
 from sniff.engine.table import Table

@@ -1,4 +1,4 @@
-"""What a capture is asked to do; crosses to the capture process as JSON."""
+"""The orders of a capture process: what it is asked to do; they cross to it as JSON."""
 
 from __future__ import annotations
 

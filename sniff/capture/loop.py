@@ -16,20 +16,20 @@ from dissectors.frame import Chunk
 from dissectors.line import MS, NS_PER_S, LineSettings
 from sniff.capture.disk_watch import DiskWatch
 from sniff.capture.frame_counter import FrameCounter
-from sniff.capture.outlet import Outlet
-from sniff.capture.trigger_ring import TriggerRing
-from sniff.capture.waiting import Waiting
-from sniff.capture.wire import (
+from sniff.capture.ipc import (
     LOSSY,
-    Kind,
+    IpcError,
+    IpcKind,
     MessageSplitter,
     Status,
-    WireError,
     decode_derived,
     decode_trigger,
     encode_status,
     encode_tick,
 )
+from sniff.capture.ipc_sender import IpcSender
+from sniff.capture.trigger_ring import TriggerRing
+from sniff.capture.waiting import Waiting
 from sniff.engine.session import Item, LineEvent, LineEventKind, Session, SettingsChange, refusal
 from sniff.recording.writer import Recorder
 from sniff.sources import PortError, Source
@@ -89,7 +89,7 @@ class CaptureLoop:
     clock: Clock
     sources: list[Source]
     recorders: list[Recorder]
-    outlet: Outlet
+    outlet: IpcSender
     commands: socket.socket | None = None
     waker: socket.socket | None = None  # readable when a signal came
     priority: str = ""
@@ -341,7 +341,7 @@ class CaptureLoop:
         try:
             for kind, bus, body in self._splitter.feed(data):
                 self._command(kind, bus, body)
-        except WireError:
+        except IpcError:
             data = b""  # not our main process: stop listening to it
         if not data:
             self._waiting.unregister(self.commands.fileno())
@@ -356,17 +356,17 @@ class CaptureLoop:
                 self.stop("the main process is gone, which searched for the protocol whose frames are counted")
 
     def _command(self, kind: int, bus: int, body: bytes) -> None:
-        if kind == Kind.STOP:
+        if kind == IpcKind.STOP:
             self.stop("stopped")
-        elif kind == Kind.FOUND and bus < len(self._buses):
+        elif kind == IpcKind.FOUND and bus < len(self._buses):
             change = SettingsChange.parse(body.decode("utf-8", "replace"))
             self._seeking.discard(bus)
             self._unknown.discard(bus)
             self._take(self._buses[bus])
             self._settings(self._buses[bus], replace(change, searching=False, found=True))
-        elif kind == Kind.TRIGGER and bus < len(self._buses):
+        elif kind == IpcKind.TRIGGER and bus < len(self._buses):
             self._fire(bus, *decode_trigger(body))
-        elif kind == Kind.DERIVED and bus < len(self.recorders):
+        elif kind == IpcKind.DERIVED and bus < len(self.recorders):
             derived = decode_derived(bus, body)
             ring = self._buses[bus].ring
             if ring is not None and not ring.keeps(derived.log_time):
@@ -379,7 +379,7 @@ class CaptureLoop:
                 derived.data,
                 derived.metadata,
             )
-        elif kind == Kind.RECONFIGURE and bus < len(self._buses):
+        elif kind == IpcKind.RECONFIGURE and bus < len(self._buses):
             source = self._buses[bus].source
             line = body.decode("ascii", "replace")
             self._take(self._buses[bus])  # what is there was heard with the settings before

@@ -17,10 +17,10 @@ import sys
 from types import FrameType
 
 from sniff.capture.config import CaptureConfig, RecordSpec, SourceSpec
+from sniff.capture.ipc import IpcError, IpcKind, MessageSplitter, decode_json, encode_ended, encode_json
+from sniff.capture.ipc_sender import IpcSender
 from sniff.capture.loop import CaptureLoop
-from sniff.capture.outlet import Outlet
 from sniff.capture.priority import raise_priority
-from sniff.capture.wire import Kind, MessageSplitter, WireError, decode_json, encode_ended, encode_json
 from sniff.engine.capture import CaptureError
 from sniff.engine.session import Session
 from sniff.recording.rotation import Rotation
@@ -56,7 +56,7 @@ def main() -> int:
         for source in sources:
             source.close()
         kind = "port" if isinstance(error, PortError) else "capture"
-        connection.sendall(encode_json(Kind.FAILED, {"kind": kind, "text": str(error)}))
+        connection.sendall(encode_json(IpcKind.FAILED, {"kind": kind, "text": str(error)}))
         return 4
     return _capture(config, clock, sources, sessions, recorders, connection, priority)
 
@@ -102,7 +102,7 @@ def _capture(
     connection: socket.socket,
     priority: str,
 ) -> int:
-    outlet = Outlet(connection, len(sources))
+    outlet = IpcSender(connection, len(sources))
     paths = [str(recorder.path) for recorder in recorders]
     hello = {
         "pid": os.getpid(),
@@ -112,7 +112,7 @@ def _capture(
         "sessions": [session.to_metadata() for session in sessions],
         "paths": paths,
     }
-    outlet.post(encode_json(Kind.HELLO, hello))
+    outlet.post(encode_json(IpcKind.HELLO, hello))
     loop = CaptureLoop(
         clock,
         sources,
@@ -189,8 +189,8 @@ def _read_config(connection: socket.socket) -> CaptureConfig:
         if not data:
             raise SystemExit("sniff485: the capture process is started by sniff485 itself")
         for kind, _, body in splitter.feed(data):
-            if kind != Kind.CONFIG:
-                raise WireError(f"message {kind} before the settings")
+            if kind != IpcKind.CONFIG:
+                raise IpcError(f"message {kind} before the settings")
             return CaptureConfig.from_json(decode_json(body))
 
 

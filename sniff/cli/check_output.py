@@ -1,4 +1,4 @@
-"""What `check` prints: text for people, JSON Lines for programs, JUnit XML for build servers."""
+"""The output of `check`: text for people, JSON Lines for programs, JUnit XML for build servers."""
 
 from __future__ import annotations
 

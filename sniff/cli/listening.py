@@ -1,4 +1,4 @@
-"""What `live`, `record` and `demo` share: how a capture is started, run and ended."""
+"""Listening, as `live`, `record` and `demo` share it: how a capture is started, run and ended."""
 
 from __future__ import annotations
 

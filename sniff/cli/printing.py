@@ -11,12 +11,12 @@ from sniff.analysis.plain import plain
 from sniff.analysis.summary import Summary
 from sniff.bus.live import LiveBus, LiveItem, LiveTables
 from sniff.bus.triggers import Fired, Triggers
-from sniff.capture.wire import Ended, Status
+from sniff.capture.ipc import Ended, Status
 from sniff.cli import rows
 from sniff.engine.engine import Output
 from sniff.engine.session import LineEvent, LineEventKind
 from sniff.engine.table import Table
-from sniff.engine.verdict_join import Settled, Settling
+from sniff.engine.verdict_join import JudgedRow, VerdictJoin
 
 if TYPE_CHECKING:
     from sniff.outlets.alerts import Alerts
@@ -44,7 +44,7 @@ class Printer:
         self._session = live.session
         self._trouble = ""
         self._waited = False
-        self._settling = Settling(live.points)
+        self._settling = VerdictJoin(live.points)
 
     @property
     def summary(self) -> Summary:
@@ -117,7 +117,7 @@ class Printer:
     def _settle(self) -> None:
         """A search has ended: go on with what it found."""
         self._session = self.live.session
-        self._settling = Settling(self.live.points)  # what came before belongs to no transaction
+        self._settling = VerdictJoin(self.live.points)  # what came before belongs to no transaction
 
     def finish(self) -> None:
         """Print what still waits for a verdict."""
@@ -129,7 +129,7 @@ class Printer:
         for settled in self._settling.add(output):
             self._print(settled)
 
-    def _print(self, settled: Settled) -> None:
+    def _print(self, settled: JudgedRow) -> None:
         if self.quiet:
             return
         if self.as_json:

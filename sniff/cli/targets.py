@@ -1,4 +1,4 @@
-"""Which buses are meant by what somebody names: ports, configured buses, all of them; where recordings go."""
+"""The buses that somebody names: ports, configured buses, all of them; where recordings go."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whom a running capture tells: triggers mark it, alerts and metrics leave it."""
+"""The outlets of a running capture: triggers mark it, alerts and metrics leave it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What an archive says: its buses, the ill ones first, day by day, and what changed over the days. Pure."""
+"""The answer of an archive: its buses, the ill ones first, day by day, and what changed over the days. Pure."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What an archive holds: captures found below folders, and the parts of recordings grouped into tasks.
+"""An archive: captures found below folders, and the parts of recordings grouped into tasks.
 
 A task is what one worker reads at a time: one capture, or the parts of one recording that began on one day. Only the
 beginning of each file is read here, and none that the index knows.

@@ -1,4 +1,4 @@
-"""What is known of one bus on one day: the unit of everything that a fleet's report says; mergeable."""
+"""One bus on one day: the unit of everything that a fleet's report says; mergeable."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What was read already: a file of SQLite beside the archive. A second run reads only what is new.
+"""The index of what was read already: a file of SQLite beside the archive. A second run reads only what is new.
 
 An entry is the result of one task, under the paths, sizes and times of its files and under the code that read them: a
 new version of the program reads again what it reads by other code, and nothing else. Two runs at once do not harm it.

@@ -1,4 +1,4 @@
-"""Making a whole file of a recording that was cut off or damaged."""
+"""Recovery: a whole file of a recording that was cut off or damaged."""
 
 from __future__ import annotations
 

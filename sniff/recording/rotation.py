@@ -1,4 +1,4 @@
-"""When a recording goes on in a new file, what the files are called, and which are kept.
+"""Rotation: when a recording goes on in a new file, what the files are called, and which are kept.
 
 Every part carries its final name from the start (`night-0007.mcap`): it can be opened while it is written, and after
 a power cut nothing needs to be renamed. Whether it is whole, its own end says.

@@ -3,8 +3,8 @@
 A recorder never waits for the disk: the capture's thread only collects octets; another thread packs, writes and
 rotates, and one more syncs. Loss is bounded in time by the caller's `tick`: a chunk is in the file within 1 s and on
 the disk within 10 s. When the disk does not take it, `trouble` says so in words, `behind` for how long, up to
-`keeper.MOST_WAITING` octets wait in memory, and what comes after that is counted in `lost_octets` and, where it is
-missing, in the file. Nothing is raised into the capture but a file that cannot be created at the start.
+`writer_thread.MOST_WAITING` octets wait in memory, and what comes after that is counted in `lost_octets` and, where
+it is missing, in the file. Nothing is raised into the capture but a file that cannot be created at the start.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ from sniff.engine.session import (
     settings_change,
 )
 from sniff.formats.files import NewFile, explain
-from sniff.recording import keeper
+from sniff.recording import writer_thread
 from sniff.recording.batch import Batcher, Message, loss_message, stamp
 from sniff.recording.block_batches import add_block
-from sniff.recording.keeper import CHECK, CLOSE, SYNC, Changed, Flush, Keeper, Parcel
 from sniff.recording.part import PartFile
 from sniff.recording.rotation import Rotation
 from sniff.recording.topics import LINE, RAW
+from sniff.recording.writer_thread import CHECK, CLOSE, SYNC, Changed, Flush, Keeper, WriteBatch
 
 if TYPE_CHECKING:
     from sniff.engine.blocks import Block
@@ -262,12 +262,12 @@ class Recorder:
     ) -> None:
         """Record a result of the engine, best effort. `schema_name`: one of `topics.SCHEMAS`; `metadata`: of the
         channel, taken when the topic is new in a file. /raw and /line are not for results."""
-        if self._closed or topic in (RAW, LINE) or self._full(keeper.MOST_DERIVED):
+        if self._closed or topic in (RAW, LINE) or self._full(writer_thread.MOST_DERIVED):
             return
         sequence = self._sequences.get(topic, 0)
         self._sequences[topic] = (sequence + 1) % (1 << 32)
         message = Message(topic, stamp(log_time), stamp(publish_time), sequence, data)
-        self._send(Parcel([message], 0, self._batcher.first, schema_name, metadata, self._bus))
+        self._send(WriteBatch([message], 0, self._batcher.first, schema_name, metadata, self._bus))
         self._note(log_time if self._now is None else self._now)
 
     def tick(self, now_ns: int) -> None:
@@ -284,7 +284,7 @@ class Recorder:
             self._close_batch()
             self._closed = True
             if self._gap_octets:  # nothing came after it
-                self._send(Parcel([self._gap(self._now or 0)], 0, self._following, bus=self._bus))
+                self._send(WriteBatch([self._gap(self._now or 0)], 0, self._following, bus=self._bus))
             self._keeper.orders.put(CLOSE)
 
     @property
@@ -410,7 +410,7 @@ class Recorder:
 
     def _send_raw(self, messages: list[Message], following: int) -> None:
         octets, self._open_octets = self._open_octets, 0
-        if self._full(keeper.MOST_WAITING):
+        if self._full(writer_thread.MOST_WAITING):
             self._dropped_octets += octets
             self._gap_octets += octets
             self._gap_reads += following - self._following
@@ -419,7 +419,7 @@ class Recorder:
         if self._gap_octets and messages[-1].topic == RAW:
             messages = [self._gap(messages[-1].publish_time), *messages]
         self._following = following
-        self._send(Parcel(messages, octets, following, bus=self._bus))
+        self._send(WriteBatch(messages, octets, following, bus=self._bus))
 
     def _gap(self, time: int) -> Message:
         """What says in the file how much is missing before a batch."""
@@ -432,7 +432,7 @@ class Recorder:
     def _full(self, limit: int) -> bool:
         return self._sent - self._share.taken + self._keeper.waiting > limit
 
-    def _send(self, parcel: Parcel) -> None:
+    def _send(self, parcel: WriteBatch) -> None:
         self._sent += parcel.weight
         self._keeper.orders.put(parcel)
 

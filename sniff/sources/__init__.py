@@ -1,4 +1,4 @@
-"""Where chunks come from: a serial port, a gateway on the network, a capture file. All of them only listen."""
+"""Sources of chunks: a serial port, a gateway on the network, a capture file. All of them only listen."""
 
 from __future__ import annotations
 

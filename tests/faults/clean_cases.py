@@ -8,7 +8,7 @@ from functools import partial
 
 from dissectors.bacnet.application import Poller, Quiet, read_property
 from dissectors.bacnet.envelope import npdu_frame
-from dissectors.bacnet.simulated import Node
+from dissectors.bacnet.simulated import SimulatedNode
 from dissectors.line import LineSettings, Timing
 from dissectors.modbus.simulated_master import read_holding, write_register, write_registers
 from dissectors.simulated import Station
@@ -170,7 +170,7 @@ def _looking_for_devices() -> Poller:
 
 
 def _slave(mac: int, *, seed: int) -> Station:
-    return NeverByItself(Node(mac, Timing(MSTP_LINE), drive(mac)))
+    return NeverByItself(SimulatedNode(mac, Timing(MSTP_LINE), drive(mac)))
 
 
 def _asks_slaves(*, seed: int) -> Station:

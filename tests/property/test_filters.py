@@ -14,7 +14,7 @@ from sniff.bus.offline import settled, settled_columns
 from sniff.engine.column_join import SettledRows
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import Session
-from sniff.engine.verdict_join import Settled
+from sniff.engine.verdict_join import JudgedRow
 from sniff.filter import Scope, compile_filter
 from sniff.filter.choosing import chosen
 from sniff.filter.fields import COLUMN_TYPES, column_type, types_of
@@ -38,7 +38,7 @@ TIMES = ("10:00", "10:00:00.2", "2026-03-01", "2026-03-01T10:00:00.5Z", "2026-03
 
 
 @cache
-def capture_of(name: str) -> tuple[Session, list[Settled], list[SettledRows]]:
+def capture_of(name: str) -> tuple[Session, list[JudgedRow], list[SettledRows]]:
     """Its rows one by one, and as columns."""
     capture = read(CAPTURES / f"{name}.cap.txt")
     rows = list(settled(capture.items(), capture.session))

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dissectors.frame import Check, Damage, Found, Frame
 from dissectors.n2.blame import blamed
 from dissectors.n2.commands import parse_command
-from dissectors.n2.masters import HASTE, Asked, Masters
-from dissectors.n2.record import Damages, Missing, Station
+from dissectors.n2.masters import HASTE, Masters, OpenCommand
+from dissectors.n2.record import Damages, Missing, N2StationRecord
 
 MS = 1_000_000
 READ, OTHER = b">0111010387\r", b">02110A0398\r"
@@ -53,16 +53,16 @@ def test_what_is_answered_late_is_not_missing():
     assert (tally.count, tally.first, tally.last) == (39, 0, 38 * MS)
 
 
-def asked(octets: bytes, start: int, damage: Damage | None = None) -> Asked:
+def asked(octets: bytes, start: int, damage: Damage | None = None) -> OpenCommand:
     check = Check.GOOD if damage is None else Check.ABSENT
     frame = Frame("n2", octets, start, start + len(octets) * MS, check, Found.DELIMITER, damage)
-    return Asked(start, frame, parse_command(octets))
+    return OpenCommand(start, frame, parse_command(octets))
 
 
-def seen(*commands: Asked, quickest: int | None = 50 * MS, answered: int = 20) -> int:
+def seen(*commands: OpenCommand, quickest: int | None = 50 * MS, answered: int = 20) -> int:
     masters = Masters()
     for command in commands:
-        masters.see_command(command, Station(answered=answered, quickest=quickest))
+        masters.see_command(command, N2StationRecord(answered=answered, quickest=quickest))
     return masters.seen.count
 
 
@@ -80,7 +80,7 @@ def test_a_command_in_the_middle_of_another_is_not_the_same_masters():
 
 
 def test_something_between_two_commands_may_have_been_an_answer():
-    masters, station = Masters(), Station(answered=20, quickest=50 * MS)
+    masters, station = Masters(), N2StationRecord(answered=20, quickest=50 * MS)
     masters.see_command(asked(READ, 0), station)
     masters.see_other()
     masters.see_command(asked(OTHER, 20 * MS), station)

@@ -1,4 +1,4 @@
-"""What was remembered of a Modbus line, judged and put into words. Pure: `Evidence` in, findings out."""
+"""The rules of a Modbus line as a whole, in words. Pure: `BusRecord` in, findings out."""
 
 from __future__ import annotations
 
@@ -6,11 +6,13 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from dissectors.findings import Finding, Severity, Tally, counted, found, times
-from dissectors.modbus.damage_shares import Damage, shares_of_damage, to_blame
-from dissectors.modbus.evidence import Evidence
-from dissectors.modbus.judgement_words import MS, ms, note_if, request_words, seconds, units
+from dissectors.line import MS
+from dissectors.modbus.bus_record import BusRecord
+from dissectors.modbus.damage_shares import DamageShare, shares_of_damage, to_blame
+from dissectors.modbus.finding_words import note_if, request_words, units
 from dissectors.modbus.rules import RULES
-from dissectors.modbus.station_judgement import FLAWS, is_absent, of_station
+from dissectors.modbus.rules_station import FLAWS, is_absent, of_station
+from dissectors.words import duration, fine_milliseconds
 
 _WASTE = 0.05
 _HABIT = 10  # a sender that is too quick is so once in so many frames at least; what a computer holds up is rarer
@@ -22,7 +24,7 @@ _CUT_LEAST = 3
 _COMMON_LEAST = 3
 
 
-def judge(seen: Evidence, timeout: int | None) -> tuple[Finding, ...]:
+def judge(seen: BusRecord, timeout: int | None) -> tuple[Finding, ...]:
     """All findings: the bus first, then station by station. `timeout`: the master's, ns, None while unlearnt."""
     damage = shares_of_damage(seen)
     made = [
@@ -40,7 +42,7 @@ def judge(seen: Evidence, timeout: int | None) -> tuple[Finding, ...]:
 # ---- the bus
 
 
-def _of_bus(seen: Evidence, is_blamed: bool) -> Iterator[Finding]:
+def _of_bus(seen: BusRecord, is_blamed: bool) -> Iterator[Finding]:
     requests = sum(station.asked for station in seen.stations.values()) + seen.damaged_requests.count
     damaged = seen.damaged_requests
     if damaged.count:
@@ -63,7 +65,7 @@ def _of_bus(seen: Evidence, is_blamed: bool) -> Iterator[Finding]:
     waited = sum(station.waited for station in absent.values())
     if waited:
         share = waited / seen.span
-        words = f"{share:.0%} of the time ({seconds(waited)}) went into waiting for {units(absent)}"
+        words = f"{share:.0%} of the time ({duration(waited)}) went into waiting for {units(absent)}"
         severity = Severity.WARNING if share > _WASTE else None
         first = min(station.missing.first for station in absent.values())
         last = max(station.missing.last for station in absent.values())
@@ -97,7 +99,7 @@ def _of_bus(seen: Evidence, is_blamed: bool) -> Iterator[Finding]:
     yield from _cycle(seen)
 
 
-def _of_requests(seen: Evidence) -> Iterator[Finding]:
+def _of_requests(seen: BusRecord) -> Iterator[Finding]:
     """What is wrong with what the master sends, and what its own adapter makes of it."""
     malformed = seen.malformed
     if malformed.count:
@@ -134,7 +136,7 @@ def _of_requests(seen: Evidence) -> Iterator[Finding]:
             yield tally.found(RULES[FLAWS[flaw]], "master", words, severity)
 
 
-def _of_masters(seen: Evidence) -> Iterator[Finding]:
+def _of_masters(seen: BusRecord) -> Iterator[Finding]:
     """Requests into the wait of another, sooner than the station asked has ever answered.
 
     An answer that this tap missed cannot have come before, and a master that never waits sends after the same time
@@ -159,11 +161,11 @@ def _of_masters(seen: Evidence) -> Iterator[Finding]:
         tally.add(time, before, no)
     words = f"{len(gaps)} requests came while another one waited for a station that answers, and never so soon"
     if gaps[len(gaps) // 2] < 10 * MS:
-        words += f"; half of them within {ms(gaps[len(gaps) // 2])}"
+        words += f"; half of them within {fine_milliseconds(gaps[len(gaps) // 2])}"
     yield tally.found(RULES["MB203"], "bus", words)
 
 
-def _asked_twice(seen: Evidence) -> Iterator[Finding]:
+def _asked_twice(seen: BusRecord) -> Iterator[Finding]:
     """Requests that came twice at once, and had two answers: no echo is answered, and no master repeats so soon.
 
     Not where copies are usual, as behind a repeater, or where answers come twice to requests that do not.
@@ -176,7 +178,7 @@ def _asked_twice(seen: Evidence) -> Iterator[Finding]:
     yield twice.found(RULES["MB203"], "bus", words)
 
 
-def _of_gaps(seen: Evidence) -> Iterator[Finding]:
+def _of_gaps(seen: BusRecord) -> Iterator[Finding]:
     timing = seen.timing
     for sender, calls in sorted(seen.close.items()):
         tally = Tally()
@@ -184,7 +186,7 @@ def _of_gaps(seen: Evidence) -> Iterator[Finding]:
             if before not in seen.late_frames and no not in seen.late_frames:
                 tally.add(time, before, no)
         if tally.count >= 3 and _HABIT * tally.count >= seen.frames[sender]:
-            words = f"{tally.count} frames began less than {ms(timing.t35)} after the frame before"
+            words = f"{tally.count} frames began less than {fine_milliseconds(timing.t35)} after the frame before"
             yield tally.found(RULES["MB301"], sender, words)
     paused = seen.paused if seen.judges_pauses else {}
     hits = {sender: tally.count for sender, tally in paused.items()}
@@ -192,24 +194,24 @@ def _of_gaps(seen: Evidence) -> Iterator[Finding]:
     common = [paused[sender] for sender in sorted(hits) if sender not in blamed]
     if len(common) > 1 and sum(tally.count for tally in common) >= _PAUSES_LEAST:
         count = sum(tally.count for tally in common)
-        words = f"{count} frames of {len(common)} senders with over {ms(timing.t15)} of silence inside"
+        words = f"{count} frames of {len(common)} senders with over {fine_milliseconds(timing.t15)} of silence inside"
         evidence = tuple(sorted(no for tally in common for no in tally.evidence))
         yield found(
             RULES["MB304"], "adapter", words, first=seen.first or 0, last=seen.now, count=count, evidence=evidence
         )
     paused = {sender: paused[sender] for sender in blamed if paused[sender].count >= _PAUSES_LEAST}
     for sender, tally in sorted(paused.items()):
-        words = f"{tally.count} frames with over {ms(timing.t15)} of silence inside"
+        words = f"{tally.count} frames with over {fine_milliseconds(timing.t15)} of silence inside"
         yield tally.found(RULES["MB302"], sender, words)
     if not seen.judges_pauses and seen.stations:
         words = (
-            f"the adapter may hold octets back for {ms(timing.latency)}; limits are {ms(timing.t15)} inside a frame "
-            f"and {ms(timing.t35)} between frames"
+            f"the adapter may hold octets back for {fine_milliseconds(timing.latency)}; limits are "
+            f"{fine_milliseconds(timing.t15)} inside a frame and {fine_milliseconds(timing.t35)} between frames"
         )
         yield found(RULES["MB303"], "adapter", words, first=seen.first or 0, last=seen.now)
 
 
-def _of_ends(seen: Evidence) -> Iterator[Finding]:
+def _of_ends(seen: BusRecord) -> Iterator[Finding]:
     """Frames without LF: of those who leave it out while others send it; where all do, it is how this bus speaks."""
     habits = {
         sender: tally
@@ -231,7 +233,7 @@ def _of_ends(seen: Evidence) -> Iterator[Finding]:
         yield tally.found(RULES["MB019"], sender, words)
 
 
-def _common_damage(seen: Evidence, damage: Damage) -> list[Finding]:
+def _common_damage(seen: BusRecord, damage: DamageShare) -> list[Finding]:
     """What is damaged of senders none of which has more of it than its share."""
     hits, struck = damage.common, [int(sender.split()[1]) for sender in damage.common if sender != "master"]
     damaged = sum(hits.values())
@@ -252,13 +254,13 @@ def _common_damage(seen: Evidence, damage: Damage) -> list[Finding]:
     return [replace(finding, count=answers, last=last)]
 
 
-def _cycle(seen: Evidence) -> Iterator[Finding]:
+def _cycle(seen: BusRecord) -> Iterator[Finding]:
     usual = seen.cycles.usual()
     if usual is None or len(usual[2]) < 4:
         return
     unit, key, periods = usual
     low, median, high = (periods[len(periods) * part // 100] for part in (5, 50, 95))
-    words = f"the master comes back to station {unit} ({request_words(key)}) every {seconds(median)}"
+    words = f"the master comes back to station {unit} ({request_words(key)}) every {duration(median)}"
     if high - low > max(median // 50, 2 * seen.timing.latency, MS):
-        words += f"; 9 of 10 times after {seconds(low)} to {seconds(high)}"
+        words += f"; 9 of 10 times after {duration(low)} to {duration(high)}"
     yield found(RULES["MB401"], "bus", words, first=seen.first or 0, last=seen.now, count=len(periods))

@@ -1,4 +1,4 @@
-"""What a receiver on the pair gets when drivers talk over each other: bits mixed in time, sampled like a UART does.
+"""Collisions: what a receiver gets when drivers talk over each other, bits mixed in time, sampled like a UART does.
 
 Used only where transmissions overlap or the line is held low; a transmission that is alone needs no bits. The model:
 a driver that is off leaves the line at 1 (fail-safe bias), and where two drivers disagree the 0 wins. Real drivers
@@ -18,7 +18,7 @@ Low = tuple[int, int]
 """A time [begin, end), ns, in which a driver holds the line at 0."""
 
 
-class Received(NamedTuple):
+class ReceivedOctets(NamedTuple):
     """Octets as a receiver got them, the end of each (ns, ascending), and what its UART said of them."""
 
     octets: bytes
@@ -41,7 +41,7 @@ def low_times(line: LineSettings, start: int, octets: bytes, flips: dict[int, in
     return lows
 
 
-def receive(line: LineSettings, lows: Iterable[Low]) -> Received:
+def receive(line: LineSettings, lows: Iterable[Low]) -> ReceivedOctets:
     """Read the mixed line with a UART: start edge, samples in the middle of each bit, stop bit.
 
     A stop bit at 0 is a framing error, all bits at 0 a break; the receiver then waits for the line to rise.
@@ -69,7 +69,7 @@ def receive(line: LineSettings, lows: Iterable[Low]) -> Received:
         time = edge + int((_framed_bits(line) + 0.5) * bit)
         if not levels[-1]:  # still low: no new start bit before the line rises
             time = merged[bisect_right(begins, time) - 1][1] if low_at(time) else time
-    return Received(bytes(octets), ends, tuple(marks))
+    return ReceivedOctets(bytes(octets), ends, tuple(marks))
 
 
 def parity_bit(line: LineSettings, octet: int) -> int | None:

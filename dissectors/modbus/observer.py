@@ -1,4 +1,4 @@
-"""What is wrong on a Modbus line: what is remembered of each row and transaction. `judgement.py` puts it into words.
+"""The observer of a Modbus line: remembers each row and transaction. `rules_bus.py` puts it into words.
 
 Implements `dissectors.findings.Judge` for RTU and ASCII. An adapter's delay is always taken off in favour of the
 station: it is slow when even the shortest reading is too long, too quick when even the longest is too short.
@@ -10,12 +10,11 @@ from dissectors.checksums import crc16_modbus
 from dissectors.findings import ExceptionWords, Finding, Tally
 from dissectors.frame import Damage, Event, Flaw, Frame, Header, Noise, Role
 from dissectors.line import MS
-from dissectors.modbus.asked import Asked
+from dissectors.modbus.asked import AskedRequest
 from dissectors.modbus.envelope import RTU_NAME, readable_adu, rtu_check
 from dissectors.modbus.exchange import is_begin_of
 from dissectors.modbus.functions import BROADCAST, EXCEPTION_BIT, FUNCTIONS, answer_length
-from dissectors.modbus.judgement import judge
-from dissectors.modbus.learnt import READ
+from dissectors.modbus.learned_timing import READ
 from dissectors.modbus.pairing import is_answer
 from dissectors.modbus.remembered import (
     BEGIN,
@@ -28,8 +27,9 @@ from dissectors.modbus.remembered import (
     Remembered,
     slow_limit,
 )
-from dissectors.modbus.response_groups import Answered
-from dissectors.modbus.station_record import Lost, Station
+from dissectors.modbus.response_groups import AnsweredRequest
+from dissectors.modbus.rules_bus import judge
+from dissectors.modbus.station_record import Lost, StationRecord
 from dissectors.tracker import Placement, Transaction, Verdict
 
 TURNAROUND = 90 * MS
@@ -83,7 +83,7 @@ class ModbusFindings(Remembered):
             self.open = self.broadcast = None
         else:
             self.newest = placement.tx
-            self._see_request(Asked(no, event, header, octets), placement)
+            self._see_request(AskedRequest(no, event, header, octets), placement)
         if header.ok and octets and octets[0] > LAST_STANDARD_UNIT:
             self.station(octets[0]).reserved.add(event.start, no)
 
@@ -159,7 +159,7 @@ class ModbusFindings(Remembered):
 
     # ---- rows
 
-    def _see_request(self, asked: Asked, placement: Placement) -> None:
+    def _see_request(self, asked: AskedRequest, placement: Placement) -> None:
         if len(self.asked) < OPEN_KEPT:
             self.asked[placement.tx] = asked
         if not asked.header.ok:
@@ -177,7 +177,7 @@ class ModbusFindings(Remembered):
         self.open = None if is_broadcast or not asked.header.ok else asked
         self.broadcast = asked if is_broadcast and asked.header.ok else None
 
-    def _is_no_request(self, asked: Asked) -> bool:
+    def _is_no_request(self, asked: AskedRequest) -> bool:
         """Whether it is an answer in the shape of a request: to a broadcast, or by another unit than the one asked."""
         if self.broadcast is not None and self._is_answer_to_broadcast(asked):
             self.seen.answers_to_broadcast.add(asked.frame.start, self.broadcast.no, asked.no)
@@ -189,7 +189,7 @@ class ModbusFindings(Remembered):
             return True
         return False
 
-    def waited_in_vain(self, before: Asked, asked: Asked) -> None:
+    def waited_in_vain(self, before: AskedRequest, asked: AskedRequest) -> None:
         """A request after another that nothing has followed."""
         self.station(before.unit).waited += max(0, asked.frame.start - before.frame.start)
         if not asked.header.ok or before.is_for_nobody:
@@ -242,7 +242,7 @@ class ModbusFindings(Remembered):
             return
         self.broadcast = None
 
-    def _is_answer_to_broadcast(self, asked: Asked) -> bool:
+    def _is_answer_to_broadcast(self, asked: AskedRequest) -> bool:
         """Whether what looks like a request is a station's copy of the broadcast before it, as itself or as 0."""
         broadcast = self.broadcast
         if broadcast is None or asked.octets[1:] != broadcast.octets[1:] or (self.seen.echoes and not asked.unit):
@@ -250,13 +250,13 @@ class ModbusFindings(Remembered):
         gap = asked.frame.start - broadcast.frame.end
         return self.timing.char + self.timing.latency < gap < TURNAROUND
 
-    def _is_answer_of_another(self, before: Asked, asked: Asked) -> bool:
+    def _is_answer_of_another(self, before: AskedRequest, asked: AskedRequest) -> bool:
         """Whether what looks like a request is the copy of the one before it, by a unit that is known to answer so."""
         return asked.octets[1:] == before.octets[1:] and (before.unit, asked.unit) in self.seen.pairs
 
     # ---- transactions
 
-    def _is_torn(self, transaction: Transaction, asked: Asked | None) -> bool:
+    def _is_torn(self, transaction: Transaction, asked: AskedRequest | None) -> bool:
         """Whether a late read made of it what it seems; where a station's frames are so often, it is the station."""
         verdict, torn = transaction.verdict, self.torn
         if verdict in (Verdict.UNSOLICITED, Verdict.LATE, Verdict.ANSWERED_TWICE):
@@ -296,7 +296,7 @@ class ModbusFindings(Remembered):
         self.seen.unasked.add(transaction.start, transaction.response)
 
     def settle_request(
-        self, station: Station, transaction: Transaction, asked: Asked, code: int | None, answer: bytes
+        self, station: StationRecord, transaction: Transaction, asked: AskedRequest, code: int | None, answer: bytes
     ) -> None:
         """A request that closed, with its answer, the code of its exception, or neither."""
         verdict = transaction.verdict
@@ -341,7 +341,7 @@ class ModbusFindings(Remembered):
                 self.learnt.answered(transaction.station or 0, READ, transaction.latency.nominal)
             self._compare_with_timeout(station, transaction, transaction.latency.low)
             if verdict is Verdict.ANSWERED and transaction.error is None and transaction.response is not None:
-                came = Answered(transaction.response, transaction.end, transaction.latency, answer)
+                came = AnsweredRequest(transaction.response, transaction.end, transaction.latency, answer)
                 station.compare(asked.key, asked.octets, came)
         if verdict is Verdict.EXCEPTION:
             if asked.fault is None:
@@ -353,20 +353,20 @@ class ModbusFindings(Remembered):
             if len(station.unfit_words) < _WORDS_KEPT:
                 station.unfit_words[transaction.error] += 1
 
-    def _is_unfit(self, transaction: Transaction, asked: Asked, code: int | None, answer: bytes) -> bool:
+    def _is_unfit(self, transaction: Transaction, asked: AskedRequest, code: int | None, answer: bytes) -> bool:
         """Whether the answer itself is not what was asked for: damage before a good answer is none of its faults."""
         if code is not None or transaction.id in self.contradictory:  # an exception to something else
             return True
         return bool(answer) and not is_answer(asked.octets, answer)
 
-    def _compare_with_timeout(self, station: Station, transaction: Transaction, least: int) -> None:
+    def _compare_with_timeout(self, station: StationRecord, transaction: Transaction, least: int) -> None:
         """Whether an answer took long; counted anew when the timeout gets known, since the limit is another then."""
         limit = slow_limit(self.learnt.timeout)
         station.compare_with(limit, 1)
         if least > (SLOW_UNLEARNT if limit is None else limit):
             self.gaps.took_long(station.slow, transaction)
 
-    def _settle_late(self, station: Station, transaction: Transaction) -> None:
+    def _settle_late(self, station: StationRecord, transaction: Transaction) -> None:
         """An answer after the next request: its own request is not lost; late only if the master has waited at all."""
         station.heard(transaction.end)
         self.seen.late(transaction.response)
@@ -377,7 +377,7 @@ class ModbusFindings(Remembered):
                 return
         station.late.add(transaction.start, transaction.response)
 
-    def _settle_for_nobody(self, transaction: Transaction, asked: Asked) -> None:
+    def _settle_for_nobody(self, transaction: Transaction, asked: AskedRequest) -> None:
         """A read of address 0, and who answered it."""
         seen = self.seen
         seen.to_nobody.add(transaction.start, transaction.request, transaction.response)
@@ -386,7 +386,7 @@ class ModbusFindings(Remembered):
         seen.cycles.add(asked.octets, asked.key, transaction.start)
 
     def _settle_damaged(
-        self, station: Station, transaction: Transaction, asked: Asked, stray: bytes, flaw: Flaw | None
+        self, station: StationRecord, transaction: Transaction, asked: AskedRequest, stray: bytes, flaw: Flaw | None
     ) -> None:
         """Something came in place of an answer: in what way it is wrong."""
         if flaw is not None:

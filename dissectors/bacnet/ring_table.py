@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dissectors.bacnet.ring import Ring, What
+from dissectors.bacnet.ring import Ring, RingEventKind
 from dissectors.histogram import Histogram
 from dissectors.line import MS
 from dissectors.token_ring import Cell
@@ -45,7 +45,7 @@ def _row(ring: Ring, mac: int, following: int | None) -> tuple[Cell, ...]:
         following,
         node.tokens_sent,
         sum(edge.retries for (source, _), edge in ring.edges.items() if source == mac),
-        ring.of(What.LOST_TOKEN, mac).count,
+        ring.of(RingEventKind.LOST_TOKEN, mac).count,
         _ms(node.loop, 0.5),
         _ms(node.loop, 1),
         _ms(node.use, 0.5),
@@ -81,7 +81,7 @@ def sentences(ring: Ring) -> list[str]:
         for name, possible in ring.limits.items()
         if not possible
     ]
-    counts: dict[What, int] = {}
+    counts: dict[RingEventKind, int] = {}
     for (what, _), happened in ring.happened.items():
         counts[what] = counts.get(what, 0) + happened.count
     said += [f"{count} × {what.value}" for what, count in counts.items() if count]

@@ -1,4 +1,4 @@
-"""What the tracker learns of a bus while it listens: response times, the master's timeout, the master's pauses.
+"""The timing of a bus, learnt while it is heard: response times, the master's timeout, the master's pauses.
 
 Only traffic whose direction the octets decide teaches. Each quantity keeps its last samples, so memory is bounded and
 a bus that changes is learnt anew. All times are int ns, as they were measured (nominal).
@@ -24,7 +24,7 @@ UNLEARNT_LIMIT = 100_000_000
 than that it may be the answer of a slow station as well as the request again."""
 
 
-class Learnt:
+class LearnedTiming:
     """Response times by unit, the master's timeout, its pauses between an answer and the next request."""
 
     __slots__ = ("_answer", "_cycles", "_margin", "_pauses", "_timeout", "_times", "_tolerance", "_unanswered")

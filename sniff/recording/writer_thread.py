@@ -2,7 +2,7 @@
 
 Everything comes to it through one queue. Its numbers (`taken`, `lost_octets`, `size`, `trouble`, `paths`) are read by
 the capture's thread and written only here. A write may hang as long as the disk likes: what comes meanwhile waits in
-the queue. Syncs, which hang more often, have a thread of their own (`syncing.py`).
+the queue. Syncs, which hang more often, have a thread of their own (`sync_thread.py`).
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from sniff.formats.files import explain
 from sniff.recording.batch import Message
 from sniff.recording.part import PartFile
 from sniff.recording.rotation import FreeSpace, NewestParts, Rotation, part_name, parts
-from sniff.recording.syncing import Syncer
+from sniff.recording.sync_thread import Syncer
 from sniff.recording.topics import LINE, RAW
 
 MOST_WAITING = 32 << 20
@@ -41,7 +41,7 @@ MOST_DERIVED = MOST_WAITING // 4
 
 
 @dataclass(frozen=True, slots=True)
-class Parcel:
+class WriteBatch:
     """Messages of a bus that stay together, with how many octets and reads of it they hold."""
 
     messages: list[Message]
@@ -57,14 +57,14 @@ class Parcel:
         return sum(len(message.data) + 300 for message in self.messages)
 
 
-class Order:
+class WriterCommand:
     """What the writing thread is told besides messages."""
 
     def __init__(self, name: str) -> None:
         self.name = name
 
 
-class Flush(Order):
+class Flush(WriterCommand):
     """Write everything out; the flushes that a bus asks for are numbered from 1."""
 
     def __init__(self, number: int, bus: int = 0) -> None:
@@ -119,7 +119,7 @@ class Share:
         self.lost_octets += octets - self.unwritten
 
 
-SYNC, CHECK, CLOSE = Order("sync"), Order("check"), Order("close")
+SYNC, CHECK, CLOSE = WriterCommand("sync"), WriterCommand("check"), WriterCommand("close")
 
 
 class Keeper:
@@ -137,7 +137,7 @@ class Keeper:
         keep: int | None,
         keep_free: int | None = None,
     ) -> None:
-        self.orders: SimpleQueue[Parcel | Order | Changed] = SimpleQueue()
+        self.orders: SimpleQueue[WriteBatch | WriterCommand | Changed] = SimpleQueue()
         self.paths: list[Path] = []
         self.shares = [Share() for _ in sessions]
         self.gone = False
@@ -190,7 +190,7 @@ class Keeper:
         steps = {SYNC: self._sync, CHECK: self._check, CLOSE: self._finish}
         while self._to_close:
             order = self.orders.get()
-            if isinstance(order, Parcel):
+            if isinstance(order, WriteBatch):
                 self._try("take", partial(self._take, order), order.octets, order.bus)
             elif isinstance(order, Changed):
                 self._sessions[order.bus] = order.session
@@ -216,7 +216,7 @@ class Keeper:
             self._troubles.pop(name, None)
         self._trouble = next(iter(self._troubles.values()), None)
 
-    def _take(self, batch: Parcel) -> None:
+    def _take(self, batch: WriteBatch) -> None:
         share = self.shares[batch.bus]
         share.taken += batch.weight
         if batch.messages[-1].topic == RAW and self._part_is_full(batch):
@@ -231,7 +231,7 @@ class Keeper:
         if self._began is None and batch.messages[-1].topic == RAW:
             self._began = batch.messages[-1].publish_time
 
-    def _part_is_full(self, batch: Parcel) -> bool:
+    def _part_is_full(self, batch: WriteBatch) -> bool:
         if self._rotation is None or self._began is None:
             return False
         age = batch.messages[-1].publish_time - self._began

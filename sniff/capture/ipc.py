@@ -3,7 +3,7 @@
       u32 length of what follows    u8 kind    u8 bus    body          little-endian
 
 Both ends are the same version of this program, yet the body of a chunk comes from a line: whatever is malformed raises
-WireError, and nothing longer than LIMIT is ever held.
+IpcError, and nothing longer than LIMIT is ever held.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ LIMIT = 16 * 1024 * 1024
 """Longest message, octets."""
 
 
-class WireError(ValueError):
+class IpcError(ValueError):
     """Octets that are no message of this protocol."""
 
 
-class Kind(IntEnum):
+class IpcKind(IntEnum):
     """What a message is. The first group goes to the main process, the second comes from it."""
 
     HELLO = 1  # JSON: sessions, pid, priority
@@ -49,14 +49,14 @@ class Kind(IntEnum):
     TRIGGER = 37  # i64: when, ns; text: on what
 
 
-class Received(NamedTuple):
+class ReceivedMessage(NamedTuple):
     """Something that came from a bus (its index as given at the start), in order of time."""
 
     bus: int
     item: Item
 
 
-class Heard(NamedTuple):
+class HeardOctets(NamedTuple):
     """Reads of a bus, one or more, which follow one another."""
 
     bus: int
@@ -116,8 +116,8 @@ class Ended:
     at_end: bool = False
 
 
-Message = Received | Tick | Status | Ended
-Batch = Heard | Message
+Message = ReceivedMessage | Tick | Status | Ended
+Batch = HeardOctets | Message
 """What comes of many reads at a time."""
 
 
@@ -147,7 +147,7 @@ _LINE_KINDS = tuple(LineEventKind)
 _LINE_CODES = {kind: code for code, kind in enumerate(_LINE_KINDS)}
 
 
-def encode(kind: Kind, bus: int = 0, body: bytes = b"") -> bytes:
+def encode(kind: IpcKind, bus: int = 0, body: bytes = b"") -> bytes:
     """One message."""
     return _FRAME.pack(len(body) + 2, kind, bus) + body
 
@@ -157,13 +157,13 @@ def encode_item(bus: int, item: Item) -> bytes:
     if isinstance(item, Chunk):
         if not item.marks:
             octets = item.octets
-            return _FRAME.pack(len(octets) + 12, Kind.CHUNK, bus) + _CHUNK.pack(item.time, 0) + octets
+            return _FRAME.pack(len(octets) + 12, IpcKind.CHUNK, bus) + _CHUNK.pack(item.time, 0) + octets
         marks = item.marks[:0xFFFF]
         body = _CHUNK.pack(item.time, len(marks))
         body += b"".join(_MARK.pack(mark.offset, mark.error.value) for mark in marks)
-        return encode(Kind.CHUNK, bus, body + item.octets)
+        return encode(IpcKind.CHUNK, bus, body + item.octets)
     text = item.text.encode("utf-8", "replace")
-    return encode(Kind.LINE, bus, _LINE.pack(item.time, item.count, _LINE_CODES[item.kind]) + text)
+    return encode(IpcKind.LINE, bus, _LINE.pack(item.time, item.count, _LINE_CODES[item.kind]) + text)
 
 
 def encode_reads(bus: int, chunks: Sequence[Chunk]) -> bytes:
@@ -171,7 +171,9 @@ def encode_reads(bus: int, chunks: Sequence[Chunk]) -> bytes:
     count = len(chunks)
     times = struct.pack(f"<{count}q", *[chunk.time for chunk in chunks])
     lengths = struct.pack(f"<{count}I", *[len(chunk.octets) for chunk in chunks])
-    return encode(Kind.READS, bus, b"".join((_COUNT.pack(count), times, lengths, *[chunk.octets for chunk in chunks])))
+    return encode(
+        IpcKind.READS, bus, b"".join((_COUNT.pack(count), times, lengths, *[chunk.octets for chunk in chunks]))
+    )
 
 
 def gap_event(time: int, octets: int) -> LineEvent:
@@ -182,29 +184,29 @@ def gap_event(time: int, octets: int) -> LineEvent:
 
 
 def octets_in(kind: int, body: bytes) -> tuple[int, int]:
-    """Time (ns, of the first read) and number of the octets in the body of a CHUNK or of READS. Raises WireError."""
+    """Time (ns, of the first read) and number of the octets in the body of a CHUNK or of READS. Raises IpcError."""
     try:
-        if kind == Kind.READS:
+        if kind == IpcKind.READS:
             return _TICK.unpack_from(body, _COUNT.size)[0], max(0, len(body) - _octets_at(_COUNT.unpack_from(body)[0]))
         time, marks = _CHUNK.unpack_from(body)
     except struct.error as error:
-        raise WireError(f"message {kind}: {error}") from error
+        raise IpcError(f"message {kind}: {error}") from error
     return time, max(0, len(body) - _CHUNK.size - marks * _MARK.size)
 
 
 def encode_tick(bus: int, now: int) -> bytes:
     """A Tick."""
-    return encode(Kind.TICK, bus, _TICK.pack(now))
+    return encode(IpcKind.TICK, bus, _TICK.pack(now))
 
 
-def encode_json(kind: Kind, value: Any, bus: int = 0) -> bytes:
+def encode_json(kind: IpcKind, value: Any, bus: int = 0) -> bytes:
     """A message whose body is JSON."""
     return encode(kind, bus, json.dumps(value).encode())
 
 
 def encode_status(status: Status) -> bytes:
     """A Status."""
-    return encode_json(Kind.STATUS, asdict(status), status.bus)
+    return encode_json(IpcKind.STATUS, asdict(status), status.bus)
 
 
 def encode_derived(derived: Derived) -> bytes:
@@ -212,54 +214,54 @@ def encode_derived(derived: Derived) -> bytes:
     topic, schema = derived.topic.encode(), derived.schema_name.encode()
     metadata = json.dumps(derived.metadata).encode() if derived.metadata else b""
     head = _DERIVED.pack(derived.log_time, derived.publish_time, len(topic), len(schema), len(metadata))
-    return encode(Kind.DERIVED, derived.bus, head + topic + schema + metadata + derived.data)
+    return encode(IpcKind.DERIVED, derived.bus, head + topic + schema + metadata + derived.data)
 
 
 def encode_trigger(bus: int, time: int, text: str) -> bytes:
     """A trigger that fired at some time, ns."""
-    return encode(Kind.TRIGGER, bus, _TICK.pack(time) + text.encode("utf-8", "replace"))
+    return encode(IpcKind.TRIGGER, bus, _TICK.pack(time) + text.encode("utf-8", "replace"))
 
 
 def decode_trigger(body: bytes) -> tuple[int, str]:
-    """Its time and text. Raises WireError."""
+    """Its time and text. Raises IpcError."""
     if len(body) < _TICK.size:
-        raise WireError("a trigger without a time")
+        raise IpcError("a trigger without a time")
     return _TICK.unpack_from(body)[0], body[_TICK.size :].decode("utf-8", "replace")
 
 
 def encode_ended(reason: str, at_end: bool) -> bytes:
     """The end of a capture: see `Ended`."""
-    return encode(Kind.ENDED, 0, bytes((at_end,)) + reason.encode())
+    return encode(IpcKind.ENDED, 0, bytes((at_end,)) + reason.encode())
 
 
 def decode_message(kind: int, bus: int, body: bytes) -> Batch | None:
-    """A message to the main process; None for kinds that are not for it. Raises WireError."""
+    """A message to the main process; None for kinds that are not for it. Raises IpcError."""
     try:
-        if kind == Kind.READS:
-            return Heard(bus, _decode_reads(body))
-        if kind == Kind.CHUNK:
-            return Received(bus, _decode_chunk(body))
-        if kind == Kind.TICK:
+        if kind == IpcKind.READS:
+            return HeardOctets(bus, _decode_reads(body))
+        if kind == IpcKind.CHUNK:
+            return ReceivedMessage(bus, _decode_chunk(body))
+        if kind == IpcKind.TICK:
             return Tick(bus, _TICK.unpack(body)[0])
-        if kind == Kind.LINE:
+        if kind == IpcKind.LINE:
             time, count, code = _LINE.unpack_from(body)
             text = body[_LINE.size :].decode("utf-8", "replace")
-            return Received(bus, LineEvent(time, _LINE_KINDS[code], text, count))
-        if kind == Kind.STATUS:
+            return ReceivedMessage(bus, LineEvent(time, _LINE_KINDS[code], text, count))
+        if kind == IpcKind.STATUS:
             return Status(**decode_json(body))
-        if kind == Kind.ENDED:
+        if kind == IpcKind.ENDED:
             return Ended(body[1:].decode("utf-8", "replace"), at_end=body[0] == 1)
     except (struct.error, IndexError, TypeError, ValueError) as error:
-        raise WireError(f"message {kind}: {error}") from error
+        raise IpcError(f"message {kind}: {error}") from error
     return None
 
 
 def one_by_one(messages: Iterable[Batch]) -> Iterator[Message]:
     """The same with every read by itself."""
     for message in messages:
-        if isinstance(message, Heard):
+        if isinstance(message, HeardOctets):
             for chunk in message.block.chunks():
-                yield Received(message.bus, chunk)
+                yield ReceivedMessage(message.bus, chunk)
         else:
             yield message
 
@@ -277,12 +279,12 @@ def _decode_reads(body: bytes) -> Block:
     (count,) = _COUNT.unpack_from(body)
     begin = _octets_at(count)
     if not count or begin > len(body):
-        raise WireError(f"{count} reads in {len(body)} octets")
+        raise IpcError(f"{count} reads in {len(body)} octets")
     times = np.frombuffer(body, "<i8", count, _COUNT.size).astype(np.int64)
     lengths = np.frombuffer(body, "<u4", count, _COUNT.size + 8 * count).astype(np.int64)
     octets = np.frombuffer(body, np.uint8, offset=begin)
     if int(lengths.min()) < 1 or int(lengths.sum()) != len(octets):
-        raise WireError(f"reads of {int(lengths.sum())} octets, of which {len(octets)} came")
+        raise IpcError(f"reads of {int(lengths.sum())} octets, of which {len(octets)} came")
     return Block(plain_reads(octets, times, lengths))
 
 
@@ -296,7 +298,7 @@ def _decode_chunk(body: bytes) -> Chunk:
 
 
 def decode_derived(bus: int, body: bytes) -> Derived:
-    """A result on its way into the file. Raises WireError."""
+    """A result on its way into the file. Raises IpcError."""
     try:
         log_time, publish_time, *lengths = _DERIVED.unpack_from(body)
         parts = []
@@ -307,18 +309,18 @@ def decode_derived(bus: int, body: bytes) -> Derived:
         topic, schema = parts[0].decode(), parts[1].decode()
         metadata = {str(key): str(value) for key, value in decode_json(parts[2]).items()} if parts[2] else None
     except (struct.error, ValueError) as error:
-        raise WireError(f"result: {error}") from error
+        raise IpcError(f"result: {error}") from error
     return Derived(bus, topic, schema, log_time, publish_time, body[begin:], metadata)
 
 
 def decode_json(body: bytes) -> dict[str, Any]:
-    """A JSON object. Raises WireError."""
+    """A JSON object. Raises IpcError."""
     try:
         value = json.loads(body)
     except ValueError as error:
-        raise WireError(str(error)) from error
+        raise IpcError(str(error)) from error
     if not isinstance(value, dict):
-        raise WireError("not an object")
+        raise IpcError("not an object")
     return value
 
 
@@ -329,7 +331,7 @@ class MessageSplitter:
         self._held = bytearray()
 
     def feed(self, data: bytes) -> list[tuple[int, int, bytes]]:
-        """Complete messages as (kind, bus, body). Raises WireError on an impossible length."""
+        """Complete messages as (kind, bus, body). Raises IpcError on an impossible length."""
         self._held += data
         messages = []
         begin = 0
@@ -337,7 +339,7 @@ class MessageSplitter:
         while len(held) - begin >= _FRAME.size:
             length, kind, bus = _FRAME.unpack_from(held, begin)
             if not 2 <= length <= LIMIT:
-                raise WireError(f"a message of {length} octets")
+                raise IpcError(f"a message of {length} octets")
             end = begin + 4 + length
             if end > len(held):
                 break

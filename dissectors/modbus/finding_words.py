@@ -6,8 +6,6 @@ from collections.abc import Iterable
 from math import sqrt
 
 from dissectors.findings import Severity
-from dissectors.line import MS as MS
-from dissectors.line import NS_PER_S
 from dissectors.modbus.station_record import Key
 
 
@@ -26,21 +24,6 @@ def request_words(key: Key) -> str:
     """ "read holding registers from 0x2520"."""
     kind, address = key
     return kind.replace("-", " ") + (f" from 0x{address:04X}" if address is not None else "")
-
-
-def ms(duration: int) -> str:
-    """ns as "8.2 ms"."""
-    value = duration / MS
-    return f"{value:.0f} ms" if value >= 100 else f"{value:.1f} ms" if value >= 10 else f"{value:.2f} ms"
-
-
-def seconds(duration: int) -> str:
-    """ns as "2.1 s", or milliseconds, or minutes."""
-    if duration < NS_PER_S:
-        return ms(duration)
-    if duration < 120 * NS_PER_S:
-        return f"{duration / NS_PER_S:.2f} s"
-    return f"{duration / (60 * NS_PER_S):.0f} min"
 
 
 def units(units: Iterable[int]) -> str:

@@ -1,4 +1,4 @@
-"""What was remembered of one Modbus station, judged and put into words. Pure."""
+"""The rules of one Modbus station, in words. Pure: `StationRecord` in, findings out."""
 
 from __future__ import annotations
 
@@ -8,12 +8,14 @@ from itertools import pairwise
 
 from dissectors.findings import Finding, Severity, Tally, counted, found, times
 from dissectors.frame import Flaw
-from dissectors.modbus.evidence import Evidence
+from dissectors.line import MS
+from dissectors.modbus.bus_record import BusRecord
+from dissectors.modbus.finding_words import note_if, request_words, wilson
 from dissectors.modbus.functions import EXCEPTIONS as EXCEPTION_NAMES
-from dissectors.modbus.judgement_words import MS, ms, note_if, request_words, seconds, wilson
-from dissectors.modbus.response_groups import Answered
+from dissectors.modbus.response_groups import AnsweredRequest
 from dissectors.modbus.rules import EXCEPTIONS, MAKER_EXCEPTION, RULES, USED_ALIKE, VENDOR_EXCEPTION
-from dissectors.modbus.station_record import Key, Requested, Station, middle
+from dissectors.modbus.station_record import Key, Requested, StationRecord, middle
+from dissectors.words import duration, fine_milliseconds
 
 SILENT_AT_END = 5
 """Unanswered requests in a row to the end, from which on a station that used to answer has fallen silent."""
@@ -35,7 +37,9 @@ _REPEATS_COST = 0.02
 _REPEATS_LEAST = 3  # fewer are no habit, however short the capture
 
 
-def of_station(seen: Evidence, unit: int, station: Station, timeout: int | None, is_common: bool) -> Iterator[Finding]:
+def of_station(
+    seen: BusRecord, unit: int, station: StationRecord, timeout: int | None, is_common: bool
+) -> Iterator[Finding]:
     name = f"station {unit}"
     yield from _missing(seen, name, unit, station)
     foreign = _foreign(seen, name, station)
@@ -65,7 +69,7 @@ def of_station(seen: Evidence, unit: int, station: Station, timeout: int | None,
         )
 
 
-def _missing(seen: Evidence, name: str, unit: int, station: Station) -> Iterator[Finding]:
+def _missing(seen: BusRecord, name: str, unit: int, station: StationRecord) -> Iterator[Finding]:
     missing = station.missing
     if not missing.count:
         return
@@ -84,7 +88,7 @@ def _missing(seen: Evidence, name: str, unit: int, station: Station) -> Iterator
     silent = station.silent
     if silent.count >= SILENT_AT_END and station.answered and station.last_heard is not None:
         since = seen.now - station.last_heard
-        words = f"no answer to its last {silent.count} requests; last heard {seconds(since)} before the end"
+        words = f"no answer to its last {silent.count} requests; last heard {duration(since)} before the end"
         yield silent.found(RULES["MB003"], name, words)
     ignored = [(key, request) for key, request in sorted(station.requests.items(), key=str) if _is_ignored(request)]
     if station.answered >= 3 and silent.count < SILENT_AT_END:
@@ -107,7 +111,7 @@ _RARELY = 20
 """Of so many requests at most one may be answered by a copy that a late read made of its repeat."""
 
 
-def is_absent(station: Station) -> bool:
+def is_absent(station: StationRecord) -> bool:
     """Whether no good frame ever came from it, and no more than stray damage in place of answers."""
     # a late read puts the repeat of a write where its answer would be
     answered = station.answered - (station.copies if _RARELY * station.copies <= station.asked else 0)
@@ -119,7 +123,7 @@ def _is_ignored(request: Requested) -> bool:
     return request.turns >= 3 and request.missing.count == request.tries
 
 
-def _damaged(seen: Evidence, name: str, station: Station, is_common: bool) -> Iterator[Finding]:
+def _damaged(seen: BusRecord, name: str, station: StationRecord, is_common: bool) -> Iterator[Finding]:
     damaged, ends = station.damaged, station.last_octet
     if not damaged.count or is_absent(station):
         return
@@ -149,7 +153,7 @@ def _damaged(seen: Evidence, name: str, station: Station, is_common: bool) -> It
     yield damaged.found(RULES["MB005"], name, words, note_if(rare or is_common))
 
 
-def _twice(name: str, station: Station, words: str, slow: bool) -> Finding:
+def _twice(name: str, station: StationRecord, words: str, slow: bool) -> Finding:
     """Two different answers are two stations'; the same octets again may be a converter's, or one station's."""
     twice, rule = station.twice, RULES["MB201"]
     different = twice.count - station.same_twice
@@ -162,7 +166,7 @@ def _twice(name: str, station: Station, words: str, slow: bool) -> Finding:
     return replace(twice.found(rule, name, words, severity), means=means)
 
 
-def _flawed(seen: Evidence, name: str, station: Station) -> Iterator[Finding]:
+def _flawed(seen: BusRecord, name: str, station: StationRecord) -> Iterator[Finding]:
     """Damage of one kind that most damaged answers of a station share."""
     by_code: dict[str, list[tuple[Flaw, Tally]]] = {}
     for flaw, tally in station.flaws.items():
@@ -178,7 +182,7 @@ def _flawed(seen: Evidence, name: str, station: Station) -> Iterator[Finding]:
         yield replace(tally.found(RULES[code], name, words, note_if(seen.rare(count, station.asked))), count=count)
 
 
-def _foreign(seen: Evidence, name: str, station: Station) -> Finding | None:
+def _foreign(seen: BusRecord, name: str, station: StationRecord) -> Finding | None:
     """Octets in place of answers that are always the same, or those of another baud rate."""
     garbage = station.garbage
     same, factor = garbage.always(), garbage.slower_by()
@@ -210,7 +214,7 @@ def _hex(octets: bytes) -> str:
     return octets[:_HEX_SHOWN].hex(" ").upper() + (" …" if len(octets) > _HEX_SHOWN else "")
 
 
-def _exception(name: str, station: Station, key: Key, code: int, tally: Tally, maker: str) -> Finding:
+def _exception(name: str, station: StationRecord, key: Key, code: int, tally: Tally, maker: str) -> Finding:
     """`maker`: what the manual of the device says of the code; it stands before the standard."""
     otherwise = MAKER_EXCEPTION if maker else VENDOR_EXCEPTION
     severity, means, following = otherwise if maker and code not in USED_ALIKE else EXCEPTIONS.get(code, otherwise)
@@ -222,13 +226,15 @@ def _exception(name: str, station: Station, key: Key, code: int, tally: Tally, m
     return replace(tally.found(RULES["MB008"], name, words, severity), means=means, next=following)
 
 
-def _times(name: str, station: Station, timeout: int | None, seen: Evidence, is_common: bool) -> Iterator[Finding]:
+def _times(
+    name: str, station: StationRecord, timeout: int | None, seen: BusRecord, is_common: bool
+) -> Iterator[Finding]:
     times_, slow = station.times, station.slow
     if slow.count >= 3 and 100 * slow.count >= station.slow_of:
         since = "" if station.slow_of == station.answered else " since the timeout is known"
-        against = "500 ms" if timeout is None else f"70% of the master's timeout of {ms(timeout)}"
+        against = "500 ms" if timeout is None else f"70% of the master's timeout of {fine_milliseconds(timeout)}"
         words = f"{slow.count} of {counted(station.slow_of, 'answer')}{since} took longer than {against}"
-        words += f", the longest at least {ms(times_.longest)}"
+        words += f", the longest at least {fine_milliseconds(times_.longest)}"
         yield slow.found(RULES["MB101"], name, words, note_if(timeout is None))
     quarters = times_.quarters()
     if quarters:
@@ -236,13 +242,14 @@ def _times(name: str, station: Station, timeout: int | None, seen: Evidence, is_
         rises = all(20 * b.nominal >= 19 * a.nominal for a, b in pairwise(quarters))
         quickest_too = 2 * (last.least - first.least) > last.nominal - first.nominal  # not only more of a second kind
         if rises and quickest_too and 2 * last.low > 3 * first.high and last.low - first.high > 5 * MS:
-            words = f"median response time rose from {ms(first.nominal)} to {ms(last.nominal)}"
+            rose = f"from {fine_milliseconds(first.nominal)} to {fine_milliseconds(last.nominal)}"
+            words = f"median response time rose {rose}"
             yield found(
                 RULES["MB102"], name, words, first=seen.first or 0, last=station.last_heard or 0, count=times_.count
             )
     if station.late.count:
         words = f"{counted(station.late.count, 'answer')} came after the master had given up"
-        waits = f"; it waits {ms(timeout)}" if timeout is not None else ""
+        waits = f"; it waits {fine_milliseconds(timeout)}" if timeout is not None else ""
         yield station.late.found(
             RULES["MB103"], name, words + waits, note_if(seen.rare(station.late.count, station.asked))
         )
@@ -250,13 +257,13 @@ def _times(name: str, station: Station, timeout: int | None, seen: Evidence, is_
         share = station.repeats_cost / seen.span
         words = (
             f"{counted(station.repeats.count, 'request')} sent again; each cost the time that the master had waited: "
-            f"{seconds(station.repeats_cost)} in all, {share:.1%} of the time of the bus"
+            f"{duration(station.repeats_cost)} in all, {share:.1%} of the time of the bus"
         )
         costly = share > _REPEATS_COST and station.repeats.count >= _REPEATS_LEAST and not is_common
         yield station.repeats.found(RULES["MB104"], name, words, Severity.WARNING if costly else None)
 
 
-def _two_times(name: str, station: Station) -> Iterator[Finding]:
+def _two_times(name: str, station: StationRecord) -> Iterator[Finding]:
     """Two groups of response times to the same request, of the request that shows them best."""
     found_ = [(key, groups) for (key, _), same in station.same.items() if (groups := same.groups()) is not None]
     if not found_:
@@ -281,7 +288,7 @@ def _two_times(name: str, station: Station) -> Iterator[Finding]:
     yield replace(finding, first=everything[0], last=everything[-1], count=len(everything))
 
 
-def _range(answers: Sequence[Answered]) -> str:
+def _range(answers: Sequence[AnsweredRequest]) -> str:
     """Where the times of a group lie, from the shortest to the longest nominal reading."""
-    least, most = ms(answers[0].latency.nominal), ms(answers[-1].latency.nominal)
+    least, most = fine_milliseconds(answers[0].latency.nominal), fine_milliseconds(answers[-1].latency.nominal)
     return least if least == most else f"{least} to {most}"

@@ -5,8 +5,8 @@ import socket
 import pytest
 
 from dissectors.frame import Chunk
-from sniff.capture.outlet import AT_ONCE, Outlet
-from sniff.capture.wire import MessageSplitter, Received, decode_message, encode_tick, one_by_one
+from sniff.capture.ipc import MessageSplitter, ReceivedMessage, decode_message, encode_tick, one_by_one
+from sniff.capture.ipc_sender import AT_ONCE, IpcSender
 from sniff.engine.session import LineEvent, LineEventKind
 
 
@@ -31,7 +31,7 @@ def receive(there: socket.socket) -> list[object]:
 
 def test_a_reader_that_does_not_read_never_blocks_nor_grows_memory(pair) -> None:
     here, there = pair
-    outlet = Outlet(here, 2, backlog=50_000)
+    outlet = IpcSender(here, 2, backlog=50_000)
     sent = 0
     for number in range(20_000):
         outlet.item(number % 2, Chunk(number, bytes(100)))
@@ -43,14 +43,14 @@ def test_a_reader_that_does_not_read_never_blocks_nor_grows_memory(pair) -> None
     got = 0
     for _ in range(100):
         outlet.flush()
-        got += sum(len(message.item.octets) for message in receive(there) if isinstance(message, Received))
+        got += sum(len(message.item.octets) for message in receive(there) if isinstance(message, ReceivedMessage))
     assert got + sum(outlet.dropped) == sent
     assert min(outlet.dropped) > 0
 
 
 def test_a_gap_is_told_where_it_was(pair) -> None:
     here, there = pair
-    outlet = Outlet(here, 1, backlog=1000)
+    outlet = IpcSender(here, 1, backlog=1000)
     for number in range(100):
         outlet.item(0, Chunk(number, bytes(50)))
     outlet.flush()
@@ -66,7 +66,7 @@ def test_a_gap_is_told_where_it_was(pair) -> None:
 
 def test_a_reader_that_is_gone_costs_nothing(pair) -> None:
     here, there = pair
-    outlet = Outlet(here, 1)
+    outlet = IpcSender(here, 1)
     there.close()
     for _ in range(10):
         outlet.item(0, Chunk(1, bytes(100)))
@@ -79,10 +79,10 @@ def test_a_reader_that_is_gone_costs_nothing(pair) -> None:
 
 def test_of_a_long_backlog_only_what_is_sent_at_once_is_joined(pair, monkeypatch: pytest.MonkeyPatch) -> None:
     here, _ = pair
-    outlet = Outlet(here, 1, backlog=10**9)
+    outlet = IpcSender(here, 1, backlog=10**9)
     joined: list[int] = []
-    whole = Outlet._next_parts
-    monkeypatch.setattr(Outlet, "_next_parts", lambda self: joined.append(len(parts := whole(self))) or parts)
+    whole = IpcSender._next_parts
+    monkeypatch.setattr(IpcSender, "_next_parts", lambda self: joined.append(len(parts := whole(self))) or parts)
     for number in range(6000):
         outlet.item(0, Chunk(number, bytes(1000)))
         if number % 100 == 0:

@@ -8,7 +8,7 @@ import time
 from collections import deque
 
 from dissectors.frame import Chunk
-from sniff.capture.wire import A_READ, encode_item, encode_reads, gap_event
+from sniff.capture.ipc import A_READ, encode_item, encode_reads, gap_event
 from sniff.engine.session import Item
 
 BACKLOG = 2 * 1024 * 1024
@@ -22,7 +22,7 @@ TOGETHER = 64 * 1024
 """Octets of reads of one bus that become one message."""
 
 
-class Outlet:
+class IpcSender:
     """Sends messages over a connection; reads of a bus that follow one another go together. `dropped[bus]`: octets of
     the line that were not sent; `gathered`: octets of messages since the last `flush`."""
 

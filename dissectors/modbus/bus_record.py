@@ -1,4 +1,4 @@
-"""What was seen on a Modbus line as a whole: what `findings.py` gathers and `judgement.py` judges."""
+"""The record of a Modbus line as a whole: what `observer.py` gathers and `rules_bus.py` judges."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from dissectors.findings import Tally
 from dissectors.frame import Flaw
 from dissectors.line import NS_PER_S, Timing
-from dissectors.modbus.station_record import Cycles, Station
+from dissectors.modbus.station_record import Cycles, StationRecord
 
 _SENDERS_KEPT = 300
 _SCAN_LEAST = 4
@@ -25,7 +25,7 @@ def _no_words(unit: int, code: int) -> str:
 
 
 @dataclass(slots=True)
-class Evidence:
+class BusRecord:
     """What was seen on the bus. Times are ns.
 
     `hasty`: requests after another that nothing had followed: (longest reading of the silence between, unit asked
@@ -46,7 +46,7 @@ class Evidence:
     requests: int = 0
     answers: int = 0
     echoes: int = 0
-    stations: dict[int, Station] = field(default_factory=dict)
+    stations: dict[int, StationRecord] = field(default_factory=dict)
     damaged_requests: Tally = field(default_factory=Tally)
     unasked: Tally = field(default_factory=Tally)
     asked_twice: Tally = field(default_factory=Tally)

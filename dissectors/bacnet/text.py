@@ -15,7 +15,7 @@ from dissectors.bacnet.header import error_text
 from dissectors.bacnet.limits import BROADCAST
 from dissectors.bacnet.message import Message
 from dissectors.bacnet.station_address import remote
-from dissectors.bacnet.values import Record, escape, show, show_tag
+from dissectors.bacnet.values import ConstructedValue, escape, show, show_tag
 from dissectors.frame import Assembly, Frame, Header, Role
 from dissectors.meaning import Meaning
 
@@ -166,13 +166,13 @@ def parameters_text(apdu: Apdu, decoded: Decoded) -> str:
     return line.strip()
 
 
-def reference(record: Record) -> str:
+def reference(record: ConstructedValue) -> str:
     """`present-value` or `object-list[3]` from a record with a property identifier."""
     index = record.get("property-array-index")
     return f"{record['property-identifier']}" + (f"[{index}]" if index is not None else "")
 
 
-def _property(record: Record) -> str:
+def _property(record: ConstructedValue) -> str:
     line = f"{record['object-identifier']} {reference(record)}"
     if "property-value" in record:
         line += f" = {_value(record['property-value'])}"
@@ -185,7 +185,7 @@ def _value(value: Any) -> str:
     return show(value)
 
 
-def _read_multiple(record: Record) -> str:
+def _read_multiple(record: ConstructedValue) -> str:
     if "list-of-read-access-specs" in record:
         return "; ".join(
             f"{spec['object-identifier']} {', '.join(reference(item) for item in spec['list-of-property-references'])}"
@@ -197,7 +197,7 @@ def _read_multiple(record: Record) -> str:
     )
 
 
-def _result(item: Record) -> str:
+def _result(item: ConstructedValue) -> str:
     ((kind, value),) = item["read-result"].entries
     shown = _value(value)
     if kind == "property-access-error":
@@ -205,7 +205,7 @@ def _result(item: Record) -> str:
     return f"{reference(item)}={shown}"
 
 
-def _write_multiple(record: Record) -> str:
+def _write_multiple(record: ConstructedValue) -> str:
     return "; ".join(
         f"{spec['object-identifier']} "
         + ", ".join(f"{reference(item)}={_value(item['value'])}" for item in spec["list-of-properties"])
@@ -213,19 +213,19 @@ def _write_multiple(record: Record) -> str:
     )
 
 
-def _who_is(record: Record) -> str:
+def _who_is(record: ConstructedValue) -> str:
     low = record.get("device-instance-range-low-limit")
     return "all" if low is None else f"{low}…{record['device-instance-range-high-limit']}"
 
 
-def _i_am(record: Record) -> str:
+def _i_am(record: ConstructedValue) -> str:
     return (
         f"{record['i-am-device-identifier']} vendor {record['vendor-id']} "
         f"max-apdu {record['max-apdu-length-accepted']} {record['segmentation-supported']}"
     )
 
 
-def _cov(record: Record) -> str:
+def _cov(record: ConstructedValue) -> str:
     values = ", ".join(f"{reference(item)}={_value(item['value'])}" for item in record["list-of-values"])
     return (
         f"{record['initiating-device-identifier']} {record['monitored-object-identifier']} {values} "

@@ -8,15 +8,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dissectors.frame import Chunk, LineError, Mark
-from sniff.capture import wire
-from sniff.capture.wire import (
+from sniff.capture import ipc
+from sniff.capture.ipc import (
     Derived,
-    Kind,
+    IpcError,
+    IpcKind,
     MessageSplitter,
-    Received,
+    ReceivedMessage,
     Status,
     Tick,
-    WireError,
     decode_derived,
     decode_message,
     encode_derived,
@@ -47,27 +47,27 @@ def test_items_cross_unchanged_in_any_cut(sent, cuts) -> None:
     received = [
         decode_message(*message) for begin, end in pairwise(bounds) for message in splitter.feed(stream[begin:end])
     ]
-    assert received == [Received(bus, item) for bus, item in sent]
+    assert received == [ReceivedMessage(bus, item) for bus, item in sent]
 
 
 def test_text_that_is_no_unicode_crosses() -> None:
     (message,) = MessageSplitter().feed(encode_item(0, LineEvent(1, LineEventKind.NOTE, "\udcff")))
-    assert decode_message(*message) == Received(0, LineEvent(1, LineEventKind.NOTE, "?"))
+    assert decode_message(*message) == ReceivedMessage(0, LineEvent(1, LineEventKind.NOTE, "?"))
 
 
 def test_the_other_messages() -> None:
     status = Status(3, "night.mcap", 10, 20, 30, 40, "normal", "disk full")
-    stream = encode_tick(2, -5) + encode_status(status) + wire.encode_ended("stopped", at_end=False)
+    stream = encode_tick(2, -5) + encode_status(status) + ipc.encode_ended("stopped", at_end=False)
     tick, told, ended = (decode_message(*message) for message in MessageSplitter().feed(stream))
     assert (tick, told) == (Tick(2, -5), status)
-    assert ended == wire.Ended("stopped")
+    assert ended == ipc.Ended("stopped")
 
 
 @given(st.text(max_size=20), st.binary(max_size=50), st.one_of(st.none(), st.just({"unit": "°C"})))
 def test_results_cross(topic, data, metadata) -> None:
     derived = Derived(1, topic, "sniff485.Value", 5, 4, data, metadata)
     ((kind, bus, body),) = MessageSplitter().feed(encode_derived(derived))
-    assert kind == Kind.DERIVED
+    assert kind == IpcKind.DERIVED
     assert decode_derived(bus, body) == derived
 
 
@@ -77,19 +77,19 @@ def test_reads_cross_together(reads) -> None:
     (message,) = MessageSplitter().feed(encode_reads(3, chunks))
     kind, _, body = message
     assert octets_in(kind, body) == (chunks[0].time, sum(len(chunk.octets) for chunk in chunks))
-    assert list(one_by_one([decode_message(*message)])) == [Received(3, chunk) for chunk in chunks]
+    assert list(one_by_one([decode_message(*message)])) == [ReceivedMessage(3, chunk) for chunk in chunks]
 
 
 @pytest.mark.parametrize("body", [b"", bytes(4), b"\1" + bytes(15), b"\1" + bytes(20), b"\xff" * 40])
 def test_reads_that_do_not_add_up_are_refused(body) -> None:
-    with pytest.raises(WireError):
-        decode_message(Kind.READS, 0, body)
+    with pytest.raises(IpcError):
+        decode_message(IpcKind.READS, 0, body)
 
 
 @given(st.integers(0, 255), st.integers(0, 255), st.binary(max_size=60))
 def test_malformed_messages_are_refused_not_crashed_on(kind, bus, body) -> None:
     for decode in (lambda: decode_message(kind, bus, body), lambda: decode_derived(bus, body)):
-        with contextlib.suppress(WireError):
+        with contextlib.suppress(IpcError):
             decode()
 
 
@@ -97,12 +97,12 @@ def test_malformed_messages_are_refused_not_crashed_on(kind, bus, body) -> None:
 def test_any_stream_is_cut_or_refused(stream) -> None:
     try:
         cut = MessageSplitter().feed(stream)
-    except WireError:
+    except IpcError:
         return
     assert sum(6 + len(body) for _, _, body in cut) <= len(stream)
 
 
 def test_impossible_lengths_are_refused_before_memory_is_taken() -> None:
-    for length in (0, 1, wire.LIMIT + 1, 0xFFFFFFFF):
-        with pytest.raises(WireError):
+    for length in (0, 1, ipc.LIMIT + 1, 0xFFFFFFFF):
+        with pytest.raises(IpcError):
             MessageSplitter().feed(length.to_bytes(4, "little") + b"\x03\x00")
