@@ -11,6 +11,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from threading import Thread
 
 import pytest
 
@@ -294,6 +295,27 @@ def test_buses_that_record_nothing(days: list[BusDay]) -> None:
     text = "\n".join(page(found))
     assert "nothing was heard on 2026-03-07, 2026-03-08" in text
     assert "no capture since 2026-03-04, while other buses go on" in text
+
+
+def test_two_runs_at_once_do_not_harm_the_index(tmp_path: Path) -> None:
+    """Both read, both keep what they found, and each sees all of it afterwards."""
+    path = tmp_path / "x.sqlite"
+    tasks = [Task("site", (FileState(f"{number}.mcap", 1, 1),), "n2") for number in range(30)]
+
+    def run(mine: list[Task]) -> None:
+        index = Index(path)
+        for task in mine:
+            index.put(task, [])
+            index.flush()
+        index.say(["something"])
+
+    threads = [Thread(target=run, args=(tasks[at::2] + tasks[:3],)) for at in (0, 1)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert all(found is not None for _, found in Index(path).known(tasks))
+    assert Index(path).said_before() == {"something"}
 
 
 def test_what_is_known_of_a_file_is_forgotten_when_it_changes(made: Made, tmp_path: Path) -> None:
