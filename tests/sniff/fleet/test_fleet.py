@@ -35,7 +35,7 @@ from sniff.fleet.html import page as html_page
 from sniff.fleet.index import Index
 from sniff.fleet.reading import read_task
 from sniff.fleet.text import page
-from sniff.fleet.values import as_values
+from sniff.fleet.values import COLUMNS, as_values, rows
 from sniff.formats import read
 from sniff.recording.rotation import Rotation
 from sniff.recording.writer import SharedFile
@@ -226,6 +226,15 @@ def test_the_pages_say_it(days: list[BusDay]) -> None:
     links = re.findall('href="#(bus[0-9]+)"', html)
     assert len(links) >= 6
     assert all(f'id="{link}"' in html for link in links)
+
+
+def test_the_table_has_stations_that_are_there_and_what_is_wrong(days: list[BusDay]) -> None:
+    table = [dict(zip(COLUMNS, row, strict=True)) for row in rows(whole(days))]
+    ring = {row["station"] for row in table if row["protocol"] == "mstp"} - {None}
+    assert ring
+    assert len(ring) < 10  # of 128 that are polled for
+    ill = {row["bus"] for row in table if row["findings"]}
+    assert ill == {bus.bus for bus in answer(whole(days)).buses if bus.troubles}
 
 
 def test_hostile_names_are_inert(days: list[BusDay]) -> None:
