@@ -90,8 +90,11 @@ class Meaning:
         if self.profile is None:
             return ""
         titles: list[str] = []
-        for one in self.asked:
+        for one, more in _runs(self.profile, self.asked):
             entry = self.profile.at(one.space, one.address)
+            if entry is not None and more is not None:
+                titles.append(f"{entry.title.removesuffix(f' {entry.name}')}s {entry.name} … {more.name}")
+                continue
             lacks = self.profile.lacks(one.space, one.part)
             if lacks or (entry is not None and not entry.reserved):
                 title = brief_title(entry) if entry is not None else f"{one.space} {one.address}"
@@ -193,3 +196,36 @@ def _parts(entry: Entry, values: Sequence[Value]) -> tuple[tuple[str, str], ...]
 def plain_place(reading: Reading, number: str, offset: int) -> str:
     """The place of what has a kind and a number: `AI 3`, `analog-value 1 units`."""
     return f"{reading.space} {reading.address} {reading.part.replace('.', ' ')}".rstrip()
+
+
+RUN = 3
+"""So many parameters of a group without words of their own, one behind the other, are said as a span."""
+
+
+def _runs(profile: Profile, asked: Sequence[Reading]) -> Iterator[tuple[Reading, Entry | None]]:
+    """The places that are asked for; of a run of parameters that have but a number, the first with the last entry."""
+    at = 0
+    while at < len(asked):
+        end = at + 1
+        first = _nameless(profile, asked[at])
+        while first is not None and end < len(asked) and _follows(asked[end - 1], asked[end]):
+            entry = _nameless(profile, asked[end])
+            if entry is None or entry.title.removesuffix(entry.name) != first.title.removesuffix(first.name):
+                break
+            end += 1
+        if end - at < RUN:
+            yield asked[at], None
+            at += 1
+        else:
+            yield asked[at], profile.at(asked[end - 1].space, asked[end - 1].address)
+            at = end
+
+
+def _nameless(profile: Profile, one: Reading) -> Entry | None:
+    """The parameter there, where its title is its number."""
+    entry = profile.at(one.space, one.address)
+    return entry if entry is not None and not one.part and entry.title.endswith(f" {entry.name}") else None
+
+
+def _follows(before: Reading, one: Reading) -> bool:
+    return (before.space, before.address + 1) == (one.space, one.address)

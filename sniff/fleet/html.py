@@ -9,7 +9,7 @@ from sniff.analysis.plain import plain
 from sniff.fleet.answer import Answer, Bus, Day
 from sniff.fleet.bus_day import NO_DATE
 from sniff.fleet.drift import Drift
-from sniff.fleet.text import change_words, silence_words, sure_words, trouble_words
+from sniff.fleet.text import WELL, change_words, silence_words, sure_words, trouble_words
 
 _STYLE = """
 body{font:15px/1.45 system-ui,sans-serif;color:#1c2733;max-width:72rem;margin:2rem auto;padding:0 1rem}
@@ -18,7 +18,7 @@ td.n,th.n{text-align:right;font-variant-numeric:tabular-nums}h2{margin-top:2.2re
 .bad{color:#b3261e;font-weight:600}.fair{color:#8a5200;font-weight:600}.well{color:#2d6a3f}ul{margin:.4rem 0}
 .grey{color:#5b6773}svg{display:block}
 """
-_GOOD, _FAIR = 90, 60
+_FAIR = 60
 
 
 def page(found: Answer, title: str = "Fieldbus archive") -> str:
@@ -38,7 +38,7 @@ def _parts(found: Answer, title: str) -> Iterator[str]:
         yield from _line(number, bus)
     yield "</table>"
     for number, bus in enumerate(found.buses):
-        if bus.is_ill or bus.changes or bus.notes or bus.missing:
+        if _is_told(bus):
             yield from _bus(number, bus)
     if found.gone:
         yield "<h2>Gone since the run before</h2><ul>"
@@ -48,13 +48,22 @@ def _parts(found: Answer, title: str) -> Iterator[str]:
         yield "".join(f"<li>{_safe(path)}: {_safe(why)}" for path, why in found.unreadable.items()) + "</ul>"
 
 
+def _is_told(bus: Bus) -> bool:
+    """Whether there is more to say of a bus than its line does."""
+    return bool(bus.is_ill or bus.changes or bus.notes or bus.missing)
+
+
 def _line(number: int, bus: Bus) -> Iterator[str]:
     day = bus.worst
     response = day.response.quantile(0.95)
     late = f"{response / 1e6:.1f}" if response is not None else "–"
-    codes = ", ".join(dict.fromkeys(one.finding.code for one in bus.troubles)) or "–"
+    codes = ", ".join(dict.fromkeys(one.finding.code for one in bus.troubles))
+    if not codes:
+        codes = f"none: {'; '.join(day.health.reasons)}" if day.health.score < WELL else "–"
+    name = _safe(bus.name)
+    linked = f'<a href="#bus{number}">{name}</a>' if _is_told(bus) else name
     yield (
-        f'<tr><td><a href="#bus{number}">{_safe(bus.name)}</a> <span class=grey>{_safe(bus.protocol)}</span>'
+        f"<tr><td>{linked} <span class=grey>{_safe(bus.protocol)}</span>"
         f'<td class="n {_class(day.health.score)}">{day.health.score}<td>{_picture(bus)}'
         f"<td class=n>{day.load:.0%}<td class=n>{day.damaged:.2%}<td class=n>{day.unanswered:.2%}"
         f"<td class=n>{late}<td>{_safe(codes)}</tr>"
@@ -93,7 +102,7 @@ def _drift(one: Drift, noun: str) -> str:
     return (
         f"<tr><td>{_safe(noun)} {one.station}"
         f'<td><svg role=img width="{8 * len(times)}" height="26"><title>{_safe(said)}</title>{bars}</svg>'
-        f"<td class=n>{one.before / 1e6:.1f}<td class=n>{one.after / 1e6:.1f}<td class=n>{30 * one.slope / 1e6:+.1f}"
+        f"<td class=n>{one.before / 1e6:.3g}<td class=n>{one.after / 1e6:.3g}<td class=n>{30 * one.slope / 1e6:+.2g}"
         f"<td>{_safe(sure_words(one))}</tr>"
     )
 
@@ -113,7 +122,7 @@ def _bar(place: int, day: Day) -> str:
 
 
 def _class(score: int) -> str:
-    return "well" if score >= _GOOD else "fair" if score >= _FAIR else "bad"
+    return "well" if score >= WELL else "fair" if score >= _FAIR else "bad"
 
 
 def _safe(text: str) -> str:

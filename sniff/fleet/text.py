@@ -19,6 +19,9 @@ TROUBLES = 4
 WELL = 90
 """Health below which the reasons are given where no finding does."""
 
+CHANCE = 0.5
+"""Where days in any order rise or fall as steadily so often, there is no drift to be sure of."""
+
 DAYS = 10
 """Of the curve, so that a line fits 80 columns with a name of some length; the pages have more."""
 
@@ -133,10 +136,11 @@ def change_words(change: StationChange, noun: str) -> str:
 
 def sure_words(drift: Drift) -> str:
     """How sure a drift is: "sure: 1 in 1000 by chance"."""
+    if drift.chance > CHANCE:
+        return "no drift"
     if drift.sure is Sure.UNSURE and len(drift.medians) < 5:
         return f"{len(drift.medians)} days: too few to be sure"
-    odds = 1 / max(drift.chance, 1e-6)
-    return f"{drift.sure.value}: 1 in {odds:.0f} by chance" if odds >= 2 else f"{drift.sure.value}: as by chance"
+    return f"{drift.sure.value}: 1 in {1 / max(drift.chance, 1e-6):.0f} by chance"
 
 
 def silence_words(bus: Bus) -> str | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
+from dissectors.findings import Severity
 from dissectors.histogram import Histogram
 from sniff.fleet.answer import Answer, Bus, Day
 from sniff.fleet.bus_day import Archive
@@ -28,13 +29,14 @@ COLUMNS: dict[str, Kind] = {
     "response_max_ms": Kind.NUMBER,
     "findings": Kind.TEXT,
 }
-"""Of the table: a row for each bus and day (station empty) and for each station of it."""
+"""Of the table: a row for each bus and day (station empty) and for each station of it; findings that are warnings or
+errors."""
 
 
 def rows(archive: Archive) -> Iterator[tuple[Any, ...]]:
     """The table, ordered by site, bus, day, station."""
     for _, day in sorted(archive.days.items()):
-        found, summary = day.findings, day.summary
+        found, summary = [one for one in day.findings if one.severity >= Severity.WARNING], day.summary
         health = day.health(found)
         head = (day.site, day.bus, day.protocol, day.day)
         asked = sum(node.asked for node in summary.nodes)
@@ -42,7 +44,7 @@ def rows(archive: Archive) -> Iterator[tuple[Any, ...]]:
         codes = sorted({finding.code for finding in found})
         yield (*head, None, health.bus.score, day.load, summary.frames, summary.damaged, asked, unanswered,
                *_times(summary.latency), " ".join(codes))  # fmt: skip
-        for node in sorted(summary.nodes, key=lambda one: one.address):
+        for node in sorted(summary.nodes.present(), key=lambda one: one.address):
             score = health.stations.get(node.address)
             codes = sorted({one.code for one in found if one.about.station == node.address})
             yield (*head, node.address, score.score if score is not None else None, None, node.sent, node.damaged,

@@ -89,6 +89,14 @@ def test_every_register_of_a_read_has_its_name_and_octets(tmp_path: Path) -> Non
     assert [(field.begin, field.end) for field in first.children[:2]] == [(3, 5), (5, 7)]
 
 
+def test_parameters_that_have_but_a_number_are_said_as_a_span(tmp_path: Path) -> None:
+    _, lines = modbus(tmp_path, ("0303 0000 0014", "0303 0012 0002", "0303 2524 0001"), E510)
+    assert lines[0] == "3 ← read parameters 00-00 … 00-19 — holding 0x0000 ×20"
+    assert lines[1].startswith("3 ← read parameter 00-18, parameter 00-19 — ")
+    rows, _ = modbus(tmp_path, ("0303 0000 0014",), E510)
+    assert tree(rows[0])["Register 0013h (wire 0x0013)"] == "parameter 00-19"  # the tree has each
+
+
 def test_without_a_profile_registers_have_their_numbers(tmp_path: Path) -> None:
     rows, lines = modbus(tmp_path, (*READ_16, "0101 0010 000a", "0101 02 5501"), Devices())
     assert lines[1] == "3 → 16 registers: 1 8 15 22 29 36 43 50 57 64 … +6"

@@ -11,6 +11,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from threading import Thread
 
 import pytest
 
@@ -34,13 +35,13 @@ from sniff.fleet.html import page as html_page
 from sniff.fleet.index import Index
 from sniff.fleet.reading import read_task
 from sniff.fleet.text import page
-from sniff.fleet.values import as_values
+from sniff.fleet.values import COLUMNS, as_values, rows
 from sniff.formats import read
 from sniff.recording.rotation import Rotation
 from sniff.recording.writer import SharedFile
 from tests.sniff.fleet.made_archive import FAULTS, Plan, plans, write, wrong_in
 
-SECONDS, DAYS, BUSES = 20.0, 3, 12
+SECONDS, DAYS, BUSES = 12.0, 3, 11
 Made = tuple[Path, list[Plan]]
 
 
@@ -211,7 +212,7 @@ def test_the_command_loads_no_scapy_beside_dask(made: Made) -> None:
 def test_the_pages_say_it(days: list[BusDay]) -> None:
     found = answer(whole(days))
     text = "\n".join(page(found))
-    assert "12 buses of 3 sites, 2026-03-01 … 2026-03-03: 6 with something wrong, 6 well" in text
+    assert "11 buses of 3 sites, 2026-03-01 … 2026-03-03: 6 with something wrong, 5 well" in text
     assert re.search("MB001 station 4, since 03-02, 2 days, [0-9]+×: no answer to any of", text)
     for width, height in ((80, 24), (60, 10), (20, 3)):
         screen = list(page(found, len(found.buses), width, height))
@@ -221,7 +222,19 @@ def test_the_pages_say_it(days: list[BusDay]) -> None:
     html = html_page(found)
     assert "<script" not in html
     assert "http" not in html
-    assert html.count('href="#bus') == BUSES
+    assert html.count("<tr><td>") >= BUSES
+    links = re.findall('href="#(bus[0-9]+)"', html)
+    assert len(links) >= 6
+    assert all(f'id="{link}"' in html for link in links)
+
+
+def test_the_table_has_stations_that_are_there_and_what_is_wrong(days: list[BusDay]) -> None:
+    table = [dict(zip(COLUMNS, row, strict=True)) for row in rows(whole(days))]
+    ring = {row["station"] for row in table if row["protocol"] == "mstp"} - {None}
+    assert ring
+    assert len(ring) < 10  # of 128 that are polled for
+    ill = {row["bus"] for row in table if row["findings"]}
+    assert ill == {bus.bus for bus in answer(whole(days)).buses if bus.troubles}
 
 
 def test_hostile_names_are_inert(days: list[BusDay]) -> None:
@@ -294,6 +307,27 @@ def test_buses_that_record_nothing(days: list[BusDay]) -> None:
     text = "\n".join(page(found))
     assert "nothing was heard on 2026-03-07, 2026-03-08" in text
     assert "no capture since 2026-03-04, while other buses go on" in text
+
+
+def test_two_runs_at_once_do_not_harm_the_index(tmp_path: Path) -> None:
+    """Both read, both keep what they found, and each sees all of it afterwards."""
+    path = tmp_path / "x.sqlite"
+    tasks = [Task("site", (FileState(f"{number}.mcap", 1, 1),), "n2") for number in range(30)]
+
+    def run(mine: list[Task]) -> None:
+        index = Index(path)
+        for task in mine:
+            index.put(task, [])
+            index.flush()
+        index.say(["something"])
+
+    threads = [Thread(target=run, args=(tasks[at::2] + tasks[:3],)) for at in (0, 1)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert all(found is not None for _, found in Index(path).known(tasks))
+    assert Index(path).said_before() == {"something"}
 
 
 def test_what_is_known_of_a_file_is_forgotten_when_it_changes(made: Made, tmp_path: Path) -> None:
