@@ -56,14 +56,17 @@ class Guessing:
 
     def of(self, points: PointTable) -> dict[Key, GuessedPoint]:
         """By point, for those that the table has."""
-        found: dict[Key, GuessedPoint] = {}
-        for guess in guessed(covering(self._undescribed()), self.series.written):
-            for key, told in _told(guess, points):
-                found[key] = told
-        return found
+        return guesses_of(points, self.series, self.devices)
 
-    def _undescribed(self) -> Iterable[Block]:
-        return (block for block in self.series.blocks() if self.devices.at(block.device) is None)
+
+def guesses_of(points: PointTable, series: RegisterSeries, devices: Devices) -> dict[Key, GuessedPoint]:
+    """What the registers of stations without a profile may be, by point, for those that the table has."""
+    found: dict[Key, GuessedPoint] = {}
+    undescribed = (block for block in series.blocks() if devices.at(block.device) is None)
+    for guess in guessed(covering(undescribed), series.written):
+        for key, told in _told(guess, points):
+            found[key] = told
+    return found
 
 
 def guess_of(point: Point, series: RegisterSeries, points: PointTable) -> GuessedPoint | None:

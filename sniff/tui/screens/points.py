@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
 from typing import ClassVar
 
@@ -13,7 +14,7 @@ from textual.widgets import DataTable, Static
 
 from dissectors.line import MS, NS_PER_S
 from dissectors.profiles.decoding import Quality, Value, number
-from sniff.analysis.guessed_points import GuessedPoint, guess_of
+from sniff.analysis.guessed_points import GuessedPoint, guess_of, guesses_of
 from sniff.analysis.points import Point
 from sniff.tui.analyzer import analyzer
 from sniff.tui.charts import BARS
@@ -63,9 +64,12 @@ def shown_value(value: Value) -> str:
 
 
 NARROW: tuple[str, ...] = ("", "stn", "point", "value", "age", "n", "every ms")
-WIDE: tuple[str, ...] = (*NARROW, "±", "low", "high", "trend")
+WIDE: tuple[str, ...] = (*NARROW, "±", "low", "high", "trend", "what it is")
 FROM = 110
 """Width from which on all columns are shown."""
+
+GUESSED_EVERY = 5.0
+"""Seconds between two looks at what registers without a profile may be."""
 
 TALL = 30
 """Height from which on the plot is shown at once."""
@@ -98,7 +102,7 @@ class PointsScreen(TableScreen):
     LEGEND = (
         ("^", "pinned to the top (p)"),
         ("→", "a command: written to the device"),
-        ("?", "uncertain value"),
+        ("?", "uncertain value; behind a value: a guess of what a register without a profile holds"),
         ("!", "value out of its range"),
         ("*", "before a value: it changed in the last two seconds; then it is bold too"),
         ("age", "how long ago the value was seen, at the time of the newest row"),
@@ -123,6 +127,8 @@ class PointsScreen(TableScreen):
         self._drawn: tuple[int, tuple[object, ...]] | None = None
         self._columns: tuple[str, ...] = ()
         self._plotted: bool | None = None
+        self._guesses: dict[Key, GuessedPoint] = {}
+        self._guessed_at = -GUESSED_EVERY
         self._guessed: tuple[tuple[Key, int] | None, GuessedPoint | None] = (None, None)
 
     def compose_view(self) -> ComposeResult:
@@ -162,8 +168,12 @@ class PointsScreen(TableScreen):
         newest = self.store.by_no(self.store.last_no)
         now = newest.event.end if newest is not None else 0
         points = self._chosen()
+        if time.monotonic() - self._guessed_at >= GUESSED_EVERY:
+            self._guessed_at = time.monotonic()
+            self._guesses = guesses_of(self.store.points, self.store.model.series, self.store.devices)
         self.query_one(StationTable).fill(
-            (_key(point), _cells(point, now, self._pinned)[: len(self._columns)]) for point in points[:SHOWN]
+            (_key(point), _cells(point, now, self._pinned, self._guesses.get(_place(point)))[: len(self._columns)])
+            for point in points[:SHOWN]
         )
         self._hidden = max(0, len(points) - SHOWN)
         self._draw_detail()
@@ -295,6 +305,8 @@ def _seen(point: Point, guess: GuessedPoint | None) -> list[str]:
         samples += f" ±{_ms(point.jitter)}" if point.jitter is not None else ""
     words = [samples]
     low, high, rate = (point.low, point.high, point.rate) if guess is None else (guess.low, guess.high, guess.rate)
+    if point.sample.value.words:  # of states and flags the numbers between say nothing
+        low = high = rate = None
     if low is not None and high is not None and low != high:
         words.append(f"seen {low:.7g} … {high:.7g}")
     if rate:
@@ -317,8 +329,18 @@ def _key(point: Point) -> str:
     return "/".join(_place(point))
 
 
-def _cells(point: Point, now: int, pinned: list[Key]) -> list[Text]:
-    sample, value = point.sample, point.sample.value
+def _cells(point: Point, now: int, pinned: list[Key], guess: GuessedPoint | None = None) -> list[Text]:
+    """`guess`: what it may be, of a register that no profile names."""
+    sample, value, entry = point.sample, point.sample.value, point.entry
+    is_number = not value.words
+    shown, low, high, guessed = shown_value(value), point.low, point.high, ""
+    if guess is not None:
+        guessed = guess.words
+        low, high = guess.low, guess.high
+        if guess.is_covered:
+            shown, low, high = "with the one before", None, None
+        elif guess.value is not None:
+            shown = f"{guess.value:.6g} ?"
     mark = ("^" if _place(point) in pinned else "") + ("→" if point.is_command else "") + MARKS.get(point.quality, "")
     fresh = bool(point.changed) and now - point.changed <= FRESH
     style = "bold" if fresh else ""
@@ -326,12 +348,13 @@ def _cells(point: Point, now: int, pinned: list[Key]) -> list[Text]:
         Text(mark),
         Text(sample.station, justify="right"),
         Text(plain(sample.name)),
-        Text(("*" if fresh else "") + shown_value(value), style=style, justify="right"),
+        Text(("*" if fresh else "") + shown, style=style, justify="right"),
         Text(age(now - sample.time), justify="right"),
         Text(str(point.count), justify="right"),
         Text(_ms(point.interval), justify="right"),
         Text(_ms(point.jitter), justify="right"),
-        Text("–" if point.low is None else f"{point.low:.5g}", justify="right"),
-        Text("–" if point.high is None else f"{point.high:.5g}", justify="right"),
+        Text(f"{low:.5g}" if low is not None and is_number else "–", justify="right"),
+        Text(f"{high:.5g}" if high is not None and is_number else "–", justify="right"),
         Text(trend([number for _, number in point.history])),
+        Text(plain(guessed if guessed or entry is None else entry.title)),
     ]
