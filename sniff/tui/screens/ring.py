@@ -45,7 +45,7 @@ SHORT: dict[str, str] = {
     "damaged": "dam.",
 }
 """Columns of a ring's table (`TokenRing.headings`) that fit into 80, with their short titles."""
-ROOMY = 170
+ROOMY = 280
 """Width from which all columns are shown, with their titles in full."""
 BESIDE = 130
 """Width from which the ring stands beside the table, else above it."""
