@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV   ?= .venv
 BIN     = $(VENV)/bin
 
-.PHONY: demo test lint bench faults pictures clean
+.PHONY: demo test lint docs bench faults pictures clean
 
 demo: $(VENV)/.demo
 	$(BIN)/sniff485 demo $(ARGS)
@@ -16,6 +16,10 @@ lint: $(VENV)/.test
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+# The documentation, into build/site; read it there, no server and no network needed.
+docs: $(VENV)/.docs
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet -f docs/mkdocs.yml
 
 # Paired with tshark where that can do the same; FRAMES=1000000 for captures of a million frames instead of 100000.
 # `make bench ARGS=tests/bench/test_bulk_commands.py` prints the table of whole commands alone.
@@ -37,6 +41,10 @@ clean:
 $(VENV)/.demo: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e .
+	touch $@
+
+$(VENV)/.docs: pyproject.toml $(VENV)/.test
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[docs]'
 	touch $@
 
 $(VENV)/.test: pyproject.toml

@@ -1,4 +1,4 @@
-"""What the rules of all protocols give: a finding says what was seen, what it is consistent with, what to check next.
+"""Findings, as the rules of all protocols give them: what was seen, what it is consistent with, what to check next.
 
 A rule is catalogued once (`Rule`); a finding is one frozen value that names its rule by code. The codes carry the
 protocol: MB… Modbus, N2… Metasys N2, MS… MS/TP, LN… the line itself.
@@ -147,6 +147,15 @@ class WordsExceptions(Protocol):
 
     def word_exceptions(self, words: ExceptionWords) -> None:
         """Use these words from here on, also for what was seen before."""
+        ...
+
+
+@runtime_checkable
+class KnowsResponseTimes(Protocol):
+    """A judge that can be told how long each station may take to answer by the papers of its device."""
+
+    def know_response_times(self, most: Callable[[int], int | None]) -> None:
+        """`most(station)`: ns, None where nobody says. Use it from here on."""
         ...
 
 

@@ -1,4 +1,4 @@
-"""Which frames of many hold the same octets, without an object for each."""
+"""Fingerprints of frames: which of many hold the same octets, without an object for each."""
 
 from __future__ import annotations
 

@@ -43,6 +43,8 @@ class PacketFile:
     `link_types`: those that may hold them (https://www.tcpdump.org/linktypes.html), the one written first.
     `pdu_name`: the Wireshark dissector for link type 252 (exported PDU); empty where there is none.
     `least`: octets that it needs; `longer`: whether it takes damaged frames that are longer than they should be.
+    `datagrams`: how UDP datagrams begin that hold one frame each; all of a network are one bus, each behind its ends
+    (address and port of IPv4, of who sends and of who is spoken to).
     `snap`: organisation and protocol (5 octets) of Ethernet SNAP frames that hold one each, behind `snap_header`
     octets; `snap_before`: what is left out there of its begin. `ports`: of TCP and UDP that its relatives on networks
     use, with what those are called.
@@ -56,6 +58,7 @@ class PacketFile:
     snap_header: int = 0
     snap_before: bytes = b""
     ports: tuple[tuple[int, str], ...] = ()
+    datagrams: bytes = b""
 
 
 @dataclass(frozen=True, slots=True)

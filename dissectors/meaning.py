@@ -1,4 +1,4 @@
-"""What a frame means to its device: its values by name, before the raw numbers. Pure, total.
+"""The meaning of a frame to its device: its values by name, before the raw numbers. Pure, total.
 
 A frame alone often does not say: an answer needs its request, a register its profile. Whoever knows both makes a
 `Meaning` of them; a protocol's `Dissector.line` puts it into the line of the list, `Meaning.items` into the tree.
@@ -92,10 +92,11 @@ class Meaning:
         titles: list[str] = []
         for one in self.asked:
             entry = self.profile.at(one.space, one.address)
-            if entry is not None and not entry.reserved:
+            lacks = self.profile.lacks(one.space, one.part)
+            if lacks or (entry is not None and not entry.reserved):
+                title = brief_title(entry) if entry is not None else f"{one.space} {one.address}"
                 part = f" {one.part.replace('.', ' ')}" if one.part else ""
-                lacks = " (this device has none)" if self.profile.lacks(one.space, one.part) else ""
-                titles.append(brief_title(entry) + part + lacks)
+                titles.append(title + part + (" (this device has none)" if lacks else ""))
         return f"read {', '.join(dict.fromkeys(titles))}" if titles else ""
 
     def questions(self, place: PlaceName) -> Iterator[tuple[str, str]]:
@@ -108,7 +109,8 @@ class Meaning:
             where = place(one, _number(entry, one, offset, kept), offset)
             title = "reserved" if kept else "" if entry is None else _titled(entry)
             lacks = profile is not None and profile.lacks(one.space, one.part)
-            yield where, f"{title}; this device has no {one.part}" if lacks else title
+            without = [f"this device has no {one.part or 'present-value'}"] if lacks else []
+            yield where, "; ".join(part for part in (title, *without) if part)
 
     @property
     def about(self) -> str:

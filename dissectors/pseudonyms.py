@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator
 from typing import Protocol
 
 from dissectors.frame import Frame
@@ -14,16 +14,24 @@ SHORTEST_TEXT = 4
 
 
 class Pseudonyms:
-    """Numbers instead of numbers, one for one, in the order of their appearance. `kept` ones stay as they are."""
+    """Numbers instead of numbers, one for one, in the order of their appearance. `kept` ones stay as they are.
 
-    def __init__(self, numbers: Iterable[int], kept: Iterable[int]) -> None:
+    A number's pseudonym is of its own class (masters and slaves, addresses and reserved ones), so that what is
+    forbidden to one class stays so. A number of no class stays as it is.
+    """
+
+    def __init__(self, *classes: Iterable[int], kept: Iterable[int]) -> None:
         self._known = {number: number for number in kept}
-        self._free = iter([number for number in numbers if number not in self._known])
+        self._free: dict[int, Iterator[int]] = {}
+        for numbers in classes:
+            names = [number for number in numbers if number not in self._known]
+            self._free.update(dict.fromkeys(names, iter(names)))
 
     def of(self, number: int) -> int:
         """The pseudonym of a number; itself when all are used up."""
         if number not in self._known:
-            self._known[number] = next(self._free, number)
+            free = self._free.get(number)
+            self._known[number] = number if free is None else next(free, number)
         return self._known[number]
 
     def if_known(self, number: int) -> int:
@@ -41,15 +49,52 @@ class Renamer(Protocol):
         ...
 
 
-def without_text(octets: bytes) -> bytes:
-    """Runs of printable octets blanked."""
+class Blanks:
+    """Texts instead of texts: as long, saying nothing, yet the same for the same and others for others.
+
+    What differs between two answers goes on differing, as far as the length allows: the first text of a length is
+    blank, later ones end with their number among those of that length, in letters from "a" on.
+    """
+
+    def __init__(self) -> None:
+        self._numbers: dict[int, dict[bytes, int]] = {}
+
+    def of(self, text: bytes) -> bytes:
+        """The blank of a text; BLANK alone for those that are too many for their length."""
+        known = self._numbers.setdefault(len(text), {})
+        number = known.get(text, len(known))
+        if number == len(known) < MOST_BLANKS:
+            known[text] = number
+        letters = _letters(number)
+        return bytes([BLANK]) * (len(text) - len(letters)) + letters if len(letters) <= len(text) else _blank(text)
+
+
+MOST_BLANKS = 10_000
+"""Texts of one length that are told apart."""
+
+
+def _blank(text: bytes) -> bytes:
+    return bytes([BLANK]) * len(text)
+
+
+def _letters(number: int) -> bytes:
+    """0: nothing; then "a" … "j", "aa" … of ten letters."""
+    found = b""
+    while number:
+        number, rest = divmod(number - 1, 10)
+        found = bytes([ord("a") + rest]) + found
+    return found
+
+
+def without_text(octets: bytes, blanked: Callable[[bytes], bytes] = _blank) -> bytes:
+    """Runs of printable octets blanked; `blanked`: what stands for a text, as long as it is."""
     result = bytearray(octets)
     begin = 0
     for at in range(len(octets) + 1):
         if at < len(octets) and 32 <= octets[at] < 127:
             continue
         if at - begin >= SHORTEST_TEXT:
-            result[begin:at] = bytes([BLANK]) * (at - begin)
+            result[begin:at] = blanked(octets[begin:at])
         begin = at + 1
     return bytes(result)
 

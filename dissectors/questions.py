@@ -1,4 +1,4 @@
-"""What a request asks: which things of a station, without the values that it carries.
+"""The question of a request: which things of a station it asks for, without the values that it carries.
 
 Each protocol takes its own requests apart (`Dissector.questions`); two requests that ask the same are one entry of the
 master's programme, whatever they write and whichever number the exchange has.

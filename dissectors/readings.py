@@ -1,4 +1,4 @@
-"""What an exchange says of the things inside a station: readings, before anybody knows which device that is.
+"""Readings: what an exchange says of the things inside a station, before anybody knows which device that is.
 
 Each protocol takes its own exchanges apart (`Dissector.readings`); profiles give the readings names
 and units. A reading is what was on the wire, no more.

@@ -25,6 +25,12 @@ BUILT_IN: Mapping[str, str] = {
     "profibus": "dissectors.profibus:PROFIBUS",
 }
 
+RELATIVES: Mapping[str, str] = {
+    "modbus-tcp": "dissectors.modbus:TCP",
+    "bacnet-ip": "dissectors.bacnet:BACNET_IP",
+}
+"""Relatives on networks of the protocols of lines: known by name, looked for in captures of networks, on no line."""
+
 DEFAULT = next(iter(BUILT_IN))
 """What is taken for the protocol of a bus of which nobody says it."""
 
@@ -43,9 +49,19 @@ def names() -> tuple[str, ...]:
     return (*BUILT_IN, *plugged)
 
 
+def known() -> tuple[str, ...]:
+    """Names of all protocols and of their relatives on networks."""
+    return (*names(), *RELATIVES)
+
+
+def relatives() -> tuple[Dissector, ...]:
+    """The relatives on networks."""
+    return tuple(get(name) for name in RELATIVES)
+
+
 def get(name: str) -> Dissector:
     """The protocol of that name. Raises UnknownProtocol."""
-    target = BUILT_IN.get(name)
+    target = BUILT_IN.get(name) or RELATIVES.get(name)
     if target is not None:
         found = _built_in(target)
     else:
@@ -53,7 +69,7 @@ def get(name: str) -> Dissector:
             if point.name == name:
                 return _plugged(point)
         else:
-            raise UnknownProtocol(f"protocol {name!r} is not installed: expected one of {', '.join(names())}")
+            raise UnknownProtocol(f"protocol {name!r} is not installed: expected one of {', '.join(known())}")
     return found
 
 

@@ -1,4 +1,4 @@
-"""What a simulated station is: octets and times in, octets and times out. It touches no port and reads no clock.
+"""The contract of a simulated station: octets and times in, octets and times out. It touches no port, reads no clock.
 
 A virtual bus carries stations of any protocol. Whoever drives them (the pseudo-terminal bus, or a test with a list of
 events) keeps the clock and the line; a station only decides what it would say and when.

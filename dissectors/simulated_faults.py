@@ -1,4 +1,4 @@
-"""What can go wrong on a bus, as frozen values that a simulated line applies.
+"""Faults of a simulated bus, as frozen values that a simulated line applies.
 
 Each fault takes one transmission and gives what replaces it: nothing (lost), a changed one, or itself with something
 beside it. Which transmissions are hit is drawn from the dice that the line hands in, one seeded generator a fault, so

@@ -1,4 +1,4 @@
-"""What a finding is about, as a value: a bus, its master, a station or a thing in it, a pair, an adapter, a port.
+"""The subject of a finding, as a value: a bus, its master, a station or a thing in it, a pair, an adapter, a port.
 
 `str()` of it is how people are told: "station 3", "MAC 5", "drive 1", "station 1, AI 200", "0 → 27", "bus". Decisions
 (health, what explains what) look at the value, never at the words.

@@ -1,4 +1,4 @@
-"""What token rings of all protocols show: an observer of frames, and the ring as a value, a table and sentences."""
+"""Token rings, the same for all protocols: an observer of frames, and the ring as a value, a table and sentences."""
 
 from __future__ import annotations
 
@@ -62,14 +62,22 @@ class WatchesRing(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
+class StationTable:
+    """Stations that do not pass the token, a row each, counted as the protocol's people count them."""
+
+    headings: tuple[str, ...]
+    rows: Callable[[Any], list[tuple[Cell, ...]]]
+
+
+@dataclass(frozen=True, slots=True)
 class TokenRing:
     """How a protocol's ring is watched and shown; `ring` is what its observer gives.
 
     `observer(timing)`: watches a bus. `window(before, after)`: what changed between two looks.
     `order(ring)`: its masters in the order of the token; empty when no closed ring was seen.
-    `headings`, `rows(ring)`: a table, one row a master. `sentences(ring)`: what it comes to. `identities(ring)`: the
-    numbers by which stations called themselves, by address; one that called itself by two has both. `shares(ring)`:
-    for how much of the time each master has the token, 0 … 1.
+    `headings`, `rows(ring)`: a table, one row a master. `sentences(ring)`: what it comes to. `stations`: of who answers
+    only, where the protocol has such. `identities(ring)`: the numbers by which stations called themselves, by address;
+    one that called itself by two has both. `shares(ring)`: for how much of the time each master has the token, 0 … 1.
     """
 
     observer: Callable[[Timing], RingObserver]
@@ -78,5 +86,6 @@ class TokenRing:
     headings: tuple[str, ...]
     rows: Callable[[Any], list[tuple[Cell, ...]]]
     sentences: Callable[[Any], list[str]]
+    stations: StationTable | None = None
     identities: Callable[[Any], Mapping[int, tuple[int, ...]]] = lambda ring: {}
     shares: Callable[[Any], Mapping[int, float]] = lambda ring: {}

@@ -1,8 +1,10 @@
-"""Durations in words, the same everywhere."""
+"""Durations in words, the same everywhere: one precision for lists, one for what is compared with a limit."""
 
 from __future__ import annotations
 
-from dissectors.line import MS
+from dissectors.line import MS, NS_PER_S
+
+_MINUTES_FROM = 300 * NS_PER_S
 
 
 def milliseconds(value: int) -> str:
@@ -14,3 +16,20 @@ def bare_milliseconds(value: int) -> str:
     """The same without its unit, for columns whose title says it."""
     ms = value / MS
     return f"{ms:.0f}" if abs(ms) >= 100 else f"{ms:.1f}" if abs(ms) >= 1 else f"{ms:.2f}"
+
+
+def fine_milliseconds(value: int) -> str:
+    """A duration in ns as milliseconds in three digits, to stand beside a limit: "1.75 ms", "12.0 ms", "1250 ms"."""
+    return f"{_three_digits(value / MS)} ms"
+
+
+def duration(value: int) -> str:
+    """A duration in ns in three digits and the unit that fits: "1.75 ms", "12.0 s", "15.0 min"."""
+    if value < NS_PER_S:
+        return fine_milliseconds(value)
+    seconds = value / NS_PER_S
+    return f"{_three_digits(seconds)} s" if value < _MINUTES_FROM else f"{_three_digits(seconds / 60)} min"
+
+
+def _three_digits(number: float) -> str:
+    return f"{number:.0f}" if number >= 99.95 else f"{number:.1f}" if number >= 9.995 else f"{number:.2f}"

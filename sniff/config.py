@@ -15,6 +15,15 @@
     at = "error"                             # from which severity on; default warning
     every = 600                              # seconds between two about the same finding
 
+    [box]                                    # what runs unattended (`sniff485 box`)
+    folder = "/var/lib/sniff485"
+    name = "site"                            # site-0001.mcap, site-0002.mcap …
+    rotate = "size:64MB,time:1d"
+    keep = 500
+    keep_free = "1GB"
+    [mqtt]                                   # and [influx], [json], [foxglove], [metrics]: outlet_settings.py
+    broker = "mqtts://broker.example"
+
     [filters]
     slow = "latency_ms > 50ms"
 
@@ -50,14 +59,17 @@ from typing import Any, Final, Literal
 from dissectors import registry
 from dissectors.findings import Severity
 from dissectors.line import LineSettings
+from sniff import outlet_settings
+from sniff.outlet_settings import OutletSettings
 
 FILE = "sniff485.toml"
 AUTO: Final = "auto"
 BUS_KEYS = ("port", "line", "protocol", "record", "devices")
 ALERT_KEYS = ("command", "webhook", "at", "every")
+BOX_KEYS = ("folder", "name", "rotate", "keep", "keep_free", "metrics", "status")
 VIEW_KEYS = ("frames", "transactions", "time", "filter")
 TIMES = ("absolute", "relative", "delta")
-TOP_KEYS = ("bus", "alert", "filters", "colours", "view", "keys")
+TOP_KEYS = ("bus", "alert", "box", "filters", "colours", "view", "keys", *outlet_settings.TABLES)
 COLOURS = ("red", "green", "yellow", "blue", "magenta", "cyan")
 
 
@@ -93,6 +105,20 @@ class AlertSettings:
 
 
 @dataclass(frozen=True, slots=True)
+class BoxSettings:
+    """What `box` is told; None where the file is silent. `folder`, `name`: of the recording's parts. `rotate`, `keep`,
+    `keep_free`: as options of those names. `metrics`, `status`: ports on the loopback."""
+
+    folder: str | None = None
+    name: str | None = None
+    rotate: str | None = None
+    keep: int | None = None
+    keep_free: str | None = None
+    metrics: int | None = None
+    status: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class View:
     """How the lists of the terminal UI look. `columns`: by list ("frames", "transactions") the names of its columns in
     order; a list that is not there has its usual ones. `time`: one of TIMES, "" as it is. `filter`: "" for none."""
@@ -113,6 +139,8 @@ class Config:
     alert: AlertSettings | None = None
     filters: Mapping[str, str] = field(default_factory=dict)
     colours: Mapping[str, str] = field(default_factory=dict)
+    box: BoxSettings = field(default_factory=BoxSettings)
+    outlets: OutletSettings = field(default_factory=OutletSettings)
     views: Mapping[str, View] = field(default_factory=dict)
     keys: Mapping[str, str] = field(default_factory=dict)
 
@@ -155,7 +183,9 @@ def parse(path: Path) -> Config:
     views = {name: reader.view(name, reader.table(entry, f"view.{name}")) for name, entry in listed.items()}
     entry = reader.table(data.get("keys", {}), "keys")
     keys = {name: reader.text(entry, name, "keys") or "" for name in entry}
-    return Config(path, named, alert, filters, colours, views, keys)
+    box = reader.box(reader.table(data.get("box", {}), "box"))
+    told = outlet_settings.outlets(reader, data)
+    return Config(path, named, alert, filters, colours, box, told, views, keys)
 
 
 def save_view(name: str, view: View, start: Path | None = None) -> Path:
@@ -209,13 +239,13 @@ class _Reader:
 
     def filters(self, value: Any, section: str) -> dict[str, str]:
         """Filters by name; each is read, so that a wrong one is found before it is wanted."""
-        from sniff.filter import FilterError, compile_filter  # few configurations have any
+        from sniff.filter import FilterError, check_filter  # few configurations have any
 
         entry, found = self.table(value, section), dict[str, str]()
         for name in entry:
             found[name] = self.text(entry, name, section) or ""
             try:
-                compile_filter(found[name], registry.get(registry.DEFAULT))
+                check_filter(found[name])
             except FilterError as error:
                 raise self.error(name, section, f"{name}: {error}") from None
         return found
@@ -261,6 +291,22 @@ class _Reader:
             raise self.error("every", "alert", f"expected seconds, not {every!r}")
         return AlertSettings(tuple(command), webhook, levels[level], float(every))
 
+    def box(self, entry: Mapping[str, Any]) -> BoxSettings:
+        self.check_keys(entry, BOX_KEYS, "box")
+        texts = {key: self.text(entry, key, "box") for key in ("folder", "name", "rotate", "keep_free")}
+        if not re.fullmatch(r"[A-Za-z0-9_.-]+", texts["name"] or "site"):
+            raise self.error("name", "box", f"{texts['name']!r}: letters, digits, '-', '_' and '.' name files")
+        keep, metrics, status = (
+            self.number(entry, key, "box", least) for key, least in (("keep", 1), ("metrics", 0), ("status", 0))
+        )
+        return BoxSettings(texts["folder"], texts["name"], texts["rotate"], keep, texts["keep_free"], metrics, status)
+
+    def number(self, entry: Mapping[str, Any], key: str, section: str, least: int) -> int | None:
+        value = entry.get(key)
+        if value is not None and (isinstance(value, bool) or not isinstance(value, int) or value < least):
+            raise self.error(key, section, f"expected a whole number from {least} on, not {value!r}")
+        return value
+
     def device(self, devices: Mapping[str, Any], key: str, section: str) -> str:
         """The profile of a station; the key is its address, or "*" for every one."""
         try:
@@ -282,6 +328,7 @@ class _Reader:
                 raise self.error(key, section, f"unknown key {key!r}{nearest(key, known)}")
 
     def error(self, key: str, section: str, what: str) -> ConfigError:
+        """What names file, line and section."""
         return ConfigError(
             f"{self.path}:{self.line_of(key, section)}: [{section}] {what}"
             if section

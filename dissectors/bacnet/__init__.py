@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from dissectors.bacnet import ring_words
+from dissectors.bacnet import ip, ring_table
 from dissectors.bacnet.bulk_ring_observer import BulkRingObserver
 from dissectors.bacnet.envelope import frame
 from dissectors.bacnet.fields import fields
 from dissectors.bacnet.findings import MstpFindings, judge
 from dissectors.bacnet.framing import MstpFramer
 from dissectors.bacnet.header import peek
+from dissectors.bacnet.ip_framing import IP_NAME, IpFramer
 from dissectors.bacnet.readings import asks, readings
+from dissectors.bacnet.reassembly import Reassembler
 from dissectors.bacnet.renamer import MstpRenamer
 from dissectors.bacnet.ring import Ring
-from dissectors.bacnet.ring_observer import RingObserver
+from dissectors.bacnet.ring_observer import MstpRingObserver
 from dissectors.bacnet.ring_window import ring_window
 from dissectors.bacnet.rules import RULES
-from dissectors.bacnet.segmentation import Reassembler
-from dissectors.bacnet.summary import meant, text
+from dissectors.bacnet.text import meant, text
 from dissectors.bacnet.tracker import MstpTracker
 from dissectors.frame import Frame
 from dissectors.manifest import Dissector, PacketFile, on_first_use
@@ -27,10 +28,10 @@ __all__ = [
     "MSTP",
     "MstpFindings",
     "MstpFramer",
+    "MstpRingObserver",
     "MstpTracker",
     "Reassembler",
     "Ring",
-    "RingObserver",
     "fields",
     "judge",
     "packet",
@@ -59,9 +60,9 @@ RING = TokenRing(
     observer=BulkRingObserver,
     window=ring_window,
     order=lambda ring: ring.order,
-    headings=ring_words.HEADINGS,
-    rows=ring_words.rows,
-    sentences=ring_words.sentences,
+    headings=ring_table.HEADINGS,
+    rows=ring_table.rows,
+    sentences=ring_table.sentences,
     identities=lambda ring: {mac: node.devices for mac, node in ring.nodes.items() if node.devices},
     shares=lambda ring: {mac: node.held / ring.span for mac, node in ring.nodes.items() if node.held and ring.span},
 )
@@ -105,4 +106,26 @@ MSTP = Dissector(
     stencil=stencil,
     field_types=field_types,
     scenarios=on_first_use("dissectors.bacnet.scenario:scenarios"),
+)
+
+BACNET_IP = Dissector(
+    name=IP_NAME,
+    title="BACnet/IP",
+    framer=IpFramer,
+    peek=ip.peek_ip,
+    tracker=ip.IpTracker,
+    text=ip.ip_text,
+    meant=ip.ip_meant,
+    asks=ip.ip_asks,
+    fields=ip.ip_fields,
+    packet=ip.ip_packet,
+    default_line="115200,8N1",
+    field_prefixes=("bvlc.", "ip.", "bacnet.", "bacapp."),
+    noun="host",
+    family="bacnet",
+    bits=ip.ip_bits,
+    readings=ip.ip_readings,
+    packet_file=PacketFile((147,), datagrams=b"\x81", ports=((47808, "BACnet/IP"),)),
+    makers={IP_NAME: ip.make_ip},
+    field_types=ip.ip_types,
 )

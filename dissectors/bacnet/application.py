@@ -1,4 +1,4 @@
-"""What a simulated MS/TP node does with data: ask, or be a device with objects. Pure: octets in, octets out."""
+"""Simulated applications behind an MS/TP node: one that asks, one that is a device with objects. Pure."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from dissectors.bacnet import apdu as apdus
 from dissectors.bacnet import codec, names, npdu, services
 from dissectors.bacnet.apdu import SEGMENTED_ACCEPTED, Apdu, PduType
 from dissectors.bacnet.limits import BROADCAST
-from dissectors.bacnet.segmenting import Receiver, Sender
-from dissectors.bacnet.values import BitString, Enumerated, ObjectId, Record
+from dissectors.bacnet.segmenting import SegmentReceiver, SegmentSender
+from dissectors.bacnet.values import BitString, ConstructedValue, Enumerated, ObjectId
 
 READ_PROPERTY, READ_MULTIPLE, WRITE_PROPERTY = 12, 14, 15
 I_AM, WHO_IS = 0, 8
@@ -82,7 +82,7 @@ class Poller(Quiet):
         self._every = every
         self._next = 0
         self._turn = 0
-        self._receiving: dict[tuple[int, int], Receiver] = {}  # by server and invoke id, the newest last
+        self._receiving: dict[tuple[int, int], SegmentReceiver] = {}  # by server and invoke id, the newest last
         self.answers: list[bytes] = []
 
     def on_token(self, now: int) -> Iterable[Outgoing]:
@@ -103,7 +103,7 @@ class Poller(Quiet):
         about = source, apdu.invoke_id or 0
         receiver = self._receiving.pop(about, None)
         if receiver is None or (apdu.sequence == 0 and receiver.is_whole):
-            receiver = Receiver()
+            receiver = SegmentReceiver()
         self._receiving[about] = receiver
         if len(self._receiving) > _RECEIVING_MAX:
             del self._receiving[next(iter(self._receiving))]
@@ -143,7 +143,7 @@ class Device:
     announce: bool = True  # says I-Am when it gets its first token
     segments: bool = False  # answers that are too long go in segments where the client takes them
     written: list[tuple[ObjectId, Any]] = field(default_factory=list)
-    _sending: dict[tuple[int, int], Sender] = field(default_factory=dict)  # by client and invoke id
+    _sending: dict[tuple[int, int], SegmentSender] = field(default_factory=dict)  # by client and invoke id
 
     def on_token(self, now: int) -> Iterable[Outgoing]:
         """I-Am, once; segments that nobody acknowledged."""
@@ -220,20 +220,20 @@ class Device:
             error = codec.encode(services.parameters(PduType.ERROR, service) or "", refused.error)
             return apdus.encode(PduType.ERROR, error, invoke_id=invoke_id, service=service)
         if len(made) + 3 > self.max_apdu and self.segments and apdu.flags & SEGMENTED_ACCEPTED:
-            sender = self._sending[source, invoke_id] = Sender.of(invoke_id, service, made, self.max_apdu)
+            sender = self._sending[source, invoke_id] = SegmentSender.of(invoke_id, service, made, self.max_apdu)
             return sender.window_of_segments()[0]
         if len(made) + 3 > self.max_apdu:
             return apdus.encode(PduType.ABORT, invoke_id=invoke_id, reason=_ABORT_SEGMENTATION, flags=1)
         return apdus.encode(PduType.COMPLEX_ACK, made, invoke_id=invoke_id, service=service)
 
-    def _read(self, asked: Record) -> dict[str, Any]:
+    def _read(self, asked: ConstructedValue) -> dict[str, Any]:
         values = dict(asked.entries)
         values["property-value"] = self._value(
             asked["object-identifier"], asked["property-identifier"].value, asked.get("property-array-index")
         )
         return values
 
-    def _read_many(self, asked: Record) -> dict[str, Any]:
+    def _read_many(self, asked: ConstructedValue) -> dict[str, Any]:
         results = []
         for spec in asked["list-of-read-access-specs"]:
             target = self._own(spec["object-identifier"])
@@ -276,7 +276,7 @@ class Device:
             raise _Refused("property-is-not-an-array")
         return _element(value, index)
 
-    def _write(self, asked: Record) -> None:
+    def _write(self, asked: ConstructedValue) -> None:
         target, value = asked["object-identifier"], asked["property-value"]
         thing = self.objects.get(target)
         if thing is None:

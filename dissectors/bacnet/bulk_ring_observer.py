@@ -1,4 +1,4 @@
-"""The ring's observer for many rows at once: runs of clean rows as columns, every other row as `RingObserver` sees it.
+"""The ring's observer for many rows at once: runs of clean rows as columns, all others as `MstpRingObserver` does.
 
 What a run needs is the state that the row before it leaves when nothing else is known (`_is_calm`); it ends where a row
 means more because of what was before. So both ways give the same ring, wherever rows are cut into tables.
@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dissectors.bacnet.ring_observer import RingObserver
-from dissectors.bacnet.ring_questions import Asked
+from dissectors.bacnet.ring_observer import MstpRingObserver
+from dissectors.bacnet.ring_questions import AskedInRing
 
 if TYPE_CHECKING:
     from dissectors.bacnet.ring_columns import RingColumns
@@ -22,7 +22,7 @@ RUN_LEAST = 24
 _LOOKED_AT = 1024  # rows that are looked at while some of them may mean more than others
 
 
-class BulkRingObserver(RingObserver):
+class BulkRingObserver(MstpRingObserver):
     """The same ring, from single rows and from tables in any order of both."""
 
     def take(self, rows: RowColumns) -> None:
@@ -113,7 +113,7 @@ class BulkRingObserver(RingObserver):
         self._questions.asked = None
         if columns.asks[last]:
             kind = int(columns.kind[last])
-            self._questions.asked = Asked(kind, source, destination, frame, told.first + last)
+            self._questions.asked = AskedInRing(kind, source, destination, frame, told.first + last)
         self._questions.alone_since = columns.alone_since(last)
         self._storms.see_many(columns.end[rows][columns.to_all[rows]].tolist())
         self._reads.pass_by(frame)

@@ -19,9 +19,9 @@ from dissectors.bacnet.tags import Tag
 from dissectors.bacnet.values import (
     APPLICATION,
     NUMBER_OF,
+    ConstructedValue,
     Enumerated,
     ObjectId,
-    Record,
     base,
     pack,
     primitive,
@@ -57,7 +57,7 @@ class Decoded:
     `wrong`: values of properties that are of another type than they should.
     """
 
-    record: Record
+    record: ConstructedValue
     rest: tuple[Tag, ...] = ()
     error: str | None = None
     wrong: tuple[WrongType, ...] = ()
@@ -81,7 +81,7 @@ class Outline:
     alone after `VALUE_ONLY`, by its place; `groups`: the records that several tags make, by begin and end."""
 
     tags: dict[int, str] = made(default_factory=dict)
-    groups: dict[int, dict[int, Record]] = made(default_factory=dict)
+    groups: dict[int, dict[int, ConstructedValue]] = made(default_factory=dict)
 
 
 @dataclass(slots=True)
@@ -101,7 +101,7 @@ class _Scope:
         """Inside a value other properties are spoken of."""
         return _Scope(self.wrong, names=self.names)
 
-    def group(self, tags: Sequence[Tag], record: Record) -> None:
+    def group(self, tags: Sequence[Tag], record: ConstructedValue) -> None:
         if self.names is not None and len(tags) > 1:
             self.names.groups.setdefault(tags[0].start, {}).setdefault(tags[-1].end, record)
 
@@ -135,7 +135,7 @@ def decode(layout: str | None, octets: bytes, names: Outline | None = None) -> D
     """
     tree = tagging.read(octets)
     if layout is None:
-        return Decoded(Record(None, ()), tree.tags, tree.error)
+        return Decoded(ConstructedValue(None, ()), tree.tags, tree.error)
     entries: tuple[tuple[str, Any], ...] = ()
     error, at = None, 0
     wrong: list[WrongType] = []
@@ -147,7 +147,7 @@ def decode(layout: str | None, octets: bytes, names: Outline | None = None) -> D
     rest = tree.tags[at:]
     if error is None and rest:
         error = f"{len(rest)} tags more than the service has"
-    return Decoded(Record(None, entries), rest, tree.error or error, tuple(wrong))
+    return Decoded(ConstructedValue(None, entries), rest, tree.error or error, tuple(wrong))
 
 
 def _sequence(
@@ -243,7 +243,7 @@ def _in_place(type_name: str, tags: Sequence[Tag], at: int, scope: _Scope, depth
         for field in alternatives:
             if _fits(field, tags, at):
                 value, after = _field(field, tags, at, scope, depth + 1)
-                return Record(type_name, ((field.name, value),)), after
+                return ConstructedValue(type_name, ((field.name, value),)), after
         raise _Misfit(f"no alternative of {type_name} fits")
     fields = notation.sequence(type_name)
     if fields is None:
@@ -252,7 +252,7 @@ def _in_place(type_name: str, tags: Sequence[Tag], at: int, scope: _Scope, depth
         entries, after = _sequence(fields, tags, at, scope, depth + 1)
     except _Misfit as misfit:
         raise _Misfit(str(misfit)) from None
-    record = Record(type_name, tuple(entries))
+    record = ConstructedValue(type_name, tuple(entries))
     scope.group(tags[at:after], record)
     return record, after
 
@@ -328,7 +328,7 @@ def plain(tag: Tag) -> Any:
 # Encoding
 
 
-def encode(layout: str, values: Mapping[str, Any] | Record) -> bytes:
+def encode(layout: str, values: Mapping[str, Any] | ConstructedValue) -> bytes:
     """The octets of parameters by a layout.
 
     Values are what `decode` gives, or plain Python ones: names for enumerations, "device,1" for objects, mappings for
@@ -337,8 +337,8 @@ def encode(layout: str, values: Mapping[str, Any] | Record) -> bytes:
     return tagging.write(_encode_sequence(notation.parse(layout), values))
 
 
-def _encode_sequence(fields: Sequence[Field], values: Mapping[str, Any] | Record) -> list[Tag]:
-    given = dict(values.entries) if isinstance(values, Record) else dict(values)
+def _encode_sequence(fields: Sequence[Field], values: Mapping[str, Any] | ConstructedValue) -> list[Tag]:
+    given = dict(values.entries) if isinstance(values, ConstructedValue) else dict(values)
     tags: list[Tag] = []
     for field in fields:
         if field.name not in given:
@@ -369,7 +369,7 @@ def _encode_in_place(type_name: str, value: Any) -> list[Tag]:
         return [Tag(NUMBER_OF[kind], False, pack(type_name, value))]
     alternatives = notation.choice(type_name)
     if alternatives is not None:
-        ((name, chosen),) = dict(value.entries if isinstance(value, Record) else value).items()
+        ((name, chosen),) = dict(value.entries if isinstance(value, ConstructedValue) else value).items()
         for field in alternatives:
             if field.name == name:
                 return _encode_field(field, chosen)
@@ -384,7 +384,7 @@ def encode_any(value: Any) -> list[Tag]:
     """The tags of any value: a plain one, a Record of a known type, tags, or several of them."""
     if isinstance(value, Tag):
         return [value]
-    if isinstance(value, Record):
+    if isinstance(value, ConstructedValue):
         if value.type is None:
             raise ValueError("a record without a type has no layout")
         return _encode_in_place(value.type, value)

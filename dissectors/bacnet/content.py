@@ -1,4 +1,4 @@
-"""What a good frame says that cannot be right: reply bits, dates that are none, values of another type. Pure, total.
+"""Oddities in the content of good frames: reply bits, dates that are none, values of another type. Pure, total.
 
 Whether a reply is expected is said twice: by the frame type (5, 32: the receiver answers at once; ANSI/ASHRAE 135, 9.3)
 and by bit 2 of the network header (6.2.2, which a router makes the frame type from). A confirmed request has both
@@ -18,12 +18,13 @@ from dissectors.bacnet import codec, services
 from dissectors.bacnet import message as messages
 from dissectors.bacnet import npdu as npdus
 from dissectors.bacnet.apdu import Apdu, PduType
+from dissectors.bacnet.dates import Date, Time
 from dissectors.bacnet.frame_types import EXPECTING
 from dissectors.bacnet.limits import BROADCAST
 from dissectors.bacnet.message import Message
 from dissectors.bacnet.npdu import Npdu
 from dissectors.bacnet.tags import Tag
-from dissectors.bacnet.values import APPLICATION, Date, Record, Time, primitive
+from dissectors.bacnet.values import APPLICATION, ConstructedValue, primitive
 from dissectors.frame import Frame
 
 
@@ -126,7 +127,7 @@ def _whens(value: Any, depth: int) -> Iterator[Date | Time]:
         yield value
     elif depth > 40:
         return
-    elif isinstance(value, Record):
+    elif isinstance(value, ConstructedValue):
         for _, entry in value:
             yield from _whens(entry, depth + 1)
     elif isinstance(value, (tuple, list)):

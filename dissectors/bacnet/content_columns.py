@@ -1,4 +1,4 @@
-"""Which of many frames may hold something odd (`content.py`): all that say the same are read once.
+"""Frames of many that may hold an oddity (`content.py`): all that say the same are read once.
 
 What is odd does not depend on who sends to whom, on the invoke id, on which object of a type is read, nor on which real
 number it has: these octets are taken for 0 where the layout says for sure that they are that.

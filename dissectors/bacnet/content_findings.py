@@ -1,4 +1,4 @@
-"""What is found in the content of good frames: notes about the station that sent it. `content.py` says what is odd."""
+"""Findings in the content of good frames: notes about the station that sent it. `content.py` says what is odd."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ from dissectors.tracker import Interval, Transaction, Verdict
 _TOKEN, _POLL, _TEST = (bytes((kind,)) for kind in (FrameType.TOKEN, FrameType.POLL_FOR_MASTER, FrameType.TEST_REQUEST))
 
 
-class Party(NamedTuple):
+class RequestParty(NamedTuple):
     """Who speaks at one end: the MS/TP address, and behind a router the network and address there."""
 
     mac: int
@@ -26,8 +26,8 @@ class Party(NamedTuple):
 class Key(NamedTuple):
     """What an answer repeats of its request."""
 
-    client: Party
-    server: Party
+    client: RequestParty
+    server: RequestParty
     invoke_id: int
 
 
@@ -155,8 +155,8 @@ def read(frame: Frame) -> tuple[Message | None, Key | None]:
     apdu, npdu = message.apdu, message.npdu
     if apdu.invoke_id is None:
         return message, None
-    source = Party(message.source, npdu.snet, npdu.sadr)
-    destination = Party(message.destination, npdu.dnet, npdu.dadr)
+    source = RequestParty(message.source, npdu.snet, npdu.sadr)
+    destination = RequestParty(message.destination, npdu.dnet, npdu.dadr)
     if apdu.is_answer:
         return message, Key(destination, source, apdu.invoke_id)
     if apdu.type in (PduType.CONFIRMED_REQUEST, PduType.SEGMENT_ACK, PduType.ABORT):

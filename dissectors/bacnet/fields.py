@@ -10,22 +10,13 @@ from typing import Any
 from dissectors.bacnet import message as messages
 from dissectors.bacnet import npdu as npdus
 from dissectors.bacnet.apdu import Apdu, PduType
+from dissectors.bacnet.dates import Date, Time
 from dissectors.bacnet.frame_types import HEADER, PREAMBLE, PROPRIETARY, is_encoded
 from dissectors.bacnet.framing import body_is_good, header_is_good
 from dissectors.bacnet.message import Message
 from dissectors.bacnet.npdu import Npdu
 from dissectors.bacnet.tags import Tag
-from dissectors.bacnet.values import (
-    BitString,
-    Date,
-    Double,
-    Enumerated,
-    ObjectId,
-    Record,
-    Signed,
-    Time,
-    escape,
-)
+from dissectors.bacnet.values import BitString, ConstructedValue, Double, Enumerated, ObjectId, Signed, escape
 from dissectors.frame import Frame, Role
 
 Value = int | float | str
@@ -182,7 +173,7 @@ _VENDOR_IDENTIFIER = 120
 _OBJECT_NAME = 77
 
 
-def _parameters(record: Record, about: int | None, found: dict[str, list[Value]], depth: int) -> None:
+def _parameters(record: ConstructedValue, about: int | None, found: dict[str, list[Value]], depth: int) -> None:
     """Fields of named values; `about` is the property spoken of."""
     if depth > 40:
         return
@@ -199,7 +190,7 @@ def _parameters(record: Record, about: int | None, found: dict[str, list[Value]]
 
 
 def _value(value: Any, about: int | None, found: dict[str, list[Value]], depth: int) -> None:
-    if isinstance(value, Record):
+    if isinstance(value, ConstructedValue):
         _parameters(value, about, found, depth)
     elif isinstance(value, (tuple, list)):
         for item in value if depth <= 40 else ():

@@ -1,4 +1,4 @@
-"""What the rules say of a ring. `judge` is pure: a Ring in, findings out; `MstpFindings` feeds it from the live bus."""
+"""The rules' findings about a ring: `judge` is pure, a Ring in, findings out; `MstpFindings` feeds it from a bus."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from dissectors.bacnet.content_findings import ContentFindings
 from dissectors.bacnet.findings_of_damage import damage, duplicates
 from dissectors.bacnet.findings_of_use import polls, use
 from dissectors.bacnet.limits import MAX_MASTER, N_POLL, T_REPLY_DELAY, T_USAGE_DELAY
-from dissectors.bacnet.ring import COARSE_LIMIT, Node, Ring, What
-from dissectors.bacnet.ring_remarks import Remark, listed, milliseconds, of, plain
+from dissectors.bacnet.ring import COARSE_LIMIT, Ring, RingEventKind, RingNode
+from dissectors.bacnet.ring_remarks import Remark, listed, measured, of, plain
 from dissectors.bacnet.rules import RULES
 from dissectors.findings import Finding, Severity, Tally, as_consequence, counted, times
 from dissectors.frame import Event, Header
@@ -45,19 +45,19 @@ REFUSED_KEPT = 512
 
 _ANSWERED = frozenset((Verdict.ANSWERED, Verdict.RETRY, Verdict.EXCEPTION))
 
-_SIMPLE: tuple[tuple[str, What, int, str], ...] = (
-    ("MS102", What.RETRY, 1, "token repeated {times}"),
-    ("MS105", What.REJOINED, 1, "answered a Poll For Master {times} though it had been in the ring"),
-    ("MS107", What.SELF_TOKEN, 1, "passed the token to itself {times}"),
-    ("MS301", What.NO_REPLY, 1, "no answer to {requests}"),
-    ("MS304", What.BROADCAST_REQUEST, 1, "sent a broadcast that expects a reply {times}"),
-    ("MS404", What.ILLEGAL, 1, "sent a forbidden address or length {times}"),
+_SIMPLE: tuple[tuple[str, RingEventKind, int, str], ...] = (
+    ("MS102", RingEventKind.RETRY, 1, "token repeated {times}"),
+    ("MS105", RingEventKind.REJOINED, 1, "answered a Poll For Master {times} though it had been in the ring"),
+    ("MS107", RingEventKind.SELF_TOKEN, 1, "passed the token to itself {times}"),
+    ("MS301", RingEventKind.NO_REPLY, 1, "no answer to {requests}"),
+    ("MS304", RingEventKind.BROADCAST_REQUEST, 1, "sent a broadcast that expects a reply {times}"),
+    ("MS404", RingEventKind.ILLEGAL, 1, "sent a forbidden address or length {times}"),
 )
 """Rules that only count: code, kind of event, from how many on, what was seen."""
 
-_TIMED: tuple[tuple[str, What, int, str], ...] = (
-    ("MS202", What.LATE_POLL_REPLY, T_USAGE_DELAY, "answered a poll late {times}, up to {most}"),
-    ("MS302", What.LATE_REPLY, T_REPLY_DELAY, "answered late {times}, up to {most}"),
+_TIMED: tuple[tuple[str, RingEventKind, int, str], ...] = (
+    ("MS202", RingEventKind.LATE_POLL_REPLY, T_USAGE_DELAY, "answered a poll late {times}, up to {most}"),
+    ("MS302", RingEventKind.LATE_REPLY, T_REPLY_DELAY, "answered late {times}, up to {most}"),
 )
 """Rules that name the longest time."""
 
@@ -107,23 +107,27 @@ def _under_causes(made: list[Remark]) -> Iterable[Finding]:
 
 def _tokens(ring: Ring) -> Iterable[Remark]:
     for (what, mac), happened in ring.happened.items():
-        if what is What.LOST_TOKEN:
+        if what is RingEventKind.LOST_TOKEN:
             longest = max((event.value or 0 for event in happened.events), default=0)
             makers = sorted({event.other for event in happened.events if event.other is not None})
             disturbed = "who had it is not known, or octets that are no good frame came first"
             held = disturbed if mac is None else f"MAC {mac} had it"
             grave = None if mac is not None else Severity.WARNING if happened.count > 1 else Severity.NOTE
             seen = (
-                f"the token was lost {times(happened.count)}; {held}; silence up to {milliseconds(longest)}; "
+                f"the token was lost {times(happened.count)}; {held}; silence up to {measured(longest)}; "
                 f"begun anew by MAC {listed(makers)}"
             )
             yield of("MS101", mac, seen, happened, grave)
-        elif what is What.LEFT and mac is not None and ring.of(What.REJOINED, mac).last <= happened.last:
+        elif (
+            what is RingEventKind.LEFT
+            and mac is not None
+            and ring.of(RingEventKind.REJOINED, mac).last <= happened.last
+        ):
             node = ring.nodes.get(mac)
             if node is not None and node.last <= happened.last:
                 seen = "did not use its token, was passed over, and has been silent since"
                 yield of("MS106", mac, seen, happened)
-    strays = [happened for (what, _), happened in ring.happened.items() if what is What.TWO_TOKENS]
+    strays = [happened for (what, _), happened in ring.happened.items() if what is RingEventKind.TWO_TOKENS]
     total = sum(happened.count for happened in strays)
     if total >= 2 and ring.shows_tokens:
         together = strays[0]
@@ -151,7 +155,7 @@ def _holders(ring: Ring) -> Iterable[Remark]:
                 f"{f'only {listed(polled)}' if polled else 'nobody'}, never {_between(by, following)}"
             )
             yield plain("MS110", ring, mac, seen, rounds)
-        unasked = ring.of(What.UNASKED, mac)
+        unasked = ring.of(RingEventKind.UNASKED, mac)
         if unasked.count and not (node.is_master and mac <= MAX_MASTER) and ring.shows_tokens:
             held = sorted({event.other for event in unasked.events if event.other is not None})
             why = "an address above 127 can have no token" if mac > MAX_MASTER else "it never gets a token"
@@ -159,7 +163,7 @@ def _holders(ring: Ring) -> Iterable[Remark]:
             yield of("MS111", mac, seen, unasked, Severity.NOTE if unasked.count == 1 else None)
 
 
-def _skipped_by(ring: Ring, mac: int, node: Node) -> tuple[int, int, int] | None:
+def _skipped_by(ring: Ring, mac: int, node: RingNode) -> tuple[int, int, int] | None:
     """Who passes the token past a station that was in the ring: (who, to whom, how often).
 
     It missed no token, or is heard while the token goes past it and nobody polls it.
@@ -205,10 +209,10 @@ def _counted(ring: Ring) -> Iterable[Remark]:
                     severity = Severity.NOTE
                 seen = words.format(times=times(happened.count), requests=counted(happened.count, "request"))
                 # a forbidden address is the sender's affair, and may stand for no station
-                yield of(code, mac, seen, happened, severity, pair=what is not What.ILLEGAL)
+                yield of(code, mac, seen, happened, severity, pair=what is not RingEventKind.ILLEGAL)
 
 
-def _share(count: int, node: Node | None) -> float:
+def _share(count: int, node: RingNode | None) -> float:
     return count / max(1, node.tokens_received if node is not None else 0)
 
 
@@ -219,15 +223,15 @@ def _times(ring: Ring) -> Iterable[Remark]:
         for (what, mac), happened in ring.happened.items():
             if what is kind:
                 most = max((event.value or 0 for event in happened.events), default=0)
-                seen = words.format(times=times(happened.count), most=milliseconds(most))
+                seen = words.format(times=times(happened.count), most=measured(most))
                 yield of(code, mac, seen, happened, pair=True)
     yield from _late_uses(ring)
 
 
 def _late_uses(ring: Ring) -> Iterable[Remark]:
-    uses = {mac: (ring.of(What.LATE_USE, mac), node) for mac, node in ring.nodes.items() if node.use.count}
+    uses = {mac: (ring.of(RingEventKind.LATE_USE, mac), node) for mac, node in ring.nodes.items() if node.use.count}
     for mac, (late, node) in uses.items():
-        given_up = ring.of(What.GIVEN_UP, mac)
+        given_up = ring.of(RingEventKind.GIVEN_UP, mac)
         words, evidence = [], given_up
         others = [(theirs.count, other.use.count) for who, (theirs, other) in uses.items() if who != mac]
         share = sum(count for count, _ in others) / max(1, sum(count for _, count in others))
@@ -235,23 +239,23 @@ def _late_uses(ring: Ring) -> Iterable[Remark]:
         often = late.count >= max(2, LATE_SHARE * node.use.count)
         if often and not ring.coarse and alone and node.use.count >= LEAST_USES:
             words.append(
-                f"{late.count} of {node.use.count} times it used the token over {milliseconds(T_USAGE_DELAY)} "
+                f"{late.count} of {node.use.count} times it used the token over {measured(T_USAGE_DELAY)} "
                 "after "
-                f"it came; median {milliseconds(node.use.quantile(0.5))}, longest {milliseconds(node.use.most)}"
+                f"it came; median {measured(node.use.quantile(0.5))}, longest {measured(node.use.most)}"
             )
             evidence = late.merge(given_up)
         if given_up.count:
             most = max((event.value or 0 for event in given_up.events), default=0)
             words.append(
                 f"{times(given_up.count)} only after its neighbour had taken the token back, up to "
-                f"{milliseconds(most)} "
+                f"{measured(most)} "
                 "after it came: two tokens for a moment"
             )
-        both = ring.of(What.USED_BOTH, mac)
+        both = ring.of(RingEventKind.USED_BOTH, mac)
         if _uses_both(ring, mac, node):
             most = max((event.value or 0 for event in both.events), default=0)
             words.append(
-                f"{times(both.count)} only after its neighbour had repeated the token, up to {milliseconds(most)} "
+                f"{times(both.count)} only after its neighbour had repeated the token, up to {measured(most)} "
                 "after it came, and then it used the repeated one too, while the next station sent"
             )
             evidence = evidence.merge(both)
@@ -259,12 +263,12 @@ def _late_uses(ring: Ring) -> Iterable[Remark]:
             yield of("MS103", mac, "; ".join(words), evidence)
 
 
-def _uses_both(ring: Ring, mac: int, node: Node) -> bool:
+def _uses_both(ring: Ring, mac: int, node: RingNode) -> bool:
     """Whether the damage after tokens that were repeated to a station is its own: it uses them and their repeats.
 
     A noisy neighbour, or noise that falls anywhere, strikes as often after tokens that were not repeated.
     """
-    both, repeated = ring.of(What.USED_BOTH, mac).count, ring.of(What.RETRY, mac).count
+    both, repeated = ring.of(RingEventKind.USED_BOTH, mac).count, ring.of(RingEventKind.RETRY, mac).count
     usual = node.tokens_received - repeated
     if both < max(USED_BOTH_LEAST, USED_BOTH_SHARE * repeated) or usual < repeated:
         return False
@@ -277,7 +281,7 @@ def _answers(ring: Ring) -> Iterable[Remark]:
         if node.postponed >= 5 and node.postponed > POSTPONED_SHARE * node.requests_received:
             seen = f"{node.postponed} of {counted(node.requests_received, 'request')} answered with Reply Postponed"
             if node.service.count:
-                median, most = milliseconds(node.service.quantile(0.5)), milliseconds(node.service.most)
+                median, most = measured(node.service.quantile(0.5)), measured(node.service.most)
                 seen += f"; the real answers took {median}, up to {most}"
             yield plain("MS303", ring, mac, seen, node.postponed)
 

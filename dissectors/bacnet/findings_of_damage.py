@@ -1,4 +1,4 @@
-"""What the rules say of damaged frames and noise, and of two stations with one address."""
+"""Findings about damaged frames and noise, and about two stations with one address."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from math import sqrt
 
 from dissectors.bacnet.findings_of_use import has_two_rhythms
-from dissectors.bacnet.ring import Happened, Node, Ring, What
+from dissectors.bacnet.ring import Happened, Ring, RingEventKind, RingNode
 from dissectors.bacnet.ring_remarks import Remark, listed, of, plain
 from dissectors.findings import Severity, counted, times
 
@@ -44,13 +44,13 @@ def damage(ring: Ring) -> Iterable[Remark]:
         yield plain("MS403", ring, None, seen, ring.noise)
 
 
-def _is_there(node: Node) -> bool:
+def _is_there(node: RingNode) -> bool:
     """Whether more than damaged headers speak for a station: it sent a good frame, or was asked or given the token. Two
     that talk at once make headers of stations that there are not."""
     return _sent(node) > node.damaged or node.tokens_received > 0 or node.requests_received > 0
 
 
-def _is_its_own(ring: Ring, node: Node) -> bool:
+def _is_its_own(ring: Ring, node: RingNode) -> bool:
     """Whether a station has more damaged frames than noise that hits everybody brings, by its share of the octets."""
     own = node.octets + node.damaged_octets
     others = [other for other in ring.nodes.values() if other is not node]
@@ -59,9 +59,9 @@ def _is_its_own(ring: Ring, node: Node) -> bool:
     return node.damaged > LIKE_ALL * expected + 3 * sqrt(expected)
 
 
-def _of_one(ring: Ring, mac: int, node: Node) -> Iterable[Remark]:
+def _of_one(ring: Ring, mac: int, node: RingNode) -> Iterable[Remark]:
     sent = _sent(node)
-    replies = ring.of(What.DAMAGED_REPLY, mac).count
+    replies = ring.of(RingEventKind.DAMAGED_REPLY, mac).count
     if node.cut_last >= DAMAGED_LEAST and node.cut_last >= AT_END_SHARE * node.damaged:
         seen = f"{node.cut_last} of its {sent} frames lack their last octet, or it is wrong; all before it is right"
         yield plain("MS405", ring, mac, seen, node.cut_last)
@@ -72,15 +72,15 @@ def _of_one(ring: Ring, mac: int, node: Node) -> Iterable[Remark]:
         yield plain("MS402", ring, mac, seen, node.damaged)
 
 
-def _sent(node: Node) -> int:
+def _sent(node: RingNode) -> int:
     return node.data_sent + node.tokens_sent + node.polls_sent + node.poll_replies_sent + node.postponed + node.damaged
 
 
 def duplicates(ring: Ring) -> Iterable[Remark]:
     """Two stations with one address: only what a single one cannot have done."""
     for mac in sorted({mac for _, mac in ring.happened if mac is not None}):
-        second, echo = ring.of(What.SECOND_DEVICE, mac), ring.of(What.OTHER_ECHO, mac)
-        other, node = ring.of(What.OTHER_DEVICE, mac), ring.nodes.get(mac, Node())
+        second, echo = ring.of(RingEventKind.SECOND_DEVICE, mac), ring.of(RingEventKind.OTHER_ECHO, mac)
+        other, node = ring.of(RingEventKind.OTHER_DEVICE, mac), ring.nodes.get(mac, RingNode())
         reasons, evidence = [], Happened()
         if second.count:
             reasons.append(f"devices {listed(node.devices)} said I-Am from this address in turns")
@@ -89,7 +89,7 @@ def duplicates(ring: Ring) -> Iterable[Remark]:
             reasons.append(f"answered a test of its own address {times(echo.count)} with other octets")
             evidence = evidence.merge(echo)
         if has_two_rhythms(ring, mac):
-            soon = ring.of(What.TOO_SOON, mac)
+            soon = ring.of(RingEventKind.TOO_SOON, mac)
             reasons.append(
                 f"sent again {times(soon.count)} before its own poll could be answered, and waited for the answer "
                 f"{times(node.polls_waited)}"

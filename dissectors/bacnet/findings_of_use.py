@@ -1,13 +1,13 @@
-"""What the rules say of polls for masters, and of who uses the line."""
+"""Findings about polls for masters, and about who uses the line."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
 from dissectors.bacnet.limits import N_POLL, T_USAGE_TIMEOUT_MAX
-from dissectors.bacnet.ring import Ring, What
+from dissectors.bacnet.ring import Ring, RingEventKind
 from dissectors.bacnet.ring_questions import T_GO_ON
-from dissectors.bacnet.ring_remarks import Remark, listed, milliseconds, of, plain
+from dissectors.bacnet.ring_remarks import Remark, listed, measured, of, plain
 from dissectors.findings import Severity, counted, times
 from dissectors.line import NS_PER_S
 
@@ -43,13 +43,13 @@ def polls(ring: Ring) -> Iterable[Remark]:
                 f"unanswered, up to address {node.highest_polled}; "
                 f"unanswered polls of all stations take {ring.poll_waste_share:.0%} of the time"
             )
-        stopped = ring.of(What.STOPPED, mac)
+        stopped = ring.of(RingEventKind.STOPPED, mac)
         if stopped.count > 1:
             longest = max(event.value or 0 for event in stopped.events)
             seen.append(
                 f"{times(stopped.count)} it polled up to {node.highest_polled} for a successor after a loss, and "
                 "the bus "
-                f"stood still for up to {milliseconds(longest)}"
+                f"stood still for up to {measured(longest)}"
             )
         if seen:
             words = "; ".join(seen)
@@ -63,16 +63,16 @@ def _waits(ring: Ring) -> Iterable[Remark]:
         if node is None or mac is None:
             continue
         waited = node.poll_wait
-        if what is What.SLOW_SEARCH and happened.count >= max(SLOW_POLLS_LEAST, waited.count // 2):
+        if what is RingEventKind.SLOW_SEARCH and happened.count >= max(SLOW_POLLS_LEAST, waited.count // 2):
             seen = (
-                f"{happened.count} of {times(waited.count)} it went on later than {milliseconds(T_GO_ON)} after a "
+                f"{happened.count} of {times(waited.count)} it went on later than {measured(T_GO_ON)} after a "
                 "poll that "
-                f"nobody answered (20 … 35 ms are usual); median {milliseconds(waited.quantile(0.5))}, longest "
-                f"{milliseconds(waited.most)}"
+                f"nobody answered (20 … 35 ms are usual); median {measured(waited.quantile(0.5))}, longest "
+                f"{measured(waited.most)}"
             )
             yield of("MS203", mac, seen, happened)
         if (
-            what is What.TOO_SOON
+            what is RingEventKind.TOO_SOON
             and happened.count >= HASTY_LEAST
             and not ring.coarse
             and not has_two_rhythms(ring, mac)
@@ -80,7 +80,7 @@ def _waits(ring: Ring) -> Iterable[Remark]:
             seen = (
                 f"{happened.count} of {counted(waited.count, 'time')} it went on before the station that it "
                 "polled could "
-                f"answer; median {milliseconds(waited.quantile(0.5))}, {milliseconds(T_USAGE_TIMEOUT_MAX)} at "
+                f"answer; median {measured(waited.quantile(0.5))}, {measured(T_USAGE_TIMEOUT_MAX)} at "
                 "most are usual"
             )
             yield of("MS204", mac, seen, happened)
@@ -92,7 +92,7 @@ def has_two_rhythms(ring: Ring, mac: int) -> bool:
     No single station does both.
     """
     node = ring.nodes.get(mac)
-    soon = ring.of(What.TOO_SOON, mac).count
+    soon = ring.of(RingEventKind.TOO_SOON, mac).count
     return node is not None and not ring.coarse and soon >= HASTY_LEAST and node.polls_waited >= HASTY_LEAST
 
 
@@ -131,13 +131,15 @@ def _slow_rounds(ring: Ring) -> Iterable[Remark]:
         f"{counted(ring.nodes[mac].most_in_a_hold, 'frame')} a token"
         for mac in users
     )
-    seen = f"95% of the rounds took up to {milliseconds(max(slow.values()))}; most of the time had {shares}"
+    seen = f"95% of the rounds took up to {measured(max(slow.values()))}; most of the time had {shares}"
     yield plain("MS108", ring, None, seen, len(slow))
 
 
 def _storm(ring: Ring) -> Iterable[Remark]:
     storms = {
-        mac: happened for (what, mac), happened in ring.happened.items() if what is What.STORM and mac is not None
+        mac: happened
+        for (what, mac), happened in ring.happened.items()
+        if what is RingEventKind.STORM and mac is not None
     }
     if not storms:
         return
@@ -168,7 +170,7 @@ def _near_limit(ring: Ring) -> Iterable[Remark]:
     for_data = 1 - rounds * idle / ring.span - ring.poll_waste_share
     if for_data >= NEAR_LIMIT and loop >= STRETCHED * idle:
         seen = (
-            f"data take {for_data:.0%} of the time; a round takes {milliseconds(loop)} where an idle one would take "
-            f"{milliseconds(idle)}"
+            f"data take {for_data:.0%} of the time; a round takes {measured(loop)} where an idle one would take "
+            f"{measured(idle)}"
         )
         yield plain("MS603", ring, None, seen, severity=Severity.NOTE)

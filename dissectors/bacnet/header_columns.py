@@ -1,4 +1,4 @@
-"""What `peek` says of many MS/TP frames at once.
+"""Headers of many MS/TP frames at once, as `peek` gives them one by one.
 
 Tables by frame type, by the first octet of an APDU and by service give kind and role; what is rare (network messages,
 encoded data, cut headers, odd errors) is asked of `peek` itself, once for every different frame.

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 from dissectors.bacnet.frame_types import FrameType
 from dissectors.bacnet.limits import T_USAGE_DELAY
-from dissectors.bacnet.ring import Event
+from dissectors.bacnet.ring import RingEvent
 from dissectors.frame import Frame
 
 _MOST = 8
@@ -26,15 +26,15 @@ class HeldReads:
     """
 
     least_gap: int
-    _late: list[Event] = field(default_factory=list)
+    _late: list[RingEvent] = field(default_factory=list)
     _before: Frame | None = None
 
-    def add(self, event: Event) -> None:
+    def add(self, event: RingEvent) -> None:
         """Something was late in the newest frame."""
         if len(self._late) < _MOST:
             self._late.append(event)
 
-    def settle(self, frame: Frame) -> Iterable[Event]:
+    def settle(self, frame: Frame) -> Iterable[RingEvent]:
         """The next frame has come: give what was surely late, in order."""
         before, self._before = self._before, frame
         if not self._late or before is None:

@@ -1,4 +1,4 @@
-"""What a damaged frame was, where its own checks prove that only one thing happened to it.
+"""Mended frames: what a damaged frame was, where its own checks prove that only one thing happened to it.
 
 A header whose CRC agrees without its preamble is a header; a length that the data CRC contradicts is put right where
 both CRCs then agree; a frame that ends one octet early and agrees in all that is left of it lacks its last octet. One

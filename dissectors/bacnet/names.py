@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dissectors.bacnet.enumerations import BIT_STRINGS, ENUMERATIONS
-from dissectors.bacnet.newer_numbers import NEWER
+from dissectors.bacnet.enumerations_later import NEWER
 
 FIRST_VENDOR: dict[str, int] = {
     "ObjectType": 128,

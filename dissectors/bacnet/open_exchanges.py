@@ -1,4 +1,4 @@
-"""What is open on an MS/TP bus and what is over: the memory of the tracker, and what time alone ends (tracker.py)."""
+"""The open exchanges of an MS/TP bus: the memory of the tracker, and what time alone ends (tracker.py)."""
 
 from __future__ import annotations
 

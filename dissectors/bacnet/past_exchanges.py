@@ -10,7 +10,7 @@ from collections import OrderedDict
 from collections.abc import Sized
 from typing import Any, Protocol
 
-from dissectors.bacnet.exchange import Exchange, Key, Party
+from dissectors.bacnet.exchange import Exchange, Key, RequestParty
 from dissectors.tracker import Verdict
 
 NO_KEY = -1
@@ -50,7 +50,9 @@ class Nets:
         """The key that a number stands for."""
         (client_net, client), (server_net, server) = self._nets[code >> 39], self._nets[code >> 16 & 0x7FFF]
         return Key(
-            Party(code >> 31 & 0xFF, client_net, client), Party(code >> 8 & 0xFF, server_net, server), code & 0xFF
+            RequestParty(code >> 31 & 0xFF, client_net, client),
+            RequestParty(code >> 8 & 0xFF, server_net, server),
+            code & 0xFF,
         )
 
 

@@ -1,4 +1,4 @@
-"""What each row of MS/TP columns is, by itself and by the row before it: the half of pairing that needs no memory.
+"""The rows of MS/TP columns, each by itself and by the row before it: the half of pairing that needs no memory.
 
 A token, a poll and a request wait for the next frame and are over with it, whatever it is; everything else waits for
 nothing. Where that is not so, or needs to know more than two rows, the row is doubtful: `pairing.py` lists which.

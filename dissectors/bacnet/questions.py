@@ -1,4 +1,4 @@
-"""What BACnet requests ask: properties of objects; of other services the object, where they name one."""
+"""The questions in BACnet requests: properties of objects; of other services the object, where they name one."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from dissectors.bacnet.frame_types import CARRIES_NPDU, HEADER
 from dissectors.bacnet.npdu_columns import bodies
 from dissectors.bacnet.readings import PRESENT_VALUE
 from dissectors.bacnet.station_address import remote
-from dissectors.bacnet.values import ObjectId, Record
+from dissectors.bacnet.values import ConstructedValue, ObjectId
 from dissectors.columns import FrameColumns, Octets
 from dissectors.frame import Frame
 from dissectors.questions import Question, Span, Stems
@@ -72,7 +72,7 @@ def stems(frames: FrameColumns, octets: Octets) -> Stems:
     return Stems(begin, np.where(plain, body + size, begin + length), hole)
 
 
-def _spans(record: Record, writes: bool) -> Iterator[Span]:
+def _spans(record: ConstructedValue, writes: bool) -> Iterator[Span]:
     for outer, inner in _LISTS:
         if outer in record:
             for spec in record[outer]:
@@ -85,7 +85,7 @@ def _spans(record: Record, writes: bool) -> Iterator[Span]:
             return
 
 
-def _span(thing: ObjectId, record: Record, writes: bool) -> Span:
+def _span(thing: ObjectId, record: ConstructedValue, writes: bool) -> Span:
     space, _, number = str(thing).partition(",")
     which = record.get("property-identifier")
     part = "" if which is None or which.value == PRESENT_VALUE else str(which)

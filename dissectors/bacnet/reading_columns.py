@@ -1,4 +1,4 @@
-"""Which exchanges of an MS/TP bus tell nothing for sure: those of frames without data."""
+"""Exchanges of an MS/TP bus that tell nothing for sure: those of frames without data."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What BACnet exchanges tell: properties with their values. Reads, writes and changes of value. A message in
+"""Readings of BACnet exchanges: properties with their values. Reads, writes and changes of value. A message in
 segments tells it with its last one."""
 
 from __future__ import annotations
@@ -10,9 +10,10 @@ from typing import Any
 from dissectors.bacnet import message as messages
 from dissectors.bacnet import names
 from dissectors.bacnet.apdu import PduType
+from dissectors.bacnet.dates import Date, Time
 from dissectors.bacnet.frame_types import HEADER
 from dissectors.bacnet.message import Message
-from dissectors.bacnet.values import BitString, Date, Double, Enumerated, ObjectId, Record, Time, show
+from dissectors.bacnet.values import BitString, ConstructedValue, Double, Enumerated, ObjectId, show
 from dissectors.frame import Frame
 from dissectors.readings import How, Reading
 
@@ -55,7 +56,7 @@ def asks(frame: Frame) -> tuple[Reading, ...]:
     return tuple(_asked(decoded.record, message.destination))
 
 
-def _asked(record: Record, station: int) -> Iterator[Reading]:
+def _asked(record: ConstructedValue, station: int) -> Iterator[Reading]:
     specs = record.get("list-of-read-access-specs")
     if specs is None:
         pairs = [(record.get("object-identifier"), record)]
@@ -68,7 +69,7 @@ def _asked(record: Record, station: int) -> Iterator[Reading]:
             yield Reading(space, int(number), None, "", How.READ, part, station=station)
 
 
-def _part_of(record: Record, index: int | None) -> str:
+def _part_of(record: ConstructedValue, index: int | None) -> str:
     which = record["property-identifier"]
     return "" if which.value == PRESENT_VALUE else str(which) + (f".{index}" if index is not None else "")
 
@@ -96,17 +97,17 @@ def _told(message: Message) -> Iterator[Reading]:
         return
 
 
-Item = tuple[ObjectId, Record, Any, How]
+Item = tuple[ObjectId, ConstructedValue, Any, How]
 
 
 def _property(how: How) -> Any:
-    def tell(record: Record) -> Iterator[Item]:
+    def tell(record: ConstructedValue) -> Iterator[Item]:
         yield record["object-identifier"], record, record["property-value"], how
 
     return tell
 
 
-def _read_multiple(record: Record) -> Iterator[Item]:
+def _read_multiple(record: ConstructedValue) -> Iterator[Item]:
     for result in record["list-of-read-access-results"]:
         for item in result.get("list-of-results", ()):
             ((kind, value),) = item["read-result"].entries
@@ -114,13 +115,13 @@ def _read_multiple(record: Record) -> Iterator[Item]:
                 yield result["object-identifier"], item, value, How.READ
 
 
-def _write_multiple(record: Record) -> Iterator[Item]:
+def _write_multiple(record: ConstructedValue) -> Iterator[Item]:
     for spec in record["list-of-write-access-specs"]:
         for item in spec["list-of-properties"]:
             yield spec["object-identifier"], item, item["value"], How.WRITE
 
 
-def _change(record: Record) -> Iterator[Item]:
+def _change(record: ConstructedValue) -> Iterator[Item]:
     for item in record["list-of-values"]:
         yield record["monitored-object-identifier"], item, item["value"], How.REPORT
 
@@ -142,19 +143,23 @@ _ARRAYS = frozenset(
 """Arrays whose elements are values by themselves: read at once they tell the same as read one by one."""
 
 
-def _parts(record: Record, value: Any) -> Iterator[tuple[int | None, Any]]:
+def _parts(record: ConstructedValue, value: Any) -> Iterator[tuple[int | None, Any]]:
     """The value with its array index; each element of an array that came as a whole."""
     index = record.get("property-array-index")
     if index is None and isinstance(value, tuple) and record["property-identifier"].value in _ARRAYS:
         for place, element in enumerate(value, 1):
-            chosen = element.entries[0][1] if isinstance(element, Record) and len(element.entries) == 1 else element
+            chosen = (
+                element.entries[0][1]
+                if isinstance(element, ConstructedValue) and len(element.entries) == 1
+                else element
+            )
             yield place, chosen
     else:
         yield index, value
 
 
 def _reading(
-    thing: ObjectId, record: Record, index: int | None, value: Any, how: How, station: int | None
+    thing: ObjectId, record: ConstructedValue, index: int | None, value: Any, how: How, station: int | None
 ) -> Reading | None:
     space, _, number = str(thing).partition(",")
     part = _part_of(record, index)

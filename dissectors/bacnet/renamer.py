@@ -14,7 +14,7 @@ from dissectors.bacnet.frame_types import data_length
 from dissectors.bacnet.tags import header_at
 from dissectors.checksums import crc8_mstp, crc16_x25
 from dissectors.frame import Frame
-from dissectors.pseudonyms import BLANK, Pseudonyms, inflicted, without_text
+from dissectors.pseudonyms import Blanks, Pseudonyms, inflicted, without_text
 
 OCTET_STRING, CHARACTER_STRING, OBJECT_IDENTIFIER = 6, 7, 12
 DEVICE = 8
@@ -32,8 +32,9 @@ class MstpRenamer:
     """Renames MS/TP frames: MAC addresses, device instances, network addresses, texts."""
 
     def __init__(self) -> None:
-        self.stations = Pseudonyms(range(255), kept=(255,))
+        self.stations = Pseudonyms(range(128), range(128, 255), kept=(255,))  # masters; slaves, which get no token
         self.devices = Pseudonyms(range(1, 4_194_303), kept=(4_194_303,))
+        self._blanks = Blanks()
 
     def __call__(self, frame: Frame) -> bytes:
         """The frame under another name, with the same damage."""
@@ -54,16 +55,16 @@ class MstpRenamer:
         if not intact or not length:
             return head + octets[8:]
         if octets[2] >= 32:  # encoded: its length would not survive a change of its content; the frame reads damaged
-            return head + bytes([BLANK]) * (len(octets) - 8)
+            return head + self._blanks.of(octets[8:])
         data, end = octets[8 : 8 + length], octets[8 + length :]
-        renamed = self._npdu(data) if octets[2] in (5, 6) else without_text(data)
+        renamed = self._npdu(data) if octets[2] in (5, 6) else self._without_text(data)
         error = int.from_bytes(end[:2], "little") ^ crc16_x25(data)
         return head + renamed + (crc16_x25(renamed) ^ error).to_bytes(2, "little") + end[2:]
 
     def _npdu(self, data: bytes) -> bytes:
         header = npdus.decode(data)
         if header is None or header.error is not None:
-            return without_text(data)
+            return self._without_text(data)
         front = bytearray(data[: header.body])
         for named in (header.dadr, header.sadr):
             if named:
@@ -78,7 +79,7 @@ class MstpRenamer:
         apdu = apdus.decode(body)
         if apdu is None or apdu.error is not None or apdu.segmented:
             begin = apdu.body if apdu is not None and apdu.error is None else 0
-            return body[:begin] + _without_any_text(body[begin:])
+            return body[:begin] + self._without_any_text(body[begin:])
         asks_range = apdu.type == UNCONFIRMED and apdu.service in (WHO_HAS, WHO_IS)
         result = bytearray(body)
         ends: list[tuple[int, int]] = []
@@ -86,7 +87,7 @@ class MstpRenamer:
         while at < len(body):
             tag = header_at(body, at)
             if isinstance(tag, str):
-                result[at:] = _without_any_text(body[at:])
+                result[at:] = self._without_any_text(body[at:])
                 break
             if tag.kind == "primitive":
                 context = bool(body[at] & 8)
@@ -99,6 +100,19 @@ class MstpRenamer:
         self._rename_range(result, ends)
         return bytes(result)
 
+    def _without_text(self, octets: bytes) -> bytes:
+        """Runs of printable octets blanked."""
+        return without_text(octets, self._blanks.of)
+
+    def _without_any_text(self, octets: bytes) -> bytes:
+        """The same, those of two octets a character too."""
+        return _WIDE.sub(lambda found: self._wide(found[0]), self._without_text(octets))
+
+    def _wide(self, text: bytes) -> bytes:
+        """A text of two octets a character, blanked: the zeros stay where they are."""
+        letters = iter(self._blanks.of(bytes(octet for octet in text if octet)))
+        return bytes(next(letters) if octet else 0 for octet in text)
+
     def _rename_range(self, body: bytearray, ends: list[tuple[int, int]]) -> None:
         """Low and high limit of the instances that are asked for, where they stand."""
         values = [int.from_bytes(body[begin:end], "big") for begin, end in ends]
@@ -110,9 +124,9 @@ class MstpRenamer:
 
     def _content(self, number: int, context: bool, content: bytes) -> bytes:
         if not context and number == OCTET_STRING:
-            return bytes([BLANK]) * len(content)
+            return self._blanks.of(content)
         if content and ((not context and number == CHARACTER_STRING) or (context and _may_be_text(content))):
-            return content[:1] + bytes([BLANK]) * (len(content) - 1)
+            return content[:1] + self._blanks.of(content[1:])
         value = int.from_bytes(content, "big")
         is_object = (not context and number == OBJECT_IDENTIFIER) or context
         if is_object and len(content) == 4 and value >> 22 == DEVICE:
@@ -125,12 +139,3 @@ def _may_be_text(content: bytes) -> bool:
     if len(content) > LONGEST_NUMBER:
         return True
     return content[0] == 0 and len(content) > 1 and all(32 <= octet < 127 for octet in content[1:])
-
-
-def _without_any_text(octets: bytes) -> bytes:
-    """Runs of printable octets blanked, those of two octets a character too."""
-    narrow = without_text(octets)
-    return _WIDE.sub(lambda found: found[0].translate(_BLANKED), narrow)
-
-
-_BLANKED = bytes([0, *[BLANK] * 255])

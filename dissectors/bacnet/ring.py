@@ -1,7 +1,8 @@
 """The token ring as a value: who passes to whom, how long each takes, what goes wrong. Two of them add up.
 
-`RingObserver` (ring_observer.py) makes it from the frames. Times in ns. Memory is bounded: distributions, counts and
-the first EVENTS_MAX events of each kind. What the adapter's timing cannot tell is not judged: see `Ring.measurable`.
+`MstpRingObserver` (ring_observer.py) makes it from the frames. Times in ns. Memory is bounded: distributions, counts
+and the first EVENTS_MAX events of each kind. What the adapter's timing cannot tell is not judged: see
+`Ring.measurable`.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ COARSE_LIMIT = 100_000_000
 """Limits from here on can be judged with coarse times too (systems that stamp every 16 ms)."""
 
 
-class What(Enum):
+class RingEventKind(Enum):
     """Kinds of events on a ring."""
 
     LOST_TOKEN = "lost token"  # silence of 500 ms and more, then somebody began anew
@@ -51,10 +52,10 @@ class What(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Event:
+class RingEvent:
     """What happened at `time`, in frame `no`, about `mac`; `other` is a second party, `value` ns or a number."""
 
-    what: What
+    what: RingEventKind
     time: int
     no: int
     mac: int | None
@@ -69,9 +70,9 @@ class Happened:
     count: int = 0
     first: int = 0
     last: int = 0
-    events: tuple[Event, ...] = ()
+    events: tuple[RingEvent, ...] = ()
 
-    def add(self, event: Event) -> Happened:
+    def add(self, event: RingEvent) -> Happened:
         """One more."""
         events = (*self.events, event) if len(self.events) < EVENTS_MAX else self.events
         first = event.time if not self.count else min(self.first, event.time)
@@ -90,7 +91,7 @@ class Happened:
 
 
 @dataclass(frozen=True, slots=True)
-class Node:
+class RingNode:
     """One address. Counts of frames that it sent (`…_sent`) or was sent.
 
     `use`: end of a token to it … its first frame. `loop`: from token to token. `reply`: request to its answer.
@@ -146,14 +147,14 @@ class Node:
         """Most data frames on one token (its Max_Info_Frames is at least that)."""
         return max(self.holds, default=0)
 
-    def merge(self, other: Node) -> Node:
+    def merge(self, other: RingNode) -> RingNode:
         """Both together."""
         holds = dict(self.holds)
         for frames, count in other.holds.items():
             holds[frames] = holds.get(frames, 0) + count
         merged: dict[str, Any] = {name: getattr(self, name) + getattr(other, name) for name in SUMS}
         merged |= {name: getattr(self, name).merge(getattr(other, name)) for name in _DISTRIBUTIONS}
-        return Node(
+        return RingNode(
             **merged,
             highest_polled=max(self.highest_polled, other.highest_polled),
             first=min(self.first, other.first),
@@ -236,9 +237,9 @@ class Ring:
     poll_waste: int = 0
     impossible: int = 0
     hole: int = 0
-    nodes: Mapping[int, Node] = field(default_factory=lambda: MappingProxyType({}))
+    nodes: Mapping[int, RingNode] = field(default_factory=lambda: MappingProxyType({}))
     edges: Mapping[tuple[int, int], Edge] = field(default_factory=lambda: MappingProxyType({}))
-    happened: Mapping[tuple[What, int | None], Happened] = field(default_factory=lambda: MappingProxyType({}))
+    happened: Mapping[tuple[RingEventKind, int | None], Happened] = field(default_factory=lambda: MappingProxyType({}))
     polled: Mapping[tuple[int, int], int] = field(default_factory=lambda: MappingProxyType({}))
 
     @property
@@ -336,7 +337,7 @@ class Ring:
                 words.append(f"MAC {mac} polls up to {node.highest_polled}: Max_Master {needed} would do")
         return tuple(words)
 
-    def of(self, what: What, mac: int | None = None) -> Happened:
+    def of(self, what: RingEventKind, mac: int | None = None) -> Happened:
         """Events of a kind about a station."""
         return self.happened.get((what, mac), Happened())
 

@@ -1,4 +1,4 @@
-"""Rows of an MS/TP bus as `RingObserver` would see them, where all goes its way: tokens, polls, requests and answers.
+"""Rows of an MS/TP bus as `MstpRingObserver` sees them, where all goes its way: tokens, polls, requests, answers.
 
 Who has the token behind such a row is told by the row and the one before it alone: whoever was sent a token, or an
 answer; else the sender. A row is *clean* where nothing happens in it that the observer tells of. What is left out:

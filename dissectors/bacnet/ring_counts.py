@@ -1,4 +1,4 @@
-"""Counting clean rows of a ring: what `RingObserver` adds for each of them, for many at once.
+"""Counting clean rows of a ring: what `MstpRingObserver` adds for each of them, for many at once.
 
 What an observer asks for while it sees a single row (when a station got its token last, to whom it passed it …) is true
 at once; what only adds up is added at the end of a table, for all runs of clean rows together.

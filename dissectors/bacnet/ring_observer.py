@@ -28,9 +28,9 @@ from dissectors.bacnet.limits import (
     TURNAROUND_BITS,
 )
 from dissectors.bacnet.repeated_token import RepeatedToken
-from dissectors.bacnet.ring import EVENTS_MAX, Event, Ring, What
+from dissectors.bacnet.ring import EVENTS_MAX, Ring, RingEvent, RingEventKind
 from dissectors.bacnet.ring_damage import count_damage, speaker_of
-from dissectors.bacnet.ring_questions import Asked, Questions
+from dissectors.bacnet.ring_questions import AskedInRing, RingQuestions
 from dissectors.bacnet.ring_tally import NodeTally, RingTally
 from dissectors.bacnet.storms import Storms
 from dissectors.bacnet.turn import Turn
@@ -69,7 +69,7 @@ class _GivenUp:
     token_end: int
 
 
-class RingObserver:
+class MstpRingObserver:
     """Fed every event of a bus in order; gives the `Ring` at any time. Total."""
 
     def __init__(self, timing: Timing) -> None:
@@ -91,7 +91,7 @@ class RingObserver:
         self._missed: int | None = None  # where octets may be lost, until an event comes after it
         self._turn = Turn(timing)
         self._reads = HeldReads(self._least_gap)
-        self._questions = Questions(self._tally, self._reads)
+        self._questions = RingQuestions(self._tally, self._reads)
         self._storms = Storms()
 
     def see(self, no: int, event: FramerEvent, header: Header | None) -> None:
@@ -171,11 +171,11 @@ class RingObserver:
         if asked is None or speaker is None or asked.frame_type == _POLL:
             pass
         elif (speaker.source, speaker.destination) == (asked.destination, asked.source):
-            tally.note(What.DAMAGED_REPLY, frame.start, no, asked.destination, asked.source)
+            tally.note(RingEventKind.DAMAGED_REPLY, frame.start, no, asked.destination, asked.source)
         if is_whole_header(frame) and header.function in (*EXPECTING, _TEST) and header.destination != BROADCAST:
             assert header.source is not None
             assert header.destination is not None
-            self._questions.asked = Asked(header.function, header.source, header.destination, frame, no)
+            self._questions.asked = AskedInRing(header.function, header.source, header.destination, frame, no)
         self._doubt = True
 
     def _disturb(self, no: int, start: int) -> bool:
@@ -183,7 +183,7 @@ class RingObserver:
         mac = self._repeated.of
         took = None if mac is None else self._repeated.disturbed(start)
         if took is not None:
-            self._tally.note(What.USED_BOTH, start, no, mac, None, took)
+            self._tally.note(RingEventKind.USED_BOTH, start, no, mac, None, took)
         return took is not None
 
     # Good frames
@@ -203,7 +203,7 @@ class RingObserver:
         if (slow := self._repeated.of) is not None:
             took = self._repeated.see(frame, frame_type, source, destination)
             if took is not None:
-                tally.note(What.USED_BOTH, frame.start, no, slow, None, took)
+                tally.note(RingEventKind.USED_BOTH, frame.start, no, slow, None, took)
         self._questions.holder = self._holder
         answers = self._questions.is_answer(no, frame, frame_type, source, destination, node)
         self._check_addresses(no, frame, frame_type, source, destination)
@@ -218,7 +218,7 @@ class RingObserver:
         elif frame_type == _POLL_REPLY:
             node.poll_replies_sent += 1
             if node.gone:
-                tally.note(What.REJOINED, frame.start, no, source, destination)
+                tally.note(RingEventKind.REJOINED, frame.start, no, source, destination)
                 node.gone = False
         elif frame_type == _POSTPONED:
             node.postponed += 1
@@ -226,7 +226,7 @@ class RingObserver:
             if not answers:
                 self._take_turn(no, frame, source, node)
             if frame_type == _TEST:
-                self._questions.asked = Asked(frame_type, source, destination, frame, no)
+                self._questions.asked = AskedInRing(frame_type, source, destination, frame, no)
             elif frame_type in CARRIES_NPDU or frame_type >= PROPRIETARY:
                 self._see_data(no, frame, frame_type, source, destination, node, answers, header)
 
@@ -238,7 +238,7 @@ class RingObserver:
             node.polls_of_search += 1
         if node.highest_polled < destination <= MAX_MASTER:
             node.highest_polled = destination
-        self._questions.asked = Asked(_POLL, source, destination, frame, no)
+        self._questions.asked = AskedInRing(_POLL, source, destination, frame, no)
         if source <= MAX_MASTER and destination <= MAX_MASTER:
             self._tally.polled[source, destination] = frame.end
         polled = self._tally.nodes.get(destination)
@@ -261,17 +261,17 @@ class RingObserver:
         if destination == BROADCAST:
             node.broadcasts_sent += 1
             if self._storms.see(frame.end):
-                self._tally.note(What.STORM, frame.start, no, source)
+                self._tally.note(RingEventKind.STORM, frame.start, no, source)
         if not answers:
             self._hold += 1
             self._questions.end_postponed(frame, source, destination, node)
         if frame_type in EXPECTING and not answers:
             if destination == BROADCAST:
-                self._tally.note(What.BROADCAST_REQUEST, frame.start, no, source)
+                self._tally.note(RingEventKind.BROADCAST_REQUEST, frame.start, no, source)
             elif header.role is Role.REQUEST:  # answers and what is unconfirmed ask for nothing, whatever the type says
                 node.requests_sent += 1
                 self._tally.node(destination).requests_received += 1
-                self._questions.asked = Asked(frame_type, source, destination, frame, no)
+                self._questions.asked = AskedInRing(frame_type, source, destination, frame, no)
         if header.kind == "i-am":
             self._see_i_am(no, frame, source, node)
 
@@ -286,13 +286,13 @@ class RingObserver:
         before, node.device = node.device, instance
         if instance in node.devices:
             if before not in (None, instance):
-                self._tally.note(What.SECOND_DEVICE, frame.start, no, source, None, instance)
+                self._tally.note(RingEventKind.SECOND_DEVICE, frame.start, no, source, None, instance)
             return
         if len(node.devices) >= EVENTS_MAX:
             return
         node.devices.append(instance)
         if len(node.devices) > 1:
-            self._tally.note(What.OTHER_DEVICE, frame.start, no, source, None, instance)
+            self._tally.note(RingEventKind.OTHER_DEVICE, frame.start, no, source, None, instance)
 
     # Who may send
 
@@ -314,7 +314,7 @@ class RingObserver:
         self._questions.give_up(no, frame, source)
         if tally.edges:  # where no token was ever seen, none can be lost
             holder = None if self._doubt or self._was_interrupted() else self._holder
-            tally.note(What.LOST_TOKEN, frame.start, no, holder, source, self._silence(frame))
+            tally.note(RingEventKind.LOST_TOKEN, frame.start, no, holder, source, self._silence(frame))
             tally.node(source).searches = True
             tally.node(source).searching_since = frame.start
         self._forget()
@@ -335,7 +335,7 @@ class RingObserver:
                 if not self._doubt:
                     node.use.add(gap)
                     if surely_over(frame, self._token, T_USAGE_DELAY):
-                        self._late(What.LATE_USE, no, frame, source, self._passed_by, gap)
+                        self._late(RingEventKind.LATE_USE, no, frame, source, self._passed_by, gap)
                 self._token = self._passed_by = None
             return
         if source == self._passed_by:  # nobody used it: it is repeated, or somebody else is looked for
@@ -345,10 +345,10 @@ class RingObserver:
             return
         if self._holder is not None and not self._doubt:
             if self._is_slave(frame, source, node):
-                self._tally.note(What.UNASKED, frame.start, no, source, self._holder)
+                self._tally.note(RingEventKind.UNASKED, frame.start, no, source, self._holder)
                 self._token = None  # the time to its use is not its own any more
             else:
-                self._tally.note(What.TWO_TOKENS, frame.start, no, source, self._holder)
+                self._tally.note(RingEventKind.TWO_TOKENS, frame.start, no, source, self._holder)
                 self._second = source
             return
         self._forget()
@@ -360,7 +360,7 @@ class RingObserver:
             token_end = frame.start if self._token is None else self._token.end
             self._given_up = _GivenUp(self._holder, source, token_end)
             if frame.octets[2] == _POLL and not self._doubt:  # damage in between may have been its use
-                self._tally.note(What.LEFT, frame.start, no, self._holder, source)
+                self._tally.note(RingEventKind.LEFT, frame.start, no, self._holder, source)
                 self._tally.node(self._holder).gone = True
             if frame.octets[2] == _POLL:
                 node.searches = True
@@ -376,7 +376,7 @@ class RingObserver:
             self._given_up = None
             self._tally.node(source).gone = False
             if not self._doubt:
-                self._tally.note(What.GIVEN_UP, frame.start, no, source, late.by, gap)
+                self._tally.note(RingEventKind.GIVEN_UP, frame.start, no, source, late.by, gap)
             self._two_until = frame.end + T_LATE_USE
             self._second = source
             return True
@@ -412,7 +412,7 @@ class RingObserver:
         if again and before is not None:
             self._repeated.repeat(destination, before.end)
             edge.retries += 1
-            tally.note(What.RETRY, frame.start, no, destination, source, self._gap(frame))
+            tally.note(RingEventKind.RETRY, frame.start, no, destination, source, self._gap(frame))
         else:
             hold = min(self._hold, _HOLD_MAX)
             node.holds[hold] = node.holds.get(hold, 0) + 1
@@ -422,7 +422,7 @@ class RingObserver:
             target.got = frame.end
         self._hold = 0
         if source == destination:
-            tally.note(What.SELF_TOKEN, frame.start, no, source)
+            tally.note(RingEventKind.SELF_TOKEN, frame.start, no, source)
         if source == self._second and source != self._holder:
             self._second = destination
             return
@@ -443,7 +443,7 @@ class RingObserver:
         since, node.searching_since = node.searching_since, None
         if since is not None and frame.start - since >= T_STOPPED:
             value = frame.start - since
-            self._tally.note(What.STOPPED, frame.start, no, source, node.highest_polled, value)
+            self._tally.note(RingEventKind.STOPPED, frame.start, no, source, node.highest_polled, value)
 
     def _check_addresses(self, no: int, frame: Frame, frame_type: int, source: int, destination: int) -> None:
         length = frame.octets[5] << 8 | frame.octets[6]
@@ -451,13 +451,13 @@ class RingObserver:
         if frame_type <= _POLL and (source > MAX_MASTER or destination > MAX_MASTER):
             illegal = True
         if illegal or (length > MAX_DATA and not is_encoded(frame_type)):
-            self._tally.note(What.ILLEGAL, frame.start, no, source, destination, length)
+            self._tally.note(RingEventKind.ILLEGAL, frame.start, no, source, destination, length)
 
     # Times
 
-    def _late(self, what: What, no: int, frame: Frame, mac: int, other: int | None, value: int) -> None:
+    def _late(self, what: RingEventKind, no: int, frame: Frame, mac: int, other: int | None, value: int) -> None:
         """Something was late, unless the next frame shows that the read was."""
-        self._reads.add(Event(what, frame.start, no, mac, other, value))
+        self._reads.add(RingEvent(what, frame.start, no, mac, other, value))
 
     def _gap(self, frame: Frame) -> int:
         return 0 if self._before is None else max(0, frame.start - self._before.end)

@@ -1,4 +1,4 @@
-"""What waits for an answer on a ring, polls, tests and requests: whether it comes, too late, or never."""
+"""Polls, tests and requests that wait for an answer on a ring: whether it comes, too late, or never."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dissectors.bacnet.frame_types import CARRIES_NPDU, FrameType
 from dissectors.bacnet.held_reads import HeldReads, surely_over
 from dissectors.bacnet.limits import MS, T_NO_TOKEN, T_REPLY_DELAY, T_USAGE_DELAY
 from dissectors.bacnet.message import data_of, more_follows
-from dissectors.bacnet.ring import Event, What
+from dissectors.bacnet.ring import RingEvent, RingEventKind
 from dissectors.bacnet.ring_tally import NodeTally, RingTally
 from dissectors.frame import Frame
 
@@ -28,7 +28,7 @@ _NO_ANSWERS = frozenset(
 
 
 @dataclass(slots=True)
-class Asked:
+class AskedInRing:
     """The frame that waits for its answer. `missed`: it was counted as one that nobody answered."""
 
     frame_type: int
@@ -39,7 +39,7 @@ class Asked:
     missed: bool = False
 
 
-class Questions:
+class RingQuestions:
     """`asked` is what must be answered now; those given up, and those postponed, are remembered, bounded.
 
     `doubt`: something may have been missed since the last good frame. `holder`: who has the token, as far as known.
@@ -47,13 +47,13 @@ class Questions:
     """
 
     def __init__(self, tally: RingTally, reads: HeldReads) -> None:
-        self.asked: Asked | None = None
+        self.asked: AskedInRing | None = None
         self.doubt = True
         self.holder: int | None = None
         self.alone_since: int | None = None
         self._tally = tally
         self._reads = reads
-        self._unanswered: OrderedDict[tuple[int, int], Asked] = OrderedDict()  # by server and client
+        self._unanswered: OrderedDict[tuple[int, int], AskedInRing] = OrderedDict()  # by server and client
         self._postponed: deque[tuple[int, int, int]] = deque(maxlen=_POSTPONED_MAX)  # server, client, end of request
 
     @property
@@ -96,7 +96,7 @@ class Questions:
                 return
 
     def _answers(
-        self, asked: Asked, no: int, frame: Frame, frame_type: int, source: int, destination: int, node: NodeTally
+        self, asked: AskedInRing, no: int, frame: Frame, frame_type: int, source: int, destination: int, node: NodeTally
     ) -> bool:
         back = source == asked.destination and destination == asked.source
         took = frame.start - asked.frame.end
@@ -106,13 +106,13 @@ class Questions:
                 return False
             node.poll_reply.add(took)
             if surely_over(frame, asked.frame, T_USAGE_DELAY):
-                self._reads.add(Event(What.LATE_POLL_REPLY, frame.start, no, source, destination, took))
+                self._reads.add(RingEvent(RingEventKind.LATE_POLL_REPLY, frame.start, no, source, destination, took))
             return True
         if asked.frame_type == _TEST:
             answered = back and frame_type == FrameType.TEST_RESPONSE
             to_itself = answered and asked.frame.ok and source == destination
             if to_itself and data_of(frame.octets) != data_of(asked.frame.octets):
-                self._tally.note(What.OTHER_ECHO, frame.start, no, source)
+                self._tally.note(RingEventKind.OTHER_ECHO, frame.start, no, source)
             return answered
         if not back or frame_type in _NO_ANSWERS:
             self._unanswered_request(asked)
@@ -120,35 +120,37 @@ class Questions:
         node.replies += 1
         node.reply.add(took)
         if surely_over(frame, asked.frame, T_REPLY_DELAY):
-            self._reads.add(Event(What.LATE_REPLY, frame.start, no, source, destination, took))
+            self._reads.add(RingEvent(RingEventKind.LATE_REPLY, frame.start, no, source, destination, took))
         if frame_type == FrameType.REPLY_POSTPONED:
             self._postponed.append((source, destination, asked.frame.end))
         return True
 
-    def _unanswered_poll(self, asked: Asked, no: int, frame: Frame, source: int) -> None:
+    def _unanswered_poll(self, asked: AskedInRing, no: int, frame: Frame, source: int) -> None:
         node = self._tally.node(asked.source)
         self._tally.poll_waste += max(0, min(frame.start - asked.frame.start, T_NO_TOKEN))
         node.polls_unanswered += 1
         if source == asked.source:
             self._go_on(asked, no, frame, node)
 
-    def _go_on(self, asked: Asked, no: int, frame: Frame, node: NodeTally) -> None:
+    def _go_on(self, asked: AskedInRing, no: int, frame: Frame, node: NodeTally) -> None:
         """The station that polled has given the poll up: too soon, in time or late."""
         took = frame.start - asked.frame.end
         node.poll_wait.add(took)
         if surely_over(frame, asked.frame, T_USAGE_DELAY):
             node.polls_waited += 1
         if surely_over(frame, asked.frame, T_GO_ON):
-            self._reads.add(Event(What.SLOW_SEARCH, frame.start, no, asked.source, asked.destination, took))
+            self._reads.add(
+                RingEvent(RingEventKind.SLOW_SEARCH, frame.start, no, asked.source, asked.destination, took)
+            )
         since, same = self.alone_since, frame.octets == asked.frame.octets
         if since is None or took < self._reads.least_gap or self.doubt or same:
             return
         # the poll may have come in a late read too, and begun directly after what was before it
         longest = frame.start - since - (asked.frame.end - asked.frame.start)
         if longest < T_USAGE_DELAY // 2:
-            self._tally.note(What.TOO_SOON, frame.start, no, asked.source, asked.destination, took)
+            self._tally.note(RingEventKind.TOO_SOON, frame.start, no, asked.source, asked.destination, took)
 
-    def _unanswered_request(self, asked: Asked) -> None:
+    def _unanswered_request(self, asked: AskedInRing) -> None:
         if not asked.frame.ok:  # it may have been damaged for everybody
             return
         key = asked.destination, asked.source
@@ -158,7 +160,7 @@ class Questions:
             self._unanswered.popitem(last=False)
         if not self.doubt and not more_follows(asked.frame):
             asked.missed = True
-            self._tally.note(What.NO_REPLY, asked.frame.end, asked.no, asked.destination, asked.source)
+            self._tally.note(RingEventKind.NO_REPLY, asked.frame.end, asked.no, asked.destination, asked.source)
 
     def _is_late(self, no: int, frame: Frame, source: int, destination: int) -> bool:
         """Whether it is for the one that asked and has given up: late, but neither lost nor a second token."""
@@ -169,6 +171,6 @@ class Questions:
         if took > T_LATE_ANSWER:
             return False
         if asked.missed:
-            self._tally.take_back(What.NO_REPLY, asked.no, source)
-        self._tally.note(What.LATE_REPLY, frame.start, no, source, destination, took)
+            self._tally.take_back(RingEventKind.NO_REPLY, asked.no, source)
+        self._tally.note(RingEventKind.LATE_REPLY, frame.start, no, source, destination, took)
         return True

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from dissectors.bacnet.ring import Happened, Ring
 from dissectors.bacnet.rules import RULES
 from dissectors.findings import EVIDENCE_MAX, Finding, Severity, found
-from dissectors.line import MS
+from dissectors.words import duration
 
 
 class Remark(NamedTuple):
@@ -67,9 +67,9 @@ def _pair(happened: Happened, mac: int | None) -> str:
     return subject(mac)
 
 
-def milliseconds(duration: int | None) -> str:
+def measured(time: int | None) -> str:
     """A duration (ns) for people, "?" where it is not known."""
-    return "?" if duration is None else f"{duration / MS:.3g} ms" if duration < 1000 * MS else f"{duration / 1e9:.2f} s"
+    return "?" if time is None else duration(time)
 
 
 def listed(numbers: Iterable[int]) -> str:

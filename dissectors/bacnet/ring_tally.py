@@ -1,18 +1,18 @@
-"""A ring while it is being counted: what `RingObserver` adds to, and what becomes a `Ring` value at any time."""
+"""A ring while it is being counted: what `MstpRingObserver` adds to, and what becomes a `Ring` value at any time."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
-from dissectors.bacnet.ring import SUMS, Edge, Event, Happened, Node, Ring, What
+from dissectors.bacnet.ring import SUMS, Edge, Happened, Ring, RingEvent, RingEventKind, RingNode
 from dissectors.histogram import Histogram
 from dissectors.line import Timing
 
 
 @dataclass(slots=True)
 class NodeTally:
-    """One address; counts and distributions as in `Node`."""
+    """One address; counts and distributions as in `RingNode`."""
 
     tokens_received: int = 0
     tokens_sent: int = 0
@@ -54,9 +54,9 @@ class NodeTally:
     next: int | None = None  # to whom it passed the token last
     device: int | None = None  # the instance that it gave last
 
-    def value(self) -> Node:
+    def value(self) -> RingNode:
         """What was counted so far."""
-        return Node(
+        return RingNode(
             **{name: getattr(self, name) for name in SUMS},
             highest_polled=self.highest_polled,
             first=self.first,
@@ -103,7 +103,7 @@ class RingTally:
     hole: int = 0
     nodes: dict[int, NodeTally] = field(default_factory=dict)
     edges: dict[tuple[int, int], EdgeTally] = field(default_factory=dict)
-    happened: dict[tuple[What, int | None], Happened] = field(default_factory=dict)
+    happened: dict[tuple[RingEventKind, int | None], Happened] = field(default_factory=dict)
     polled: dict[tuple[int, int], int] = field(default_factory=dict)
 
     def node(self, mac: int) -> NodeTally:
@@ -121,13 +121,19 @@ class RingTally:
         return found
 
     def note(
-        self, what: What, time: int, no: int, mac: int | None, other: int | None = None, value: int | None = None
+        self,
+        what: RingEventKind,
+        time: int,
+        no: int,
+        mac: int | None,
+        other: int | None = None,
+        value: int | None = None,
     ) -> None:
-        """Something happened: arguments as in `Event`."""
+        """Something happened: arguments as in `RingEvent`."""
         key = (what, mac)
-        self.happened[key] = self.happened.get(key, Happened()).add(Event(what, time, no, mac, other, value))
+        self.happened[key] = self.happened.get(key, Happened()).add(RingEvent(what, time, no, mac, other, value))
 
-    def take_back(self, what: What, no: int, mac: int | None) -> None:
+    def take_back(self, what: RingEventKind, no: int, mac: int | None) -> None:
         """What was noted of frame `no` turned out to be nothing."""
         happened = self.happened.get((what, mac))
         if happened is None:

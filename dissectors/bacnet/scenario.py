@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from dissectors.bacnet.f510 import f510
-from dissectors.bacnet.simulated import Faults, Node, Poller
+from dissectors.bacnet.simulated import Faults, Poller, SimulatedNode
 from dissectors.frame import Place
 from dissectors.line import LineSettings, Timing
 from dissectors.simulated import Party, SimulatedBus
@@ -31,9 +31,9 @@ def _parties(line: LineSettings, faults: bool) -> list[Party]:
     logger = Poller([(drive, "analog-output,0", "present-value"), (fan, "analog-output,0", "present-value")])
     forgetful = Faults(loses_token_every=700, postpones=True) if faults else Faults(postpones=True)
     nodes = {
-        "controller": Node(1, timing, controller, max_master=31, max_info_frames=2),
-        "logger": Node(2, timing, logger, max_master=31),
-        "drive": Node(drive, timing, f510(drive), max_master=127),
-        "fan": Node(fan, timing, f510(fan, name="fan"), max_master=31, faults=forgetful),
+        "controller": SimulatedNode(1, timing, controller, max_master=31, max_info_frames=2),
+        "logger": SimulatedNode(2, timing, logger, max_master=31),
+        "drive": SimulatedNode(drive, timing, f510(drive), max_master=127),
+        "fan": SimulatedNode(fan, timing, f510(fan, name="fan"), max_master=31, faults=forgetful),
     }
     return [Party(name, node, answers=False) for name, node in nodes.items()]

@@ -22,7 +22,7 @@ RETRIES = 3
 
 
 @dataclass(slots=True)
-class Sender:
+class SegmentSender:
     """An answer on its way. `first`: the earliest segment not acknowledged; `sent_at`: ns, None until it is known."""
 
     invoke_id: int
@@ -34,7 +34,7 @@ class Sender:
     retries: int = RETRIES
 
     @classmethod
-    def of(cls, invoke_id: int, service: int, parameters: bytes, max_apdu: int) -> Sender:
+    def of(cls, invoke_id: int, service: int, parameters: bytes, max_apdu: int) -> SegmentSender:
         """An answer cut so that each APDU fits."""
         size = max(1, max_apdu - HEADER)
         pieces = tuple(parameters[at : at + size] for at in range(0, len(parameters), size))
@@ -84,7 +84,7 @@ class Sender:
 
 
 @dataclass(slots=True)
-class Receiver:
+class SegmentReceiver:
     """What one side has of a message in segments. `window`: what it allows."""
 
     window: int = 2

@@ -1,6 +1,6 @@
 """Simulated MS/TP nodes as stations of a virtual bus (dissectors/simulated.py): pure, a clock only in what is told.
 
-`Node` is a master: it passes the token, polls for masters, answers, and makes a new token when it was lost
+`SimulatedNode` is a master: it passes the token, polls for masters, answers, and makes a new token when it was lost
 (ANSI/ASHRAE 135, 9.5.6). What it does with data is its application's affair (application.py; f510.py is a drive).
 `Faults` make it misbehave on purpose.
 """
@@ -33,7 +33,7 @@ from dissectors.frame import Chunk, Frame
 from dissectors.line import Timing
 from dissectors.simulated import Send
 
-__all__ = ["Device", "Faults", "Node", "Poller", "f510"]
+__all__ = ["Device", "Faults", "Poller", "SimulatedNode", "f510"]
 
 _QUEUE_MAX = 64
 
@@ -67,7 +67,7 @@ class _State(Enum):
     ASKING = auto()  # waits for an answer
 
 
-class Node:
+class SimulatedNode:
     """One master on the bus.
 
     `mac` 0 … 127. `max_info_frames`: data frames a token. `polls_every`: tokens from poll to poll. `begins_at`: ns,

@@ -1,4 +1,4 @@
-"""What the lines of MS/TP frames read of them: no check, no invoke ID of requests and acks; reals are numbers."""
+"""Stencils of MS/TP frames: no check, no invoke ID of requests and acks; reals are numbers."""
 
 from __future__ import annotations
 

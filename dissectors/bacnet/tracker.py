@@ -30,7 +30,7 @@ from dissectors.bacnet.frame_types import EXPECTING, FrameType, total
 from dissectors.bacnet.header import is_whole_header
 from dissectors.bacnet.limits import BROADCAST, MAX_ENCODED, MS, T_USAGE_DELAY, TURNAROUND_BITS
 from dissectors.bacnet.open_exchanges import OpenExchanges
-from dissectors.bacnet.segmentation import Reassembler
+from dissectors.bacnet.reassembly import Reassembler
 from dissectors.bacnet.turn import Turn
 from dissectors.frame import Assembly, Event, Frame, Header, Noise, Role
 from dissectors.line import Timing

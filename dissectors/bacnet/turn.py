@@ -1,4 +1,4 @@
-"""Whose turn it is to speak, as far as the frames before tell: by that, a frame with a damaged header has a sender.
+"""The turn to speak, as far as the frames before tell: by it a frame with a damaged header has a sender.
 
 A token says who speaks next, a poll or a request who answers, silence that the one before has given up. A damaged frame
 is compared with what each of those could have sent; octets may be wrong, missing or too many.

@@ -1,4 +1,4 @@
-"""Whose turn it is behind many good frames that follow one another in order."""
+"""The turn to speak behind many good frames that follow one another in order."""
 
 from __future__ import annotations
 

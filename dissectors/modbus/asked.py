@@ -10,7 +10,7 @@ from dissectors.modbus.station_record import Key
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class AskedRequest:
     """The request of an open transaction."""
 
     no: int

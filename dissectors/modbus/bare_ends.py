@@ -6,8 +6,8 @@ from typing import Final
 
 from dissectors.frame import Event, Frame, Header, Noise
 from dissectors.line import Timing
+from dissectors.modbus.bus_record import BusRecord
 from dissectors.modbus.envelope import ASCII_NAME
-from dissectors.modbus.evidence import Evidence
 from dissectors.modbus.gaps import sender_of
 from dissectors.tracker import Placement
 
@@ -17,7 +17,7 @@ _CR: Final = 0x0D
 class BareEnds:
     """Fed frame by frame; writes what it finds into the evidence."""
 
-    def __init__(self, timing: Timing, seen: Evidence) -> None:
+    def __init__(self, timing: Timing, seen: BusRecord) -> None:
         self._seen = seen
         self._touching = timing.char + timing.latency
         self.newest: tuple[str, int, int] | None = None  # sender, time, frame that ended with CR alone

@@ -1,4 +1,6 @@
-"""Whose the damage is: a sender's own, or the bus's, that falls on whoever sends. Pure.
+"""Shares of the damage: a sender's own, or the bus's, that falls on whoever sends. Pure.
+
+Damage is counted in strikes (`dissectors.strikes`): what a master repeats into one disturbance is one observation.
 
 Noise that falls anywhere strikes each sender as often as it sends octets. So a sender is blamed only where so great a
 part of all damage as it has would seldom come about by its share of the octets; the worst one first, then the others
@@ -10,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import erfc, exp, lgamma, log, log1p, sqrt
 
-from dissectors.modbus.evidence import Evidence
+from dissectors.modbus.bus_record import BusRecord
 
 _SELDOM = 0.002  # with a handful of senders, one in a hundred buses blames somebody wrongly
 _SELDOM_ALONE = 0.05  # where nobody else has any damage, which speaks for itself
@@ -18,21 +20,23 @@ _EXACT_MOST = 400
 
 
 @dataclass(frozen=True, slots=True)
-class Damage:
+class DamageShare:
     """Senders ("master", "station 3") that have more damage than their share; how much the others have."""
 
     blamed: frozenset[str]
     common: dict[str, int]
 
 
-def shares_of_damage(seen: Evidence) -> Damage:
+def shares_of_damage(seen: BusRecord) -> DamageShare:
     """Sort all senders into those that are to blame and those that are not.
 
     Stations are compared with each other, and the master with all: what strikes all answers is no station's fault.
     """
-    hits = {f"station {unit}": one.damaged.count - one.explained for unit, one in seen.stations.items()}
+    frames = {f"station {unit}": one.damaged.count - one.explained for unit, one in seen.stations.items()}
+    hits = {sender: seen.strikes.of(sender, count) for sender, count in frames.items()}
     octets = {sender: max(1, seen.octets[sender]) for sender in (*hits, "master")}
-    requests = seen.damaged_requests.count
+    frames["master"] = seen.damaged_requests.count
+    requests = seen.strikes.of("master", frames["master"])
     if len(hits) == 1:
         hits["master"] = requests
     blamed = to_blame(hits, octets)
@@ -42,8 +46,8 @@ def shares_of_damage(seen: Evidence) -> Damage:
         alone = not any(count for sender, count in hits.items() if sender != "master")
         if chance(requests, sum(hits.values()), share) < (_SELDOM_ALONE if alone else _SELDOM):
             blamed.add("master")
-    common = {sender: count for sender, count in hits.items() if count > 0 and sender not in blamed}
-    return Damage(frozenset(blamed), common)
+    common = {sender: count for sender, count in frames.items() if count > 0 and sender not in blamed}
+    return DamageShare(frozenset(blamed), common)
 
 
 def to_blame(hits: dict[str, int], octets: dict[str, int]) -> set[str]:

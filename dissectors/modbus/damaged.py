@@ -1,4 +1,4 @@
-"""What no frame covers: is it a damaged frame of a station, or noise?"""
+"""Octets that no frame covers: a damaged frame of a station, or noise?"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which station a damaged frame names, where its first octets do not say so rightly. Pure.
+"""The station that a damaged frame names, where its first octets do not say so rightly. Pure.
 
 A frame to or from a station that nobody ever heard of names it wrongly, more likely than not. An LRC is a sum: if all
 but the unit came right, it tells what the unit was. That is believed where it is a station that is known, and where one

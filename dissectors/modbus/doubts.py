@@ -18,7 +18,7 @@ from itertools import pairwise
 
 from dissectors.line import NS_PER_S
 from dissectors.modbus.exchange import Exchange
-from dissectors.modbus.learnt import READ, Learnt
+from dissectors.modbus.learned_timing import READ, LearnedTiming
 from dissectors.tracker import Verdict
 
 _KEPT = 16
@@ -37,7 +37,7 @@ class _Doubt:
 Decided = tuple[Exchange, Verdict]
 
 
-def of_next(request: Exchange, start: int, resembles: bool, learnt: Learnt) -> Verdict | None:
+def of_next(request: Exchange, start: int, resembles: bool, learnt: LearnedTiming) -> Verdict | None:
     """What a request and the copies after it were, when another frame starts; None where that does not tell.
 
     `resembles`: the other frame is a request like the first one (unit, function, length).
@@ -71,7 +71,7 @@ def is_full(request: Exchange) -> bool:
     return len(request.copies) >= _RUN_MOST
 
 
-def of_chain(chain: list[Exchange], learnt: Learnt) -> Verdict:
+def of_chain(chain: list[Exchange], learnt: LearnedTiming) -> Verdict:
     """What requests are that equal each other and had no sure answer, where answers are known to come sooner."""
     gaps = [before.gap(after.request.frame.start) for before, after in pairwise(chain)]
     if any(learnt.is_timeout(gap) for gap in gaps):
@@ -83,7 +83,7 @@ def of_chain(chain: list[Exchange], learnt: Learnt) -> Verdict:
 class Doubts:
     """Requests with one frame each that the next one did not decide about; bounded in number and in time."""
 
-    def __init__(self, learnt: Learnt) -> None:
+    def __init__(self, learnt: LearnedTiming) -> None:
         self._learnt = learnt
         self._kept: deque[_Doubt] = deque()
 

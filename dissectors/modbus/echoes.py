@@ -1,4 +1,4 @@
-"""Whether a copy of a request is its echo: given back at once, sooner than a station can answer or a master repeat.
+"""Echoes: copies of a request given back at once, sooner than a station can answer or a master repeat.
 
 A bus with an echo (a converter or adapter that hears itself) gives back every request; most buses none.
 """
@@ -8,7 +8,7 @@ from __future__ import annotations
 from dissectors.line import Timing
 from dissectors.modbus.exchange import Exchange, Seen, is_begin_of
 from dissectors.modbus.functions import BROADCAST
-from dissectors.modbus.learnt import Learnt
+from dissectors.modbus.learned_timing import LearnedTiming
 from dissectors.modbus.promptness import AT_ONCE
 
 ECHO_VOTES = 4
@@ -26,7 +26,7 @@ class Echoes:
     answer. `usual`: whether this bus repeats requests at once; None while unlearnt.
     """
 
-    def __init__(self, timing: Timing, silence: int, learnt: Learnt) -> None:
+    def __init__(self, timing: Timing, silence: int, learnt: LearnedTiming) -> None:
         self._timing = timing
         self._silence = silence
         self._learnt = learnt

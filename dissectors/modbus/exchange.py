@@ -1,4 +1,4 @@
-"""What the tracker holds of a request until it closes, and the transactions that come of it."""
+"""An exchange: what the tracker holds of a request until it closes, and the transactions that come of it."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from dissectors.frame import Frame, Header, Role
 from dissectors.modbus.functions import BROADCAST, EXCEPTION_BIT, FUNCTIONS
-from dissectors.modbus.learnt import READ, WRITE
+from dissectors.modbus.learned_timing import READ, WRITE
 from dissectors.tracker import Interval, Transaction, Verdict
 
 _OWN_PACE = 0x100
@@ -75,7 +75,7 @@ class Exchange:
 
     @property
     def pace(self) -> int:
-        """What of the station's response times its answer is to be compared with; see `learnt.py`."""
+        """What of the station's response times its answer is to be compared with; see `learned_timing.py`."""
         code = self.request.header.function
         function = FUNCTIONS.get(code) if code is not None else None
         if function is None:

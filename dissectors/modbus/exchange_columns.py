@@ -34,7 +34,7 @@ from dissectors.columns import (
 from dissectors.frame import Role
 from dissectors.line import NS_PER_S, Timing
 from dissectors.modbus.functions import EXCEPTION_BIT, ITEMS_ASKED
-from dissectors.modbus.learnt import Learnt
+from dissectors.modbus.learned_timing import LearnedTiming
 from dissectors.modbus.length_columns import PADDING, answer_lengths, of_codes
 from dissectors.modbus.ranges import RANGES_REPEATED, SINGLE_WRITES
 from dissectors.tracker import Verdict
@@ -56,7 +56,7 @@ _PAIRED: Final = frozenset((*ITEMS_ASKED, *RANGES_REPEATED))
 
 
 @dataclass(frozen=True, slots=True)
-class Exchanges:
+class ExchangeColumns:
     """Regular exchanges in order, one entry an exchange.
 
     `request`: its first row. `answered`: whether the next row is its answer; else it has but one. `unanswered`: the
@@ -88,12 +88,12 @@ class Exchanges:
         """Last row of each."""
         return self.request + self.answered
 
-    def take(self, which: Masks) -> Exchanges:
+    def take(self, which: Masks) -> ExchangeColumns:
         """Some of them."""
-        return Exchanges(*(getattr(self, one.name)[which] for one in fields(self)))
+        return ExchangeColumns(*(getattr(self, one.name)[which] for one in fields(self)))
 
 
-def exchanges(frames: FrameColumns, octets: Octets, timing: Timing, slack: Times | None = None) -> Exchanges:
+def exchanges(frames: FrameColumns, octets: Octets, timing: Timing, slack: Times | None = None) -> ExchangeColumns:
     """The regular exchanges among frames. `octets`: of all reads. `slack`: of each frame, ns; the latency if None."""
     octets = np.concatenate((octets, np.zeros(PADDING, np.uint8)))
     request, answered, unanswered = _candidates(frames, octets)
@@ -113,9 +113,9 @@ def exchanges(frames: FrameColumns, octets: Octets, timing: Timing, slack: Times
     limit = max(7 * timing.char // 2, timing.char + timing.latency)
     at_once = copy & (np.maximum(gap - _slack(frames, timing, slack)[last], 0) <= limit)
     none = np.zeros(len(run), np.int64)
-    found = Exchanges(request, answered, unanswered, repeat, run, unit, gap, sure, copy, writes, at_once, none)
+    found = ExchangeColumns(request, answered, unanswered, repeat, run, unit, gap, sure, copy, writes, at_once, none)
     too_soon = repeat & answered & (gap < 7 * timing.char // 2)  # the answer of an attempt before
-    return _in_time(_cut(found, too_soon), Learnt(timing).tolerance)
+    return _in_time(_cut(found, too_soon), LearnedTiming(timing).tolerance)
 
 
 def _slack(frames: FrameColumns, timing: Timing, slack: Times | None) -> Times:
@@ -190,7 +190,7 @@ def _numbered(sure: Masks, follows: Masks) -> Times:
 # --- copies of writes ------------------------------------------------------------------------------------------------
 
 
-def _in_time(found: Exchanges, tolerance: int) -> Exchanges:
+def _in_time(found: ExchangeColumns, tolerance: int) -> ExchangeColumns:
     """Without the copies that come later than the last 16 writes of their station allow; samples counted."""
     told = found.answered & found.writes & (found.sure | found.copy)  # these teach how long a write takes
     late = np.zeros(len(found), bool)
@@ -210,7 +210,7 @@ def _in_time(found: Exchanges, tolerance: int) -> Exchanges:
     return found
 
 
-def _by_station(found: Exchanges, told: Masks) -> tuple[Times, Times]:
+def _by_station(found: ExchangeColumns, told: Masks) -> tuple[Times, Times]:
     """Places of exchanges by run and station, in order, and how many of the same stand before each."""
     at = np.flatnonzero(told)
     key = found.run[at] << 8 | found.unit[at]
@@ -221,7 +221,7 @@ def _by_station(found: Exchanges, told: Masks) -> tuple[Times, Times]:
     return at[order], number - np.maximum.accumulate(np.where(first, number, 0))
 
 
-def _cut(found: Exchanges, late: Masks) -> Exchanges:
+def _cut(found: ExchangeColumns, late: Masks) -> ExchangeColumns:
     """Without some of them: a run ends there, and the next begins with what is sure."""
     if not late.any():
         return found
@@ -235,7 +235,7 @@ def _cut(found: Exchanges, late: Masks) -> Exchanges:
 
 
 def placed(
-    found: Exchanges,
+    found: ExchangeColumns,
     frames: FrameColumns,
     which: slice,
     numbers: Times,

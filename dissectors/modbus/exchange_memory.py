@@ -1,4 +1,4 @@
-"""What regular exchanges need of the tracker's memory, and what they leave there.
+"""The tracker's memory, as far as regular exchanges need it and change it.
 
 What the tracker learns decides a few things of a regular exchange. No answer may come later than 4/5 of the master's
 timeout; a copy that comes at once must not be an echo; the copy of a write must come in time by the station's last 16
@@ -18,8 +18,8 @@ import numpy as np
 
 from dissectors.columns import FrameColumns, Masks, Times
 from dissectors.line import Timing
-from dissectors.modbus.exchange_columns import GIVE_UP, SAMPLES, TO_ALL, Exchanges
-from dissectors.modbus.learnt import READ, UNLEARNT_LIMIT, WRITE, Learnt
+from dissectors.modbus.exchange_columns import GIVE_UP, SAMPLES, TO_ALL, ExchangeColumns
+from dissectors.modbus.learned_timing import READ, UNLEARNT_LIMIT, WRITE, LearnedTiming
 
 ANSWERED: Final = 4
 """Exchanges that the tracker keeps of those that were answered."""
@@ -36,7 +36,7 @@ VOTES: Final = 5
 HORIZON: Final = 1 << 14
 """Exchanges looked at in one go: a run that goes on is taken up again."""
 
-_ANSWER_CHARS: Final = 32  # as in learnt.py
+_ANSWER_CHARS: Final = 32  # as in learned_timing.py
 _REPEATED_AT_ONCE: Final = 50_000_000  # ns, as in the tracker: no master repeats a request sooner
 _NEVER: Final = 1 << 62
 
@@ -79,7 +79,7 @@ class Passed:
 
 
 def holding(
-    found: Exchanges, frames: FrameColumns, place: int, known: Known, timing: Timing, since: int | None = None
+    found: ExchangeColumns, frames: FrameColumns, place: int, known: Known, timing: Timing, since: int | None = None
 ) -> int:
     """Place behind the last exchange that stands, where the tracker is at rest before the one at `place`.
 
@@ -93,13 +93,15 @@ def holding(
         end = _first(found.at_once[place:end] & (sure < (VOTES if known.echoing else 1)), place, end)
     begin = int(np.searchsorted(found.run, found.run[place]))
     warm = SAMPLES + (place if since is None else since) - begin
-    end = _first_late(found, place, end, warm, known, Learnt(timing).tolerance)
+    end = _first_late(found, place, end, warm, known, LearnedTiming(timing).tolerance)
     while end > place and found.unanswered[end - 1]:  # it closes with the next request
         end -= 1
     return end
 
 
-def _impatient(found: Exchanges, frames: FrameColumns, place: int, end: int, known: Known, timing: Timing) -> Masks:
+def _impatient(
+    found: ExchangeColumns, frames: FrameColumns, place: int, end: int, known: Known, timing: Timing
+) -> Masks:
     """Which exchanges [place, end) do not surely stand by what is known of the master's timeout there."""
     part = slice(place, end)
     gap, answered, unanswered = found.gap[part], found.answered[part], found.unanswered[part]
@@ -138,7 +140,7 @@ def _first(which: Masks, place: int, end: int) -> int:
     return place + at if len(which) and which[at] else end
 
 
-def _first_late(found: Exchanges, place: int, end: int, warm: int, known: Known, tolerance: int) -> int:
+def _first_late(found: ExchangeColumns, place: int, end: int, warm: int, known: Known, tolerance: int) -> int:
     """Place of the first copy that does not surely come in time; looks one by one at those with few before them."""
     part = slice(place, end)
     doubtful = found.copy[part] & (found.samples[part] < warm)
@@ -163,7 +165,7 @@ def _first_late(found: Exchanges, place: int, end: int, warm: int, known: Known,
 
 
 def _limit(times: Sequence[int], tolerance: int) -> int | None:
-    """As `Learnt.response_limit`, less what the master's timeout does to it."""
+    """As `LearnedTiming.response_limit`, less what the master's timeout does to it."""
     if len(times) < 2:
         return None
     ordered = sorted(times)
@@ -171,7 +173,7 @@ def _limit(times: Sequence[int], tolerance: int) -> int | None:
     return slowest + slowest // 2 + tolerance
 
 
-def passed(found: Exchanges, frames: FrameColumns, place: int, end: int) -> Passed:
+def passed(found: ExchangeColumns, frames: FrameColumns, place: int, end: int) -> Passed:
     """What the tracker would remember of exchanges [place, end)."""
     part = slice(place, end)
     answered, unit = found.answered[part], found.unit[part]

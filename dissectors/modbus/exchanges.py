@@ -8,7 +8,7 @@ from dissectors.line import NS_PER_S
 from dissectors.modbus.doubts import Doubts, of_chain, of_next, of_run
 from dissectors.modbus.echoes import Echoes
 from dissectors.modbus.exchange import Exchange, Seen, answer_apart
-from dissectors.modbus.learnt import Learnt
+from dissectors.modbus.learned_timing import LearnedTiming
 from dissectors.modbus.pairing import mismatch
 from dissectors.tracker import Transaction, Verdict
 
@@ -27,7 +27,7 @@ class Exchanges:
     empty when they differ.
     """
 
-    def __init__(self, learnt: Learnt, echoes: Echoes) -> None:
+    def __init__(self, learnt: LearnedTiming, echoes: Echoes) -> None:
         self._learnt = learnt
         self._echoes = echoes
         self._doubts = Doubts(learnt)

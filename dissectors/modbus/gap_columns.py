@@ -1,4 +1,4 @@
-"""What `gaps.py` makes of frames, for stretches of regular exchanges at once."""
+"""Silences between frames (`gaps.py`), for stretches of regular exchanges at once."""
 
 from __future__ import annotations
 

@@ -13,16 +13,16 @@ from dataclasses import dataclass
 from dissectors.findings import Tally
 from dissectors.frame import Frame, Header, Role
 from dissectors.line import Timing
+from dissectors.modbus.bus_record import BusRecord
 from dissectors.modbus.envelope import RTU_NAME
-from dissectors.modbus.evidence import Evidence
-from dissectors.modbus.learnt import Learnt
+from dissectors.modbus.learned_timing import LearnedTiming
 from dissectors.modbus.station_record import middle
 from dissectors.tracker import Placement, Transaction
 
 SPACING_KEPT = 64
 SPACING_LEAST = 8
 PAUSES_KEPT = 32
-"""The newest pauses, of which `Learnt` keeps no more."""
+"""The newest pauses, of which `LearnedTiming` keeps no more."""
 
 _SLOW_KEPT = 2
 
@@ -38,7 +38,7 @@ class _Slow:
 class Gaps:
     """Fed frame by frame; writes what it finds into the evidence."""
 
-    def __init__(self, timing: Timing, seen: Evidence, learnt: Learnt) -> None:
+    def __init__(self, timing: Timing, seen: BusRecord, learnt: LearnedTiming) -> None:
         self.latency = timing.latency
         self._char = timing.char
         self.pause_limit = timing.t15

@@ -1,4 +1,4 @@
-"""What `peek_rtu` says of RTU frames, for all frames of a capture at once.
+"""Headers of RTU frames, as `peek_rtu` gives them, for all frames of a capture at once.
 
 Reads, writes and exceptions by table and gather; other functions, and requests that contradict themselves, by
 `peek_rtu` once for each different frame. A property test holds both equal.

@@ -16,9 +16,9 @@ from dissectors.columns import ROLES
 from dissectors.frame import Frame, Role
 from dissectors.line import MS
 from dissectors.modbus.envelope import RTU_NAME
-from dissectors.modbus.findings import ModbusFindings
 from dissectors.modbus.gap_columns import hurried, see_close, see_spacing, silences
 from dissectors.modbus.gaps import sender_name
+from dissectors.modbus.observer import ModbusFindings
 from dissectors.modbus.regular_exchanges import UNANSWERED, adus_of, regular
 from dissectors.modbus.remembered import FINAL_KEPT, OPEN_KEPT
 from dissectors.modbus.stretch_evidence import Exchanged, StretchEvidence

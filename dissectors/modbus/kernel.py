@@ -27,7 +27,7 @@ from dissectors.modbus.header_columns import Words, headers
 from dissectors.modbus.length_columns import PADDING
 from dissectors.modbus.lengths import MAX_FRAME
 from dissectors.modbus.stretch_crc import StretchCrc
-from dissectors.modbus.stretch_rows import Rows, Stretches
+from dissectors.modbus.stretch_rows import Rows, StretchRows
 from dissectors.modbus.whole_columns import Told, whole_frames
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ _GAP, _LENGTH, _SPLIT = (np.uint8(FOUNDS.index(found)) for found in (Found.GAP, 
 def kernel(reads: Reads, timing: Timing) -> FrameColumns:
     """The frames of all clean chains; see `dissectors.columns.Kernel`."""
     times = OctetTimes.of(reads, timing.char)
-    stretches = Stretches.of(reads, times, timing)
+    stretches = StretchRows.of(reads, times, timing)
     octets = np.zeros(len(reads.octets) + MAX_FRAME + PADDING, np.uint8)
     octets[: len(reads.octets)] = reads.octets
     rows = _rows(octets, len(reads.octets), stretches)
@@ -54,7 +54,7 @@ def kernel(reads: Reads, timing: Timing) -> FrameColumns:
     return _columns(octets, rows, stretches, times, timing)
 
 
-def _rows(octets: Octets, count: int, stretches: Stretches) -> Rows:
+def _rows(octets: Octets, count: int, stretches: StretchRows) -> Rows:
     """Frames that are whole stretches, and candidates of runs of frames, in order and apart."""
     told = np.full(len(stretches), Told.RUN, np.uint8)
     whole, runs = [], []
@@ -70,7 +70,7 @@ def _rows(octets: Octets, count: int, stretches: Stretches) -> Rows:
     return Rows.joined([frames, run_columns.apart(candidates)]).ordered()
 
 
-def _without_others_inside(frames: Rows, candidates: Rows, stretches: Stretches, told: Codes) -> tuple[Rows, Rows]:
+def _without_others_inside(frames: Rows, candidates: Rows, stretches: StretchRows, told: Codes) -> tuple[Rows, Rows]:
     """Less the whole frames that are none if something else in them is good, where that is so."""
     unless = told[candidates.stretch] == Told.UNLESS_INSIDE
     if not unless.any():
@@ -82,7 +82,7 @@ def _without_others_inside(frames: Rows, candidates: Rows, stretches: Stretches,
     return frames.take(told[frames.stretch] != Told.DOUBTFUL), candidates.take(~unless)
 
 
-def _columns(octets: Octets, rows: Rows, stretches: Stretches, times: OctetTimes, timing: Timing) -> FrameColumns:
+def _columns(octets: Octets, rows: Rows, stretches: StretchRows, times: OctetTimes, timing: Timing) -> FrameColumns:
     """The columns, made some rows at a time."""
     names, gaps = Words(), times.gaps()
     parts = [
@@ -98,7 +98,7 @@ def _columns(octets: Octets, rows: Rows, stretches: Stretches, times: OctetTimes
 def _some_columns(
     octets: Octets,
     rows: Rows,
-    stretches: Stretches,
+    stretches: StretchRows,
     times: OctetTimes,
     gaps: Times,
     timing: Timing,
@@ -130,7 +130,7 @@ def _some_columns(
     return columns if header.known.all() else columns.take(header.known)
 
 
-def _reads_of(rows: Rows, stretches: Stretches, times: OctetTimes) -> tuple[Times, Times]:
+def _reads_of(rows: Rows, stretches: StretchRows, times: OctetTimes) -> tuple[Times, Times]:
     """The reads that hold the first and the last octet of each."""
     first, last = stretches.first[rows.stretch], stretches.last[rows.stretch]
     runs = np.flatnonzero(~rows.whole)
@@ -153,7 +153,7 @@ def _starts(octets: Times, reads: Times, times: OctetTimes) -> Times:
 
 
 def _found(
-    rows: Rows, first: Times, last: Times, stretches: Stretches, times: OctetTimes, gaps: Times, timing: Timing
+    rows: Rows, first: Times, last: Times, stretches: StretchRows, times: OctetTimes, gaps: Times, timing: Timing
 ) -> Codes:
     """How the limits were found: between silences, next to others, or by their length alone."""
     found = np.full(len(rows), _GAP, np.uint8)

@@ -1,4 +1,4 @@
-"""How long the frame of a message is, told by its first octets: a function for each message of the layout.
+"""Lengths of frames, told by their first octets: a function for each message of the layout.
 
 Lengths count the whole RTU frame, address … CRC:  [unit][function][data …][CRC lo][CRC hi]
                                          offset:    0     1          2 …

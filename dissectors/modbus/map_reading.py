@@ -1,4 +1,4 @@
-"""Which kind of register map a file is, by what is in it, and what it says. Pure; raises MapError with the way out."""
+"""Files of register maps: their kind by what is in them, and what they say. Pure; raises MapError with the way out."""
 
 from __future__ import annotations
 

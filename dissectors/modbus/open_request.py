@@ -1,4 +1,4 @@
-"""What the bus waits for: the request that is open, and how well octets fit as its answer.
+"""The open request: what the bus waits for, and how well octets fit as its answer.
 
 A framer needs only this much memory of the exchange, to weigh candidates; pairing for people is the tracker's.
 """

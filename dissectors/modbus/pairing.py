@@ -1,4 +1,4 @@
-"""Does this response fit that request? Both as unit and PDU, without check (see `envelope.py`).
+"""The fit of a response to a request: both as unit and PDU, without check (see `envelope.py`).
 
 What must agree follows from the layout: a copy, leading fields that come back, a byte count that was asked for
 (Modbus Application Protocol V1.1b3, clause 6).

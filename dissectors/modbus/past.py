@@ -1,4 +1,4 @@
-"""What a bus has said so far, as far as it helps to weigh octets: requests, lengths of answers, stray zeros.
+"""The past of a bus, as far as it helps to weigh octets: requests, lengths of answers, stray zeros.
 
 A master asks the same again and again, and a station answers it at the same length. Only good frames teach; memory is
 bounded.

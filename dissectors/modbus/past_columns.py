@@ -1,4 +1,4 @@
-"""What a bus has said, learnt from many good frames at once: the memory of the framer over a stretch of a kernel."""
+"""The past of a bus, learnt from many good frames at once: the framer's memory over a stretch of a kernel."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _WORD = 8
 """Octets of the commonest requests, which are compared as numbers."""
 
 
-class Learnt:
+class LearntLengths:
     """What was noted already, ascending: answers by station, function and length; requests of eight octets."""
 
     def __init__(self) -> None:
@@ -32,7 +32,7 @@ def learn(past: Past, units: set[int], frames: FrameColumns, octets: Octets) -> 
     """
     frames = frames.take(frames.ok & (frames.length >= 4))
     units.update(np.flatnonzero(np.bincount(octets[frames.offset])).tolist())
-    known = past.learnt if past.only_gathers and isinstance(past.learnt, Learnt) else Learnt()
+    known = past.learnt if past.only_gathers and isinstance(past.learnt, LearntLengths) else LearntLengths()
     past.learnt = known
     is_answer = frames.role == _RESPONSE
     for row in _new_answers(frames, octets, np.flatnonzero(is_answer), known):
@@ -58,7 +58,7 @@ def learn(past: Past, units: set[int], frames: FrameColumns, octets: Octets) -> 
         past.note(one, request=True)
 
 
-def _new_answers(frames: FrameColumns, octets: Octets, rows: Times, known: Learnt) -> list[int]:
+def _new_answers(frames: FrameColumns, octets: Octets, rows: Times, known: LearntLengths) -> list[int]:
     """One row for each station, function and length that was not there before."""
     begins = frames.offset[rows]
     keys = octets[begins].astype(np.int64) << 24 | octets[begins + 1].astype(np.int64) << 16 | frames.length[rows]
@@ -70,7 +70,7 @@ def _new_answers(frames: FrameColumns, octets: Octets, rows: Times, known: Learn
     return found
 
 
-def _first_of_each(frames: FrameColumns, octets: Octets, rows: Times, known: Learnt) -> Times:
+def _first_of_each(frames: FrameColumns, octets: Octets, rows: Times, known: LearntLengths) -> Times:
     """Of rows of one length the first with each content; of short ones only those that were not there before."""
     length = int(frames.length[rows[0]])
     content = np.ascontiguousarray(octets[frames.offset[rows][:, None] + np.arange(length)])

@@ -1,4 +1,4 @@
-"""Where a Modbus value is: its register or coil in words, and its octets in the frame."""
+"""The place of a Modbus value: its register or coil in words, and its octets in the frame."""
 
 from __future__ import annotations
 

@@ -1,10 +1,10 @@
-"""Whether a frame comes when an answer to the open request would, by the times that this bus has shown."""
+"""Promptness: whether a frame comes when an answer to the open request would, by the times that this bus has shown."""
 
 from __future__ import annotations
 
 from dissectors.modbus.exchange import Exchange, Seen
 from dissectors.modbus.functions import BROADCAST, FUNCTIONS
-from dissectors.modbus.learnt import READ, Learnt
+from dissectors.modbus.learned_timing import READ, LearnedTiming
 
 AT_ONCE = 50_000_000
 """ns; no master repeats a request sooner, unless its timeout is known to be that short."""
@@ -13,7 +13,7 @@ AT_ONCE = 50_000_000
 class Promptness:
     """Compares times with what was learnt. `silence`: ns, the shortest time in which a station can begin an answer."""
 
-    def __init__(self, learnt: Learnt, silence: int) -> None:
+    def __init__(self, learnt: LearnedTiming, silence: int) -> None:
         self._learnt = learnt
         self._silence = silence
 

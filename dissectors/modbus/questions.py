@@ -1,4 +1,4 @@
-"""What Modbus requests ask: coils, inputs and registers, by table and number; a 23 reads some and writes others."""
+"""The questions in Modbus requests: coils, inputs, registers, by table and number; a 23 reads some, writes others."""
 
 from __future__ import annotations
 

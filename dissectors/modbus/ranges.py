@@ -1,4 +1,4 @@
-"""Which addresses a message names, how many, and which byte count must agree: compiled from the layout, by function.
+"""Ranges of a message: its addresses, how many, and which byte count must agree: compiled from the layout.
 
 request 03    first address in octets 2, 3, how many in 4, 5          answer 03    half of octet 2 is how many
 """

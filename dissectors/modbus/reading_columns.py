@@ -1,4 +1,4 @@
-"""What Modbus RTU exchanges tell of registers, many at once: `readings.py` for functions 3, 4, 6 and 16."""
+"""Readings of Modbus RTU exchanges, many at once: `readings.py` for functions 3, 4, 6 and 16."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What Modbus exchanges tell: coils, inputs and registers with their values. Addresses as on the wire."""
+"""Readings of Modbus exchanges: coils, inputs and registers with their values. Addresses as on the wire."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which exchanges on a Modbus line are regular, for the rules: good frames, each with its transaction beside it.
+"""Regular exchanges on a Modbus line, for the rules: good frames, each with its transaction beside it.
 
     a request, and its answer or an exception in the next row, which closes it
     a request, and a regular one in the next row, which closes it without an answer

@@ -1,4 +1,4 @@
-"""What the rules keep in mind while a Modbus line is judged: what is open, and what is still to be settled. Bounded."""
+"""The memory of the rules while a Modbus line is judged: what is open, and what is still to be settled. Bounded."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from collections import deque
 
 from dissectors.frame import Flaw, Frame
 from dissectors.line import MS, Timing
-from dissectors.modbus.asked import Asked
+from dissectors.modbus.asked import AskedRequest
 from dissectors.modbus.bare_ends import BareEnds
-from dissectors.modbus.evidence import Evidence
+from dissectors.modbus.bus_record import BusRecord
 from dissectors.modbus.gaps import Gaps
-from dissectors.modbus.learnt import Learnt
-from dissectors.modbus.station_record import Lost, Station
+from dissectors.modbus.learned_timing import LearnedTiming
+from dissectors.modbus.station_record import Lost, StationRecord
 from dissectors.modbus.torn import TornFrames
 
 SLOW_UNLEARNT = 500 * MS
@@ -32,17 +32,17 @@ def slow_limit(timeout: int | None) -> int | None:
 
 
 class Remembered:
-    """State of the rules between one row and the next; `findings.py` and `judging_columns.py` move it on."""
+    """State of the rules between one row and the next; `observer.py` and `judging_columns.py` move it on."""
 
     def __init__(self, timing: Timing) -> None:
         self.timing = timing
-        self.learnt = Learnt(timing)
-        self.seen = Evidence(timing)
+        self.learnt = LearnedTiming(timing)
+        self.seen = BusRecord(timing)
         self.gaps = Gaps(timing, self.seen, self.learnt)
         self.ends = BareEnds(timing, self.seen)
-        self.asked: dict[int, Asked] = {}  # by transaction
-        self.open: Asked | None = None  # the newest request, while nothing has come after it
-        self.broadcast: Asked | None = None  # likewise
+        self.asked: dict[int, AskedRequest] = {}  # by transaction
+        self.open: AskedRequest | None = None  # the newest request, while nothing has come after it
+        self.broadcast: AskedRequest | None = None  # likewise
         self.codes: dict[int, int] = {}  # exception codes by transaction
         self.answers: dict[int, bytes] = {}  # good answers by transaction
         self.elsewhere: dict[int, int] = {}  # requests (by frame) that another unit answered, and which
@@ -63,10 +63,10 @@ class Remembered:
         self.waits: dict[int, int] = {}  # by request that nothing followed: until the next one, ns
         self.final: dict[int, bytes] = {}  # the last answers, by transaction
 
-    def station(self, unit: int) -> Station:
+    def station(self, unit: int) -> StationRecord:
         """What is known of a station."""
         stations = self.seen.stations
         station = stations.get(unit)
         if station is None:
-            station = stations[unit] = Station()
+            station = stations[unit] = StationRecord()
         return station

@@ -8,7 +8,7 @@ from dissectors.frame import Damage, Frame
 from dissectors.modbus.envelope import seal_rtu
 from dissectors.modbus.layout import MESSAGES
 from dissectors.modbus.notation import has_text
-from dissectors.pseudonyms import Pseudonyms, hex_octet, inflicted, without_text
+from dissectors.pseudonyms import Blanks, Pseudonyms, hex_octet, inflicted, without_text
 
 _WITH_TEXT = frozenset(code for code, messages in MESSAGES.items() if has_text(messages.response))
 
@@ -17,7 +17,8 @@ class RtuRenamer:
     """Renames RTU frames."""
 
     def __init__(self) -> None:
-        self.stations = Pseudonyms([*range(1, 248), *range(248, 256)], kept=(0,))
+        self.stations = Pseudonyms(range(1, 248), range(248, 256), kept=(0,))  # the last ones are reserved
+        self._blanks = Blanks()
 
     def __call__(self, frame: Frame) -> bytes:
         """The frame under another name, with the same damage."""
@@ -37,7 +38,7 @@ class RtuRenamer:
         """Unit and PDU, renamed."""
         unit, pdu = body[:1], body[1:]
         if pdu and pdu[0] in _WITH_TEXT:
-            pdu = pdu[:1] + without_text(pdu[1:])
+            pdu = pdu[:1] + without_text(pdu[1:], self._blanks.of)
         return bytes([self.stations.of(unit[0])]) + pdu
 
 

@@ -1,4 +1,4 @@
-"""What a damaged RTU frame was, where one thing at one of its ends went wrong and the check proves it.
+"""Repairs of damaged RTU frames: one thing at one of the ends went wrong, and the check proves it.
 
 A fault that is always the same (a driver that switches late or too early, a CRC sent high octet first) leaves frames
 that are good but for it. Put it right, and see whether the check agrees:

@@ -28,7 +28,7 @@ _FEW_VALUES = 3  # different answers of a group, up to which it says something t
 
 
 @dataclass(frozen=True, slots=True)
-class Answered:
+class AnsweredRequest:
     """One answer: its row, how long it took, its octets."""
 
     no: int
@@ -41,8 +41,8 @@ class Answered:
 class Groups:
     """Quick and slow answers to one request, each sorted by time taken. `apart`: what they say differs, too."""
 
-    quick: tuple[Answered, ...]
-    slow: tuple[Answered, ...]
+    quick: tuple[AnsweredRequest, ...]
+    slow: tuple[AnsweredRequest, ...]
     apart: bool
 
     @property
@@ -55,7 +55,7 @@ class Groups:
 class SameRequest:
     """The last answers to one and the same request, in the order they came."""
 
-    answers: deque[Answered] = field(default_factory=lambda: deque(maxlen=ANSWERS_KEPT))
+    answers: deque[AnsweredRequest] = field(default_factory=lambda: deque(maxlen=ANSWERS_KEPT))
 
     def groups(self) -> Groups | None:
         """The two groups that they fall into; None where they do not, or where it cannot be known."""
@@ -89,6 +89,6 @@ def _width(times: Sequence[int]) -> int:
     return times[len(times) * 9 // 10] - times[len(times) // 10]
 
 
-def _say_different_things(quick: Sequence[Answered], slow: Sequence[Answered]) -> bool:
+def _say_different_things(quick: Sequence[AnsweredRequest], slow: Sequence[AnsweredRequest]) -> bool:
     by_quick, by_slow = {answer.octets for answer in quick}, {answer.octets for answer in slow}
     return max(len(by_quick), len(by_slow)) <= _FEW_VALUES and by_quick.isdisjoint(by_slow)

@@ -13,6 +13,9 @@ _OF_COLLISIONS = (
 )
 """What two senders at once make of good frames."""
 
+_OF_ANOTHER_TALKER = ("MB005", "MB007", "MB009", "MB104", "LN101", "LN103")
+"""The damage that answers which nobody asked for do to frames that they fall on."""
+
 _OF_DAMAGE = ("MB002", "MB005", "MB007", "MB104", "MB202")
 """What damage that is always the same would otherwise be taken for."""
 
@@ -74,7 +77,7 @@ _ALL = (
         "are most of its damaged answers. In RTU the low octet of the CRC is right and the high one wrong.",
         "the station releases its driver before the last octet is out",
         "its turnaround or transmit-delay setting; with a converter, the timer that switches direction",
-        explains=("MB002", "MB005", "MB104"),
+        explains=("MB002", "MB005", "MB007", "MB104"),
     ),
     Rule(
         "MB007",
@@ -330,6 +333,7 @@ _ALL = (
         "Answers without a request before them. A warning from three on and 1 in 100 of all answers.",
         "requests that this tap does not hear, or a second bus coupled in",
         "whether the tap is at a place where the master is heard well",
+        explains=_OF_ANOTHER_TALKER,
     ),
     Rule(
         "MB208",

@@ -28,7 +28,7 @@ from dissectors.modbus.length_columns import (
 from dissectors.modbus.lengths import MIN_FRAME, MORE, NEVER
 from dissectors.modbus.open_request import EXACT, ODD
 from dissectors.modbus.past import KNOWN_LENGTH
-from dissectors.modbus.stretch_rows import Rows, Stretches
+from dissectors.modbus.stretch_rows import Rows, StretchRows
 from dissectors.modbus.whole_columns import FIRST_LOOK, Told
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ _PLAIN = WHOLE_STRETCH - CRC_BITS
 where it is sure that none are."""
 
 
-def candidates(octets: Octets, begin: int, end: int, crc: StretchCrc, stretches: Stretches, told: Codes) -> Rows:
+def candidates(octets: Octets, begin: int, end: int, crc: StretchCrc, stretches: StretchRows, told: Codes) -> Rows:
     """Stretches with a good CRC that begin in [begin, end) where a look at the whole stretch did not settle it.
 
     `octets`, `crc`: of the part from place `begin` on, with some more at the end.
@@ -73,7 +73,7 @@ def candidates(octets: Octets, begin: int, end: int, crc: StretchCrc, stretches:
     return Rows.joined(found).ordered()
 
 
-def _places(begin: int, end: int, stretches: Stretches, told: Codes, octets: Octets) -> tuple[Times, Times]:
+def _places(begin: int, end: int, stretches: StretchRows, told: Codes, octets: Octets) -> tuple[Times, Times]:
     """Where a frame could begin, by its function octet, from `begin` on; and in which stretch."""
     first = max(int(np.searchsorted(stretches.begin, begin, side="right")) - 1, 0)
     beyond = int(np.searchsorted(stretches.begin, end))
@@ -102,7 +102,7 @@ def apart(rows: Rows) -> Rows:
     return rows.take(~overlaps)
 
 
-def certain(octets: Octets, rows: Rows, stretches: Stretches, sound: Masks) -> Masks:
+def certain(octets: Octets, rows: Rows, stretches: StretchRows, sound: Masks) -> Masks:
     """Which rows the reference gives, whatever it remembers, if it is at rest where their chain begins.
 
     `rows`: none overlapping another. `sound`: those of them that are so by themselves or, if damaged, behind a sound
@@ -125,7 +125,7 @@ def certain(octets: Octets, rows: Rows, stretches: Stretches, sound: Masks) -> M
     return (free | follows) & (newest_free > newest_break)
 
 
-def _weighed(octets: Octets, rows: Rows, at: Times, stretches: Stretches) -> tuple[Masks, Masks]:
+def _weighed(octets: Octets, rows: Rows, at: Times, stretches: StretchRows) -> tuple[Masks, Masks]:
     """Of candidates in runs: which the reference takes whatever came before; which if the row before is certain."""
     place, length, other = rows.start[at], rows.length[at].astype(np.int64), rows.other[at].astype(np.int64)
     request, response = rows.request[at], rows.response[at]
@@ -192,7 +192,7 @@ def _firm(octets: Octets, rows: Rows) -> Masks:
     return firm & ~rows.damaged
 
 
-def _from_the_begin(rows: Rows, at: Times, sure: Masks, stretches: Stretches) -> Masks:
+def _from_the_begin(rows: Rows, at: Times, sure: Masks, stretches: StretchRows) -> Masks:
     """Which of rows `at` stand behind nothing but sure ones since silence was proved.
 
     There the reference goes from frame to frame, and nothing is left to the best segmentation.

@@ -1,4 +1,4 @@
-"""How rarely chance makes octets look as well formed as those of a message: a function for each message of the layout.
+"""Shapes of messages: how rarely chance makes octets look as well formed; a function for each message of the layout.
 
 A field held to some values tells as many bits as chance seldom hits them (a quantity of 1 … 125 of 65536: 9 bits); a
 byte count that must agree with a quantity tells all of its bits. No frame is believed for its shape beyond 12 bits.
@@ -25,7 +25,7 @@ MOST_BITS: Final = 12
 Test = Callable[[Octets, int, int], bool]
 
 
-class Rule(NamedTuple):
+class ShapeRule(NamedTuple):
     """What a healthy device keeps, the bits that it tells, and how many things it asks for."""
 
     holds: Test
@@ -65,7 +65,7 @@ def held(message: Message) -> tuple[tuple[Place, Collection[int]], ...]:
     return tuple((place, place.field.among) for place in places(message) if place.field.among and place.at <= end)
 
 
-def _rules(message: Message) -> list[Rule]:
+def _rules(message: Message) -> list[ShapeRule]:
     """All that its octets are held to."""
     count = counted(message)
     rules = [_among(place, values) for place, values in held(message)]
@@ -128,7 +128,7 @@ def _all_held(holds: list[Test], bits: int, penalty: int) -> Shape:
     return shape
 
 
-def _among(place: Place, values: Collection[int]) -> Rule:
+def _among(place: Place, values: Collection[int]) -> ShapeRule:
     """The field has one of these values."""
     at, size = place.at, place.field.size
     listed = values if isinstance(values, range) else frozenset(values)
@@ -145,11 +145,11 @@ def _among(place: Place, values: Collection[int]) -> Rule:
 
     bits = 8 * size - log2(len(listed))
     if size == 1:
-        return Rule(octet_listed, bits)
-    return Rule(word_within if isinstance(values, range) else word_listed, bits)
+        return ShapeRule(octet_listed, bits)
+    return ShapeRule(word_within if isinstance(values, range) else word_listed, bits)
 
 
-def _agreeing(count: Counted, quantity: Place) -> Rule:
+def _agreeing(count: Counted, quantity: Place) -> ShapeRule:
     """The byte count is what so many items take, and the single fields before them."""
     at, size, beside, of = count.count.at, count.count.field.size, count.beside, quantity.at
     bits = count.items.bits
@@ -159,20 +159,20 @@ def _agreeing(count: Counted, quantity: Place) -> Rule:
         many = octets[start + of] << 8 | octets[start + of + 1]
         return there == beside + (many * bits + 7 >> 3)
 
-    return Rule(agrees, 8 * size)
+    return ShapeRule(agrees, 8 * size)
 
 
-def _dividing(count: Counted) -> Rule:
+def _dividing(count: Counted) -> ShapeRule:
     """The byte count is that of whole items."""
     at, item = count.count.at, count.items.size
 
     def divides(octets: Octets, start: int, length: int) -> bool:
         return octets[start + at] % item == 0
 
-    return Rule(divides, log2(item))
+    return ShapeRule(divides, log2(item))
 
 
-def _chained(count: Counted) -> Rule:
+def _chained(count: Counted) -> ShapeRule:
     """Groups follow one another, each with its type, and the last ends where the frame does."""
     first, group = count.start, Group.of(count.items.group)
 
@@ -182,4 +182,4 @@ def _chained(count: Counted) -> Rule:
             at += group.whole(octets, at)
         return at == end
 
-    return Rule(chained, MOST_BITS, asks=2)
+    return ShapeRule(chained, MOST_BITS, asks=2)

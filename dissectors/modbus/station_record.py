@@ -1,4 +1,4 @@
-"""What the rules remember of a station, and of the times on the bus; bounded, without judgement."""
+"""The record of a station and of the times on the bus: what the rules remember; bounded, without judgement."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from dissectors.findings import Tally
 from dissectors.frame import Flaw
 from dissectors.modbus.garbage import Garbage
-from dissectors.modbus.response_groups import Answered, SameRequest
+from dissectors.modbus.response_groups import AnsweredRequest, SameRequest
 from dissectors.tracker import Interval
 
 KEYS_KEPT = 512
@@ -25,7 +25,7 @@ Key = tuple[str, int | None]
 
 
 @dataclass(frozen=True, slots=True)
-class Block:
+class RegisterBlock:
     """Some response times in a row, ns: medians by the shortest, the nominal and the longest reading, and the least."""
 
     least: int
@@ -41,7 +41,7 @@ class ResponseTimes:
     count: int = 0
     longest: int = 0  # by the shortest reading, ns
     quickest: int = 0  # by the shortest reading, ns
-    blocks: list[Block] = field(default_factory=list)
+    blocks: list[RegisterBlock] = field(default_factory=list)
     _size: int = 8
     _lows: list[int] = field(default_factory=list)  # of those since the last block, by their three readings
     _nominals: list[int] = field(default_factory=list)
@@ -82,13 +82,13 @@ class ResponseTimes:
         """
         return middle([block.least for block in self.blocks]) if self.blocks else self.quickest
 
-    def median(self) -> Block | None:
+    def median(self) -> RegisterBlock | None:
         """Over all of them; None without any."""
         if self.blocks:
             return _of_blocks(self.blocks)
         return _block(self._lows, self._nominals, self._highs) if self._lows else None
 
-    def quarters(self) -> tuple[Block, ...]:
+    def quarters(self) -> tuple[RegisterBlock, ...]:
         """Medians of the four quarters, in order; empty while there is too little to compare."""
         size = len(self.blocks) // 4
         if size < 2:
@@ -101,12 +101,12 @@ def middle(values: Sequence[int]) -> int:
     return sorted(values)[len(values) // 2]
 
 
-def _block(lows: Sequence[int], nominals: Sequence[int], highs: Sequence[int]) -> Block:
-    return Block(min(lows), middle(lows), middle(nominals), middle(highs))
+def _block(lows: Sequence[int], nominals: Sequence[int], highs: Sequence[int]) -> RegisterBlock:
+    return RegisterBlock(min(lows), middle(lows), middle(nominals), middle(highs))
 
 
-def _of_blocks(blocks: Sequence[Block]) -> Block:
-    return Block(
+def _of_blocks(blocks: Sequence[RegisterBlock]) -> RegisterBlock:
+    return RegisterBlock(
         middle([block.least for block in blocks]),
         middle([block.low for block in blocks]),
         middle([block.nominal for block in blocks]),
@@ -114,8 +114,8 @@ def _of_blocks(blocks: Sequence[Block]) -> Block:
     )
 
 
-def _mean(earlier: Block, later: Block) -> Block:
-    return Block(
+def _mean(earlier: RegisterBlock, later: RegisterBlock) -> RegisterBlock:
+    return RegisterBlock(
         (earlier.least + later.least) // 2,
         (earlier.low + later.low) // 2,
         (earlier.nominal + later.nominal) // 2,
@@ -142,7 +142,7 @@ class Lost:
 
 
 @dataclass(slots=True)
-class Station:
+class StationRecord:
     """One station. `missing`: no octet followed. `silent`: those since its last sign of life."""
 
     asked: int = 0
@@ -205,7 +205,7 @@ class Station:
             key = ("other requests", None)
         return self.exceptions.setdefault((key, code), Tally())
 
-    def compare(self, key: Key, request: bytes, answer: Answered) -> None:
+    def compare(self, key: Key, request: bytes, answer: AnsweredRequest) -> None:
         """Keep an answer beside the others to exactly the same request; the first SAME_KEPT requests only."""
         same = self.same_request(key, request)
         if same is not None:

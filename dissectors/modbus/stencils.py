@@ -1,4 +1,4 @@
-"""What the lines of Modbus RTU frames read of them: units and functions, addresses, counts, the first ten registers."""
+"""Stencils of Modbus RTU frames: units and functions, addresses, counts, the first ten registers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the rules learn of the stations, exchange by exchange, in a stretch of regular ones (`regular_exchanges.py`)."""
+"""Evidence about the stations in a stretch of regular exchanges (`regular_exchanges.py`), one by one."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 
 from dissectors.frame import Frame
-from dissectors.modbus.asked import Asked
+from dissectors.modbus.asked import AskedRequest
 from dissectors.modbus.exchange_columns import SAMPLES
-from dissectors.modbus.learnt import READ
+from dissectors.modbus.learned_timing import READ
 from dissectors.modbus.regular_exchanges import REFUSED, TO_ALL, UNANSWERED
 from dissectors.modbus.remembered import BEGIN, LAST_STANDARD_UNIT, OPEN_KEPT, SLOW_UNLEARNT, slow_limit
-from dissectors.modbus.response_groups import ANSWERS_KEPT, Answered, SameRequest
-from dissectors.modbus.station_record import Key, Requested, Station
+from dissectors.modbus.response_groups import ANSWERS_KEPT, AnsweredRequest, SameRequest
+from dissectors.modbus.station_record import Key, Requested, StationRecord
 from dissectors.tracker import Interval, Transaction
 
 if TYPE_CHECKING:
     from dissectors.columns import TransactionColumns
-    from dissectors.modbus.findings import ModbusFindings
+    from dissectors.modbus.observer import ModbusFindings
     from dissectors.modbus.regular_exchanges import Adus, Regular
     from dissectors.row_columns import RowColumns
 
@@ -98,21 +98,21 @@ class Exchanged:
         address = self.address[at]
         return self.rows.frames.names[self.kind[at]], None if address < 0 else address
 
-    def asked(self, at: int) -> Asked:
+    def asked(self, at: int) -> AskedRequest:
         """A request as the rules see it."""
         row = self.rows.row(self.request[at])
         assert isinstance(row.event, Frame)
         assert row.header is not None
-        return Asked(row.no, row.event, row.header, self.said(at))
+        return AskedRequest(row.no, row.event, row.header, self.said(at))
 
     def transaction(self, at: int) -> Transaction:
         """As it closed."""
         return self.rows.transaction(int(self.found.transaction[at]))
 
-    def answered(self, at: int) -> Answered:
+    def answered(self, at: int) -> AnsweredRequest:
         """An answer, to be compared with others."""
         latency = Interval(self.nominal[at], self.low[at], self.high[at])
-        return Answered(self.rows.first + self.last[at], self.ended[at], latency, self.answer(at))
+        return AnsweredRequest(self.rows.first + self.last[at], self.ended[at], latency, self.answer(at))
 
 
 @dataclass(slots=True)
@@ -137,7 +137,7 @@ class _Took:
     """A station, and the exchanges with it that are not counted yet, by place."""
 
     unit: int
-    station: Station
+    station: StationRecord
     exchanges: list[int] = field(default_factory=list)
 
 
@@ -198,6 +198,8 @@ class StretchEvidence:
                 request.answers.append(at)
             elif request.is_new:
                 self._compare(at, said, request)
+        if min(became[begin:end]) <= REFUSED:
+            self._judge.seen.strikes.whole()
         self._pause_until(one.last[end - 1])
         self._count_all()
         for request in self._compared:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Stretches:
+class StretchRows:
     """Octets between two proved silences, in order.
 
     `begin`, `end`: places in the octets of all reads. `first`, `last`: their reads. `proved`: whether silence is proved

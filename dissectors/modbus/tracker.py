@@ -2,7 +2,7 @@
 
 Direction is not in the octets of writes and diagnostics, whose good answer repeats the request. So:
 
-1. What the shape decides (`peek`: REQUEST or RESPONSE) is believed, and teaches (`learnt.py`).
+1. What the shape decides (`peek`: REQUEST or RESPONSE) is believed, and teaches (`learned_timing.py`).
 2. A copy of the open request is an echo when it comes sooner than a station can answer, an answer when it comes within
    the station's response time, and a repeat of the request after that.
 3. A request closes the open one: unanswered, or answered by something damaged.
@@ -30,7 +30,7 @@ from dissectors.modbus.envelope import readable_adu
 from dissectors.modbus.exchange import Exchange, Garble, Seen, answer_apart, echo_of
 from dissectors.modbus.exchanges import FIRST_SEEN, Exchanges
 from dissectors.modbus.functions import BROADCAST
-from dissectors.modbus.learnt import WRITE, Learnt
+from dissectors.modbus.learned_timing import WRITE, LearnedTiming
 from dissectors.modbus.pairing import another_function, is_listen_only, is_restart, mismatch
 from dissectors.modbus.promptness import Promptness
 from dissectors.tracker import Placement, Tracked, Transaction, Verdict
@@ -72,7 +72,7 @@ class ModbusTracker:
     """
 
     def __init__(self, timing: Timing, silence: int | None = None) -> None:
-        self.learnt = Learnt(timing)
+        self.learnt = LearnedTiming(timing)
         self._timing = timing
         self._silence = 7 * timing.char // 2 if silence is None else silence
         self._times = Promptness(self.learnt, self._silence)

@@ -17,7 +17,7 @@ from dissectors.modbus import damaged_columns
 from dissectors.modbus.best_split import PROVED
 from dissectors.modbus.length_columns import common, frame_bits, lengths, predicting
 from dissectors.modbus.lengths import MAX_FRAME, MIN_FRAME, NEVER
-from dissectors.modbus.stretch_rows import Rows, Stretches
+from dissectors.modbus.stretch_rows import Rows, StretchRows
 
 if TYPE_CHECKING:
     from dissectors.columns import Codes, Masks, Octets, Times
@@ -40,7 +40,7 @@ class Told(IntEnum):
     DOUBTFUL = 3
 
 
-def whole_frames(octets: Octets, base: int, crc: StretchCrc, which: Times, stretches: Stretches, told: Codes) -> Rows:
+def whole_frames(octets: Octets, base: int, crc: StretchCrc, which: Times, stretches: StretchRows, told: Codes) -> Rows:
     """The stretches `which` that are one frame; writes into `told` (a `Told` for each of `stretches`).
 
     `octets`, `crc`: those of a part that begins at place `base` and holds these stretches, as far as they count.

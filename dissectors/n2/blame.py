@@ -1,4 +1,4 @@
-"""Whose damage it is: one sender's where it has far more than its share of the time on the line, else the bus's."""
+"""Blame for damage: one sender's where it has far more than its share of the time on the line, else the bus's."""
 
 from __future__ import annotations
 
@@ -8,30 +8,39 @@ from typing import Final
 
 from dissectors.findings import Tally
 from dissectors.n2.record import Damages
+from dissectors.strikes import Strikes
 
 OUTSTANDING: Final = 4
 """So many times the damage that noise at the rate of all others would have done make it a sender's own."""
 
+SELDOM_ALONE: Final = 0.05
+"""Chance below which it is no chance that all strikes fell on one sender."""
 
-def blamed(senders: Mapping[str, Damages]) -> dict[str, Tally]:
+
+def blamed(senders: Mapping[str, Damages], strikes: Strikes) -> dict[str, Tally]:
     """Subject → damaged frames. Noise falls on each sender as long as it sends; who has several times more than that
-    is named, and so is the only one that has any. What is left is the bus's."""
+    is named, and so is the only one that has any, where chance would seldom have struck it alone. What is left is the
+    bus's."""
     left = {name: sent for name, sent in senders.items() if sent.octets}
+    octets = sum(sent.octets for sent in left.values())
     named: dict[str, Tally] = {}
-    while worst := _outstanding(left):
+    while worst := _outstanding(left, strikes):
         named[worst] = left.pop(worst).bad
     struck = {name: sent.bad for name, sent in left.items() if sent.bad.count}
     if len(struck) == 1:
-        return named | struck
+        ((name, _),) = struck.items()
+        if (left[name].octets / octets) ** strikes.of(name, left[name].bad.count) <= SELDOM_ALONE:
+            return named | struck
     return named | ({"bus": _together(struck)} if struck else {})
 
 
-def _outstanding(senders: Mapping[str, Damages]) -> str | None:
+def _outstanding(senders: Mapping[str, Damages], strikes: Strikes) -> str | None:
     """The sender with the most damage beyond what the others' rate explains, where that cannot be chance."""
-    bad, octets = sum(one.bad.count for one in senders.values()), sum(one.octets for one in senders.values())
+    struck = {name: strikes.of(name, one.bad.count) for name, one in senders.items()}
+    bad, octets = sum(struck.values()), sum(one.octets for one in senders.values())
     worst: tuple[float, str] | None = None
     for name, sent in senders.items():
-        mine, rest = sent.bad.count, octets - sent.octets
+        mine, rest = struck[name], octets - sent.octets
         if mine < 3 or not rest:
             continue
         due = (bad - mine + 0.5) / rest * sent.octets

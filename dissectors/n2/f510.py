@@ -15,7 +15,7 @@ _REGIONS = {"AI": _AI, "BI": _BI, "AO": _AO, "BO": _BO}
 
 
 @dataclass(frozen=True, slots=True)
-class Point:
+class F510Point:
     """One object. `low`, `high`: its range; `writable`: whether an override changes it; `initial`: at power-up."""
 
     region: int
@@ -50,8 +50,8 @@ _INITIAL: dict[str, float] = {
 }
 
 
-def _point(entry: Entry) -> Point:
-    return Point(
+def _point(entry: Entry) -> F510Point:
+    return F510Point(
         region=_REGIONS[entry.space],
         number=entry.address,
         name=entry.label,
@@ -63,4 +63,4 @@ def _point(entry: Entry) -> Point:
     )
 
 
-POINTS: tuple[Point, ...] = tuple(map(_point, packaged("teco-f510").in_space(*_REGIONS)))
+POINTS: tuple[F510Point, ...] = tuple(map(_point, packaged("teco-f510").in_space(*_REGIONS)))

@@ -1,4 +1,4 @@
-"""What is wrong on an N2 bus: the class that gathers it row by row. The words are in `wording.py`.
+"""The observer of an N2 bus: gathers row by row what is wrong. The words are in `wording.py`.
 
 `see` takes every row of the bus, `settle` every transaction that closed; `findings` may be asked at any time and
 gives the same for the same rows. A limit is judged by the bound that the adapter's latency leaves: a station is slow
@@ -15,10 +15,11 @@ from dissectors.frame import Damage, Event, Frame, Header, Noise
 from dissectors.line import Timing
 from dissectors.n2.commands import parse_command
 from dissectors.n2.header import meant
-from dissectors.n2.masters import Asked, Masters
-from dissectors.n2.record import Damages, Override, Station
+from dissectors.n2.masters import Masters, OpenCommand
+from dissectors.n2.record import Damages, N2StationRecord, Override
 from dissectors.n2.torn import TornFrames
-from dissectors.n2.wording import SLOW, Heard, worded
+from dissectors.n2.wording import SLOW, N2Evidence, worded
+from dissectors.strikes import Strikes
 from dissectors.tracker import Placement, Transaction, Verdict
 
 __all__ = ["SLOW", "N2Findings"]
@@ -41,11 +42,12 @@ class N2Findings:
         self._timing = timing
         self.first: int | None = None
         self.now = 0
-        self.stations: dict[int, Station] = {}
+        self.stations: dict[int, N2StationRecord] = {}
         self.master = Damages()
-        self._asked: dict[int, Asked] = {}  # by transaction
+        self._asked: dict[int, OpenCommand] = {}  # by transaction
         self.masters = Masters()
         self.torn = TornFrames(timing)
+        self.strikes = Strikes()
         self._stray = Tally()
         self._codes: dict[int, str] = {}  # transaction → error code, of refusals that are still to close
         self._answers: OrderedDict[int, bytes] = OrderedDict()  # transaction → its good answer
@@ -66,7 +68,7 @@ class N2Findings:
             self._see_answer(no, event, header, placement)
 
     def _see_command(self, no: int, event: Frame, header: Header, placement: Placement) -> None:
-        asked = Asked(no, event, parse_command(meant(event)))
+        asked = OpenCommand(no, event, parse_command(meant(event)))
         before = self.masters.last_station
         self.masters.see_command(asked, self.stations.get(before) if before is not None else None)
         self._asked[placement.tx] = asked
@@ -77,12 +79,13 @@ class N2Findings:
                 self.station(placement.destination).turns += 1
             self.turn = placement.destination
         elif event.damage is not Damage.RESTARTED or event.repair is not None:
-            self._add_bad(self.master, no, event)
+            self._add_bad("master", self.master, no, event)
 
     def _see_answer(self, no: int, event: Frame, header: Header, placement: Placement) -> None:
         self.masters.see_other()
         octets = event.octets
         if header.ok:
+            self.strikes.whole()
             if octets[:1] == b"N":
                 self._codes[placement.tx] = refusal_code(octets)
             self.keep_answer(placement.tx, octets)
@@ -94,11 +97,12 @@ class N2Findings:
         sent.frames += 1
         sent.octets += len(octets)
         if not header.ok:
-            self._add_bad(sent, no, event)
+            self._add_bad(f"station {placement.source}", sent, no, event)
 
-    def _add_bad(self, sender: Damages, no: int, event: Frame) -> None:
+    def _add_bad(self, name: str, sender: Damages, no: int, event: Frame) -> None:
         if self.torn.is_late(event) or self.torn.completes(no):
             return  # its begin was read before, or may have been
+        self.strikes.struck(name)
         sender.add_bad(event.end, no, event.repair.flaw if event.repair is not None else None)
         self.torn.struck(sender)
 
@@ -135,7 +139,7 @@ class N2Findings:
         elif asked is not None:
             self._settle_asked(station, asked, code, transaction)
 
-    def _settle_asked(self, station: Station, asked: Asked, code: str, transaction: Transaction) -> None:
+    def _settle_asked(self, station: N2StationRecord, asked: OpenCommand, code: str, transaction: Transaction) -> None:
         station.asked += 1
         station.only_identify &= asked.command.type.kind == "identify"
         verdict = transaction.verdict
@@ -145,6 +149,7 @@ class N2Findings:
                     return
                 station.missing.add(transaction.id, transaction.end, transaction.request)
             elif verdict is Verdict.DAMAGED_ANSWER and not self.torn.is_torn(transaction.id, transaction.request):
+                self.strikes.struck(f"station {transaction.station}")
                 station.sent.add_bad(transaction.end, transaction.request)
             return
         station.answered += 1
@@ -157,19 +162,19 @@ class N2Findings:
     def findings(self) -> tuple[Finding, ...]:
         """All findings so far: the bus first, then station by station."""
         seconds = (self.now - (self.first or 0)) / 1e9
-        heard = Heard(self.now, seconds, self.master, self.stations, self.masters.seen, self._stray)
+        heard = N2Evidence(self.now, seconds, self.master, self.stations, self.masters.seen, self._stray, self.strikes)
         return tuple(worded(heard))
 
     # --- judging ---
 
-    def station(self, address: int) -> Station:
+    def station(self, address: int) -> N2StationRecord:
         """What is known of a station."""
         station = self.stations.get(address)
         if station is None:
-            station = self.stations[address] = Station()
+            station = self.stations[address] = N2StationRecord()
         return station
 
-    def _judge_latency(self, station: Station, transaction: Transaction) -> None:
+    def _judge_latency(self, station: N2StationRecord, transaction: Transaction) -> None:
         latency = transaction.latency
         if latency is None or transaction.verdict is Verdict.DAMAGED_ANSWER:
             return
@@ -178,7 +183,7 @@ class N2Findings:
             station.slow.add(transaction.end, transaction.response)
             station.slowest = max(station.slowest, latency.low)
 
-    def refused(self, station: Station, asked: Asked, code: str, transaction: Transaction) -> None:
+    def refused(self, station: N2StationRecord, asked: OpenCommand, code: str, transaction: Transaction) -> None:
         """A command that was refused, with this code."""
         command, time = asked.command, transaction.end
         if code == "00":
@@ -194,7 +199,7 @@ class N2Findings:
             refused = station.refused.setdefault((code, command.type.title), Tally())
             refused.add(time, transaction.request, transaction.response)
 
-    def obeyed(self, station: Station, asked: Asked, transaction: Transaction) -> None:
+    def obeyed(self, station: N2StationRecord, asked: OpenCommand, transaction: Transaction) -> None:
         """A command that was obeyed."""
         command = asked.command
         kind = command.type.kind

@@ -20,7 +20,7 @@ from dissectors.framer import OctetWindow, Taken
 from dissectors.line import NS_PER_S, Timing
 from dissectors.n2.commands import Command, expected_length, parse_command
 from dissectors.n2.envelope import COMMAND, CR, NOT_TEXT, is_good, judge
-from dissectors.n2.stretch import SHORTEST, Before, Piece, Stretch, good_whole
+from dissectors.n2.stretch import SHORTEST, Before, N2Stretch, Piece, good_whole
 
 if TYPE_CHECKING:
     from dissectors.columns import FrameColumns, Octets
@@ -150,11 +150,11 @@ class N2Framer:
                 return
             at = self._start
 
-    def _stretch(self, end: int, damage: Damage | None) -> Stretch:
+    def _stretch(self, end: int, damage: Damage | None) -> N2Stretch:
         start = self._start
         seams = tuple(seam - start for seam in self._seams if start < seam < end)
         octets = bytes(self._window.octets[start:end])
-        return Stretch(octets, damage, seams, self._before, self._waits, self._asked, self._proved)
+        return N2Stretch(octets, damage, seams, self._before, self._waits, self._asked, self._proved)
 
     def _conclude(self, end: int, damage: Damage | None) -> None:
         """Give what was collected up to `end`."""

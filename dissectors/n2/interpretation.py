@@ -1,4 +1,4 @@
-"""What an answer means, given the command it answers.
+"""The interpretation of an answer, given the command it answers.
 
 An N2 answer carries neither address nor object, so alone it is only characters. Fields that no public source
 describes (status and configuration bits, change-of-state records, the time in 0/0) are read as *tentative*: in words,
@@ -28,7 +28,7 @@ from dissectors.n2.objects import (
 
 
 @dataclass(frozen=True, slots=True)
-class Record:
+class ChangeOfState:
     """One tentative change-of-state record; `status` and `value` None where the record has none."""
 
     region: int
@@ -57,7 +57,7 @@ class Interpretation:
     raw: str = ""
     error: str | None = None
     tentative: tuple[str, ...] = ()
-    records: tuple[Record, ...] = ()
+    records: tuple[ChangeOfState, ...] = ()
 
     @property
     def text(self) -> str:
@@ -159,7 +159,7 @@ def _identify(base: Interpretation) -> Interpretation:
     return replace(base, value=kind, name="vendor device" if kind == VENDOR_DEVICE else "device type")
 
 
-def change_records(raw: str) -> tuple[tuple[Record, ...], tuple[str, ...]]:
+def change_records(raw: str) -> tuple[tuple[ChangeOfState, ...], tuple[str, ...]]:
     """Tentative change-of-state records, and the doubt in words.
 
     The Nidec H300 manual names region, point, status and value; no source gives their widths. Four grammars are tried
@@ -176,7 +176,7 @@ def change_records(raw: str) -> tuple[tuple[Record, ...], tuple[str, ...]]:
     return distinct[0], tuple(map(_record_text, distinct[0]))
 
 
-def _records(raw: str, region_width: int, binary_width: int) -> tuple[Record, ...]:
+def _records(raw: str, region_width: int, binary_width: int) -> tuple[ChangeOfState, ...]:
     records, at = [], 0
     while at < len(raw):
         head = region_width + 4
@@ -191,12 +191,12 @@ def _records(raw: str, region_width: int, binary_width: int) -> tuple[Record, ..
             value = decode(raw[at + head : at + head + width], region.value, signed=region.signed)
             if value is None:
                 return ()
-        records.append(Record(region.number, point, status, value))
+        records.append(ChangeOfState(region.number, point, status, value))
         at += head + width
     return tuple(records)
 
 
-def _record_text(record: Record) -> str:
+def _record_text(record: ChangeOfState) -> str:
     value = "" if record.value is None else f" = {number(record.value)}"
     return f"{object_name(record.region, record.object)}{value} status {record.status:02X}h"
 

@@ -21,14 +21,14 @@ from dissectors.frame import Frame, Role
 from dissectors.n2.commands import parse_command
 from dissectors.n2.findings import ANSWERS_KEPT, N2Findings, refusal_code
 from dissectors.n2.header import BROADCAST, meant
-from dissectors.n2.masters import HASTE, Asked
+from dissectors.n2.masters import HASTE, OpenCommand
 from dissectors.n2.wording import SLOW
 from dissectors.row_columns import in_turn
 from dissectors.tracker import Verdict
 
 if TYPE_CHECKING:
     from dissectors.columns import Masks, Times
-    from dissectors.n2.record import Station
+    from dissectors.n2.record import N2StationRecord
     from dissectors.row_columns import RowColumns
 
 _RESPONSE = ROLES.index(Role.RESPONSE)
@@ -128,6 +128,8 @@ class _Judging:
         frames = rows.frames
         judge.first = int(frames.start[stretch.start]) if judge.first is None else judge.first
         judge.now = max(judge.now, int(frames.end[stretch].max()))
+        if self.found.answered[which].any():
+            judge.strikes.whole()
         judge.torn.pass_by(rows.first + stretch.start, rows.slack[stretch])
         self._count(which)
         for at in (begin + np.flatnonzero(self._events[which])).tolist():
@@ -172,7 +174,7 @@ class _Judging:
             station.slowest = max(station.slowest, least)
         row, transaction = rows.row(place), rows.transaction(int(found.stretches.transaction[at]))
         assert isinstance(row.event, Frame)
-        asked = Asked(row.no, row.event, parse_command(meant(row.event)))
+        asked = OpenCommand(row.no, row.event, parse_command(meant(row.event)))
         if found.refused[at]:
             judge.refused(station, asked, refusal_code(self._octets(place + 1)), transaction)
         else:
@@ -188,7 +190,9 @@ class _Judging:
         return self._rows.octets[begin : begin + int(self._rows.frames.length[place])].tobytes()
 
 
-def _add(station: Station, turns: int, asked: int, other: int, answered: int, octets: int, quickest: int) -> None:
+def _add(
+    station: N2StationRecord, turns: int, asked: int, other: int, answered: int, octets: int, quickest: int
+) -> None:
     """Count commands to a station (`other`: those that are no identify) and its answers."""
     station.turns += turns
     station.asked += asked

@@ -1,4 +1,4 @@
-"""Whether a second master speaks: what no single one would do.
+"""Signs of a second master: what no single one would do.
 
 A command that no answer followed says little: a master may be impatient, its answer may not have been heard here. So
 only this counts:
@@ -17,7 +17,7 @@ from dissectors.findings import Tally
 from dissectors.frame import Damage, Frame
 from dissectors.n2.commands import Command
 from dissectors.n2.header import BROADCAST
-from dissectors.n2.record import Station
+from dissectors.n2.record import N2StationRecord
 from dissectors.tracker import Transaction
 
 HASTE: Final = 100_000_000
@@ -30,7 +30,7 @@ _SAME = 6  # octets of two commands: start, address, command and what it asks
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class OpenCommand:
     """The command of an open transaction."""
 
     row: int
@@ -43,13 +43,13 @@ class Masters:
     """Fed the commands; `seen` counts what one master would not do."""
 
     seen: Tally = field(default_factory=Tally)
-    _last: Asked | None = None  # the newest command, while nothing has come after it
+    _last: OpenCommand | None = None  # the newest command, while nothing has come after it
 
     def see_other(self) -> None:
         """Something that is no command came, or may have come."""
         self._last = None
 
-    def see_command(self, asked: Asked, station: Station | None) -> None:
+    def see_command(self, asked: OpenCommand, station: N2StationRecord | None) -> None:
         """Take a command; `station`: that of the command before."""
         last, self._last = self._last, asked
         if last is None:
@@ -70,7 +70,7 @@ class Masters:
         if longest < station.quickest:
             self.seen.add(asked.frame.start, last.row, asked.row)
 
-    def see_late(self, transaction: Transaction, station: Station) -> None:
+    def see_late(self, transaction: Transaction, station: N2StationRecord) -> None:
         """Take an answer that came after the next command."""
         latency = transaction.latency
         if latency is not None and latency.high < HASTE and station.answered >= KNOWN:

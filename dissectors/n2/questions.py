@@ -1,4 +1,4 @@
-"""What N2 commands ask: an object, or one of its attributes; polls and the like name nothing."""
+"""The questions in N2 commands: an object, or one of its attributes; polls and the like name nothing."""
 
 from __future__ import annotations
 

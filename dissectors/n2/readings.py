@@ -1,4 +1,4 @@
-"""What N2 exchanges tell: objects with their values.
+"""Readings of N2 exchanges: objects with their values.
 
 A binary object answers its status octet; that bit 6 of it is the state no public source confirms, so such a reading is
 not sure. Reports of changes are tentative altogether.
@@ -11,7 +11,7 @@ import struct
 from dissectors.frame import Frame
 from dissectors.n2.commands import Command, parse_command
 from dissectors.n2.header import error_code
-from dissectors.n2.interpretation import Interpretation, Record, interpret
+from dissectors.n2.interpretation import ChangeOfState, Interpretation, interpret
 from dissectors.n2.objects import REGIONS, Encoding, attribute_name, is_hex, region_name
 from dissectors.readings import How, Reading
 
@@ -57,7 +57,7 @@ def refusal(frame: Frame) -> tuple[str, int] | None:
     return "n2", int(code) if code.isdigit() else int(code, 16)
 
 
-def _change(record: Record) -> Reading:
+def _change(record: ChangeOfState) -> Reading:
     raw: int = record.status
     value: int | float = record.status >> _STATE_BIT & 1
     if record.value is not None:

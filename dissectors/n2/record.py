@@ -1,4 +1,4 @@
-"""What is kept of one station, or of the master, while a bus is judged."""
+"""The record of one station, or of the master, while a bus is judged."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ class Override:
 
 
 @dataclass(slots=True)
-class Station:
+class N2StationRecord:
     """What is known of one station. `turns`: how often the master turned to it; `quickest`: shortest answer, ns."""
 
     asked: int = 0

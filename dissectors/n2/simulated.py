@@ -16,7 +16,7 @@ from dissectors.frame import Check
 from dissectors.line import MS, LineSettings
 from dissectors.n2.commands import VENDOR_DEVICE, Command, fields_of, parse_command
 from dissectors.n2.envelope import make_answer, make_command
-from dissectors.n2.f510 import POINTS, Point
+from dissectors.n2.f510 import POINTS, F510Point
 from dissectors.n2.framing import MAX_LENGTH, judge
 from dissectors.n2.objects import ATTRIBUTES, REGIONS, Encoding, decode, encode, holds_current_value
 from dissectors.simulated import Send
@@ -42,7 +42,7 @@ def refusal(code: str) -> bytes:
 class _Object:
     """A point and what the follower holds of it."""
 
-    point: Point
+    point: F510Point
     value: float
     configuration: int = 0x01
     reported: float | None = None
@@ -60,7 +60,7 @@ class Follower:
         self,
         address: int,
         *,
-        points: Iterable[Point] = POINTS,
+        points: Iterable[F510Point] = POINTS,
         delay: int = 10 * MS,
         status_in_front: bool = True,
     ) -> None:
@@ -261,7 +261,7 @@ def releasing(address: int, region: int, number: int) -> Job:
     return Job(address, command(address, f"73{region:02X}{number:02X}"))
 
 
-def readings(address: int, points: Sequence[Point] = POINTS) -> tuple[Job, ...]:
+def readings(address: int, points: Sequence[F510Point] = POINTS) -> tuple[Job, ...]:
     """Read the current values of points."""
     return tuple(reading(address, p.region, p.number) for p in points)
 

@@ -81,7 +81,7 @@ def good_whole(octets: bytes, before: Before, *, waits: bool, proved: bool) -> C
 
 
 @dataclass(frozen=True, slots=True)
-class Stretch:
+class N2Stretch:
     """Octets and what is known about them.
 
     `damage`: why it ended without CR, None where it ends with one. `seams`: where silence was proved inside it.
@@ -317,14 +317,14 @@ class Stretch:
     def _noise(self, size: int) -> list[Piece]:
         return [Piece(size)] if size else []
 
-    def _cut_at(self, at: int) -> Stretch:
+    def _cut_at(self, at: int) -> N2Stretch:
         """What stands before the place."""
         seams = tuple(seam for seam in self.seams if seam < at)
         damage = Damage.RESTARTED if self.octets[at : at + 1] == b">" else Damage.FORM
-        return Stretch(self.octets[:at], damage, seams, self.before, self.waits, self.asked, self.proved)
+        return N2Stretch(self.octets[:at], damage, seams, self.before, self.waits, self.asked, self.proved)
 
-    def _from(self, at: int) -> Stretch:
+    def _from(self, at: int) -> N2Stretch:
         """What stands from the place on."""
         seams = tuple(seam - at for seam in self.seams if seam > at)
         before = Before.LINE_END if at in self.seams else Before.TEXT
-        return Stretch(self.octets[at:], self.damage, seams, before, self.waits, self.asked, self.proved)
+        return N2Stretch(self.octets[at:], self.damage, seams, before, self.waits, self.asked, self.proved)

@@ -1,4 +1,4 @@
-"""What was gathered of an N2 bus, as findings in words."""
+"""The words of the findings about an N2 bus."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ from dissectors.line import MS, NS_PER_S
 from dissectors.n2.blame import blamed
 from dissectors.n2.commands import error_name
 from dissectors.n2.objects import attribute_name, number, object_name
-from dissectors.n2.record import Damages, Station
+from dissectors.n2.record import Damages, N2StationRecord
 from dissectors.n2.rules import RULES
+from dissectors.strikes import Strikes
 
 SLOW = 250 * MS
 """Shortest message timeout that an NAE can be given, ns (JCI help, N2 trunk)."""
@@ -31,15 +32,16 @@ SCAN = 8
 
 
 @dataclass(frozen=True, slots=True)
-class Heard:
+class N2Evidence:
     """All that was gathered up to `now` (ns) in `seconds`."""
 
     now: int
     seconds: float
     master: Damages
-    stations: Mapping[int, Station]
+    stations: Mapping[int, N2StationRecord]
     masters: Tally
     stray: Tally
+    strikes: Strikes
 
     def is_rare(self, tally: Tally, of: int) -> bool:
         """Whether so few are not worth a warning: one, or under 1 in 100 and at most two a minute."""
@@ -51,7 +53,7 @@ class Heard:
         return replace(finding, severity=Severity.NOTE) if rare else finding
 
 
-def worded(heard: Heard) -> Iterator[Finding]:
+def worded(heard: N2Evidence) -> Iterator[Finding]:
     """All findings: the bus first, then station by station."""
     if heard.masters.count >= 2:
         seen = f"{heard.masters.count} times what one master would not do: a command in the middle of another one, "
@@ -72,30 +74,31 @@ def worded(heard: Heard) -> Iterator[Finding]:
 # --- damage ---
 
 
-def _senders(heard: Heard) -> dict[str, Damages]:
+def _senders(heard: N2Evidence) -> dict[str, Damages]:
     return {"master": heard.master} | {f"station {a}": heard.stations[a].sent for a in sorted(heard.stations)}
 
 
-def _damaged(heard: Heard) -> Iterator[Finding]:
+def _damaged(heard: N2Evidence) -> Iterator[Finding]:
     """Damaged frames, at their sender or at the bus."""
     senders = _senders(heard)
     frames = sum(sent.frames for sent in senders.values())
-    for subject, tally in blamed(senders).items():
+    for subject, tally in blamed(senders, heard.strikes).items():
         of = senders[subject].frames if subject in senders else frames
         what = {"bus": "frame", "master": "command"}.get(subject, "answer")
         seen = f"{counted(tally.count, f'damaged {what}')} of {of}"
         if subject == "bus":
-            seen += ", of all senders as long as they send"
+            several = sum(one.bad.count > 0 for one in senders.values()) > 1
+            seen += ", of all senders as long as they send" if several else ", too few to say whose they are"
         yield heard.noted_if(heard.is_rare(tally, of), tally.found(RULES["N2004"], subject, seen))
 
 
-def _alike(heard: Heard) -> Iterator[Finding]:
+def _alike(heard: N2Evidence) -> Iterator[Finding]:
     """Senders whose frames are damaged in one and the same way."""
     senders = {name: sent for name, sent in _senders(heard).items() if sent.frames}
     found = {name: flaw for name, sent in senders.items() if (flaw := _flaw(sent)) is not None}
-    stations = [name for name in senders if name != "master" and senders[name].frames >= ALIKE]
-    flaws = {found.get(name) for name in stations}
-    if len(stations) > 1 and len(flaws) == 1 and (flaw := flaws.pop()) is not None:
+    stations = [name for name, sent in senders.items() if name != "master" and (sent.frames >= ALIKE or sent.bad.count)]
+    flaws = {found.get(name) or _only_flaw(senders[name]) for name in stations}
+    if found.keys() - {"master"} and len(stations) > 1 and len(flaws) == 1 and (flaw := flaws.pop()) is not None:
         tallies = [senders[name].flaws[flaw] for name in stations]
         tally = Tally(sum(one.count for one in tallies), min(one.first for one in tallies))
         tally.last = max(one.last for one in tallies)
@@ -119,6 +122,12 @@ def _flaw(sent: Damages) -> Flaw | None:
     return None
 
 
+def _only_flaw(sent: Damages) -> Flaw | None:
+    """The flaw that all frames of a sender of few have."""
+    flaws = [flaw for flaw, tally in sent.flaws.items() if tally.count == sent.frames]
+    return flaws[0] if len(flaws) == 1 else None
+
+
 def _flaw_words(flaw: Flaw) -> str:
     return f"always the same: {flaw.value}"
 
@@ -126,14 +135,14 @@ def _flaw_words(flaw: Flaw) -> str:
 # --- who is not there ---
 
 
-def _scanned(heard: Heard) -> frozenset[int]:
+def _scanned(heard: N2Evidence) -> frozenset[int]:
     """Addresses that are only asked who they are, and are not there, where they are many."""
     absent = [address for address, one in heard.stations.items() if one.asked and not one.answered]
     scanned = frozenset(a for a in absent if heard.stations[a].only_identify and heard.stations[a].missing.count)
     return scanned if len(scanned) >= SCAN else frozenset()
 
 
-def _scan(heard: Heard, scanned: frozenset[int]) -> Iterator[Finding]:
+def _scan(heard: N2Evidence, scanned: frozenset[int]) -> Iterator[Finding]:
     if not scanned:
         return
     tally = Tally()
@@ -145,7 +154,7 @@ def _scan(heard: Heard, scanned: frozenset[int]) -> Iterator[Finding]:
     yield tally.found(RULES["N2005"], "master", seen, Severity.NOTE)
 
 
-def _missing(heard: Heard, name: str, station: Station) -> Finding:
+def _missing(heard: N2Evidence, name: str, station: N2StationRecord) -> Finding:
     tally, rule = station.missing.tally(), RULES["N2005"]
     if not station.answered and not station.late.count:
         if station.turns <= 1 and station.asked <= TRIES:
@@ -159,7 +168,7 @@ def _missing(heard: Heard, name: str, station: Station) -> Finding:
 # --- stations ---
 
 
-def _of_station(heard: Heard, name: str, station: Station, scanned: bool) -> Iterable[Finding]:
+def _of_station(heard: N2Evidence, name: str, station: N2StationRecord, scanned: bool) -> Iterable[Finding]:
     if station.resets.count:
         seen = f"answered N00 {times(station.refused_while_reset)}: {times(station.resets.count)} reset"
         yield station.resets.found(RULES["N2001"], name, seen)
@@ -177,7 +186,7 @@ def _of_station(heard: Heard, name: str, station: Station, scanned: bool) -> Ite
         yield station.again.found(RULES["N2010"], name, f"identified again {times(station.again.count)}")
 
 
-def _points(name: str, station: Station) -> Iterator[Finding]:
+def _points(name: str, station: N2StationRecord) -> Iterator[Finding]:
     for (region, point, attribute), tally in sorted(station.points.items(), key=lambda item: str(item[0])):
         what = object_name(region, point)
         if attribute is not None:
@@ -187,7 +196,7 @@ def _points(name: str, station: Station) -> Iterator[Finding]:
         yield tally.found(RULES["N2002"], f"{name}, {object_name(region, point)}", seen)
 
 
-def _slow(heard: Heard, name: str, station: Station) -> Finding:
+def _slow(heard: N2Evidence, name: str, station: N2StationRecord) -> Finding:
     """Slow answers; a warning only where they cost something, and are more than a busy computer makes."""
     seen = (
         f"{station.slow.count} of {counted(station.answered, 'answer')} took over {SLOW // MS} ms, "
@@ -197,7 +206,7 @@ def _slow(heard: Heard, name: str, station: Station) -> Finding:
     return heard.noted_if(harmless, station.slow.found(RULES["N2003"], name, seen))
 
 
-def _overrides(heard: Heard, name: str, station: Station) -> Iterator[Finding]:
+def _overrides(heard: N2Evidence, name: str, station: N2StationRecord) -> Iterator[Finding]:
     for (region, point), override in sorted(station.overrides.items()):
         age = heard.now - override.time
         if age > OVERRIDE_AGE:
@@ -207,7 +216,7 @@ def _overrides(heard: Heard, name: str, station: Station) -> Iterator[Finding]:
             yield tally.found(RULES["N2006"], f"{name}, {object_name(region, point)}", seen)
 
 
-def _again(heard: Heard, name: str, station: Station) -> Iterator[Finding]:
+def _again(heard: N2Evidence, name: str, station: N2StationRecord) -> Iterator[Finding]:
     """Answers that came a second time, or late."""
     if station.twice.count:
         seen = f"a second, different answer came to {counted(station.twice.count, 'command')}"

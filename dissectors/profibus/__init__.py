@@ -17,7 +17,7 @@ from dissectors.profibus.telegram import telegram, token
 from dissectors.profibus.text import text
 from dissectors.profibus.tracker import ProfibusTracker
 from dissectors.profibus.watch import BusWatch
-from dissectors.token_ring import TokenRing
+from dissectors.token_ring import StationTable, TokenRing
 
 __all__ = ["PROFIBUS", "ProfibusFramer", "ProfibusTracker", "fields", "peek", "text"]
 
@@ -39,6 +39,7 @@ RING = TokenRing(
     headings=ring_words.HEADINGS,
     rows=ring_words.rows,
     sentences=ring_words.sentences,
+    stations=StationTable(ring_words.SLAVE_HEADINGS, ring_words.slave_rows),
 )
 
 PROFIBUS = Dissector(

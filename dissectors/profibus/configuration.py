@@ -7,17 +7,26 @@ special   k k 0 0 m m m m      k 00 empty slot, 01 input, 10 output, 11 output a
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 
 @dataclass(frozen=True, slots=True)
 class Module:
-    """`inputs`, `outputs`: octets. `words`: as people say it. `is_whole`: consistent as a whole."""
+    """`inputs`, `outputs`: octets. `words`: as people say it. `is_whole`: consistent as a whole. `begin`, `end`: its
+    octets; `makers`: those of them that are the maker's."""
 
     inputs: int
     outputs: int
     words: str
     is_whole: bool
+    begin: int = 0
+    end: int = 0
+    makers: bytes = b""
+
+    @property
+    def consistency(self) -> str:
+        """What is consistent, in words; empty for an empty slot."""
+        return ("as a whole" if self.is_whole else "by units") if self.inputs or self.outputs else ""
 
 
 def parse_configuration(data: bytes) -> tuple[Module, ...]:
@@ -26,7 +35,7 @@ def parse_configuration(data: bytes) -> tuple[Module, ...]:
     while at < len(data):
         octet = data[at]
         if octet & 0x30:
-            modules.append(_general(octet))
+            modules.append(replace(_general(octet), begin=at, end=at + 1))
             at += 1
             continue
         kinds = octet >> 6
@@ -34,8 +43,12 @@ def parse_configuration(data: bytes) -> tuple[Module, ...]:
         named = data[at + 1 : at + 1 + lengths]
         if len(named) < lengths:
             break
-        modules.append(_special(kinds, named))
-        at += 1 + lengths + (octet & 0x0F)
+        behind = at + 1 + lengths
+        end = behind + (octet & 0x0F)
+        if end > len(data):
+            break
+        modules.append(replace(_special(kinds, named), begin=at, end=end, makers=data[behind:end]))
+        at = end
     return tuple(modules)
 
 

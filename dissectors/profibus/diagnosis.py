@@ -14,6 +14,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from dissectors.profibus.dpv1 import device_block
+
 STANDARD = 6
 NO_MASTER = 255
 
@@ -22,7 +24,7 @@ PARAMETER_FAULT, LOCKED = 0x40, 0x80
 PARAMETERS_WANTED, STATIC, WATCHDOG, FREEZE, SYNC = 0x01, 0x02, 0x08, 0x10, 0x20
 OVERFLOW = 0x80
 
-_FIRST = (
+FIRST = (
     (0x01, "station does not exist"),
     (NOT_READY, "not ready"),
     (CONFIGURATION_FAULT, "configuration fault"),
@@ -32,7 +34,7 @@ _FIRST = (
     (PARAMETER_FAULT, "parameter fault"),
     (LOCKED, "locked by another master"),
 )
-_SECOND = (
+SECOND = (
     (PARAMETERS_WANTED, "wants parameters"),
     (STATIC, "static diagnosis: no valid data"),
     (WATCHDOG, "watchdog on"),
@@ -40,6 +42,25 @@ _SECOND = (
     (SYNC, "sync"),
     (0x80, "deactivated"),
 )
+DIAGNOSIS_BITS = {
+    "not_existent": (0, 0x01, "station does not exist; the master sets it"),
+    "not_ready": (0, NOT_READY, "slave is not ready for data"),
+    "cfg_fault": (0, CONFIGURATION_FAULT, "configuration is not the slave's"),
+    "ext_diag": (0, EXTENDED, "there is extended diagnosis that tells of a fault"),
+    "not_supported": (0, NOT_SUPPORTED, "a function is not supported"),
+    "invalid_response": (0, 0x20, "answer was not plausible; the master sets it"),
+    "prm_fault": (0, PARAMETER_FAULT, "parameters are not the slave's"),
+    "master_lock": (0, LOCKED, "another master has parameterised the slave"),
+    "prm_req": (1, PARAMETERS_WANTED, "slave wants parameters"),
+    "stat_diag": (1, STATIC, "slave has no valid data; ask until this is gone"),
+    "wd_on": (1, WATCHDOG, "watchdog is on"),
+    "freeze": (1, FREEZE, "inputs are frozen"),
+    "sync": (1, SYNC, "outputs are held"),
+    "deactivated": (1, 0x80, "slave is taken out; the master sets it"),
+    "overflow": (2, OVERFLOW, "more diagnosis than fits"),
+}
+"""The bits of the status octets by name: octet, bit, meaning."""
+
 _CHANNEL_TYPES = ("?", "bit", "2 bits", "4 bits", "octet", "word", "2 words", "?")
 _ERRORS = {
     1: "short circuit",
@@ -82,9 +103,7 @@ class Diagnosis:
     @property
     def status_words(self) -> tuple[str, ...]:
         """The bits of the status octets that are set, in words."""
-        words = [word for bit, word in _FIRST if self.first & bit] + [
-            word for bit, word in _SECOND if self.second & bit
-        ]
+        words = [word for bit, word in FIRST if self.first & bit] + [word for bit, word in SECOND if self.second & bit]
         return (*words, "diagnosis overflow") if self.third & OVERFLOW else tuple(words)
 
     @property
@@ -100,27 +119,57 @@ def parse_diagnosis(data: bytes) -> Diagnosis | None:
     return Diagnosis(data[0], data[1], data[2], data[3], data[4] << 8 | data[5], data[STANDARD:])
 
 
+@dataclass(frozen=True, slots=True)
+class Block:
+    """A block of extended diagnosis: octets [begin, end) of those behind the standard ones, and what they say.
+
+    `module`, `channel`, `error`: of a channel's. `is_cut`: it is longer than what is there.
+    """
+
+    begin: int
+    end: int
+    title: str
+    words: str
+    module: int | None = None
+    channel: int | None = None
+    error: str | None = None
+    is_cut: bool = False
+
+
 def blocks(octets: bytes) -> tuple[str, ...]:
     """Blocks of extended diagnosis in words; total."""
-    words, at = [], 0
+    return tuple(block.words for block in parse_blocks(octets))
+
+
+def parse_blocks(octets: bytes) -> tuple[Block, ...]:
+    """Blocks of extended diagnosis; total."""
+    found: list[Block] = []
+    at = 0
     while at < len(octets):
         header = octets[at]
         kind, low = header >> 6, header & 0x3F
-        if kind == 2:
-            words.append(_channel(octets[at : at + 3]))
-            at += 3
-        elif kind == 3:
-            words.append(f"revision {low}")
-            at += 1
-        else:
-            content = octets[at + 1 : at + max(low, 1)]
-            words.append(_device(content) if not kind else _modules(content))
-            at += max(low, 1)
-    return tuple(words)
+        size = 3 if kind == 2 else 1 if kind == 3 else max(low, 1)
+        end = min(at + size, len(octets))
+        found.append(_block(kind, low, octets[at:end], at, at + size > len(octets)))
+        at = end
+    return tuple(found)
+
+
+def _block(kind: int, low: int, octets: bytes, at: int, is_cut: bool) -> Block:
+    end, cut = at + len(octets), " (cut off)" if is_cut else ""
+    if kind == 2:
+        return _channel(octets, at)
+    if kind == 3:
+        return Block(at, end, "revision", f"revision {low}")
+    title, words = ("modules", _modules(octets[1:])) if kind else ("device", _device(octets[1:]))
+    return Block(at, end, title, words + cut, is_cut=is_cut)
 
 
 def _device(content: bytes) -> str:
-    return f"device: {content.hex(' ')}" if content else "device: nothing"
+    if not content:
+        return "device: nothing"
+    perhaps = device_block(content)
+    return f"device: {content.hex(' ')}" + (f" (if of DP-V1: {perhaps})" if perhaps is not None else "")
 
 
 def _modules(content: bytes) -> str:
@@ -128,10 +177,11 @@ def _modules(content: bytes) -> str:
     return f"modules with a diagnosis: {', '.join(faulty)}" if faulty else "no module with a diagnosis"
 
 
-def _channel(block: bytes) -> str:
+def _channel(block: bytes, at: int) -> Block:
     if len(block) < 3:
-        return f"channel: cut off ({block.hex(' ')})"
+        return Block(at, at + len(block), "channel", f"channel: cut off ({block.hex(' ')})", is_cut=True)
     direction, channel = _DIRECTIONS[block[1] >> 6], block[1] & 0x3F
     code = block[2] & 0x1F
     error = _ERRORS.get(code, f"error {code}" if code < 16 else f"maker's error {code}")
-    return f"module {block[0] & 0x3F}, {direction}channel {channel} ({_CHANNEL_TYPES[block[2] >> 5]}): {error}"
+    words = f"module {block[0] & 0x3F}, {direction}channel {channel} ({_CHANNEL_TYPES[block[2] >> 5]}): {error}"
+    return Block(at, at + 3, "channel", words, block[0] & 0x3F, channel, error)

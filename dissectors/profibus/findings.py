@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 from dissectors.findings import Finding, Severity, Tally, counted, times
 from dissectors.frame import Event, Frame, Header, Role
 from dissectors.line import NS_PER_S, Timing
 from dissectors.profibus.configuration import parse_configuration
-from dissectors.profibus.diagnosis import CONFIGURATION_FAULT, LOCKED, PARAMETER_FAULT
-from dissectors.profibus.record import Record
+from dissectors.profibus.diagnosis import CONFIGURATION_FAULT, PARAMETER_FAULT
+from dissectors.profibus.record import Record, joined
 from dissectors.profibus.ring import Ring
 from dissectors.profibus.rules import RULES, usual_tsdr
 from dissectors.profibus.slave_watch import SlaveView
@@ -21,8 +21,12 @@ from dissectors.words import milliseconds
 
 _LEAST = 3
 _SHARE = 0.01
+_SLOW_SHARE = 0.1
+_COMMON = 0.5
 _URGENT_MOST = 20
-_CLEAR_LONG = 5 * NS_PER_S
+_LEAST_FRESH = 2
+"""Requests without answer, repeats at once aside, that are more than a look whether somebody is there."""
+
 _ONE_STATION = 0.9
 _TOLERANCE = 5
 """Bit times by which a measured answer time may be off."""
@@ -33,13 +37,16 @@ class ProfibusFindings:
 
     def __init__(self, timing: Timing) -> None:
         self._watch = BusWatch(timing, self._noticed)
-        self._slow = timing.line.bits(usual_tsdr(timing.line.baud) + _TOLERANCE)
+        self._usual, self._tolerance = timing.line.bits(usual_tsdr(timing.line.baud)), timing.line.bits(_TOLERANCE)
+        self._most: Callable[[int], int | None] | None = None
+        self._limits: dict[int, int] = {}
         self._records: dict[int, Record] = defaultdict(Record)
         self._noted: dict[tuple[Notice, int], Tally] = defaultdict(Tally)
         self._diagnosed: dict[int, dict[str, Tally]] = defaultdict(lambda: defaultdict(Tally))
         self._damaged = Tally()
         self._frames = 0
-        self._tokens = 0
+        self._passed: dict[int, int] = defaultdict(int)  # tokens to each master
+        self._told: dict[int, int] = defaultdict(int)  # tokens and requests from each master
 
     def see(self, no: int, event: Event, header: Header | None, placement: Placement | None) -> None:
         """Take the next row."""
@@ -47,14 +54,33 @@ class ProfibusFindings:
             self._frames += 1
             if not event.ok:
                 self._damaged.add(event.start, no)
-            elif header is not None and header.role is Role.TOKEN:
-                self._tokens += 1
+            elif header is not None:
+                self._count(header)
         self._watch.see(no, event, header)
+
+    def _count(self, header: Header) -> None:
+        is_token = header.role is Role.TOKEN
+        if is_token and header.destination is not None:
+            self._passed[header.destination] += 1
+        if header.source is not None and header.role is not Role.RESPONSE:
+            self._told[header.source] += 1
 
     def settle(self, transaction: Transaction) -> None:
         """Take a transaction that closed."""
         if transaction.station is not None and not transaction.is_passing:
-            self._records[transaction.station].settle(transaction, self._slow)
+            self._records[transaction.station].settle(transaction, self._slow_of(transaction.station))
+
+    def know_response_times(self, most: Callable[[int], int | None]) -> None:
+        """Let a device's GSD say how long it may take, where there is one."""
+        self._most = most
+
+    def _slow_of(self, address: int) -> int:
+        """ns above which an answer of a station is slow."""
+        limit = self._limits.get(address)
+        if limit is None:
+            said = None if self._most is None else self._most(address)
+            limit = self._limits[address] = self._usual if said is None else said
+        return limit + self._tolerance
 
     def ring(self) -> Ring:
         """The ring so far."""
@@ -68,6 +94,8 @@ class ProfibusFindings:
         if what is Notice.DIAGNOSIS:
             for code in self._codes_of(self._watch.slaves[address]):
                 self._diagnosed[address][code].add(time, no)
+        elif what is Notice.LOCKED:
+            self._diagnosed[address]["PB011"].add(time, no)
         else:
             self._noted[what, address].add(time, no)
 
@@ -83,14 +111,13 @@ class ProfibusFindings:
             yield "PB005"
         if given is not None and given.ident != told.ident:
             yield "PB006"
-        if told.first & LOCKED:
-            yield "PB011"
         if slave.has_trouble:
             yield "PB009"
 
     def _all(self) -> Iterator[Finding]:
         for address in sorted(self._records):
             yield from self._of_exchanges(station(address), self._records[address])
+        yield from self._of_repeats()
         for address in sorted(self._watch.slaves):
             yield from self._of_diagnosis(address, self._watch.slaves[address])
         yield from self._of_damage()
@@ -99,30 +126,44 @@ class ProfibusFindings:
     def _of_exchanges(self, who: Subject, record: Record) -> Iterator[Finding]:
         silent, total = record.unanswered, record.requests
         if silent.count and not record.answers and silent.count >= _LEAST:
-            yield silent.found(RULES["PB001"], who, f"no answer to any of {counted(total, 'request')}")
+            grave = Severity.ERROR if record.fresh >= _LEAST_FRESH else Severity.NOTE
+            yield silent.found(RULES["PB001"], who, f"no answer to any of {counted(total, 'request')}", grave)
         elif silent.count and record.answers:
             grave = _grave(silent.count, total)
             yield silent.found(RULES["PB002"], who, f"{silent.count} of {total} requests without answer", grave)
-        if record.repeated.count and record.answers:
-            seen = f"{record.repeated.count} of {total} requests are repeats; at worst {record.worst} in a row"
-            yield record.repeated.found(RULES["PB003"], who, seen, _grave(record.repeated.count, total))
         if record.twice.count:
-            grave = Severity.ERROR if record.twice.count > 1 else Severity.NOTE
+            often = record.twice.count >= _LEAST and record.twice.count >= _SHARE * total
+            grave = Severity.ERROR if often else Severity.NOTE
             seen = f"a second, different answer came {times(record.twice.count)}"
             yield record.twice.found(RULES["PB010"], who, seen, grave)
         if record.refused.count:
             seen = f"{record.refused.count} of {total} requests refused: {'; '.join(sorted(record.refusals)[:4])}"
-            yield record.refused.found(RULES["PB017"], who, seen, _grave(record.refused.count, total))
-        if record.slow.count >= _LEAST and record.slow.count >= _SHARE * total:
+            yield record.refused.found(RULES["PB017"], who, seen, _grave(record.put_off, record.exchanged))
+        if record.slow.count >= _LEAST and record.slow.count >= _SLOW_SHARE * total:
             slowest = milliseconds(record.slowest)
-            seen = f"{record.slow.count} of {total} answers later than usual; the slowest after {slowest}"
+            limit = self._limits.get(who.station or 0, self._usual)
+            allowed = "usual" if limit == self._usual else f"its GSD allows ({milliseconds(limit)})"
+            seen = f"{record.slow.count} of {total} answers later than {allowed}; the slowest after {slowest}"
             yield record.slow.found(RULES["PB018"], who, seen)
+
+    def _of_repeats(self) -> Iterator[Finding]:
+        """Repeats of what was answered well here: of one station's requests, or of the bus where most stations' are."""
+        known = {address: one for address, one in self._records.items() if one.answers >= _LEAST}
+        told = {address: one for address, one in known.items() if one.repeated.count}
+        grave = [one for one in told.values() if _grave(one.repeated.count, one.requests) >= Severity.WARNING]
+        if len(grave) > 1 and len(grave) >= _COMMON * len(known):
+            together = joined([one.repeated for one in told.values()])
+            total = sum(one.requests for one in known.values())
+            seen = f"{together.count} of {total} requests are sent again, to {len(told)} stations that had answered"
+            yield together.found(RULES["PB003"], BUS, seen, Severity.WARNING)
+            return
+        for address, one in sorted(told.items()):
+            seen = f"{one.repeated.count} of {one.requests} requests are sent again although they were answered here"
+            yield one.repeated.found(RULES["PB003"], station(address), seen, _grave(one.repeated.count, one.requests))
 
     def _of_diagnosis(self, address: int, slave: SlaveView) -> Iterator[Finding]:
         who, told, tallies = station(address), slave.told, self._diagnosed.get(address, {})
-        if told is None:
-            return
-        words = "; ".join((*told.status_words, *told.block_words))
+        words = "" if told is None else "; ".join((*told.status_words, *told.block_words))
         for code, tally in sorted(tallies.items()):
             yield tally.found(
                 RULES[code], who, self._diagnosis_seen(code, slave, words), self._diagnosis_grave(code, slave)
@@ -134,7 +175,10 @@ class ProfibusFindings:
             yield fallen.found(RULES["PB007"], who, seen, grave)
         starved = self._noted.get((Notice.STARVED, address))
         if starved is not None and fallen is None:
-            seen = f"left data exchange {times(starved.count)} when its master was silent for longer than its watchdog"
+            seen = (
+                f"left data exchange {times(starved.count)}, when its master had been silent for longer than its "
+                "watchdog, or octets were damaged"
+            )
             yield starved.found(RULES["PB007"], who, seen, Severity.NOTE)
         if slave.urgent >= _URGENT_MOST and "PB009" not in tallies:
             time, _ = slave.changes[-1] if slave.changes else (0, None)
@@ -154,17 +198,22 @@ class ProfibusFindings:
             return f"the master configures {wanted}" + (f"; the slave has {has}" if has else "")
         if code == "PB009" and not slave.has_trouble:
             return "had a diagnosis to tell, which is gone"
+        if code == "PB011" and told is not None:
+            wanted = " and ".join(str(one) for one in sorted(slave.wanted_by))
+            owner = "another master" if slave.owner is None else f"master {slave.owner}"
+            return f"given parameters by {wanted}; its diagnosis says that it belongs to {owner}"
         return f"its newest diagnosis: {words or 'nothing to report'}"
 
     @staticmethod
     def _diagnosis_grave(code: str, slave: SlaveView) -> Severity:
         told = slave.told
-        assert told is not None
+        if told is None:
+            return RULES[code].severity
         still = {
             "PB004": bool(told.first & PARAMETER_FAULT),
             "PB005": bool(told.first & CONFIGURATION_FAULT),
+            "PB006": slave.given is not None and slave.given.ident != told.ident,
             "PB009": slave.has_trouble,
-            "PB011": bool(told.first & LOCKED),
         }.get(code, True)
         return RULES[code].severity if still else Severity.NOTE
 
@@ -176,7 +225,7 @@ class ProfibusFindings:
         total = sum(tally.count for tally in answers.values())
         worst = max(answers, key=lambda address: answers[address].count, default=None)
         others = any(one.answers >= _LEAST for address, one in self._records.items() if address != worst)
-        grave = _grave(damaged.count, self._frames)
+        checked = self._frames - sum(self._passed.values())
         is_one = (
             worst is not None
             and others
@@ -186,24 +235,28 @@ class ProfibusFindings:
         if is_one and worst is not None:
             asked = self._records[worst].requests
             seen = f"{answers[worst].count} of {asked} answers damaged, {damaged.count} telegrams in all"
-            yield answers[worst].found(RULES["PB008"], station(worst), seen, grave)
+            yield answers[worst].found(RULES["PB008"], station(worst), seen, _grave(answers[worst].count, asked))
         else:
-            yield damaged.found(RULES["PB008"], BUS, f"{damaged.count} of {self._frames} telegrams damaged", grave)
+            seen = f"{damaged.count} of {checked} telegrams (tokens aside) damaged"
+            yield damaged.found(RULES["PB008"], BUS, seen, _grave(damaged.count, checked))
 
     def _of_masters(self) -> Iterator[Finding]:
         for (what, address), tally in sorted(self._noted.items(), key=lambda one: (one[0][0].value, one[0][1])):
             if what is Notice.CLAIM:
                 seen = f"station {address} made a token of its own {times(tally.count)}"
-                yield tally.found(RULES["PB013"], BUS, seen)
+                yield tally.found(RULES["PB013"], BUS, seen + self._woken_seen())
             elif what is Notice.TOKEN_AGAIN:
                 seen = f"the token to it was sent again {times(tally.count)}"
-                yield tally.found(RULES["PB014"], station(address), seen, _grave(tally.count, self._tokens))
+                yield tally.found(RULES["PB014"], station(address), seen, _grave(tally.count, self._passed[address]))
             elif what is Notice.OUT_OF_TURN and tally.count >= _LEAST:
                 seen = f"station {address} sent {times(tally.count)} while another master held the token"
-                yield tally.found(RULES["PB015"], BUS, seen)
-            elif what is Notice.CLEAR and tally.last - tally.first >= _CLEAR_LONG:
-                seen = f"outputs are cleared for {(tally.last - tally.first) / NS_PER_S:.0f} s of data exchange"
-                yield tally.found(RULES["PB012"], station(address), seen)
+                often = tally.count >= _SHARE * self._told[address]
+                yield tally.found(RULES["PB015"], BUS, seen, Severity.ERROR if often else Severity.NOTE)
+            elif what is Notice.CLEAR:
+                yield tally.found(RULES["PB012"], station(address), self._clear_seen(address))
+            elif what is Notice.CLEAR_PERHAPS and (Notice.CLEAR, address) not in self._noted:
+                seen = f"{self._clear_seen(address)}; octets were damaged since, its end may not have been heard"
+                yield tally.found(RULES["PB012"], station(address), seen, Severity.NOTE)
         ring = self._watch.ring()
         for address, view in sorted(ring.masters.items()):
             if view.polls > view.answered:
@@ -211,6 +264,15 @@ class ProfibusFindings:
                 share = ring.wasted / ring.span if ring.span else 0
                 seen = f"{tally.count} of {view.polls} polls found nobody; all masters' take {share:.1%} of the time"
                 yield tally.found(RULES["PB016"], station(address), seen)
+
+    def _woken_seen(self) -> str:
+        woken = sorted(address for (what, address) in self._noted if what is Notice.WOKE)
+        if not woken:
+            return ""
+        return f"; silent with the token until then, and going on as if it still had it: {', '.join(map(str, woken))}"
+
+    def _clear_seen(self, address: int) -> str:
+        return f"outputs are cleared for {self._watch.longest_clear(address) / NS_PER_S:.0f} s of data exchange"
 
 
 def _grave(count: int, total: int) -> Severity:

@@ -14,6 +14,8 @@ from scapy.packet import Packet, Raw
 
 from dissectors.checksums import sum8
 from dissectors.frame import Frame, Role
+from dissectors.meaning import Node
+from dissectors.profibus.outline import outline
 from dissectors.profibus.telegram import ED, FIXED, SC, SD1, SD2, SD3, SD4, body_of
 
 _TRAILER = 2
@@ -111,6 +113,10 @@ class PBRequest(Packet):
             told = [self.getfieldval(name) for name in ("le", "le_repeated", "sd_repeated")]
             head += bytes(b if a is None else a for a, b in zip(told, (length, length, SD2), strict=True))
         return head + body + bytes((sum8(body) if self.fcs is None else self.fcs, self.ed))
+
+    def tree(self) -> tuple[Node, ...] | None:
+        """The telegram octet by octet, and what its service says."""
+        return outline(bytes(self))
 
     def extract_padding(self, s: bytes) -> tuple[bytes, bytes]:
         """Nothing follows the end; what does is shown as padding."""

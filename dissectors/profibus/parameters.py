@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 LEAST = 7
 WATCHDOG, FREEZE, SYNC, UNLOCK, LOCK = 0x08, 0x10, 0x20, 0x40, 0x80
-_STATUS = ((WATCHDOG, "watchdog"), (FREEZE, "freeze"), (SYNC, "sync"), (UNLOCK, "unlock"), (LOCK, "lock"))
+STATUS = ((WATCHDOG, "watchdog"), (FREEZE, "freeze"), (SYNC, "sync"), (UNLOCK, "unlock"), (LOCK, "lock"))
 _MILLISECOND_BASE = 0x04  # in the first octet of DP-V1 parameters
 CLEAR, UNFREEZE, DO_FREEZE, UNSYNC, DO_SYNC = 0x02, 0x04, 0x08, 0x10, 0x20
 _CONTROLS = ((CLEAR, "clear"), (UNFREEZE, "unfreeze"), (DO_FREEZE, "freeze"), (UNSYNC, "unsync"), (DO_SYNC, "sync"))
@@ -36,7 +36,7 @@ class Parameters:
     @property
     def words(self) -> tuple[str, ...]:
         """The request bits in words."""
-        return tuple(word for bit, word in _STATUS if self.status & bit)
+        return tuple(word for bit, word in STATUS if self.status & bit)
 
 
 def parse_parameters(data: bytes) -> Parameters | None:

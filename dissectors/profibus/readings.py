@@ -15,12 +15,17 @@ from dissectors.readings import How, Reading
 
 
 def readings(request: Frame | None, response: Frame | None) -> tuple[Reading, ...]:
-    """The outputs that a slave took and the inputs that it gave; total."""
-    asked = parse(request.octets) if request is not None else None
-    told = parse(response.octets) if response is not None else None
-    if asked is None or told is None or refusal_words(told) is not None:
+    """The outputs that a slave took and the inputs that it gave; without the answer, the outputs that it is given;
+    total."""
+    if request is None or not request.ok:
         return ()
+    asked = parse(request.octets)
     service = service_of(asked)
+    if response is None:
+        return _words("dp-output", asked.data, How.WRITE) if service is Service.DATA_EXCHANGE else ()
+    told = parse(response.octets)
+    if not response.ok or refusal_words(told) is not None:
+        return ()
     if service is Service.DATA_EXCHANGE:
         return (*_words("dp-output", asked.data, How.WRITE), *_words("dp-input", told.data, How.READ))
     if service is Service.DIAGNOSIS and (said := parse_diagnosis(told.data)) is not None:

@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from dissectors.findings import Tally
+from dissectors.findings import EVIDENCE_MAX, Tally
+from dissectors.profibus.services import Service
 from dissectors.tracker import Transaction, Verdict
 
+_EXCHANGE = Service.DATA_EXCHANGE.value
+_WELL = frozenset((Verdict.ANSWERED, Verdict.RETRY, Verdict.EXCEPTION))
 _LISTENED = frozenset((Verdict.ANSWERED, Verdict.RETRY, Verdict.EXCEPTION, Verdict.DAMAGED_ANSWER, Verdict.LATE))
 
 
 @dataclass(slots=True)
 class Record:
-    """Requests to a station and what became of them. `run`, `worst`: repeats in a row, now and at most."""
+    """Requests to a station and what became of them.
+
+    `repeats`: of all kinds; `worst`: in a row, at most. `repeated`: those of requests that were answered well here.
+    `before`: how the newest ended. `fresh`: requests without answer that are no repeats at once. `exchanged`,
+    `put_off`: requests for data exchange, and refused ones of them.
+    """
 
     requests: int = 0
     answers: int = 0
@@ -24,7 +33,12 @@ class Record:
     slow: Tally = field(default_factory=Tally)
     slowest: int = 0
     refusals: set[str] = field(default_factory=set)
+    repeats: int = 0
     worst: int = 0
+    before: Verdict | None = None
+    fresh: int = 0
+    exchanged: int = 0
+    put_off: int = 0
 
     def settle(self, closed: Transaction, slow: int) -> None:
         """Take an exchange with it. `slow`: ns that an answer may take."""
@@ -35,17 +49,30 @@ class Record:
         if closed.request is None:
             return
         self.requests += 1
+        self.exchanged += closed.kind == _EXCHANGE
         self.answers += verdict in _LISTENED
         if closed.attempt > 1:
-            self.repeated.add(closed.start, closed.request)
+            self.repeats += 1
             self.worst = max(self.worst, closed.attempt - 1)
+            if self.before in _WELL:
+                self.repeated.add(closed.start, closed.request)
+        self.before = verdict
         if verdict is Verdict.NO_RESPONSE:
             self.unanswered.add(closed.start, closed.request)
+            self.fresh += closed.attempt == 1
         elif verdict is Verdict.DAMAGED_ANSWER:
             self.damaged.add(closed.start, closed.request, closed.response)
         elif verdict is Verdict.EXCEPTION:
             self.refused.add(closed.start, closed.request, closed.response)
+            self.put_off += closed.kind == _EXCHANGE
             self.refusals.add(f"{closed.kind}: {closed.error}")
         if closed.latency is not None and closed.latency.low > slow and verdict is not Verdict.DAMAGED_ANSWER:
             self.slow.add(closed.start, closed.request, closed.response)
             self.slowest = max(self.slowest, closed.latency.low)
+
+
+def joined(tallies: Sequence[Tally]) -> Tally:
+    """Several tallies as one; there must be one."""
+    evidence = sorted(no for tally in tallies for no in tally.evidence)[:EVIDENCE_MAX]
+    first, last = min(tally.first for tally in tallies), max(tally.last for tally in tallies)
+    return Tally(sum(tally.count for tally in tallies), first, last, evidence)

@@ -28,14 +28,31 @@ class MasterView:
 
 
 @dataclass(frozen=True, slots=True)
+class SlaveCounts:
+    """What went otherwise than smoothly with a slave; `ring_words.SLAVE_HEADINGS` says what each is."""
+
+    lost: int = 0
+    syncs: int = 0
+    repeats: int = 0
+    longest: int = 0
+    illegal: int = 0
+    rejects: int = 0
+    diagnoses: int = 0
+    faults: int = 0
+
+
+@dataclass(frozen=True, slots=True)
 class SlaveRow:
-    """A slave: its state and since when (ns), how often that changed, exchanges of data."""
+    """A slave: its state and since when (ns), how often that changed, exchanges of data; `cycle`: ns from one exchange
+    of data that its master began to the next."""
 
     state: SlaveState
     since: int
     changed: int
     exchanges: int
     changes: tuple[tuple[int, SlaveState], ...]
+    counts: SlaveCounts = SlaveCounts()
+    cycle: Histogram = field(default_factory=Histogram)
 
 
 @dataclass(frozen=True, slots=True)

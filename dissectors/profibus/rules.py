@@ -13,8 +13,9 @@ RULES: dict[str, Rule] = {
             "PB001",
             Severity.ERROR,
             "no answer",
-            "A station is asked at least three times and never answers, with silence where the answer should be. Polls "
-            "for stations (FDL status) do not count: nobody need be there.",
+            "A station is asked at least three times and never answers, with silence where the answer should be. Only "
+            "noted where that was one request and its repeats. Polls for stations (FDL status) do not count: nobody "
+            "need be there.",
             "no station at this address: off, set to another address, cut off, or without the bus's rate",
             "its supply, address switches, connector and terminators; if it is gone, take it out of the configuration",
             explains=("PB003", "PB007"),
@@ -32,9 +33,11 @@ RULES: dict[str, Rule] = {
             "PB003",
             Severity.NOTE,
             "telegrams repeated",
-            "The frame count bit shows that a request is the one before it once more: the master got no answer, or did "
-            "not understand it. A warning from 3 and 1 in 100 requests on. Nothing is counted where octets were "
-            "damaged in between: the request between may have been lost here.",
+            "The frame count bit shows that a request is the one directly before it once more, although that was "
+            "answered well here: the master did not understand the answer. A warning from 3 and 1 in 100 requests on; "
+            "about the bus where it is so of most stations. Repeats after no answer or a damaged one are counted "
+            "there. Nothing is counted where octets were damaged in between: the request between may have been lost "
+            "here.",
             "answers that reach this place of the bus and not the master, or none",
             "what is between the station and the master: connectors, terminators, a repeater; measure at the master",
         ),
@@ -70,7 +73,8 @@ RULES: dict[str, Rule] = {
             Severity.WARNING,
             "dropped out of data exchange",
             "A slave that exchanged data wants new parameters, or refuses data, although nobody unlocked it. An error "
-            "from three times on. Only noted where its master had asked nothing for longer than the watchdog.",
+            "from three times on. Only noted where its master had asked nothing for longer than the watchdog (than "
+            "ever before, where that was not heard), or octets were damaged since its last answer.",
             "its watchdog expired because requests did not reach it, its supply failed, or it restarted",
             "whether its master was silent before; the watchdog time in Set_Prm; the supply of the slave",
             explains=("PB009", "PB017"),
@@ -79,8 +83,9 @@ RULES: dict[str, Rule] = {
             "PB008",
             Severity.NOTE,
             "damaged telegrams",
-            "Telegrams with a wrong sum, start or end. A warning from 3 and 1 in 100 on; about one station where nine "
-            "in ten damaged answers are its, although others answer too.",
+            "Telegrams with a wrong sum, start or end. A warning from 3 and 1 in 100 on, tokens not counted; about "
+            "one station, and 1 in 100 of its answers, where nine in ten damaged answers are its, although others "
+            "answer too.",
             "reflections (terminators missing or too many), spurs, disturbances, two stations that send at once",
             "terminators at both ends and nowhere else, their supply, spurs, shields",
             explains=("PB002", "PB003", "PB007", "PB013", "PB014", *_LINE),
@@ -98,7 +103,8 @@ RULES: dict[str, Rule] = {
             "PB010",
             Severity.ERROR,
             "answered twice",
-            "A second, different good answer came to one request. A single one is only noted.",
+            "A second, different good answer came to one request, with nothing damaged between. An error from 3 and 1 "
+            "in 100 requests on.",
             "two stations have the same address",
             "switch the station off and see whether something still answers",
             explains=("PB002", "PB003", "PB007", "PB008", *_LINE),
@@ -107,8 +113,8 @@ RULES: dict[str, Rule] = {
             "PB011",
             Severity.WARNING,
             "belongs to another master",
-            "A master asks a slave to take its parameters, and the slave's diagnosis names another master, or says "
-            "that it is locked by one.",
+            "A master gives parameters to a slave, and the diagnosis that it fetches then names another master, or "
+            "says that the slave is locked by one. Who only reads a diagnosis does not count.",
             "two masters have the same slave in their projects",
             "decide which master the slave belongs to, and take it out of the other one's project",
             explains=("PB017",),
@@ -117,8 +123,8 @@ RULES: dict[str, Rule] = {
             "PB012",
             Severity.WARNING,
             "master in Clear",
-            "Data is exchanged for more than five seconds while the master's last Global_Control says Clear: all "
-            "outputs are zero or in their safe state.",
+            "Data is exchanged for more than five seconds while the master's last Global_Control to all says Clear, "
+            "and all outputs are zero. Only noted where octets were damaged since: its end may be lost there.",
             "the controller is in stop, or one of its slaves is missing and it clears the others (auto clear)",
             "the controller's mode switch and its fault list",
         ),
@@ -126,7 +132,8 @@ RULES: dict[str, Rule] = {
             "PB013",
             Severity.WARNING,
             "token lost",
-            "A master made a token of its own in a ring that was running.",
+            "A master made a token of its own in a ring that was running, after its holder had been silent. That the "
+            "old holder then goes on as if nothing had been is part of it.",
             "the token was damaged, or its holder fell silent: switched off, restarted, disturbed",
             "who held the token before; terminators; whether that master restarted",
             explains=("PB007", "PB014"),
@@ -135,7 +142,8 @@ RULES: dict[str, Rule] = {
             "PB014",
             Severity.NOTE,
             "token sent again",
-            "A token was sent once more because its taker did not show itself. A warning from 3 and 1 in 100 on.",
+            "A token was sent once more because its taker did not show itself. A warning from 3 and 1 in 100 tokens "
+            "to it on.",
             "a master that is slower than the slot time, disturbed, or gone",
             "slot time in both projects; connector and terminators at that master",
         ),
@@ -144,7 +152,7 @@ RULES: dict[str, Rule] = {
             Severity.ERROR,
             "speaks without the token",
             "A master sends requests while another one holds the token, at least three times, with nothing damaged "
-            "between token and request.",
+            "between token and request. Only noted where it is fewer than 1 in 100 of what that master sends.",
             "two masters that do not see each other, one with other bus parameters, or a master's address twice",
             "the bus parameters and addresses of all masters; take off the one that was added last",
             explains=("PB002", "PB003", "PB007", "PB008", "PB013", "PB014", *_LINE),
@@ -162,7 +170,7 @@ RULES: dict[str, Rule] = {
             Severity.NOTE,
             "requests refused",
             "A station answers with an error: service not activated (RS), no resources (RR), user error (UE). A "
-            "warning from 3 and 1 in 100 requests on.",
+            "warning from 3 and 1 in 100 requests for data exchange on; other services a device need not have.",
             "a service that the device does not have, or one that it cannot do in its present state",
             "which service is refused, and in which state the slave is",
         ),
@@ -170,9 +178,10 @@ RULES: dict[str, Rule] = {
             "PB018",
             Severity.NOTE,
             "slower than usual",
-            "Even the smallest reading of the answer time is above the usual longest station delay (max TSDR): 60 bit "
-            "times up to 187.5 kBd, 100 at 500 kBd, 150 at 1.5 MBd, 250 at 3 MBd, 450 at 6 MBd, 800 at 12 MBd. Only "
-            "where the adapter tells times that exactly; the device's GSD may allow more.",
+            "Even the smallest reading of one answer in ten or more is above the longest station delay (max TSDR) of "
+            "the device's GSD, or where none is given above the usual one: 60 bit times up to 187.5 kBd, 100 at 500 "
+            "kBd, 150 at 1.5 MBd, 250 at 3 MBd, 450 at 6 MBd, 800 at 12 MBd. Only where the adapter tells times that "
+            "exactly.",
             "a slow device, a repeater or a converter in between",
             "MaxTsdr in the GSD file of the device, and the slot time of the project",
         ),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from enum import Enum
 
 from dissectors.profibus.control import FDL_STATUS
+from dissectors.profibus.dpv1 import parse_acyclic
 from dissectors.profibus.telegram import Telegram
 
 MASTER_SAP = 62
@@ -27,6 +28,7 @@ class Service(Enum):
     ALARM = "alarm"
     SERVER = "read-write"
     RESOURCE_MANAGER = "resource-manager"
+    CONNECTION = "connection"
     MASTER_TO_MASTER = "master-to-master"
     FDL_STATUS = "fdl-status"
     TOKEN = "token"
@@ -51,9 +53,10 @@ _TITLES = {
     Service.SET_PARAMETERS: "Set_Prm",
     Service.CHECK_CONFIGURATION: "Chk_Cfg",
     Service.EXTENDED_PARAMETERS: "Ext_User_Prm",
-    Service.ALARM: "alarm",
+    Service.ALARM: "DP-V1 alarm",
     Service.SERVER: "DP-V1 read or write",
     Service.RESOURCE_MANAGER: "DP-V1 resource manager",
+    Service.CONNECTION: "DP-V1 connection",
     Service.MASTER_TO_MASTER: "master to master",
     Service.FDL_STATUS: "FDL status",
     Service.TOKEN: "token",
@@ -77,6 +80,12 @@ _BY_SAP = {
     61: Service.SET_PARAMETERS,
     62: Service.CHECK_CONFIGURATION,
 }
+ACYCLIC = frozenset((Service.ALARM, Service.SERVER, Service.RESOURCE_MANAGER, Service.CONNECTION))
+"""Services of DP-V1, whose data is a PDU of its own (`dpv1.py`)."""
+
+_LAST_CONNECTION = 48
+"""Access points 0 … 48 of a slave are for connections of masters of class 2, the resource manager gives them out."""
+
 _SRD = (0xC, 0xD)
 
 
@@ -93,6 +102,8 @@ def service_of(telegram: Telegram) -> Service:
         return Service.FDL_STATUS
     point = slave_sap(telegram)
     if point is not None:
+        if point <= _LAST_CONNECTION:
+            return Service.CONNECTION if parse_acyclic(telegram.data, control.is_request) else Service.OTHER
         return _BY_SAP.get(point, Service.OTHER)
     if telegram.dsap is not None or telegram.ssap is not None:
         return Service.OTHER
@@ -104,3 +115,13 @@ def service_of(telegram: Telegram) -> Service:
 def slave_sap(telegram: Telegram) -> int | None:
     """The slave's access point: where a request goes to, where an answer comes from."""
     return telegram.dsap if telegram.is_request else telegram.ssap
+
+
+def sap_name(point: int | None, is_destination: bool, is_request: bool) -> str:
+    """An access point with its name: that of the slave has one, that of the master says no more than whose it is."""
+    if point is None:
+        return ""
+    if is_destination != is_request:
+        return f"{point} (master)"
+    service = Service.CONNECTION if point <= _LAST_CONNECTION else _BY_SAP.get(point)
+    return f"{point} ({service.title})" if service is not None else f"{point}"

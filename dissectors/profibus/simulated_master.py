@@ -53,11 +53,12 @@ class Job:
     fcb: bool = True
     due: int = 0
 
-    def request(self, master: int, now: int) -> bytes:
-        """The next telegram to it."""
+    def request(self, master: int, now: int, is_clear: bool = False) -> bytes:
+        """The next telegram to it; in Clear all outputs are zero."""
         control = _SRD_HIGH | (_FCB if self.fcb else 0) | (0 if self.is_first else _FCV)
         if self.step is _Step.EXCHANGE:
-            return telegram(self.address, master, control, self.outputs(now))
+            outputs = self.outputs(now)
+            return telegram(self.address, master, control, bytes(len(outputs)) if is_clear else outputs)
         point, data = 60, b""
         if self.step is _Step.PARAMETERS:
             head = (0x88 if self.watchdog else 0x80, self.watchdog, 1 if self.watchdog else 0, 11)
@@ -92,7 +93,8 @@ class Ring:
     `slot`: bit times that it waits for an answer. `highest`: address up to which GAP is polled. `gap_every`: rounds
     from one GAP poll to the next. `cycle`: ns from one round of requests to the next. `hold`: bit times that it keeps a
     token for which it has no use, less than `slot`. `is_clear`: whether it stays in Clear. `retries`: how often it
-    repeats a request. `pause`: ns until it looks again for a slave that it lost.
+    repeats a request. `pause`: ns until it looks again for a slave that it lost. `commands`: of Global_Control, one in
+    each round by turns, with the groups. `is_class_1`: whether it tells slaves of its own Clear and Operate.
     """
 
     slot: int = 1000
@@ -103,6 +105,8 @@ class Ring:
     is_clear: bool = False
     retries: int = 1
     pause: int = 500 * MS
+    commands: tuple[tuple[int, int], ...] = ()
+    is_class_1: bool = True
 
 
 @dataclass(slots=True)
@@ -216,12 +220,17 @@ class Master:
 
     def _command(self) -> bytes | None:
         """Global_Control, where what it says has changed."""
+        if not self._ring.is_class_1:
+            return None
         is_clear = self._ring.is_clear or not any(job.step is _Step.EXCHANGE for job in self._jobs)
         if self._life.told is None or (self._life.told and not is_clear):
             self._life.told = is_clear
-            data = bytes((2 if is_clear else 0, 0))
-            return telegram(BROADCAST, self.address, _SDN_HIGH, data, 58, MASTER_SAP)
-        return None
+            return self._control(2 if is_clear else 0, 0)
+        commands = self._ring.commands
+        return self._control(*commands[self._life.rounds % len(commands)]) if commands and not is_clear else None
+
+    def _control(self, command: int, groups: int) -> bytes:
+        return telegram(BROADCAST, self.address, _SDN_HIGH, bytes((command, groups)), 58, MASTER_SAP)
 
     def _poll(self, now: int) -> tuple[Send, ...]:
         """Look for a master between this and the next one."""
@@ -236,7 +245,7 @@ class Master:
         return self._send(_Waiting(octets, None, 0), now)
 
     def _ask(self, job: Job, now: int) -> tuple[Send, ...]:
-        return self._send(_Waiting(job.request(self.address, now), job, 0), now)
+        return self._send(_Waiting(job.request(self.address, now, bool(self._life.told)), job, 0), now)
 
     def _send(self, waiting: _Waiting, now: int) -> tuple[Send, ...]:
         waiting.until = now + len(waiting.octets) * self._line.char + self._slot + 260 * self._line.char

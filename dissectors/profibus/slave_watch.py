@@ -4,10 +4,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from dissectors.histogram import Histogram
 from dissectors.line import MS
 from dissectors.profibus.control import Status
-from dissectors.profibus.diagnosis import EXTENDED, NO_MASTER, Diagnosis, parse_diagnosis
+from dissectors.profibus.diagnosis import (
+    CONFIGURATION_FAULT,
+    EXTENDED,
+    LOCKED,
+    NO_MASTER,
+    PARAMETER_FAULT,
+    Diagnosis,
+    parse_diagnosis,
+)
 from dissectors.profibus.parameters import UNLOCK, Parameters, parse_parameters
+from dissectors.profibus.ring import SlaveCounts
 from dissectors.profibus.services import Service
 from dissectors.profibus.slave_state import SlaveState
 from dissectors.profibus.telegram import Telegram
@@ -15,6 +25,9 @@ from dissectors.profibus.telegram import Telegram
 CHANGES_KEPT = 32
 OFFLINE_AFTER = 4
 """Requests in a row without any answer after which a slave counts as offline."""
+
+_LEAST_WATCHDOG = 10 * MS
+"""ns; no slave of DP-V0 has a shorter one."""
 
 
 @dataclass(slots=True)
@@ -29,7 +42,7 @@ class SlaveView:
     changes: list[tuple[int, SlaveState]] = field(default_factory=list)
     changed: int = 0
     exchanges: int = 0
-    urgent: int = 0  # answers of high priority since the newest diagnosis
+    urgent: int = 0  # answers of high priority in a row since the newest diagnosis
     unanswered: int = 0
     drops: int = 0
     given: Parameters | None = None
@@ -37,22 +50,79 @@ class SlaveView:
     has: bytes = b""
     told: Diagnosis | None = None
     unlocked: bool = False
-    asked: int | None = None  # when it was asked last, ns
-    silence: int = 0  # the longest pause between requests since it answered well
+    owner: int | None = None  # the master whose parameters it has, as far as it is known
+    wanted_by: set[int] = field(default_factory=set)  # masters that gave it parameters
+    asked: int | None = None  # when its master asked it last, ns
+    silence: int = 0  # the longest pause between requests of its master since it answered well
+    survived: int = 0  # the longest such pause after which it still exchanged data
+    cycle: Histogram = field(default_factory=Histogram)
+    begun: int | None = None  # when its newest exchange of data began, ns; None after a disturbance
+    lost: int = 0
+    syncs: int = 0
+    repeats: int = 0
+    longest: int = 0
+    run: int = 0
+    illegal: int = 0
+    rejects: int = 0
+    diagnoses: int = 0
+    faults: int = 0
+    is_blurred: bool = False  # octets were damaged since it last answered: what its master told it may be lost here
 
-    def ask(self, time: int) -> None:
-        """It is asked for something."""
+    def ask(self, time: int, master: int) -> None:
+        """It is asked for something; what others ask does not serve its watchdog."""
+        if self.owner not in (None, master):
+            return
         self.silence = max(self.silence, 0 if self.asked is None else time - self.asked)
         self.asked = time
 
-    def heard(self, time: int) -> None:
-        """It has answered."""
-        self.silence = 0
+    def request(self, asked: Telegram, is_exchange: bool, is_repeat: bool, time: int) -> None:
+        """Count a request to it. `is_repeat`: it is the one directly before once more."""
+        control = asked.control
+        if is_repeat:
+            self.repeats, self.run = self.repeats + 1, self.run + 1
+            self.longest = max(self.longest, self.run)
+            return
+        self.run = 0
+        if control is not None and control.fcb and not control.fcv:
+            self.syncs += 1
+            self.lost += self.state is SlaveState.EXCHANGE and self.unanswered > 0
+            if self.unanswered and self.state is SlaveState.EXCHANGE:
+                self.become(SlaveState.OFFLINE, time)
+        if is_exchange:
+            if self.begun is not None:
+                self.cycle.add(time - self.begun)
+            self.begun = time
 
     @property
-    def was_starved(self) -> bool:
-        """Whether nobody asked it for longer than its watchdog."""
-        watchdog = None if self.given is None else self.given.watchdog_ms
+    def counts(self) -> SlaveCounts:
+        """What went otherwise than smoothly."""
+        return SlaveCounts(
+            self.lost,
+            self.syncs,
+            self.repeats,
+            self.longest,
+            self.illegal,
+            self.rejects,
+            self.diagnoses,
+            self.faults,
+        )
+
+    def heard(self, is_exchange: bool) -> None:
+        """It has answered."""
+        if is_exchange:
+            self.survived = max(self.survived, self.silence)
+        self.silence, self.is_blurred = 0, False
+
+    @property
+    def is_excused(self) -> bool:
+        """Whether something else than the slave may be why it left data exchange just now: its master asked nothing for
+        longer than its watchdog (than ever before, where the watchdog was not heard), or what its master told it was
+        lost among damaged octets."""
+        if self.is_blurred:
+            return True
+        if self.given is None:
+            return self.silence > max(2 * self.survived, _LEAST_WATCHDOG)
+        watchdog = self.given.watchdog_ms
         return watchdog is not None and self.silence >= watchdog * MS
 
     def become(self, state: SlaveState, time: int) -> None:
@@ -74,6 +144,7 @@ class SlaveView:
         """Take an answer; whether it shows that the slave left data exchange by itself."""
         self.unanswered = 0
         status = None if answer.control is None else answer.control.status
+        self.rejects += status is not None and status.refuses
         if service is Service.DATA_EXCHANGE:
             return self._exchanged(status, time)
         if status is not None and status.refuses:
@@ -84,11 +155,12 @@ class SlaveView:
         if service is Service.SET_PARAMETERS:
             self.given = parse_parameters(asked.data)
             self.unlocked = self.given is not None and bool(self.given.status & UNLOCK)
+            if asked.source is not None and not self.unlocked:
+                self.wanted_by.add(asked.source)
             self.become(SlaveState.WAIT_CONFIGURATION, time)
         elif service is Service.CHECK_CONFIGURATION:
             self.configured = asked.data
-            if self.state is not SlaveState.EXCHANGE:
-                self.become(SlaveState.CONFIGURED, time)
+            self.become(SlaveState.CONFIGURED, time)
         elif service is Service.GET_CONFIGURATION:
             self.has = answer.data
         return False
@@ -102,14 +174,19 @@ class SlaveView:
         if status is not None and status.refuses:
             return False
         self.exchanges += 1
-        self.urgent += status is not None and status.is_urgent
+        self.urgent = self.urgent + 1 if status is not None and status.is_urgent else 0
         self.become(SlaveState.EXCHANGE, time)
         return False
 
     def _diagnosed(self, said: Diagnosis, time: int) -> bool:
         self.told, self.urgent = said, 0
+        self.diagnoses += 1
+        self.faults += bool(said.first & (EXTENDED | CONFIGURATION_FAULT | PARAMETER_FAULT))
+        if said.master != NO_MASTER:
+            self.owner = said.master
         if not said.wants_parameters:
             return False
+        self.owner = None
         fell = self.state is SlaveState.EXCHANGE and not self.unlocked
         self.drops += fell
         self.become(SlaveState.WAIT_PARAMETERS, time)
@@ -119,6 +196,10 @@ class SlaveView:
     def has_trouble(self) -> bool:
         """Whether its newest diagnosis has something to tell beyond the standard octets."""
         return self.told is not None and bool(self.told.first & EXTENDED)
+
+    def is_of_another(self, master: int) -> bool:
+        """Whether its newest diagnosis, which `master` fetched, says that it belongs to another one."""
+        return self.told is not None and (self.told.master not in (NO_MASTER, master) or bool(self.told.first & LOCKED))
 
     @property
     def master(self) -> int | None:

@@ -9,9 +9,10 @@ from dissectors.frame import Check, Frame, Header, Role
 from dissectors.profibus.configuration import parse_configuration
 from dissectors.profibus.control import FDL_STATUS, Control
 from dissectors.profibus.diagnosis import NO_MASTER, parse_diagnosis
+from dissectors.profibus.dpv1 import parse_acyclic
 from dissectors.profibus.header import damage_of, meant, refusal_words
 from dissectors.profibus.parameters import parse_global_control, parse_new_address, parse_parameters
-from dissectors.profibus.services import Service, service_of
+from dissectors.profibus.services import ACYCLIC, Service, service_of
 from dissectors.profibus.telegram import BROADCAST, Telegram, body_of, parse
 
 
@@ -44,6 +45,8 @@ def content(telegram: Telegram) -> str:
         return f"{control.words} ({station.words})" if station is not None else control.words
     told = _TOLD.get((service, control.is_request))
     said = told(telegram.data) if told is not None else ""
+    if service in ACYCLIC and (pdu := parse_acyclic(telegram.data, control.is_request)) is not None:
+        said = pdu.words
     if service is Service.OTHER:
         points = "" if telegram.dsap is None and telegram.ssap is None else f" SAP {telegram.ssap} → {telegram.dsap}"
         return f"{control.words}{points}" + (f" {telegram.data.hex(' ')}" if telegram.data else "")
@@ -90,7 +93,10 @@ def _parameters(data: bytes) -> str:
 
 
 def _configuration(data: bytes) -> str:
-    return "; ".join(module.words for module in parse_configuration(data)) or f"none ({data.hex(' ')})"
+    modules = parse_configuration(data)
+    rest = data[modules[-1].end if modules else 0 :]
+    words = [module.words for module in modules]
+    return "; ".join([*words, f"cut off: {rest.hex(' ')}"] if rest else words) or "none"
 
 
 def _control(data: bytes) -> str:

@@ -3,7 +3,7 @@
     request ──► open ──► answer of that station to that master, or SC          answered; after a repeat: retry
                   │ ───► answer that refuses (UE, RR, RS)                      exception
                   │ ───► damaged telegram or rubbish in its place              damaged answer
-                  │ ───► next request, token, silence                          no answer
+                  │ ───► next request, token, silence                          no answer; a poll: one-way
     SDN, to one or to all                                                      data, broadcast
     token                                                                      one-way
     answer without a request                  late after no answer; answered twice, echo after an answer; else unasked
@@ -104,6 +104,8 @@ class ProfibusTracker:
     def _repeats(self, asked: _Asked, earlier: _Asked) -> bool:
         if asked.frame.octets != earlier.frame.octets or asked.header.role is Role.POLL:
             return False
+        if earlier is not self._past:  # a master repeats at once, or not at all: this one asks anew
+            return False
         if not earlier.is_answered:
             return True
         counts = asked.control is not None and asked.control.fcv
@@ -134,10 +136,10 @@ class ProfibusTracker:
         if not frame.ok:
             verdict = Verdict.DATA
         elif past is not None and self._open is None and _is_of(header, past):
-            of = past.id
+            of = past.id if self._is_clear or not past.is_answered else None
             if not past.is_answered:
                 verdict = Verdict.LATE
-            else:
+            elif of is not None:  # else it may answer a request that was lost among damaged octets
                 verdict = Verdict.ECHO if frame.octets == past.answer else Verdict.ANSWERED_TWICE
         elif past is not None and not past.is_answered and header.source is not None and _is_of(header, past):
             verdict, of = Verdict.LATE, past.id
@@ -167,6 +169,8 @@ class ProfibusTracker:
         self._past = asked
         if not asked.frame.ok:
             verdict = Verdict.DAMAGED_REQUEST
+        elif asked.header.role is Role.POLL:
+            verdict = Verdict.DATA  # nobody need be there
         else:
             verdict = Verdict.DAMAGED_ANSWER if asked.disturbed else Verdict.NO_RESPONSE
         return (closed_exchange(asked, verdict),)

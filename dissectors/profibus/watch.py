@@ -11,12 +11,16 @@ from enum import Enum, auto
 
 from dissectors.frame import Event, Frame, Header
 from dissectors.histogram import Histogram
-from dissectors.line import Timing
+from dissectors.line import NS_PER_S, Timing
 from dissectors.profibus.parameters import parse_global_control
 from dissectors.profibus.ring import MasterView, Ring, SlaveRow
 from dissectors.profibus.services import Service, service_of
+from dissectors.profibus.slave_state import SlaveState
 from dissectors.profibus.slave_watch import SlaveView
 from dissectors.profibus.telegram import HIGHEST, Telegram, parse
+
+CLEAR_LONG = 5 * NS_PER_S
+"""ns of data exchange in Clear that are more than a start."""
 
 _LEAST_CLAIM = 6 * 37
 """Bit times of silence after which the lowest master makes a new token: six slot times, of 37 bits at least."""
@@ -28,10 +32,27 @@ class Notice(Enum):
     CLAIM = auto()  # a master made a token of its own although a ring was running
     TOKEN_AGAIN = auto()  # a token was sent again: its taker did not show itself
     OUT_OF_TURN = auto()  # a request by who did not hold the token
+    WOKE = auto()  # the same by who had it until it was given up for silent, and goes on as if nothing had been
     DROP = auto()  # a slave left data exchange by itself
-    STARVED = auto()  # the same, after its master had asked nothing for longer than its watchdog
+    STARVED = auto()  # the same, where something else than the slave may be why
     DIAGNOSIS = auto()  # a slave told its diagnosis
-    CLEAR = auto()  # data is exchanged while the master is in Clear
+    LOCKED = auto()  # the same, to a master that wants the slave; it belongs to another one
+    CLEAR = auto()  # data is exchanged while the master is in Clear, and has been for CLEAR_LONG
+    CLEAR_PERHAPS = auto()  # the same where octets were damaged since: the end of it may be lost here
+
+
+@dataclass(slots=True)
+class Clear:
+    """A master that said Clear to all. `since`: when it exchanged data first since then, ns; `latest`: when last."""
+
+    since: int | None = None
+    latest: int = 0
+    is_blurred: bool = False
+
+    @property
+    def length(self) -> int:
+        """For how long data was exchanged, ns."""
+        return 0 if self.since is None else self.latest - self.since
 
 
 @dataclass(slots=True)
@@ -41,8 +62,7 @@ class _Master:
     view: MasterView = field(default_factory=MasterView)
     got: int | None = None
     rotation: Histogram = field(default_factory=Histogram)
-    is_clear: bool | None = None
-    cleared: int = 0
+    clear: Clear | None = None
     following: dict[int, int] = field(default_factory=dict)
 
 
@@ -67,6 +87,9 @@ class BusWatch:
         self._heard = self._slack = 0  # end of the row before, and by how much it may have been earlier
         self._least_claim = timing.line.bits(_LEAST_CLAIM)
         self._holder: int | None = None
+        self._robbed: int | None = None  # who lost the token to another one that gave it up; until it speaks in turn
+        self._newest = b""  # the newest request, while no token or other request came after it
+        self._longest_clear: dict[int, int] = {}
         self._token: tuple[int, int] | None = None  # source and destination of the last token, nothing after it
         self._asked: tuple[Telegram, Service, int] | None = None  # an open request and its end
 
@@ -91,9 +114,21 @@ class BusWatch:
 
     def miss(self, time: int) -> None:
         """Octets were lost or damaged: what is missing there says nothing."""
+        if self._asked is not None and self._asked[0].destination in self.slaves:
+            slave = self.slaves[self._asked[0].destination]
+            slave.illegal += 1
+            slave.unanswered += 1
         self._asked = self._token = self._holder = None
         for master in self._masters.values():
             master.got = None
+            if master.clear is not None:
+                master.clear.is_blurred = True
+        for slave in self.slaves.values():
+            slave.is_blurred, slave.begun = True, None
+
+    def longest_clear(self, master: int) -> int:
+        """For how long a master exchanged data in Clear without a break, at most, ns."""
+        return self._longest_clear.get(master, 0)
 
     def ring(self) -> Ring:
         """The ring so far."""
@@ -106,7 +141,15 @@ class BusWatch:
             for address, one in self._masters.items()
         }
         slaves = {
-            address: SlaveRow(view.state, view.changes[-1][0], view.changed, view.exchanges, tuple(view.changes))
+            address: SlaveRow(
+                view.state,
+                view.changes[-1][0],
+                view.changed,
+                view.exchanges,
+                tuple(view.changes),
+                view.counts,
+                view.cycle.copy(),
+            )
             for address, view in self.slaves.items()
             if view.state is not None
         }
@@ -120,12 +163,14 @@ class BusWatch:
         if source is None or to is None:
             return
         self._unanswered(frame.start)
+        self._newest = b""
         giver = self._master(source)
         is_again = self._token == (source, to) and source != to
         by_another = self._token is None or self._token[0] != source  # else its taker is gone, and it goes on alone
         if self._holder not in (None, source) and self._is_at_once(frame):
-            self._tell(Notice.OUT_OF_TURN, source, no, frame.start)
-            self._holder = None
+            self._out_of_turn(source, no, frame)
+        elif self._robbed == source:
+            self._robbed = None
         is_claim = source == to and by_another and self._holder not in (None, source)
         was_in_ring = any(other != source for other in giver.following)
         giver.view = replace(
@@ -140,12 +185,21 @@ class BusWatch:
             self._tell(Notice.CLAIM, source, no, frame.start)
         if not is_claim:
             giver.following[to] = giver.following.get(to, 0) + 1
+            if not by_another and self._token is not None and self._token[1] != to:
+                self._robbed = self._token[1]  # it did not take the token, which goes on without it
+        else:
+            self._robbed = self._holder
         taker = self._master(to)
         if not is_again:
             if taker.got is not None:
                 taker.rotation.add(frame.end - taker.got)
             taker.got = frame.end
         self._holder, self._token = to, (source, to)
+
+    def _out_of_turn(self, source: int, no: int, frame: Frame) -> None:
+        """A master speaks that does not hold the token: as if nothing had been, where it slept when it lost it."""
+        self._tell(Notice.WOKE if source == self._robbed else Notice.OUT_OF_TURN, source, no, frame.start)
+        self._holder = None
 
     def _is_at_once(self, frame: Frame) -> bool:
         """Whether it is sure that less silence was before a frame than any master waits before it claims the token."""
@@ -159,18 +213,25 @@ class BusWatch:
         service, master = service_of(asked), self._master(source)
         is_poll = service is Service.FDL_STATUS
         if self._holder is not None and self._holder != source:
-            self._tell(Notice.OUT_OF_TURN, source, no, frame.start)
-            self._holder = None
+            self._out_of_turn(source, no, frame)
+        elif self._robbed == source and self._holder == source:
+            self._robbed = None
         master.view = replace(
             master.view, requests=master.view.requests + (not is_poll), polls=master.view.polls + is_poll
         )
         self._token = None
         if service is Service.GLOBAL_CONTROL and (control := parse_global_control(asked.data)) is not None:
-            master.is_clear = control.is_clear
+            if not control.groups:  # what is for some groups says nothing of the others
+                master.clear = replace(master.clear or Clear(), is_blurred=False) if control.is_clear else None
+        elif service is Service.DATA_EXCHANGE and any(asked.data):
+            master.clear = None  # outputs that are not zero: the end of Clear was not heard
         if asked.control is not None and asked.control.wants_answer and to <= HIGHEST:
             self._asked = asked, service, frame.end
-            if not is_poll and to in self.slaves:
-                self.slaves[to].ask(frame.start)
+            if not is_poll:
+                slave = self.slaves.setdefault(to, SlaveView())
+                slave.ask(frame.start, source)
+                slave.request(asked, service is Service.DATA_EXCHANGE, frame.octets == self._newest, frame.start)
+        self._newest = frame.octets
 
     def _answer(self, no: int, answer: Telegram, frame: Frame) -> None:
         if self._asked is None:
@@ -187,12 +248,23 @@ class BusWatch:
         slave = self.slaves.setdefault(asked.destination, SlaveView())
         fell = slave.answered(service, asked, answer, frame.end)
         if fell:
-            self._tell(Notice.STARVED if slave.was_starved else Notice.DROP, asked.destination, no, frame.start)
-        slave.heard(frame.end)
+            self._tell(Notice.STARVED if slave.is_excused else Notice.DROP, asked.destination, no, frame.start)
+        slave.heard(slave.state is SlaveState.EXCHANGE)
         if service is Service.DIAGNOSIS:
             self._tell(Notice.DIAGNOSIS, asked.destination, no, frame.start)
-        elif service is Service.DATA_EXCHANGE and master.is_clear:
-            self._tell(Notice.CLEAR, asked.source, no, frame.start)
+            if asked.source in slave.wanted_by and slave.is_of_another(asked.source):
+                self._tell(Notice.LOCKED, asked.destination, no, frame.start)
+        elif service is Service.DATA_EXCHANGE and master.clear is not None:
+            self._cleared(asked.source, master.clear, no, frame)
+
+    def _cleared(self, address: int, clear: Clear, no: int, frame: Frame) -> None:
+        """Data is exchanged in Clear."""
+        if clear.since is None:
+            clear.since = frame.start
+        clear.latest = frame.start
+        if clear.length >= CLEAR_LONG:
+            self._longest_clear[address] = max(self.longest_clear(address), clear.length)
+            self._tell(Notice.CLEAR_PERHAPS if clear.is_blurred else Notice.CLEAR, address, no, frame.start)
 
     def _unanswered(self, time: int) -> None:
         """The open request was not answered."""

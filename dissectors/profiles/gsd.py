@@ -87,7 +87,7 @@ def parse_gsd(text: str, origin: str) -> Profile:
         noun="slave",
         protocols=("profibus",),
         entries=(),
-        limits={"profibus": Limits(response=_longest(said))},
+        limits={"profibus": Limits(responses=_responses(said))},
         facts={key: _kept(said[key.lower()]) for key in _KEPT if key.lower() in said} | _modules(modules),
         source=f"GSD file, revision {_text(said.get('revision', '')) or 'not said'}",
         origin=origin,
@@ -116,14 +116,14 @@ def _without_comment(line: str) -> str:
     return line
 
 
-def _longest(said: dict[str, str]) -> int | None:
-    """ns that it may take to answer, at its slowest rate; None where nothing is said."""
-    times = []
+def _responses(said: dict[str, str]) -> dict[int, int]:
+    """ns that it may take to answer, by rate."""
+    times: dict[int, int] = {}
     for key, value in said.items():
         rate, bits = _RATES.get(key.removeprefix("maxtsdr_")), _number(value)
         if key.startswith("maxtsdr_") and rate is not None and bits is not None and bits > 0:
-            times.append(bits * NS_PER_S // rate)
-    return max(times, default=None)
+            times[rate] = bits * NS_PER_S // rate
+    return times
 
 
 def _modules(modules: list[str]) -> dict[str, str | int]:

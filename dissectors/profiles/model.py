@@ -1,4 +1,4 @@
-"""What a device is, as data: identity, register and object maps, limits, the maker's words for errors. Frozen values.
+"""The model of a device, as data: identity, register and object maps, limits, the maker's words for errors. Frozen.
 
 A profile is made from a TOML document (`parsing.parse`); nothing here reads a file. Places are those of the wire: an
 offset between the manual's numbers and the wire is already applied. README.md has the format.
@@ -176,12 +176,13 @@ class Limits:
 
     `frame`: octets; `response`: ns; `stations`: the lowest and the highest number that it can be given; `functions`:
     the codes that it knows; `unexecuted`: what it acknowledges and does not do, as the kind of the exchange, or that
-    and the kind of object: "release-override", "override:AI". `read_only`: attributes and properties that can only be
-    read, with their kind of object: "AI:object-status".
+    and the kind of object: "release-override", "override:AI". `responses`: ns by rate (Bd), where that differs.
+    `read_only`: attributes and properties that can only be read, with their kind of object: "AI:object-status".
     """
 
     frame: int | None = None
     response: int | None = None
+    responses: Mapping[int, int] = field(default_factory=dict)
     stations: tuple[int, int] | None = None
     functions: frozenset[int] | None = None
     unexecuted: frozenset[str] = frozenset()
@@ -254,14 +255,9 @@ class Profile:
         return self.limits.get(family, Limits())
 
     def lacks(self, space: str, part: str) -> bool:
-        """Whether the maker says that objects of this kind do not have a property."""
-        kinds = self.properties.get(part.partition(".")[0])
-        return (
-            bool(part)
-            and kinds is not None
-            and space not in kinds
-            and any(space in k for k in self.properties.values())
-        )
+        """Whether the maker says that objects of this kind do not have a property; without a `part`, a value."""
+        kinds = self.properties.get(part.partition(".")[0] or "present-value")
+        return kinds is not None and space not in kinds and any(space in k for k in self.properties.values())
 
     def exception(self, family: str, code: int) -> str:
         """The maker's words for an exception code; empty when there are none."""
@@ -287,6 +283,11 @@ class Devices:
         """The maker's words for an exception code of a station; empty when there are none."""
         profile = self.at(address)
         return "" if profile is None else profile.exception(family, code)
+
+    def response_at(self, address: int, family: str, baud: int) -> int | None:
+        """ns that a station may take to answer at a rate, by its papers; None where they do not say."""
+        profile = self.at(address)
+        return None if profile is None else profile.limits_on(family).responses.get(baud)
 
     def __bool__(self) -> bool:
         return bool(self.by_address) or self.default is not None

@@ -291,7 +291,14 @@ def _limits(table: Table) -> Limits:
     unexecuted = frozenset(table.text("unexecuted", "").split())
     read_only = frozenset(table.text("read-only", "").split())
     table.finish()
-    return Limits(frame, None if response is None else int(response * MS), stations, functions, unexecuted, read_only)
+    return Limits(
+        frame=frame,
+        response=None if response is None else int(response * MS),
+        stations=stations,
+        functions=functions,
+        unexecuted=unexecuted,
+        read_only=read_only,
+    )
 
 
 def _sign(table: Table, modbus: Table) -> Sign:

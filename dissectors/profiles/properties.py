@@ -1,4 +1,4 @@
-"""What properties of an object should be, by the profile of its device."""
+"""Properties that an object should have, by the profile of its device."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which settings and which protocol a bus runs with, from what is heard while the settings are changed. Pure.
+"""The search for the settings and the protocol of a bus, by what is heard while settings are changed. Pure.
 
 1. All protocols' framers run side by side over what one candidate heard. A good frame counts bits of evidence: log2 of
    how much rarer it is among random octets (`bits_of`). Octets in no good frame and octets with line errors count

@@ -81,7 +81,8 @@ class BulkLineFindings(LineFindings):
         table = columns.table
         first, last = (columns.name(int(columns.sender[place]), self._nouns) for place in (begin, end - 1))
         self._settle_strays(first, int(table.slack[begin]))
-        self._senders.see_good(last, int(table.frames.end[end - 1]))
+        only_master = bool(columns.asks[begin:end].all())
+        self._senders.see_good(last, int(table.frames.end[end - 1]), only_master)
         role = columns.role_before(begin, end)
         self._awaiting = self._awaiting if role is None else role is Role.REQUEST
         self._asker = last if columns.role_before(end - 1, end) is Role.REQUEST else None

@@ -1,4 +1,4 @@
-"""Whether an error flag covers one octet or a whole read, seen from which octets are marked. Pure.
+"""Runs of error flags: whether a flag covers one octet or a whole read, seen from which octets are marked. Pure.
 
 Some adapters tell only that there was an error somewhere in a USB packet, and then all its octets are marked. A capture
 that names its adapter says so. In one that does not, the marks do: they come in long runs, which go on into frames

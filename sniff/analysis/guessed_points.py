@@ -1,4 +1,4 @@
-"""What points of stations without a profile may be: guesses of their registers beside their latest values. Pure."""
+"""Guessed points of stations without a profile: guesses of their registers beside their latest values. Pure."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import numpy as np
 from dissectors.manifest import Dissector
 from dissectors.profiles import Devices
 from dissectors.profiles.decoding import plain_name
+from dissectors.profiles.model import Kind
 from sniff.analysis.points import Key, Point, PointTable, station_name
 from sniff.analysis.register_guess import RegisterGuess, Sure, Use, guessed, read_as
 from sniff.analysis.register_series import WORD_SPACES, Block, RegisterSeries, covering
@@ -30,8 +31,9 @@ _SURE = {Sure.SURE: "sure", Sure.LIKELY: "likely", Sure.OPEN: "open"}
 
 @dataclass(frozen=True, slots=True)
 class GuessedPoint:
-    """What one register of a point may be. `value`: of the latest samples, so read; `is_covered`: it is a further part
-    of the value that begins before it. `history`: times, ns, and values so read. The others as in `RegisterGuess`."""
+    """What one register of a point may be. `value`: of the latest samples, so read; `is_itself`: the register as it is,
+    a whole number; `is_covered`: it is a further part of the value that begins before it. `history`: times, ns, and
+    values so read. The others as in `RegisterGuess`."""
 
     words: str
     value: float | None
@@ -39,6 +41,7 @@ class GuessedPoint:
     high: float
     rate: float
     is_covered: bool = False
+    is_itself: bool = True
     history: tuple[tuple[int, float], ...] = ()
 
 
@@ -56,17 +59,30 @@ class Guessing:
 
     def of(self, points: PointTable) -> dict[Key, GuessedPoint]:
         """By point, for those that the table has."""
-        return guesses_of(points, self.series, self.devices)
+        found: dict[Key, GuessedPoint] = {}
+        for guess in guessed(covering(self._undescribed()), self.series.written):
+            for key, told in _told(guess, points):
+                found[key] = told
+        return found
+
+    def _undescribed(self) -> Iterable[Block]:
+        return (block for block in self.series.blocks() if self.devices.at(block.device) is None)
 
 
-def guesses_of(points: PointTable, series: RegisterSeries, devices: Devices) -> dict[Key, GuessedPoint]:
-    """What the registers of stations without a profile may be, by point, for those that the table has."""
-    found: dict[Key, GuessedPoint] = {}
-    undescribed = (block for block in series.blocks() if devices.at(block.device) is None)
-    for guess in guessed(covering(undescribed), series.written):
-        for key, told in _told(guess, points):
-            found[key] = told
-    return found
+class LatestGuesses:
+    """The same for a table that grows: guesses are worked out anew when a tenth more was heard, values every time."""
+
+    def __init__(self) -> None:
+        self._of: tuple[RegisterSeries | None, int] = (None, 0)
+        self._guesses: list[RegisterGuess] = []
+
+    def of(self, points: PointTable, series: RegisterSeries) -> dict[Key, GuessedPoint]:
+        """By point, for those that the table has; what is described is among them."""
+        heard = sum(block.count for block in series.blocks())
+        if self._of[0] is not series or not self._of[1] <= heard < 1.1 * self._of[1] + 1:
+            self._of = series, heard
+            self._guesses = list(guessed(covering(series.blocks()), series.written))
+        return {key: told for guess in self._guesses for key, told in _told(guess, points)}
 
 
 def guess_of(point: Point, series: RegisterSeries, points: PointTable) -> GuessedPoint | None:
@@ -115,7 +131,8 @@ def _told(guess: RegisterGuess, points: PointTable) -> Iterable[tuple[Key, Guess
     words = told(guess)
     for step, key in enumerate(keys):
         whole = len(raws) == len(held)
-        yield key, GuessedPoint(words, value, guess.low, guess.high, guess.rate, is_covered=step > 0 and whole)
+        covered, itself = step > 0 and whole, guess.kind is Kind.U16
+        yield key, GuessedPoint(words, value, guess.low, guess.high, guess.rate, covered, itself)
 
 
 def told(guess: RegisterGuess) -> str:

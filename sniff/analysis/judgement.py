@@ -1,4 +1,4 @@
-"""What the rules found on a bus or on a part of it: a value that is put together with that of the part that follows.
+"""The judgement of a bus or of a part of it: a value that is put together with that of the part that follows.
 
 The evidence of rules depends on what was learnt from the begin (timeouts, who is on the bus, the rhythm of the master),
 so the findings are what merges, not the evidence. Of one rule about one subject, be it one finding or several,

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from dissectors import registry
-from dissectors.findings import Finding, Rule, WordsExceptions
+from dissectors.findings import Finding, KnowsResponseTimes, Rule, WordsExceptions
 from dissectors.frame import Noise, Place, Reason
 from dissectors.manifest import Dissector
 from dissectors.profiles import Devices
@@ -18,6 +18,7 @@ from sniff.analysis.bulk_line_findings import BulkLineFindings
 from sniff.analysis.judgement import Judgement
 from sniff.analysis.line_rules import LINE_RULES
 from sniff.analysis.profile_findings import PROFILE_RULES, ProfileFindings
+from sniff.analysis.site_rules import SITE_RULES
 from sniff.engine.engine import Output
 from sniff.engine.session import LineEvent, LineEventKind, Session, settings_change
 
@@ -41,6 +42,9 @@ class Judging:
         if devices and isinstance(self.judge, WordsExceptions):
             family = dissector.profile_family
             self.judge.word_exceptions(lambda station, code: devices.exception(station, family, code))
+        if devices and isinstance(self.judge, KnowsResponseTimes):
+            family, baud = dissector.profile_family, session.timing.line.baud
+            self.judge.know_response_times(lambda station: devices.response_at(station, family, baud))
         self._searching = False
         self._hole: int | None = None  # when octets were lost, by the newest line event that says so
         self._first_after: int | None = None  # number of the first row that ends after it
@@ -170,8 +174,8 @@ def rules_over(dissector: Dissector) -> dict[str, Rule]:
 
 
 def all_rules() -> dict[str, Rule]:
-    """Every rule of every protocol, of the line and of device profiles, by code."""
-    rules = {**LINE_RULES, **PROFILE_RULES}
+    """Every rule of every protocol, of the line, of device profiles and of sites, by code."""
+    rules = {**LINE_RULES, **PROFILE_RULES, **SITE_RULES}
     for name in registry.names():
         rules.update(rules_of(registry.get(name)))
     return rules

@@ -1,4 +1,4 @@
-"""What is wrong with the line itself, whatever runs on it: fed rows, transactions and line events. Pure."""
+"""Findings about the line itself, whatever runs on it: fed rows, transactions and line events. Pure."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from sniff.analysis.line_use import LineUse
 from sniff.analysis.other_settings import SAMPLE_OCTETS, Fit, other_protocol, what_fits
 from sniff.analysis.sender_findings import BUS, WRONG, Senders
 from sniff.analysis.slower_bus import slower_by
-from sniff.analysis.time_patterns import TimePatterns
+from sniff.analysis.time_patterns import Stop, TimePatterns
 from sniff.analysis.unsure_strays import UnsureStrays
 from sniff.analysis.wording import station_word
 from sniff.engine.engine import Row
@@ -27,6 +27,9 @@ from sniff.engine.session import LineEvent, LineEventKind, Session
 
 STRAY_MOST = 3
 """So many octets that are no frame are stray ones; more are the remains of something."""
+
+ECHOES_LEAST = 3
+"""Echoes from which on a repeater or converter is likely, where half of the requests have one."""
 
 MOST_RESTS = 16
 """Stretches that are no frame and are asked what they may be."""
@@ -157,6 +160,10 @@ class LineFindings:
             tally = self._counted.setdefault(event.text, Tally())
             tally.add(event.time)
             tally.count += max(0, event.count - 1)
+
+    def stops(self) -> list[Stop]:
+        """What stopped all at once so far."""
+        return self._patterns.stops()
 
     def _see_marks(self, no: int, event: Event) -> None:
         breaks = sum(bool(mark.error & LineError.BREAK) for mark in event.marks)
@@ -342,7 +349,8 @@ class LineFindings:
             yield self._of_rests(self._rest.found(RULES["LN204"], "bus", words, severity))
         if self._echo.count:
             words = f"{self._echo.count} of {counted(self._asked, 'request')} came twice, the copy directly behind"
-            severity = Severity.WARNING if 10 * self._echo.count >= self._asked else None
+            often = self._echo.count >= ECHOES_LEAST and 2 * self._echo.count >= self._asked
+            severity = Severity.WARNING if often else None
             yield self._echo.found(RULES["LN205"], "bus", words, severity)
 
     def _of_rests(self, finding: Finding) -> Finding:

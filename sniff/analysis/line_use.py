@@ -1,4 +1,4 @@
-"""Who uses the line: how near a bus is to its limit, and what share broadcasts take; in every protocol. Pure."""
+"""The use of the line: how near a bus is to its limit, and what share broadcasts take; in every protocol. Pure."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How busy a bus is and how much of it is trouble, by second; mergeable."""
+"""The load of a bus and how much of it is trouble, by second; mergeable."""
 
 from __future__ import annotations
 

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 LOST_IN_A_ROW = 3
 ANSWERED_BEFORE = 5
 MOST_STATIONS = 300
+BY_CHANCE = 0.1
+"""Chance below which losses in one part of a capture are no chance: each falls anywhere in it."""
 
 
 @dataclass(slots=True)
@@ -92,6 +94,11 @@ class LostTogether:
 
     def findings(self, first: int, now: int) -> Iterator[Finding]:
         """What there is to say so far. `first`, `now`: ns, of the first octet of the capture and the newest."""
+        for together, names, moment in self.losses(first, now):
+            yield self._lost(together, names, moment, first)
+
+    def losses(self, first: int, now: int) -> Iterator[tuple[list[tuple[int, int, int, int]], list[int], int]]:
+        """The same as values: losses (last answer, first miss, back or 0: ns; station), stations, the moment."""
         losses: list[tuple[int, int, int, int]] = []  # last answer, first miss, back, station
         for number, station in self._stations.items():
             losses += [(*loss, number) for loss in station.losses]
@@ -105,8 +112,13 @@ class LostTogether:
             names = sorted({loss[3] for loss in together})
             window = max(loss[1] for loss in together) - min(loss[0] for loss in together)
             losses = [loss for loss in losses if loss not in together]
-            if len(names) >= 2 and 10 * window <= span:
-                yield self._lost(together, names, moment, first)
+            if len(names) >= 2 and window < span and (window / span) ** (len(names) - 1) <= BY_CHANCE:
+                yield together, names, moment
+
+    @property
+    def present(self) -> int:
+        """Stations that answered now and then."""
+        return sum(station.answered >= ANSWERED_BEFORE for station in self._stations.values())
 
     def _lost(self, together: list[tuple[int, int, int, int]], names: list[int], moment: int, first: int) -> Finding:
         tally = Tally()

@@ -1,4 +1,4 @@
-"""Who is on the bus and how each station fares; mergeable."""
+"""The stations on a bus and how each fares; mergeable."""
 
 from __future__ import annotations
 

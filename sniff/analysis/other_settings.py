@@ -1,4 +1,4 @@
-"""What octets are that make no frames with the settings of a capture: which other settings fit them. Pure, bounded.
+"""Other settings that fit octets which make no frames with those of the capture. Pure, bounded.
 
 Asked is, of a sample: another protocol (every one that the registry knows); seven bits read as eight; fewer data bits
 than the bus has; every bit inverted; a bus that is slower or faster. What fits is named with its evidence; where

@@ -39,6 +39,8 @@ ALL = "all"
 
 WHOLE = frozenset({Verdict.ANSWERED, Verdict.RETRY})
 ALONE = frozenset({Verdict.BROADCAST, Verdict.DATA})
+TELLING = WHOLE | ALONE | {Verdict.LATE}
+"""Exchanges whose frames may carry values that count."""
 
 
 @dataclass(frozen=True, slots=True)

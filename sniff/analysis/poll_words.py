@@ -1,4 +1,4 @@
-"""What an entry of the master's programme asks, and when it changed, for people and programs. Pure."""
+"""The words of the master's programme: what an entry asks, and when it changed, for people and programs. Pure."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from dataclasses import dataclass
 from enum import Enum
 from itertools import pairwise
 
-from dissectors.line import MS, NS_PER_S
+from dissectors.line import NS_PER_S
 from dissectors.profiles import Devices, Profile
 from dissectors.profiles.decoding import plain_name
 from dissectors.questions import Span
+from dissectors.words import duration
 from sniff.analysis.poll import Poll
 
 MOST_NAMES = 3
@@ -137,15 +138,7 @@ def told(found: Iterable[Change], clock: Callable[[int], str]) -> str:
     for one in found:
         when = f"{'~' if one.within else ''}{clock(one.time)}"
         if one.what is What.CHANGED and one.interval is not None:
-            said.append(f"every {span(one.interval)} from {when} on")
+            said.append(f"every {duration(one.interval)} from {when} on")
         else:
             said.append(f"{one.what.value} {when}")
     return "; ".join(said)
-
-
-def span(time: int) -> str:
-    """A duration in three digits: "250 ms", "5.00 s", "15.0 min"."""
-    if time < NS_PER_S:
-        return f"{time / MS:.3g} ms"
-    seconds = time / NS_PER_S
-    return f"{seconds:#.3g} s".replace(". s", " s") if seconds < 300 else f"{seconds / 60:.3g} min"

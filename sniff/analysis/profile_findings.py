@@ -1,4 +1,4 @@
-"""What is wrong with a device by its own profile: the rules PR…, and the class that finds them row by row. Pure.
+"""Findings about a device by its own profile: the rules PR…, and the class that finds them row by row. Pure.
 
 Only what is certain is judged: no value whose layout is a guess (a fault told that way is a note), no response time
 beyond what the adapter allows.

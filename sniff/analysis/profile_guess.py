@@ -1,4 +1,4 @@
-"""Which profile fits a station, from what it answers and refuses. Pure."""
+"""The profile that fits a station, from what it answers and refuses. Pure."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What registers that nobody has described may hold: width, order and kind, with how sure. Pure.
+"""Guesses of registers that nobody has described: width, order and kind, with how sure. Pure.
 
 A guess is sure only where what was heard excludes the other readings: a carry from one word into the next, a word that
 runs through all its values while its neighbour stays where the exponents of usual numbers are, a step across zero.
@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -139,7 +140,19 @@ def _of_block(block: Block, written: set[tuple[int, str, int]]) -> list[Register
     best, second = ranked[0][0], ranked[1][0]
     if _rank(block, words, best) == _rank(block, words, second) and best != second:
         best = [replace(one, sure=min(one.sure, Sure.LIKELY)) if one.kind.registers > 1 else one for one in best]
-    return _as_neighbours(block, words, seconds, best, written)
+    return _as_neighbours(block, words, seconds, _may_be_wider(best), written)
+
+
+def _may_be_wider(found: Sequence[RegisterGuess]) -> list[RegisterGuess]:
+    """The guesses; a number of 32 bits is not sure where the registers above it never change, and would make it one
+    of 64 bits, of which nothing has been seen yet but the lower half."""
+    still = {one.address for one in found if one.kind.registers == 1 and one.low == one.high and one.low < 0x1000}
+    told = []
+    for one in found:
+        above = (one.address + 2, one.address + 3) if one.swapped else (one.address - 2, one.address - 1)
+        is_half = one.kind in (Kind.U32, Kind.S32) and one.sure is Sure.SURE and still.issuperset(above)
+        told.append(replace(one, sure=Sure.LIKELY) if is_half else one)
+    return told
 
 
 def _rank(block: Block, words: Words, found: Sequence[RegisterGuess]) -> tuple[int, int]:
@@ -240,18 +253,24 @@ def _one(column: Words) -> _Reading:
     if _is_bits(column):
         return _Reading(Kind.U16, _PLAIN, Use.BITS, Sure.LIKELY)
     use = Use.COUNTER if _counts(column.astype(np.int64)) else Use.SENSOR
-    return _Reading(Kind.U16, _PLAIN, use, Sure.LIKELY if len(distinct) >= ENOUGH else Sure.OPEN)
+    is_open = len(distinct) < ENOUGH or _may_be_decimal(column)
+    return _Reading(Kind.U16, _PLAIN, use, Sure.OPEN if is_open else Sure.LIKELY)
 
 
 def _two(pair: Words, order: _Order) -> _Reading | None:
     if _is_text(pair):
         return None  # words of text are no number; each stands alone
     sure = _float_fits(pair, order)
-    return _count_fits(pair, order) if sure is None else _Reading(Kind.F32, order, Use.SENSOR, sure)
+    if sure is None:
+        return _sign_fits(pair, order) or _count_fits(pair, order)
+    grows = _counts(read_as(pair, Kind.U32, order.swapped, order.little).astype(np.int64))
+    return _Reading(Kind.F32, order, Use.COUNTER if grows else Use.SENSOR, sure)
 
 
 def _four(quad: Words, order: _Order) -> _Reading | None:
     words = _ordered(quad, order)
+    if _float_fits(quad[:, :2] if order.swapped else quad[:, 2:], order) is not None:
+        return None  # the lower half of a number of 64 bits would not be a usual number each time
     wild = _is_wild(words[:, 3]) and _is_wild(words[:, 2]) and _float_exponents(words[:, 0], 0x3F50, 0x41A0)
     if wild and _usual(read_as(quad, Kind.F64, order.swapped, order.little)):
         return _Reading(Kind.F64, order, Use.SENSOR, Sure.SURE)
@@ -273,11 +292,25 @@ def _float_fits(pair: Words, order: _Order) -> Sure | None:
         return None
     whole = read_as(pair, Kind.U32, order.swapped, order.little)
     distinct = len(np.unique(values))
-    if distinct < 3 or (_counts(whole.astype(np.int64)) and len(np.unique(high)) < 3):
-        return None  # a number of 32 bits that counts fits as well
+    if distinct < 3:
+        return None
+    if _counts(whole.astype(np.int64)):  # a number of 32 bits that counts fits as well, but one so large is rare
+        return Sure.LIKELY if len(np.unique(high)) > 1 else None
     if _is_wild(low) and distinct >= ENOUGH and not _is_wild(high):
         return Sure.SURE
     return Sure.LIKELY if len(np.unique(low)) >= 3 else None
+
+
+def _sign_fits(pair: Words, order: _Order) -> _Reading | None:
+    """Whether two registers are a number of 32 bits with a sign: the high one is all ones whenever the low one has its
+    highest bit set, else zero. In two things of their own that would be chance each time the sign changes."""
+    ordered = _ordered(pair, order)
+    high, low = ordered[:, 0], ordered[:, 1]
+    changes = int(np.count_nonzero(np.diff(high)))
+    if not changes or not (high == np.where(low >= 0x8000, 0xFFFF, 0)).all():
+        return None
+    enough = changes >= ENOUGH and len(np.unique(low)) >= ENOUGH
+    return _Reading(Kind.S32, order, Use.SENSOR, Sure.SURE if enough else Sure.LIKELY)
 
 
 def _count_fits(pair: Words, order: _Order) -> _Reading | None:
@@ -293,7 +326,7 @@ def _count_fits(pair: Words, order: _Order) -> _Reading | None:
         small = bool(steps.max() < 0x8000)  # what the words would do together is less than what the low one does alone
         if small and bool((np.abs(np.diff(low))[moved] > 0x8000).all()):
             use = Use.COUNTER if _counts(whole) else Use.SENSOR
-            return _Reading(Kind.U32, order, use, Sure.SURE)
+            return _Reading(Kind.U32, order, use, Sure.LIKELY if _may_be_decimal(ordered) else Sure.SURE)
         return None
     if 0 < high[0] < 0x1000 and _counts(whole) and not order.little:
         return _Reading(Kind.U32, order, Use.COUNTER, Sure.LIKELY)
@@ -328,6 +361,12 @@ def _counts(values: Wide) -> bool:
     """Whether a series only ever grows."""
     steps = np.diff(values)
     return bool(len(steps) and (steps >= 0).all() and np.count_nonzero(steps) >= 2)
+
+
+def _may_be_decimal(words: npt.NDArray[Any]) -> bool:
+    """Whether no half octet is ever above 9: a number in decimal digits (BCD), of which no profile has a type."""
+    whole = words.astype(np.int64)
+    return all(bool(((whole >> shift & 0xF) <= 9).all()) for shift in (0, 4, 8, 12))
 
 
 def _is_bits(column: Words) -> bool:
@@ -367,15 +406,23 @@ def _as_neighbours(
         free = not ({one.address, one.address + 1} & taken)
         if one.address in skip:
             continue
-        if pair and free and one.address & 1 == parity:
-            at = one.address - block.first
-            reading = _pair_like(words[:, at : at + 2], _Order(swapped, little))
+        if pair and one.address & 1 == parity:
+            at, order = one.address - block.first, _Order(swapped, little)
+            columns = words[:, at : at + 2]
+            reading = _pair_like(columns, order) if free or _grows_only_so(columns, order) else None
             if reading is not None:
                 joined.append(_guess(block, words, seconds, at, reading, written))
                 skip.add(one.address + 1)
                 continue
         joined.append(one)
     return joined
+
+
+def _grows_only_so(pair: Words, order: _Order) -> bool:
+    """Whether two registers grow all the time when they are read together in an order, and neither does by itself."""
+    whole = read_as(pair, Kind.U32, order.swapped, order.little).astype(np.int64)
+    alone = any(_counts(pair[:, at].astype(np.int64)) for at in (0, 1))
+    return _counts(whole) and len(np.unique(whole)) >= ENOUGH and not alone
 
 
 def _pair_like(pair: Words, order: _Order) -> _Reading | None:
@@ -386,6 +433,6 @@ def _pair_like(pair: Words, order: _Order) -> _Reading | None:
         use = Use.CONSTANT if len(np.unique(values)) == 1 else Use.SENSOR
         return _Reading(Kind.F32, order, use, Sure.LIKELY)
     whole = read_as(pair, Kind.U32, order.swapped, order.little).astype(np.int64)
-    if not high.any() and _counts(whole):
+    if high[0] < 0x1000 and (high == high[0]).all() and _counts(whole):
         return _Reading(Kind.U32, order, Use.COUNTER, Sure.LIKELY)
     return None

@@ -1,4 +1,4 @@
-"""What the registers of undescribed stations held over time: blocks of words as they were answered. Pure, bounded."""
+"""Registers of undescribed stations over time: blocks of words as they were answered. Pure, bounded."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is known of a row besides its octets: how it was found, and its transaction. Lines for the field tree."""
+"""The field tree's lines about a row besides its octets: how it was found, and its transaction."""
 
 from __future__ import annotations
 

@@ -13,9 +13,10 @@ from dataclasses import dataclass, field, replace
 from dissectors.findings import Finding, Severity, Tally, counted, times
 from dissectors.frame import Event, Frame, LineError, Mark, Noise
 from dissectors.line import Timing
+from dissectors.strikes import Strikes
 from sniff.analysis.flag_runs import FlagRuns
 from sniff.analysis.line_rules import LINE_RULES as RULES
-from sniff.analysis.shares import UNLIKELY, at_least, standing_out
+from sniff.analysis.shares import UNLIKELY, at_least, only_struck, standing_out
 
 WRONG = LineError.PARITY | LineError.FRAMING
 MOST_SENDERS = 600
@@ -64,6 +65,7 @@ class Senders:
         self._goes_on = False
         self._flagged: Counter[frozenset[str]] = Counter()
         self._flags = Tally()
+        self._struck, self._spoilt = Strikes(), Strikes()  # frames with an error; those of them that are not good
 
     @property
     def packets(self) -> bool:
@@ -93,10 +95,16 @@ class Senders:
         wrong = [mark for mark in frame.marks if mark.error & WRONG]
         self._see_packet(name, no, frame, wrong)
         sender.marked += len(wrong)
+        if name != MASTER and frame.ok:
+            self._spoilt.whole()
+            if not wrong:
+                self._struck.whole()
         if wrong:
+            self._struck.struck(name)
             sender.wrong.add(frame.start, no)
             sender.at.update(_place(frame, mark) for mark in wrong)
         if wrong and not frame.ok:
+            self._spoilt.struck(name)
             sender.spoilt.add(frame.start, no)
         breaks = sum(bool(mark.error & LineError.BREAK) for mark in frame.marks)
         for _ in range(min(breaks, 1) if self.packets else breaks):
@@ -112,9 +120,12 @@ class Senders:
             sender.frames += frames
             sender.octets += octets
 
-    def see_good(self, name: str, end: int) -> None:
+    def see_good(self, name: str, end: int, only_master: bool) -> None:
         """Take good frames without line errors that follow one another, which `count` has had: who sent the last of
-        them, and when it ended (ns)."""
+        them, when it ended (ns), and whether all are the master's."""
+        if not only_master:
+            self._struck.whole()
+            self._spoilt.whole()
         self._runs.see([], 1, True)
         self._close_packet()
         self.before, self._end = name, end
@@ -178,9 +189,12 @@ class Senders:
         """Line errors at the senders that have more than their share, the rest at the bus."""
         struck = {name: record for name, record in sorted(self.by_name.items()) if self._wrong(record).count}
         known = {name: one for name, one in self.by_name.items() if name != BUS}
-        out = standing_out({name: (self._wrong(one).count, float(one.octets)) for name, one in known.items()}, MASTER)
+        strikes = self._spoilt if self.packets else self._struck
+        counts = {name: strikes.of(name, self._wrong(one).count) for name, one in known.items()}
+        struck_by_share = {name: (counts[name], float(one.octets)) for name, one in known.items()}
+        out = standing_out(struck_by_share, MASTER) or only_struck(struck_by_share)
         rest = {name: record for name, record in struck.items() if name not in out}
-        if len(rest) > 1:
+        if rest.keys() - {BUS}:
             yield self._wrong_everywhere(rest, note_if)
             struck = {name: record for name, record in struck.items() if name in out}
         for name, record in struck.items():

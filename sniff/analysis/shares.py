@@ -1,4 +1,4 @@
-"""Whose trouble it is: whether one sender is struck more often than its share of the line explains. Pure.
+"""Shares of trouble: whether one sender is struck more often than its share of the line explains. Pure.
 
 Noise that falls anywhere strikes everybody by the share of the time that he sends; only who is struck clearly more
 often than the others is a case of its own. The rest is the bus's. A station is compared with other stations: what all
@@ -17,6 +17,10 @@ CLEARLY = 2.5
 """Times the rate of all others."""
 
 
+SELDOM_ALONE = 0.05
+"""The same where nobody else is struck, which speaks for itself."""
+
+
 Struck = Mapping[str, tuple[int, float]]
 """For each sender how often he was struck, and his share: octets, frames … sent."""
 
@@ -30,6 +34,16 @@ def standing_out(struck: Struck, master: str = "") -> set[str]:
     counts = [sum(pair[at] for pair in stations.values()) for at in (0, 1)]
     all_of_them = {"": (int(counts[0]), counts[1]), master: struck[master]}
     return out | (_standing_out(all_of_them) & {master})
+
+
+def only_struck(struck: Struck) -> set[str]:
+    """The only one that is struck, where chance would seldom have struck it alone; else nobody."""
+    shares = sum(share for _, share in struck.values())
+    hit = [(name, count, share) for name, (count, share) in struck.items() if count]
+    if len(hit) != 1 or not shares:
+        return set()
+    ((name, count, share),) = hit
+    return {name} if (share / shares) ** count <= SELDOM_ALONE else set()
 
 
 def _standing_out(struck: Struck) -> set[str]:

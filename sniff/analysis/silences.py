@@ -74,15 +74,22 @@ class Silences:
         if long and not self._hole and len(self._silences) < 20 * SILENT_KEPT:
             self._silences.append(silence)
 
-    def findings(self) -> Iterator[Finding]:
-        """What there is to say so far."""
+    def whole(self) -> list[tuple[int, int, int]]:
+        """Silences that stand out so far: begin, end (ns), rows before."""
         usual = self._gaps.quantile(0.98)
         if usual is None or not self._silences:
-            return
+            return []
         limit = max(SILENT_LEAST, SILENT_TIMES * usual)
         long = [one for one in self._silences if one[1] - one[0] >= limit]
         whole = [one for one in long if one[2] >= ROWS_AROUND and self._rows - one[2] >= ROWS_AROUND // 2]
         if not whole or len(long) > SILENT_KEPT or _is_regular([end - begin for begin, end, _ in long]):
+            return []
+        return whole
+
+    def findings(self) -> Iterator[Finding]:
+        """What there is to say so far."""
+        usual, whole = self._gaps.quantile(0.98), self.whole()
+        if usual is None or not whole:
             return
         tally = Tally()
         for begin, _, row in whole:

@@ -1,4 +1,4 @@
-"""Whether octets were sent more slowly than the port listens, and by how much. Pure.
+"""A bus slower than the port that listens: whether it is, and by how much. Pure.
 
 Every bit of a bus that is `factor` times slower is `factor` bits to the listener. So all levels change at multiples of
 `factor` from the begin of a character, which hardly any other octets do:

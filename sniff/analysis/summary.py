@@ -1,4 +1,4 @@
-"""What is in a capture, counted: frames, noise, checks, verdicts, stations, load; mergeable. Pure."""
+"""The summary of a capture, counted: frames, noise, checks, verdicts, stations, load; mergeable. Pure."""
 
 from __future__ import annotations
 

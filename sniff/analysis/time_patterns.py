@@ -1,4 +1,4 @@
-"""When trouble comes: in step with the mains, in bursts at a steady interval, for a while, all at once. Pure, bounded.
+"""Time patterns of trouble: in step with the mains, in bursts at a steady interval, all at once. Pure, bounded.
 
 Each pattern is told once, about the bus, and only where the bus's own rhythm does not explain it: a master that polls
 every 100 ms is in step with 50 Hz by itself, and what is asked every 5 s fails every 5 s.
@@ -97,6 +97,18 @@ class _Stretch:
     sampled: int = 0
     fit: Fit | None = None
     asked: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """`alive`: until when somebody was heard, `seen`: when it was missed first, `back`: when it was there again, None
+    for not; ns. `stations`: those that stopped; none: the whole bus. `is_all`: whether that is everybody."""
+
+    alive: int
+    seen: int
+    back: int | None
+    stations: tuple[int, ...] = ()
+    is_all: bool = True
 
 
 class TimePatterns:
@@ -265,6 +277,21 @@ class TimePatterns:
         yield from self._unreadable()
         yield from self._silences.findings()
         yield from self._lost.findings(self._silences.first or 0, self._silences.now)
+
+    def stops(self) -> list[Stop]:
+        """What stopped all at once so far: the whole bus, or stations of it."""
+        silent = [Stop(begin, begin, end) for begin, end, _ in self._silences.whole()]
+        lost = self._lost.losses(self._silences.first or 0, self._silences.now)
+        return silent + [
+            Stop(
+                max(loss[0] for loss in together),
+                moment,
+                max(loss[2] for loss in together) if all(loss[2] for loss in together) else None,
+                tuple(names),
+                len(names) == self._lost.present,
+            )
+            for together, names, moment in lost
+        ]
 
     def _in_step_with_mains(self) -> Iterator[Finding]:
         if self._steps < HUM_LEAST:

@@ -1,4 +1,4 @@
-"""Which protocol a capture is whose file does not say it, told from its first octets, and how sure that is. Pure.
+"""The protocol of a capture whose file does not say it, told from its first octets, and how sure that is. Pure.
 
 Every protocol that is known reads them with the settings that it normally has; a good frame counts bits of evidence as
 in a search on a port (`autodetect.py`). Sure is what that search would be sure of, where no other protocol makes good
@@ -19,6 +19,7 @@ from enum import Enum
 from dissectors import registry
 from dissectors.frame import Chunk, Frame, Noise
 from dissectors.line import NS_PER_S, LineSettings, Timing
+from dissectors.manifest import Dissector
 from sniff.analysis.autodetect import (
     BAUDS,
     COVERED_LEAST,
@@ -98,20 +99,28 @@ def told_by(session: Session) -> Told:
     sample = session.sample
     if not sample:
         return Told(Sureness.NO)
-    readings = []
-    for dissector in registry.usable():
-        line = LineSettings.parse(dissector.default_line) if session.line_is_assumed else session.line
-        evidence = Evidence(line, (dissector.name,), session.adapter.latency)
-        for chunk in sample:
-            evidence.feed(chunk)
-        evidence.advance(sample[-1].time + 10 * NS_PER_S)
-        readings.append(evidence.best())
+    readings = _readings(session, registry.usable())
+    if not any(one.frames and one.covered >= COVERED_LEAST for one in readings):  # a log of a gateway, then
+        readings += _readings(session, registry.relatives())
     readings.sort(key=lambda one: (one.bits, one.octets * one.covered), reverse=True)
     best = next((one for one in readings if one.frames), None)
     if best is None:
         return Told(Sureness.NO, None)
     second = _second(session, best, [one.protocol for one in readings if one is not best and one.frames])
     return Told(_how_sure(best, readings, second), best, second)
+
+
+def _readings(session: Session, protocols: Sequence[Dissector]) -> list[Reading]:
+    """What each protocol makes of the sample."""
+    readings = []
+    for dissector in protocols:
+        line = LineSettings.parse(dissector.default_line) if session.line_is_assumed else session.line
+        evidence = Evidence(line, (dissector.name,), session.adapter.latency)
+        for chunk in session.sample:
+            evidence.feed(chunk)
+        evidence.advance(session.sample[-1].time + 10 * NS_PER_S)
+        readings.append(evidence.best())
+    return readings
 
 
 def _how_sure(best: Reading, readings: Sequence[Reading], second: tuple[str, int] | None) -> Sureness:

@@ -1,4 +1,4 @@
-"""How values went over a whole capture, thinned evenly, for a plot: an observer of one bus. Pure, bounded.
+"""Trends of values over a whole capture, thinned evenly, for a plot: an observer of one bus. Pure, bounded.
 
 Points that a profile describes and things that name themselves are kept as they come; of registers that nobody has
 described the numbers that they are guessed to be.

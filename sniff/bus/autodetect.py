@@ -13,8 +13,8 @@ from dissectors import registry
 from dissectors.frame import Chunk
 from dissectors.line import NS_PER_S, LineSettings
 from sniff.analysis.autodetect import Detecting, Outcome
+from sniff.capture.ipc import Ended, Message, ReceivedMessage, Tick
 from sniff.capture.link import CaptureLink
-from sniff.capture.wire import Ended, Message, Received, Tick
 from sniff.engine.session import LineEvent, refused_line, settings_change
 
 ANSWER_PATIENCE = 3 * NS_PER_S
@@ -74,7 +74,7 @@ class Search:
         """Take what the capture sent; once settings are found, says so to the capture."""
         if isinstance(message, Ended):
             self.ended = message
-        elif isinstance(message, Received) and message.bus == self.bus:
+        elif isinstance(message, ReceivedMessage) and message.bus == self.bus:
             self._take(message.item)
         elif isinstance(message, Tick) and message.bus == self.bus:
             self._tick(message.now)

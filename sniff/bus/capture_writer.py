@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
+from dissectors import registry
 from sniff import formats
 from sniff.bus.packet_records import RecordMaker
 from sniff.engine.capture import CaptureError, CaptureWriter
 from sniff.engine.session import Item, Session
 from sniff.formats import pcap, pcapng
-from sniff.formats.linktypes import link_type_for
+from sniff.formats.linktypes import USERS, link_type_for
 from sniff.formats.records import FrameFile
 
 MICROSECONDS = "microseconds"
@@ -34,7 +35,9 @@ def create(
             if options is not None and MICROSECONDS in options
             else formats.create_of_frames(path, session, link_type)
         )
-        return FrameWriter(file, RecordMaker(session, link_type, notes=notes, marks=marks))
+        return FrameWriter(
+            file, RecordMaker(session, link_type, notes=notes, marks=marks), _not_dissected(session.protocol, link_type)
+        )
     if options:
         raise CaptureError(f"{path}: this format has no option {', '.join(options)}")
     return formats.create_of_items(path, session)
@@ -54,17 +57,31 @@ def _link_type(path: str | Path, session: Session, wanted: str | None) -> int:
         raise CaptureError(f"{path}: {error}") from None
 
 
+def _not_dissected(protocol: str, link_type: int) -> str:
+    """That Wireshark shows octets only, where it has no dissector that could be named for such frames."""
+    dissector = registry.get(protocol)
+    if (
+        link_type not in USERS
+        or dissector.packet_file is None
+        or not set(dissector.packet_file.link_types) <= set(USERS)
+    ):
+        return ""
+    return f"Wireshark has no dissector for {dissector.title}: it shows the octets of link type {link_type} (user 0)"
+
+
 class FrameWriter:
     """A CaptureWriter of a packet file: items through the engine, each frame a record."""
 
-    def __init__(self, file: FrameFile, maker: RecordMaker) -> None:
+    def __init__(self, file: FrameFile, maker: RecordMaker, remark: str = "") -> None:
+        """`remark`: what else whoever opens the file must know."""
         self._file = file
         self._maker = maker
+        self._remarks = [remark] if remark else []
 
     @property
     def losses(self) -> list[str]:
         """What the format could not keep, in words; complete after `close`."""
-        return self._file.losses
+        return self._file.losses + self._remarks
 
     def write(self, item: Item) -> None:
         """Add a chunk or line event."""

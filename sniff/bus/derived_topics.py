@@ -1,4 +1,4 @@
-"""What a live bus sends back into its recording beside frames: /bus, /nodes and /findings. Pure: messages out.
+"""The topics that a live bus sends back into its recording beside frames: /bus, /nodes and /findings. Pure.
 
 One message a second for the bus and for each station heard in it, flat JSON as in `sniff.recording.topics`; one
 message in the schema foxglove.Log for each finding when it is raised, and again when it gets graver.

@@ -1,4 +1,4 @@
-"""Where the terminal UI gets its rows from: a live capture, a file, or memory. No UI in here."""
+"""The feeds of the terminal UI: a live capture, a file, or memory. No UI in here."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What fills the terminal UI from a capture file: its first rows at once, the others while one looks at them.
+"""The source of rows from a capture file: its first rows at once, the others while one looks at them.
 
 A thread reads, takes frames out and packs them; the store takes what it has made in small bites, between two keys. The
 rules come last: what they find is final when all rows are judged.
@@ -47,12 +47,14 @@ Piece = Prepared | LineEvent
 
 
 class FileFeed:
-    """A capture file, read on until its end."""
+    """A capture file, read on until its end. `buses`: how many share the memory."""
 
-    def __init__(self, path: str, capture: Capture, session: Session, devices: Devices | None = None) -> None:
+    def __init__(
+        self, path: str, capture: Capture, session: Session, devices: Devices | None = None, buses: int = 1
+    ) -> None:
         self.path = path
         self.capture = capture
-        self._store = Store(session, dissector_for(session), rows_that_fit(), devices, judge_later=True)
+        self._store = Store(session, dissector_for(session), rows_that_fit(buses), devices, judge_later=True)
         self._pieces = self._read(session)
         self._thread: threading.Thread | None = None
         self._queue: queue.Queue[Piece | BaseException | None] = queue.Queue(WAITING)

@@ -12,12 +12,15 @@ import os
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
+from typing import Protocol
 
+from dissectors.findings import Finding
 from dissectors.line import NS_PER_S
 from dissectors.manifest import Dissector
 from dissectors.profiles import Devices
 from sniff.analysis.autodetect import Detecting
-from sniff.analysis.points import PointReader
+from sniff.analysis.points import PointReader, Sample
+from sniff.analysis.site_ear import SiteEar
 from sniff.bus.autodetect import Progress, Search
 from sniff.bus.derived_topics import NODES_A_SECOND, NODES_AT_ONCE, BusChannels, DerivedMessage
 from sniff.bus.model import BusModel
@@ -25,8 +28,8 @@ from sniff.bus.recorded_values import RecordedValues
 from sniff.bus.router import Router, octets_of
 from sniff.bus.thinning import Budget
 from sniff.bus.value_topics import ValueMessage
+from sniff.capture.ipc import Batch, Ended, HeardOctets, ReceivedMessage, Status, Tick, one_by_one
 from sniff.capture.link import CaptureLink
-from sniff.capture.wire import Batch, Ended, Heard, Received, Status, Tick, one_by_one
 from sniff.engine.blocks import Block, Gathering, blocks_of
 from sniff.engine.bulk import BulkEngine
 from sniff.engine.engine import Output
@@ -45,16 +48,41 @@ PIECE = 8192
 UNWATCHED = NS_PER_S // 2
 """ns that reads are gathered for where nobody looks at single rows: so much at once costs a tenth a frame."""
 
+LISTENED = 60 * NS_PER_S
+"""ns before which silence says nothing of a bus."""
+
+NOTHING_HEARD = "LN002"
+
 LiveItem = Output | LineEvent | Status | Ended
 LiveTables = Table | Output | LineEvent | Status | Ended
 """Few rows come as objects, many as a table."""
+
+
+class BusListener(Protocol):
+    """Somebody who is told what becomes known of running buses. Called by whoever polls: must not wait for anything."""
+
+    def on_samples(self, live: LiveBus, samples: list[Sample]) -> None:
+        """Values were read."""
+
+    def on_derived(self, live: LiveBus, messages: list[DerivedMessage]) -> None:
+        """A second is over; its statistics, and findings every few seconds, as they go into a recording."""
+
+    def on_event(self, live: LiveBus, event: LineEvent) -> None:
+        """Something happened to the line."""
+
+    def on_time(self, live: LiveBus, now: int) -> None:
+        """It is `now` (ns) on the capture's clock; comes some times a second."""
+
+    def on_end(self, live: LiveBus) -> None:
+        """The capture is over."""
 
 
 class LiveBus:
     """One bus of a running capture. Not thread-safe; nothing here can hold up the recording.
 
     `session`: of the bus; `status`: the newest report; `ended`: why it is over, None while it runs. `model`: what is
-    known of the bus; its values and findings go back into the recording. `search`: finds what `session.unknown` names,
+    known of the bus; its values and findings go back into the recording. `ear`: what is kept to hold it against the
+    other buses of the capture, where there are any (`beside_others`). `search`: finds what `session.unknown` names,
     None when everything is given; its octets are recorded like all others. When it ends, `session`, `dissector` and
     the model's become others, before the event and the outputs that this gives are handed out. `unseen`: octets that
     came here, or were on their way, and were never looked at.
@@ -84,16 +112,24 @@ class LiveBus:
         self.ended: Ended | None = None
         self.devices = devices or Devices()
         self._pending: deque[Batch] = deque()
+        self.beside_others = False
         self._gathering = Gathering()  # reads that wait for the engine
         self._gathered_since = 0  # when the first of them came, ns
         self._now: int | None = None  # up to when all that was heard has come here
         self._patience = 0 if watched else UNWATCHED
         self._leave_at: float | None = None  # when what is pending is not looked at any more
         self._skipped = 0
-        self._watched = watched
         self._values = RecordedValues(self.session.bus, self.dissector, self.devices) if link.paths else None
         self._nodes_budget = Budget(NODES_A_SECOND, NODES_AT_ONCE)
+        self._listener: BusListener | None = None
         self.model = BusModel(self.session, self.dissector, self.devices, with_points=watched)
+        self.ear = SiteEar()
+        self._settle()
+
+    def tell(self, listener: BusListener) -> None:
+        """From now on tell somebody what becomes known, values too; call it before the first `poll`."""
+        self._listener = listener
+        self.model.read_points()
         self._settle()
 
     @property
@@ -110,6 +146,13 @@ class LiveBus:
     def dissector(self) -> Dissector:
         """The protocol; during a search for it a stand-in."""
         return self.engine.dissector
+
+    def findings(self) -> tuple[Finding, ...]:
+        """What the rules found so far; that nothing is heard only once it was listened for a while."""
+        found = self.model.findings()
+        if self.model.summary.octets or self.link.clock.now() - self.session.started >= LISTENED:
+            return found
+        return tuple(one for one in found if one.code != NOTHING_HEARD)
 
     @property
     def searching(self) -> Progress | None:
@@ -164,10 +207,10 @@ class LiveBus:
             self._skipped += octets
             return []
         if self._values is not None:
-            self._values.hear(octets, len(message.block) if isinstance(message, Heard) else 1)
+            self._values.hear(octets, len(message.block) if isinstance(message, HeardOctets) else 1)
         if self.engine.searching:
             return self._search_on(message)
-        item = message.block if isinstance(message, Heard) else message.item  # type: ignore[union-attr]
+        item = message.block if isinstance(message, HeardOctets) else message.item  # type: ignore[union-attr]
         if not self._gathering.count:
             self._gathered_since = int(item.reads.times[0]) if isinstance(item, Block) else item.time
         self._gathering.add(item)  # type: ignore[arg-type]
@@ -179,7 +222,7 @@ class LiveBus:
         for one in one_by_one([message]):
             if self.search is not None:
                 self.search.take(one)
-            if isinstance(one, Received):
+            if isinstance(one, ReceivedMessage):
                 items += self._some(self.engine.take(block) for block in blocks_of([one.item]))
         return items
 
@@ -221,18 +264,21 @@ class LiveBus:
 
     def _settle(self) -> None:
         """What depends on the settings, anew."""
-        recorded = self.link.paths and not self.engine.searching
-        self._bus_channels = BusChannels(self.model) if recorded else None
+        told = (self.link.paths or self._listener is not None) and not self.engine.searching
+        self._bus_channels = BusChannels(self.model) if told else None
 
     def _take(self, message: Batch) -> list[LiveTables]:
         """Take anything but reads."""
-        if self.search is not None and self.engine.searching and not isinstance(message, Heard):
+        if self.search is not None and self.engine.searching and not isinstance(message, HeardOctets):
             self.search.take(message)
         if isinstance(message, Ended):
             items = self._look()
             self.ended = message
             self.link.let_go()
-            return [*items, *self._some([self.engine.close()]), message]
+            items += self._some([self.engine.close()])
+            if self._listener is not None:
+                self._listener.on_end(self)
+            return [*items, message]
         if message.bus != self.bus:
             return []
         if isinstance(message, Status):
@@ -240,7 +286,7 @@ class LiveBus:
             return [message]
         if isinstance(message, Tick):
             return self._pass_time(message.now)
-        if isinstance(message, Received) and isinstance(message.item, LineEvent):
+        if isinstance(message, ReceivedMessage) and isinstance(message.item, LineEvent):
             return self._happen(message.item)
         return []
 
@@ -249,12 +295,14 @@ class LiveBus:
         self._now = now
         if self._values is not None:
             self._values.pass_time(now)
-        if self._bus_channels is None:
-            return []
-        items = [*self._look(), *self._advance()] if self._bus_channels.is_due(now) else []
-        messages = self._bus_channels.due(now, self._nodes_budget.take)
-        if messages:
-            self._send(messages)
+        items: list[LiveTables] = []
+        if self._bus_channels is not None:
+            items = [*self._look(), *self._advance()] if self._bus_channels.is_due(now) else []
+            messages = self._bus_channels.due(now, self._nodes_budget.take)
+            if messages:
+                self._send(messages)
+        if self._listener is not None:
+            self._listener.on_time(self, now)
         return items
 
     def _happen(self, event: LineEvent) -> list[LiveTables]:
@@ -268,6 +316,9 @@ class LiveBus:
                 self._values.settle(self.dissector)
             self._settle()
         self.model.add_line_event(event)
+        self.ear.add_line_event(event)
+        if self._listener is not None:
+            self._listener.on_event(self, event)
         return [*items, event, *self._some([table])]
 
     def _some(self, made: Iterable[Output | Table]) -> list[LiveTables]:
@@ -276,15 +327,17 @@ class LiveBus:
             if not one:
                 continue
             items.append(one)
-            for observer in (self.model, self._bus_channels):
+            for observer in (self.model, self._bus_channels, self.ear if self.beside_others else None):
                 if observer is not None and isinstance(one, Table):
                     observer.add_table(one)
                 elif observer is not None and isinstance(one, Output):
                     observer.add(one)
             if self._values is not None:
-                told = self._values.of_samples(self.model.samples) if self._watched else self._values.of_rows(one)
-                for value in told:
+                read = self.model.reads_points
+                for value in self._values.of_samples(self.model.samples) if read else self._values.of_rows(one):
                     self._record(value)
+            if self._listener is not None and self.model.samples:
+                self._listener.on_samples(self, self.model.samples)
         return items
 
     def _record(self, value: ValueMessage) -> None:
@@ -293,8 +346,10 @@ class LiveBus:
         self.link.derived(self.bus, value.topic, value.schema, time, time, value.data, value.metadata)
 
     def _send(self, messages: list[DerivedMessage]) -> None:
-        """Send statistics and findings back into the file, best effort."""
-        for one in messages:
+        """Send statistics and findings back into the file, best effort; tell them to whoever listens."""
+        if self._listener is not None:
+            self._listener.on_derived(self, messages)
+        for one in messages if self.link.paths else ():
             self.link.derived(self.bus, one.topic, one.schema, one.log_time, one.publish_time, one.data, one.metadata)
 
 

@@ -27,7 +27,7 @@ class BusModel:
 
     `summary`: counts, stations, load. `judging`: the rules. `reader`, `points`: values by device. `samples`: those that
     the newest output completed. `series`: what the registers of stations without a profile did. `polls`: the master's
-    programme. `version` changes whenever anything changed.
+    programme. `version` changes whenever anything changed. `reads_points`: whether values and requests are read at all.
     """
 
     def __init__(
@@ -39,7 +39,7 @@ class BusModel:
         with_points: bool = True,
     ) -> None:
         """`with_points`: else neither values nor requests are read, which costs as much as a third of the judging."""
-        self._with_points = with_points
+        self.reads_points = with_points
         self.devices = devices or Devices()
         self.summary = Summary(session.line, kept_seconds=kept_seconds)
         self.points = PointTable()
@@ -62,12 +62,16 @@ class BusModel:
         self._use(session, dissector)
         self.version += 1
 
+    def read_points(self) -> None:
+        """From now on values and requests are read, too."""
+        self.reads_points = True
+
     def add(self, output: Output) -> None:
         """Take what the engine gave."""
         self.version += 1
         self.summary.add(output)
         self.judging.add(output)
-        if self._with_points:
+        if self.reads_points:
             self.samples = self.reader.add(output)
             self._take_samples()
             self.polls.add(output)
@@ -77,7 +81,7 @@ class BusModel:
         self.version += 1
         self.summary.add_table(table)
         self.judging.add_table(table)
-        if self._with_points:
+        if self.reads_points:
             self.samples = self.reader.add(telling_rows(table, telling_transactions(table)))
             self._take_samples()
             self.polls.add_table(table)

@@ -12,7 +12,7 @@ from sniff.engine.engine import Output
 from sniff.engine.follow_settings import SessionEngine, dissector_for
 from sniff.engine.observer import Observer, observe, observe_tables
 from sniff.engine.session import Item, LineEvent, Session
-from sniff.engine.verdict_join import Settled, Settling, Wanted
+from sniff.engine.verdict_join import JudgedRow, VerdictJoin, Wanted
 
 if TYPE_CHECKING:
     from sniff.engine.blocks import Block
@@ -65,13 +65,13 @@ def survey(capture: Source, session: Session, *observers: Observer, reference: b
 
 def settled(
     items: Iterable[Item], session: Session, devices: Devices | None = None, wanted: Wanted | None = None
-) -> Iterator[Settled]:
+) -> Iterator[JudgedRow]:
     """Run items through a new engine; give the rows that are `wanted` (by default all) with their verdicts.
 
     With `devices`, also what they mean to them. Raises CaptureError as `outputs` does.
     """
     points = PointReader(dissector_for(session), devices) if devices is not None else None
-    settling = Settling(points, wanted)
+    settling = VerdictJoin(points, wanted)
     try:
         for output in outputs(items, session):
             if isinstance(output, Output):
@@ -86,7 +86,7 @@ def settled(
 
 def settled_in_bulk(
     capture: Source, session: Session, devices: Devices | None = None, wanted: Wanted | None = None
-) -> Iterator[Settled]:
+) -> Iterator[JudgedRow]:
     """The same as `settled`, by way of tables: rows that a filter leaves out never become objects, unless something
     is to be said of devices."""
     from sniff.engine.table_join import TableJoin
@@ -113,15 +113,15 @@ class _Spoken:
 
     def __init__(self, points: PointReader, wanted: Wanted | None) -> None:
         self._points = points
-        self._settling = Settling(points, wanted)
+        self._settling = VerdictJoin(points, wanted)
 
-    def add(self, table: Table) -> Iterator[Settled]:
+    def add(self, table: Table) -> Iterator[JudgedRow]:
         """Take the table that follows; give the rows that are settled by it."""
         for output in table.outputs():
             self._points.remember(output)
             yield from self._settling.add(output)
 
-    def flush(self) -> Iterator[Settled]:
+    def flush(self) -> Iterator[JudgedRow]:
         """Give all that is left."""
         yield from self._settling.flush()
 

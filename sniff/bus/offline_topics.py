@@ -1,4 +1,4 @@
-"""What a recording holds beside frames, of a capture that is written anew: /values, /bus, /nodes and /findings as live.
+"""The topics beside frames of a capture that is written anew: /values, /bus, /nodes and /findings as live.
 
 Windows are those of the capture's clock, a second each while something is said; a silence is one window. Findings are
 told once, when all is read, at the time of their last evidence. Pure: messages out.

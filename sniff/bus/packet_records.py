@@ -11,7 +11,7 @@ from sniff.analysis.wording import describe, duration
 from sniff.engine.engine import Output
 from sniff.engine.follow_settings import engine_for
 from sniff.engine.session import Item, LineEvent, LineEventKind, Session
-from sniff.engine.verdict_join import Settled, Settling
+from sniff.engine.verdict_join import JudgedRow, VerdictJoin
 from sniff.formats.linktypes import LINK_TYPES, RTAC, RTAC_ERRORS, USER1, rtac_record
 from sniff.formats.records import Record
 
@@ -37,7 +37,7 @@ class RecordMaker:
         self.live = live
         self.notes: Mapping[int, str] = notes or {}
         self.marks: Mapping[int, str] = marks or {}
-        self._settling = Settling()
+        self._settling = VerdictJoin()
 
     def add(self, item: Item) -> Iterator[Record]:
         """Take one item; give the records that it completes."""
@@ -58,12 +58,12 @@ class RecordMaker:
     def _settled(self, output: Output) -> Iterator[Record]:
         if self.live:
             for row in output.rows:
-                yield from self._records(Settled(row, None))
+                yield from self._records(JudgedRow(row, None))
             return
         for item in self._settling.add(output):
             yield from self._records(item)
 
-    def _records(self, item: Settled) -> Iterator[Record]:
+    def _records(self, item: JudgedRow) -> Iterator[Record]:
         row = item.row
         event = row.event
         time = event.end
@@ -83,7 +83,7 @@ class RecordMaker:
         data = LINK_TYPES[self.link_type].write(event, role, station, time - self.session.started)
         yield Record(time, self.link_type, data, comment, not event.ok, mark=self.marks.get(row.no))
 
-    def _comment(self, item: Settled) -> str:
+    def _comment(self, item: JudgedRow) -> str:
         row, transaction = item.row, item.transaction
         notes = [] if isinstance(row.event, Frame) and row.event.ok else [describe(self.engine.dissector, row)]
         if row.header is not None and row.header.error:

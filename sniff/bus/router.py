@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections import Counter, deque
 
 from dissectors.frame import Chunk
+from sniff.capture.ipc import Batch, Ended, HeardOctets, ReceivedMessage, Tick
 from sniff.capture.link import CaptureLink
-from sniff.capture.wire import Batch, Ended, Heard, Received, Tick
 
 HELD = 4 << 20
 """Octets kept for a bus that nobody asks for; more are dropped, and counted. The recording has them."""
@@ -63,6 +63,6 @@ class Router:
 
 def octets_of(message: Batch) -> int:
     """How many octets of the line came with it."""
-    if isinstance(message, Heard):
+    if isinstance(message, HeardOctets):
         return len(message.block.reads.octets)
-    return len(message.item.octets) if isinstance(message, Received) and isinstance(message.item, Chunk) else 0
+    return len(message.item.octets) if isinstance(message, ReceivedMessage) and isinstance(message.item, Chunk) else 0

@@ -1,4 +1,4 @@
-"""What fills the terminal UI from a live bus."""
+"""The source of rows from a live bus."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collections.abc import Callable
 from sniff.bus.feed import FeedStatus
 from sniff.bus.live import LiveBus
 from sniff.bus.rows import KEPT_ROWS, Store
-from sniff.capture.wire import Status
+from sniff.capture.ipc import Status
 from sniff.engine.engine import Output
 from sniff.engine.session import LineEvent
 from sniff.engine.table import Table
@@ -19,22 +19,24 @@ ROW_OCTETS = 120
 """What a row and its share of a transaction take in memory, about."""
 
 
-def rows_that_fit() -> int:
-    """Rows that a quarter of this machine's memory holds; as many as a store keeps where the system does not tell."""
+def rows_that_fit(buses: int = 1) -> int:
+    """Rows of each of so many buses that a quarter of this machine's memory holds together; as many as a store keeps
+    where the system does not tell."""
     try:
         memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     except (AttributeError, OSError, ValueError):  # Windows has no sysconf
         return KEPT_ROWS
-    return max(LEAST_ROWS, memory // 4 // ROW_OCTETS)
+    return max(LEAST_ROWS, memory // 4 // ROW_OCTETS // max(1, buses))
 
 
 class LiveFeed:
-    """A running capture. `tell` is called once where closing it waits for a slow disk."""
+    """A running capture. `tell` is called once where closing it waits for a slow disk. `buses`: how many share the
+    memory."""
 
-    def __init__(self, live: LiveBus, tell: Callable[[Status], None] = lambda status: None) -> None:
+    def __init__(self, live: LiveBus, tell: Callable[[Status], None] = lambda status: None, buses: int = 1) -> None:
         self.live = live
         self._tell = tell
-        self._store = Store(live.session, live.dissector, min(KEPT_ROWS, rows_that_fit()), model=live.model)
+        self._store = Store(live.session, live.dissector, min(KEPT_ROWS, rows_that_fit(buses)), model=live.model)
         self._session = live.session
 
     @property

@@ -21,10 +21,11 @@ from dissectors.line import NS_PER_S
 from dissectors.manifest import Dissector
 from dissectors.meaning import Meaning
 from dissectors.profiles import Devices
+from dissectors.profiles.decoding import Value, decode
 from dissectors.tracker import Passing, Transaction, Verdict
 from sniff.analysis.load import Load
 from sniff.analysis.nodes import NodeTable
-from sniff.analysis.points import PointTable, meaning_of
+from sniff.analysis.points import TELLING, PointTable, meaning_of
 from sniff.analysis.polls import Polls
 from sniff.analysis.summary import Summary
 from sniff.analysis.wording import describe
@@ -362,6 +363,22 @@ class Store:
     def meaning(self, row: Row) -> Meaning | None:
         """What is known of a row besides its octets."""
         return meaning_of(self.dissector, self.devices, row, self._request_of(row))
+
+    def told(self, no: int) -> tuple[Value, ...]:
+        """The values that the row of a number carries; none before its exchange is whole."""
+        row = self.by_no(no)
+        transaction = None if row is None else self.transaction(row)
+        if row is None or transaction is None or transaction.verdict not in TELLING:
+            return ()
+        meaning = self.meaning(row)
+        return () if meaning is None else decode(meaning.profile, meaning.readings)
+
+    def answered(self, row: Row) -> dict[str, int | float | str]:
+        """Fields of an answer that only its request tells."""
+        fields, meaning = self.dissector.answer_fields, self.meaning(row)
+        if fields is None or meaning is None or meaning.request is None or not isinstance(row.event, Frame):
+            return {}
+        return fields(meaning.request, row.event)
 
     def _request_of(self, row: Row) -> Frame | None:
         transaction = self.transaction(row)

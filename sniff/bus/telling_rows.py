@@ -1,4 +1,4 @@
-"""What of a table may tell values of points: passing the right to send on tells none. Pure."""
+"""Rows of a table that may tell values of points: passing the right to send on tells none. Pure."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How much of what is derived from a bus goes back into its recording, so that results never outgrow the octets. Pure.
+"""Thinning: how much of what is derived goes back into a recording, so that results never outgrow the octets. Pure.
 
 Everything, as long as there is little: a budget that fills up while little is said. When it is half used up, each
 channel gets its turn at intervals that keep all of them together within the budget. What is left out is not lost: it is

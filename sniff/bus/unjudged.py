@@ -1,4 +1,4 @@
-"""What the rules have still to see of the rows that are kept: the next of them, in the order of the wire. Pure."""
+"""The rows that the rules have still to see, of those that are kept: in the order of the wire. Pure."""
 
 from __future__ import annotations
 

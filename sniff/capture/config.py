@@ -1,4 +1,4 @@
-"""What a capture is asked to do; crosses to the capture process as JSON."""
+"""The orders of a capture process: what it is asked to do; they cross to it as JSON."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ class SourceSpec:
 
     `notes`: of the session, for the recording. `unknown`: "line", "protocol" or both, when they are searched for:
     what stands there is only where the search begins. `profiles`: in force, name → document, for the recording.
+    `patient`: a port that cannot be had is waited for, and said, instead of ending the capture.
     """
 
     spec: str
@@ -25,6 +26,7 @@ class SourceSpec:
     notes: Mapping[str, str] = field(default_factory=dict)
     unknown: tuple[str, ...] = ()
     profiles: Mapping[str, str] = field(default_factory=dict)
+    patient: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +34,8 @@ class RecordSpec:
     """Where to record. `rotation`, `keep`: as the recorder takes them ("size:64MB", "time:1h"; parts to keep).
 
     `before`, `after`: ns round a trigger that are kept, and nothing else is; None: everything is kept. `keep_free`:
-    octets of the disk that stay free; the oldest parts go for them.
+    octets of the disk that stay free; the oldest parts go for them. `keep_of_all`: `keep` counts the parts of earlier
+    recordings of this name, too.
     """
 
     path: str
@@ -41,6 +44,7 @@ class RecordSpec:
     before: int | None = None
     after: int | None = None
     keep_free: int | None = None
+    keep_of_all: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +79,7 @@ class CaptureConfig:
                 dict(source.get("notes", {})),
                 tuple(source.get("unknown", ())),
                 dict(source.get("profiles", {})),
+                bool(source.get("patient", False)),
             )
             for source in value["sources"]
         )

@@ -12,16 +12,15 @@ from collections.abc import Sequence
 
 from dissectors.line import LineSettings
 from sniff.capture.config import CaptureConfig, RecordSpec, SourceSpec
-from sniff.capture.spawn import Spawned, spawn
-from sniff.capture.wire import (
+from sniff.capture.ipc import (
     LOSSY,
     Batch,
     Derived,
     Ended,
-    Kind,
+    IpcError,
+    IpcKind,
     Message,
     MessageSplitter,
-    WireError,
     decode_json,
     decode_message,
     encode,
@@ -33,6 +32,7 @@ from sniff.capture.wire import (
     octets_in,
     one_by_one,
 )
+from sniff.capture.spawn import Spawned, spawn
 from sniff.engine.capture import CaptureError
 from sniff.engine.session import Session, SettingsChange
 from sniff.sources import PortError
@@ -80,7 +80,7 @@ class CaptureLink:
         self._heard_at = time.monotonic()
         self._stops = 0
         self._told_to_end = 0  # how hard
-        self._malformed: WireError | None = None
+        self._malformed: IpcError | None = None
         self.closing = False
         self._unsent = bytearray()
         self._sessions: list[Session] = []
@@ -122,7 +122,7 @@ class CaptureLink:
     def _greet(self, config: CaptureConfig) -> None:
         self._connection.setblocking(True)
         try:
-            self._connection.sendall(encode_json(Kind.CONFIG, config.to_json()))
+            self._connection.sendall(encode_json(IpcKind.CONFIG, config.to_json()))
         except OSError as error:
             raise PortError(self._why_dead()) from error
         self._connection.setblocking(False)
@@ -133,9 +133,9 @@ class CaptureLink:
                 raise PortError(self._why_dead())
         kind, _, body = self._pop()
         value = decode_json(body)
-        if kind == Kind.FAILED:
+        if kind == IpcKind.FAILED:
             raise (PortError if value.get("kind") == "port" else CaptureError)(str(value.get("text")))
-        if kind != Kind.HELLO:
+        if kind != IpcKind.HELLO:
             raise PortError(f"capture process: message {kind} instead of a greeting")
         self._sessions = [Session.from_metadata(session) for session in value["sessions"]]
         self.priority = str(value["priority"])
@@ -172,7 +172,7 @@ class CaptureLink:
                     messages.append(message)
                 if isinstance(message, Ended):
                     return self._finish(messages, message)
-        except WireError as malformed:
+        except IpcError as malformed:
             return self._finish(messages, self._broken(malformed))
         if not alive and not self._waiting:
             error = self._malformed
@@ -184,13 +184,13 @@ class CaptureLink:
         self._send()
         try:
             alive = self._malformed is None and self._fill(timeout)
-        except WireError as error:
+        except IpcError as error:
             self._malformed = error
             alive = False
         self.closing = self.closing or not alive
         return alive
 
-    def _broken(self, error: WireError) -> Ended:
+    def _broken(self, error: IpcError) -> Ended:
         self._kill()
         return Ended(f"capture process: {error}", clean=False)
 
@@ -224,7 +224,7 @@ class CaptureLink:
 
     def _keep(self, kind: int, bus: int, body: bytes) -> None:
         """Have a message wait for the caller; reads are dropped when too much waits already."""
-        if kind in (Kind.CHUNK, Kind.READS):
+        if kind in (IpcKind.CHUNK, IpcKind.READS):
             gap = self._gap.get(bus, 0)
             if self._waiting_size > (MOST_WAITING // 2 if gap else MOST_WAITING):
                 octets = octets_in(kind, body)[1]
@@ -236,7 +236,7 @@ class CaptureLink:
                 event = gap_event(octets_in(kind, body)[0], gap)
                 for message in MessageSplitter().feed(encode_item(bus, event)):
                     self._add(*message)
-        elif kind == Kind.ENDED:
+        elif kind == IpcKind.ENDED:
             self.closing = True
         self._add(kind, bus, body)
 
@@ -271,12 +271,12 @@ class CaptureLink:
 
     def reconfigure(self, bus: int, line: LineSettings) -> None:
         """Change the line settings of a bus; a SETTINGS event says where they begin to hold."""
-        self._unsent += encode(Kind.RECONFIGURE, bus, str(line).encode())
+        self._unsent += encode(IpcKind.RECONFIGURE, bus, str(line).encode())
         self._send()
 
     def found(self, bus: int, line: LineSettings, protocol: str) -> None:
         """Say what a search came to; a SETTINGS event says from where on it holds, and later parts begin with it."""
-        self._unsent += encode(Kind.FOUND, bus, str(SettingsChange(line, protocol, found=True)).encode())
+        self._unsent += encode(IpcKind.FOUND, bus, str(SettingsChange(line, protocol, found=True)).encode())
         self._send()
 
     def trigger(self, bus: int, time: int, text: str) -> None:
@@ -286,7 +286,7 @@ class CaptureLink:
 
     def mark(self, bus: int, time: int, text: str | None) -> None:
         """Have a MARK event say in the recording what a person wrote about a moment (ns); None takes it away."""
-        self._unsent += encode_trigger(bus, time, text or "", Kind.UNMARK if text is None else Kind.MARK)
+        self._unsent += encode_trigger(bus, time, text or "", IpcKind.UNMARK if text is None else IpcKind.MARK)
         self._send()
 
     def _send(self) -> None:
@@ -307,7 +307,7 @@ class CaptureLink:
             self._stops += 1
             self._told_to_end = 0
             self._heard_at = time.monotonic()
-            self._unsent += encode(Kind.STOP)
+            self._unsent += encode(IpcKind.STOP)
             self._send()
 
     def insist(self, patience: float = STOP_PATIENCE) -> Ended | None:

@@ -16,20 +16,20 @@ from dissectors.frame import Chunk
 from dissectors.line import MS, NS_PER_S, LineSettings
 from sniff.capture.disk_watch import DiskWatch
 from sniff.capture.frame_counter import FrameCounter
-from sniff.capture.outlet import Outlet
-from sniff.capture.trigger_ring import TriggerRing
-from sniff.capture.waiting import Waiting
-from sniff.capture.wire import (
+from sniff.capture.ipc import (
     LOSSY,
-    Kind,
+    IpcError,
+    IpcKind,
     MessageSplitter,
     Status,
-    WireError,
     decode_derived,
     decode_trigger,
     encode_status,
     encode_tick,
 )
+from sniff.capture.ipc_sender import IpcSender
+from sniff.capture.trigger_ring import TriggerRing
+from sniff.capture.waiting import Waiting
 from sniff.engine.session import Item, LineEvent, LineEventKind, Session, SettingsChange, refusal
 from sniff.recording.writer import Recorder
 from sniff.sources import PortError, Source
@@ -89,7 +89,7 @@ class CaptureLoop:
     clock: Clock
     sources: list[Source]
     recorders: list[Recorder]
-    outlet: Outlet
+    outlet: IpcSender
     commands: socket.socket | None = None
     waker: socket.socket | None = None  # readable when a signal came
     priority: str = ""
@@ -109,6 +109,13 @@ class CaptureLoop:
 
     def run(self) -> str:
         """Capture; why it ended, in words."""
+        self.begin()
+        while self.reason is None:
+            self.step()
+        return self.rest()
+
+    def begin(self) -> None:
+        """Take what is there at first; `step` does one turn from then on, until there is a `reason` to end."""
         self._waiting = Waiting()
         recorders: list[Recorder | None] = [*self.recorders] or [None] * len(self.sources)
         self._buses = [
@@ -135,14 +142,15 @@ class CaptureLoop:
                 self._settings(bus, SettingsChange(session.line, searching=True))
         for bus in self._buses:
             self._take(bus)
-        while self.reason is None:
-            self._step()
+
+    def rest(self) -> str:
+        """After the last turn: what arrived meanwhile; why it ended, in words."""
         until = time.monotonic() + DRAIN
-        for bus in self._buses:  # what arrived meanwhile
+        for bus in self._buses:
             while not bus.ended and self._take(bus) and time.monotonic() < until:
                 pass
         self._beat(self.clock.now())
-        return self.reason
+        return self.reason or "stopped"
 
     def _ring(self, recorder: Recorder | None) -> TriggerRing | None:
         return TriggerRing(recorder, *self.round_triggers) if self.round_triggers and recorder is not None else None
@@ -184,7 +192,8 @@ class CaptureLoop:
 
     # -- one turn ----------------------------------------------------------------------------------------------
 
-    def _step(self) -> None:
+    def step(self) -> None:
+        """One turn: wait for whatever comes first, and take it."""
         wait = min(self._beat_at, self._due) - self.clock.now()
         for _, call in self._waiting.wait(max(0, wait) / 1e9):
             call()
@@ -341,7 +350,7 @@ class CaptureLoop:
         try:
             for kind, bus, body in self._splitter.feed(data):
                 self._command(kind, bus, body)
-        except WireError:
+        except IpcError:
             data = b""  # not our main process: stop listening to it
         if not data:
             self._waiting.unregister(self.commands.fileno())
@@ -356,19 +365,19 @@ class CaptureLoop:
                 self.stop("the main process is gone, which searched for the protocol whose frames are counted")
 
     def _command(self, kind: int, bus: int, body: bytes) -> None:
-        if kind == Kind.STOP:
+        if kind == IpcKind.STOP:
             self.stop("stopped")
-        elif kind == Kind.FOUND and bus < len(self._buses):
+        elif kind == IpcKind.FOUND and bus < len(self._buses):
             change = SettingsChange.parse(body.decode("utf-8", "replace"))
             self._seeking.discard(bus)
             self._unknown.discard(bus)
             self._take(self._buses[bus])
             self._settings(self._buses[bus], replace(change, searching=False, found=True))
-        elif kind == Kind.TRIGGER and bus < len(self._buses):
+        elif kind == IpcKind.TRIGGER and bus < len(self._buses):
             self._fire(bus, *decode_trigger(body))
-        elif kind in (Kind.MARK, Kind.UNMARK) and bus < len(self._buses):
-            self._mark(bus, LineEventKind.MARK if kind == Kind.MARK else LineEventKind.UNMARK, *decode_trigger(body))
-        elif kind == Kind.DERIVED and bus < len(self.recorders):
+        elif kind in (IpcKind.MARK, IpcKind.UNMARK) and bus < len(self._buses):
+            self._mark(bus, LineEventKind.MARK if kind == IpcKind.MARK else LineEventKind.UNMARK, *decode_trigger(body))
+        elif kind == IpcKind.DERIVED and bus < len(self.recorders):
             derived = decode_derived(bus, body)
             ring = self._buses[bus].ring
             if ring is not None and not ring.keeps(derived.log_time):
@@ -381,7 +390,7 @@ class CaptureLoop:
                 derived.data,
                 derived.metadata,
             )
-        elif kind == Kind.RECONFIGURE and bus < len(self._buses):
+        elif kind == IpcKind.RECONFIGURE and bus < len(self._buses):
             source = self._buses[bus].source
             line = body.decode("ascii", "replace")
             self._take(self._buses[bus])  # what is there was heard with the settings before

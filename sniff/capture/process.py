@@ -17,10 +17,10 @@ import sys
 from types import FrameType
 
 from sniff.capture.config import CaptureConfig, RecordSpec, SourceSpec
+from sniff.capture.ipc import IpcError, IpcKind, MessageSplitter, decode_json, encode_ended, encode_json
+from sniff.capture.ipc_sender import IpcSender
 from sniff.capture.loop import CaptureLoop
-from sniff.capture.outlet import Outlet
 from sniff.capture.priority import raise_priority
-from sniff.capture.wire import Kind, MessageSplitter, WireError, decode_json, encode_ended, encode_json
 from sniff.engine.capture import CaptureError
 from sniff.engine.session import Session
 from sniff.recording.rotation import Rotation
@@ -49,16 +49,25 @@ def main() -> int:
     sources: list[Source] = []
     try:
         for spec in config.sources:
-            sources.append(open_source(spec.spec, spec.line, clock))
+            sources.append(_opened(spec, clock))
         sessions = [session_of(*pair, clock) for pair in zip(config.sources, sources, strict=True)]
         recorders = open_recorders(config, sessions)
     except (PortError, CaptureError, OSError, ValueError) as error:
         for source in sources:
             source.close()
         kind = "port" if isinstance(error, PortError) else "capture"
-        connection.sendall(encode_json(Kind.FAILED, {"kind": kind, "text": str(error)}))
+        connection.sendall(encode_json(IpcKind.FAILED, {"kind": kind, "text": str(error)}))
         return 4
     return _capture(config, clock, sources, sessions, recorders, connection, priority)
+
+
+def _opened(spec: SourceSpec, clock: Clock) -> Source:
+    """The source of a bus. Raises PortError."""
+    if not spec.patient:
+        return open_source(spec.spec, spec.line, clock)
+    from sniff.sources.awaited import AwaitedSource
+
+    return AwaitedSource(spec.spec, spec.line, clock, open_source)
 
 
 def session_of(spec: SourceSpec, source: Source, clock: Clock) -> Session:
@@ -83,7 +92,8 @@ def open_recorders(config: CaptureConfig, sessions: list[Session]) -> list[Recor
     if record is None:
         return []
     rotation = None if record.rotation is None else Rotation.parse(record.rotation)
-    return SharedFile(record.path, sessions, rotation, record.keep, record.keep_free).recorders()
+    shared = SharedFile(record.path, sessions, rotation, record.keep, record.keep_free, record.keep_of_all)
+    return shared.recorders()
 
 
 def round_triggers(record: RecordSpec | None) -> tuple[int, int] | None:
@@ -102,7 +112,7 @@ def _capture(
     connection: socket.socket,
     priority: str,
 ) -> int:
-    outlet = Outlet(connection, len(sources))
+    outlet = IpcSender(connection, len(sources))
     paths = [str(recorder.path) for recorder in recorders]
     hello = {
         "pid": os.getpid(),
@@ -112,7 +122,7 @@ def _capture(
         "sessions": [session.to_metadata() for session in sessions],
         "paths": paths,
     }
-    outlet.post(encode_json(Kind.HELLO, hello))
+    outlet.post(encode_json(IpcKind.HELLO, hello))
     loop = CaptureLoop(
         clock,
         sources,
@@ -189,8 +199,8 @@ def _read_config(connection: socket.socket) -> CaptureConfig:
         if not data:
             raise SystemExit("sniff485: the capture process is started by sniff485 itself")
         for kind, _, body in splitter.feed(data):
-            if kind != Kind.CONFIG:
-                raise WireError(f"message {kind} before the settings")
+            if kind != IpcKind.CONFIG:
+                raise IpcError(f"message {kind} before the settings")
             return CaptureConfig.from_json(decode_json(body))
 
 

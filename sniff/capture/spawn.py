@@ -33,7 +33,7 @@ def spawn(words: Sequence[str]) -> Spawned:
     """Start it. `words` follow the module's name, for people who look at a list of processes. Raises OSError."""
     errors = tempfile.TemporaryFile()  # noqa: SIM115 (lives as long as the process)
     command = [sys.executable, "-P", "-m", "sniff.capture.process", *words]
-    options: dict[str, Any] = {"stdout": errors, "stderr": errors, "env": _environment()}
+    options: dict[str, Any] = {"stdout": errors, "stderr": errors, "env": environment()}
     start = _spawn_with_socket if os.name == "posix" else _spawn_and_listen
     try:
         return start(command, options, errors)
@@ -83,7 +83,7 @@ def _proves(connection: socket.socket, token: bytes) -> bool:
     return secrets.compare_digest(data, token)
 
 
-def _environment() -> dict[str, str]:
+def environment() -> dict[str, str]:
     """The process must find this very package, and nothing in the current folder."""
     root = str(Path(version.__file__).resolve().parents[1])
     environment = dict(os.environ)

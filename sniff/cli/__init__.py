@@ -1,6 +1,6 @@
 """The command line: one command, one file a subcommand. Only the chosen subcommand is imported.
 
-Exit codes: 0 fine · 1 findings at or above --fail-on · 2 usage · 3 unreadable input, or output that was not written ·
+Exit codes: 0 fine · 1 findings at or above --fail-on · 2 usage · 3 unreadable or cut input, or output not written ·
 4 port trouble · 70 a defect of this program · 130 interrupted.
 """
 
@@ -11,6 +11,7 @@ import contextlib
 import os
 import sys
 import traceback
+from collections.abc import Iterable
 from importlib import import_module
 from types import ModuleType
 from typing import cast
@@ -18,6 +19,7 @@ from typing import cast
 from dissectors import registry
 from sniff.cli import standard_streams
 from sniff.engine.capture import CaptureError
+from sniff.formats import cut_capture
 from sniff.formats.several_buses import chosen as bus_chosen
 from sniff.version import __version__
 
@@ -26,10 +28,11 @@ COMMANDS: dict[str, str] = {
     "detect": "baud rate, format and protocol of a bus, by listening only",
     "live": "listen to a port: terminal UI (frames as lines where there is no terminal); records",
     "record": "listen to a port and record, without a UI",
+    "box": "unattended: records all configured buses for ever, says how it stands; systemd unit, udev rules",
     "open": "terminal UI on captures",
     "show": "frames of captures, one line each, or JSON, tree, hex, fields",
     "info": "what is in a capture: times, counts, nodes, settings, completeness",
-    "stats": "tables: nodes, transactions, latency, load, ring, polls, health",
+    "stats": "tables: nodes, transactions, latency, load, ring, stations, polls, health",
     "points": "values by name: registers and objects of every station, scaled, with unit and quality",
     "profile": "device profiles: list, show, check; guess and draft from a capture, import of register maps",
     "check": "what is wrong with a bus, where, and what to do next: findings with evidence",
@@ -48,6 +51,9 @@ COMMANDS: dict[str, str] = {
     "extcap": "lets Wireshark capture from a port through this program",
     "snapshot": "writes or compares the expectations of captures that are tests",
     "config": "where the configured buses and their values come from",
+    "serve": "the terminal UI in a browser, on a capture or on a port that it records",
+    "mcp": "answers assistants' questions about captures (Model Context Protocol), reading only",
+    "completion": "what teaches a shell to complete commands, options and files",
     "demo": "a virtual RS-485 bus with simulated drives, through the real capture path",
 }
 """Name → what it does, in the order of the help. Each is `sniff/cli/<name>.py`: `configure(parser)`, `run(args)`."""
@@ -67,7 +73,7 @@ class Failure(Exception):
         self.code = code
 
 
-USAGE, UNREADABLE, PORT_TROUBLE, INTERNAL, INTERRUPTED = 2, 3, 4, 70, 130
+FOUND, USAGE, UNREADABLE, PORT_TROUBLE, INTERNAL, INTERRUPTED = 1, 2, 3, 4, 70, 130
 
 TRACEBACK = "--traceback"
 """For developers, anywhere on the command line: where an internal error came from."""
@@ -82,9 +88,12 @@ def main(argv: list[str] | None = None) -> int:
     arguments = [word for word in arguments if word != TRACEBACK]
     standard_streams.prepare()
     try:
+        cut_capture.forget()
         code = _run(arguments)
         sys.stdout.flush()
-        return code
+        for path, damage in cut_capture.unsaid():
+            standard_streams.say(_plain(f"{path}: {damage}; all before it was read"))
+        return UNREADABLE if code in (0, FOUND) and cut_capture.was_cut() else code
     except SystemExit:  # argparse, after --help, --version or a line of its own
         broken = standard_streams.output_error()
         if broken is None:
@@ -138,28 +147,11 @@ def _place(error: Exception) -> str:
 def _run(arguments: list[str]) -> int:
     name = next((word for word in arguments if not word.startswith("-")), None)
     asked = name is None and {"-h", "--help"} & {*arguments}  # all protocols are imported only then
-    parser = argparse.ArgumentParser(
-        prog="sniff485",
-        description=DESCRIPTION,
-        epilog=f"{_protocols()}\n\n{EPILOG}" if asked else EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    parser.add_argument("--version", action="version", version=f"sniff485 {__version__}")
-    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     if name is not None and name not in COMMANDS:
         raise Failure(_no_such_command(name), USAGE)
-    chosen: ModuleType | None = None
-    for command, text in COMMANDS.items():
-        sub = commands.add_parser(
-            command,
-            help=text,
-            description=text[0].upper() + text[1:] + ".",
-            formatter_class=argparse.RawDescriptionHelpFormatter,
-        )
-        if command == name:
-            chosen = import_module(f"sniff.cli.{command}")
-            sub.epilog = chosen.__doc__
-            chosen.configure(sub)
+    epilog = f"{_protocols()}\n\n{EPILOG}" if asked else EPILOG
+    parser, imported = command_line([name] if name is not None else [], epilog)
+    chosen = imported.get(name or "")
     if getattr(chosen, "TOLERANT", False):
         args, _ = parser.parse_known_args(arguments)
     else:
@@ -167,6 +159,36 @@ def _run(arguments: list[str]) -> int:
     assert chosen is not None  # argparse has refused anything else
     with bus_chosen(getattr(args, "bus", None)):
         return int(chosen.run(args))
+
+
+def command_line(
+    configured: Iterable[str] = COMMANDS, epilog: str = EPILOG
+) -> tuple[argparse.ArgumentParser, dict[str, ModuleType]]:
+    """The parser of all commands, and the modules of those whose options it knows; the others are only names.
+
+    What is generated from the command line (manual pages, completion, pages of the documentation) is made from it.
+    """
+    parser = argparse.ArgumentParser(
+        prog="sniff485",
+        description=DESCRIPTION,
+        epilog=epilog,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action="version", version=f"sniff485 {__version__}")
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    wanted, imported = set(configured), {}
+    for command, text in COMMANDS.items():
+        sub = commands.add_parser(
+            command,
+            help=text,
+            description=text[0].upper() + text[1:] + ".",
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+        if command in wanted:
+            imported[command] = module = import_module(f"sniff.cli.{command}")
+            sub.epilog = module.__doc__
+            module.configure(sub)
+    return parser, imported
 
 
 def _protocols() -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from contextvars import ContextVar
 from dataclasses import replace
 
 from dissectors import registry
@@ -120,8 +121,8 @@ def line_settings(token: str) -> LineSettings:
 
 def protocol(name: str) -> str:
     """argparse type for -p."""
-    if name not in registry.names():
-        raise argparse.ArgumentTypeError(f"unknown protocol {name!r}; expected one of {', '.join(registry.names())}")
+    if name not in registry.known():
+        raise argparse.ArgumentTypeError(f"unknown protocol {name!r}; expected one of {', '.join(registry.known())}")
     return name
 
 
@@ -200,11 +201,20 @@ def open_buses(path: str) -> list[tuple[str, Capture]]:
 def open_captures(paths: Sequence[str]) -> list[tuple[str, Capture]]:
     """Open captures by name, the parts of one recording as one; ends as `open_capture` does."""
     opened = [one for path in paths for one in open_buses(path)]
-    if len(opened) < 2:
-        return opened
-    from sniff.recording.rotated import joined
+    if len(opened) > 1:
+        from sniff.recording.rotated import joined
 
-    return joined(opened)
+        opened = joined(opened)
+    _opened_last.set(len(opened))
+    return opened
+
+
+_opened_last: ContextVar[int] = ContextVar("_opened_last", default=1)
+
+
+def captures_open() -> int:
+    """How many captures this command reads."""
+    return _opened_last.get()
 
 
 def settings_of(args: argparse.Namespace, session: Session, path: str) -> Session:
@@ -260,5 +270,9 @@ def colour() -> bool:
 
 
 def on_terminal() -> bool:
-    """Whether there is a whole terminal for the terminal UI, which draws through standard error."""
+    """Whether there is a whole terminal for the terminal UI, which draws through standard error; or a browser."""
+    import os
+
+    if os.environ.get("TEXTUAL_DRIVER", "").endswith(":WebDriver"):  # `serve` starts us so
+        return True
     return sys.stdin.isatty() and sys.stdout.isatty() and sys.stderr.isatty()

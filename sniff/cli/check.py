@@ -7,14 +7,18 @@ from __future__ import annotations
 import argparse
 import sys
 from array import array
+from collections import Counter
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dissectors.findings import Finding, Severity
+from sniff.analysis.site_ear import SiteEar
 from sniff.bus.live import LiveItem
 from sniff.bus.model import BusModel
 from sniff.bus.offline import survey
+from sniff.bus.site import site_bus, site_name
 from sniff.cli import INTERRUPTED, PORT_TROUBLE, UNREADABLE, USAGE, Failure, arguments, check_output, filtering
 from sniff.cli.check_output import Checked
 from sniff.cli.interruption import until_interrupted
@@ -66,7 +70,9 @@ def run(args: argparse.Namespace) -> int:
     for code in _words(args.only) + _words(args.ignore):
         _require_known(code)
     fail_on = None if args.fail_on == "never" else Severity[args.fail_on.upper()]
-    checked = [_select(one, args) for one in _check(args)]
+    found = _check(args)
+    selected = [_select(one, args) for one in (found if args.filter else _with_sites(found))]
+    checked = [one for one in selected if one.findings or not one.buses]
     colour = arguments.colour()
     {
         "text": lambda: check_output.write_text(checked, colour),
@@ -81,7 +87,9 @@ def _check(args: argparse.Namespace) -> list[Checked]:
     """Every source; the parts of one recording are one."""
     ports = [source for source in args.sources if not _is_file(source)]
     if not ports:
-        return [_read(name, capture, args) for name, capture in arguments.open_captures(args.sources)]
+        opened = arguments.open_captures(args.sources)
+        sites = Counter(site_name(name) for name, _ in opened)
+        return [_read(name, capture, args, sites[site_name(name)] > 1) for name, capture in opened]
     source = ports[0]
     named = source.startswith(("/dev/", "COM", "\\\\")) or "://" in source or Path(source).is_char_device()
     if not named and ("." in source or "/" in source):
@@ -98,13 +106,26 @@ def _is_file(source: str) -> bool:
     return source == "-" or source.lower().endswith(suffixes()) or path.is_file() or path.is_fifo()
 
 
-def _read(source: str, capture: Capture, args: argparse.Namespace) -> Checked:
-    """What was found in a capture."""
+def _with_sites(checked: list[Checked]) -> list[Checked]:
+    """What was found, and in front of the buses of one recording what they say together."""
+    sites: dict[str, list[Checked]] = {}
+    for one in checked:
+        sites.setdefault(site_name(one.source), []).append(one)
+    told: list[Checked] = []
+    for name, buses in sites.items():
+        told += check_output.as_site(name, buses)
+    return told
+
+
+def _read(source: str, capture: Capture, args: argparse.Namespace, several: bool = False) -> Checked:
+    """What was found in a capture; `several`: one of several buses of a recording."""
     session = arguments.settings_of(args, capture.session, source)
     run_of = Checking(
         BusModel(session, dissector_for(session), arguments.noted_devices(args, session), with_points=False)
     )
-    survey(Watched(capture), session, run_of.model, run_of, reference=args.reference)
+    ear = SiteEar()
+    ears = [ear] if several else []
+    survey(Watched(capture), session, run_of.model, run_of, *ears, reference=args.reference)
     complete = capture.completeness()
     notes = [] if complete.whole else [complete.text]
     if session.unknown:
@@ -112,7 +133,8 @@ def _read(source: str, capture: Capture, args: argparse.Namespace) -> Checked:
         notes.append(f"no settings were found while this was recorded, so nothing is judged; name them with {name}")
     result = run_of.result(source, "; ".join(notes))
     shown = filtering.shown_findings(args, capture, session, result.findings, run_of.model.devices)
-    return result.with_findings(shown)
+    result = result.with_findings(shown)
+    return replace(result, site_bus=site_bus(run_of.model, ear)) if several else result
 
 
 def _listen(port: str, args: argparse.Namespace) -> Checked:

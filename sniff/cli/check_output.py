@@ -1,4 +1,4 @@
-"""What `check` prints: text for people, JSON Lines for programs, JUnit XML for build servers."""
+"""The output of `check`: text for people, JSON Lines for programs, JUnit XML for build servers."""
 
 from __future__ import annotations
 
@@ -17,6 +17,8 @@ from dissectors.line import NS_PER_S
 from sniff.analysis.health import Health
 from sniff.analysis.judging import rules_over
 from sniff.analysis.plain import plain
+from sniff.analysis.site_findings import SiteBus, judged
+from sniff.analysis.site_rules import SITE, SITE_RULES
 from sniff.analysis.wording import station_word
 from sniff.cli.rows import iso
 from sniff.engine.follow_settings import dissector_for
@@ -32,6 +34,7 @@ class Checked:
     """What the rules found in one source.
 
     `note`: why it is not whole. `stations`: health by address. `starts`: begin of each frame by its number − 1, ns.
+    `site_bus`: what others on the same clock are held against. `buses`: of what several say together, their names.
     """
 
     source: str
@@ -43,6 +46,8 @@ class Checked:
     health: Health
     stations: Mapping[int, Health]
     starts: array[int]
+    site_bus: SiteBus | None = None
+    buses: tuple[str, ...] = ()
 
     def with_findings(self, findings: tuple[Finding, ...]) -> Checked:
         """The same with a choice of its findings."""
@@ -51,6 +56,28 @@ class Checked:
     def start(self, no: int) -> int | None:
         """When a frame began, ns since the epoch."""
         return self.starts[no - 1] if 0 < no <= len(self.starts) else None
+
+
+def as_site(name: str, buses: Sequence[Checked]) -> list[Checked]:
+    """The buses of one recording, behind what they say together where that is anything."""
+    held = [one.site_bus for one in buses if one.site_bus is not None]
+    if len(held) < 2 or len(held) < len(buses):
+        return list(buses)
+    site = judged([replace(bus, findings=one.findings) for bus, one in zip(held, buses, strict=True)])
+    told = [one.with_findings(own) for one, own in zip(buses, site.buses, strict=True)]
+    if not site.findings:
+        return told
+    seconds, frames = max(one.seconds for one in buses), sum(one.frames for one in buses)
+    names = tuple(bus.name for bus in held)
+    return [
+        replace(buses[0], source=name, note="", seconds=seconds, frames=frames, findings=site.findings, buses=names),
+        *told,
+    ]
+
+
+def _rules(one: Checked) -> Mapping[str, Rule]:
+    """The catalogue by which it was judged."""
+    return SITE_RULES if one.buses else rules_over(dissector_for(one.session))
 
 
 def failures(findings: Sequence[Finding], fail_on: Severity, code: str = "") -> list[Finding]:
@@ -81,13 +108,17 @@ def write_text(checked: Sequence[Checked], colour: bool) -> None:
             _write_finding(one, finding, width, colour)
         print()
         print(_count_words(one.findings))
-    if len(checked) > 1 and len({one.session.bus for one in checked}) == 1:  # several buses are told apart
+    is_one_bus = len({one.session.bus for one in checked}) == 1 and not any(one.buses for one in checked)
+    if len(checked) > 1 and is_one_bus:  # several buses are told apart
         _write_together(checked, width)
 
 
 def _write_head(one: Checked, width: int) -> None:
     session = one.session
     heard = f"{_span(one.seconds)}, {one.frames} frames"
+    if one.buses:
+        print(f"{plain(one.source)}: {plain(', '.join(one.buses))} together, {heard}")
+        return
     print(f"{plain(one.source)}: {session.protocol_words}, {session.line_words}, {heard}")
     if one.note:
         print(f"  incomplete: {one.note}")
@@ -158,7 +189,7 @@ def _paragraph(text: str, width: int, first: str, rest: str | None = None) -> No
 
 
 def _title(one: Checked, finding: Finding) -> str:
-    rule = rules_over(dissector_for(one.session)).get(finding.code)
+    rule = _rules(one).get(finding.code) or SITE_RULES.get(finding.code)
     return rule.title if rule is not None else ""
 
 
@@ -237,7 +268,7 @@ def write_junit(checked: Sequence[Checked], fail_on: Severity) -> None:
 
 
 def _suite(one: Checked, fail_on: Severity) -> list[str]:
-    rules: dict[str, Rule] = rules_over(dissector_for(one.session))
+    rules, kind = _rules(one), SITE if one.buses else one.session.protocol
     failing = {finding.code for finding in failures(one.findings, fail_on)}
     head = (
         f"  <testsuite name={_attribute(one.source)} tests={_attribute(str(len(rules)))} "
@@ -246,7 +277,7 @@ def _suite(one: Checked, fail_on: Severity) -> list[str]:
     lines = [head]
     for code, rule in sorted(rules.items()):
         found = [finding for finding in one.findings if finding.code == code]
-        case = f"    <testcase classname={_attribute(one.session.protocol)} name={_attribute(f'{code} {rule.title}')}"
+        case = f"    <testcase classname={_attribute(kind)} name={_attribute(f'{code} {rule.title}')}"
         if not found:
             lines.append(case + "/>")
             continue

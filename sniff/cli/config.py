@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import asdict
 
 from sniff.cli import USAGE, Failure, json_output
 from sniff.config import FILE, ConfigError, load
@@ -37,6 +38,13 @@ def run(args: argparse.Namespace) -> int:
         for key, value in values.items():
             if value is not None:
                 print(f"  {key} = {value!r}  # {bus.origin.get(key, config.path)}")
+    box = {key: value for key, value in asdict(config.box).items() if value is not None}
+    if box and args.json:
+        print(json_output.dumps({"box": box, "from": str(config.path)}))
+    elif box:
+        print("[box]")
+        for key, value in box.items():
+            print(f"  {key} = {value!r}  # {config.path}")
     for section, filters in (("filters", config.filters), ("colours", config.colours)):
         if filters and args.json:
             print(json_output.dumps({section: dict(filters), "from": str(config.path)}))

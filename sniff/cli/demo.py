@@ -9,7 +9,7 @@ import sys
 
 from dissectors import registry
 from sniff.capture.config import RecordSpec, SourceSpec
-from sniff.cli import PORT_TROUBLE, USAGE, Failure, arguments, listening, targets
+from sniff.cli import PORT_TROUBLE, USAGE, Failure, arguments, listening, outlets, targets
 from sniff.cli.live import show
 
 DEFAULT_DURATION = 10.0
@@ -25,8 +25,11 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--duration", type=arguments.duration, metavar="TIME", help="stop after (default without a terminal: 10 s)"
     )
-    parser.add_argument("--json", action="store_true", help="JSON lines instead of the terminal UI")
+    parser.add_argument(
+        "--json", action="store_true", help="JSON lines instead of the terminal UI: frames, values, findings, health"
+    )
     parser.add_argument("--lines", action="store_true", help="lines of text instead of the terminal UI")
+    outlets.add_outlets(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -38,6 +41,7 @@ def run(args: argparse.Namespace) -> int:
         plan = scenario(args.protocol or registry.DEFAULT, args.seed, not args.clean, args.line)
     except UnknownScenario as error:
         raise Failure(f"demo: {error}", USAGE) from None
+    told_to = outlets.prepare(outlets.settings_of(args), [outlets.Printed()] if args.json else ())
     on_terminal = arguments.on_terminal() and not args.json and not args.lines
     duration = args.duration or (None if on_terminal else DEFAULT_DURATION)
     print(f"sniff485: virtual bus, {plan.line}: {plan.text}", file=sys.stderr)
@@ -50,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
             record = RecordSpec(args.write) if args.write else None
             live = listening.start(source, record, duration, devices)
             bus.begin()  # with the sniffer listening, so that the first words of the bus are heard
-            return show(live, args.json, args.lines)
+            return show([live], args.json, args.lines, told_to)
     except BrokenPipeError:  # whoever read our output went away
         raise
     except (BusFailed, OSError) as error:

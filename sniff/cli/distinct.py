@@ -1,4 +1,4 @@
-"""Which numbers there are in a column, and where each row's stands among them."""
+"""The distinct numbers in a column, and where each row's stands among them."""
 
 from __future__ import annotations
 

@@ -107,8 +107,8 @@ def _capture(bus: _Bus, fifo: str) -> int:
 
     from sniff.bus.capture_writer import live_pcapng
     from sniff.capture.config import SourceSpec
+    from sniff.capture.ipc import Ended, ReceivedMessage, Tick
     from sniff.capture.link import CaptureLink
-    from sniff.capture.wire import Ended, Received, Tick
     from sniff.cli.interruption import until_interrupted
     from sniff.engine.capture import CaptureError
     from sniff.sources import PortError
@@ -125,7 +125,7 @@ def _capture(bus: _Bus, fifo: str) -> int:
             writer = live_pcapng(fifo, link.session(0))
             while ended is None and not caught:
                 for message in link.receive(0.2):
-                    if isinstance(message, Received):
+                    if isinstance(message, ReceivedMessage):
                         writer.write(message.item)
                     elif isinstance(message, Tick):
                         writer.advance(message.now)

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
+import sys
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import Any
 
 from dissectors import registry
@@ -13,11 +16,12 @@ from dissectors.line import MS, NS_PER_S
 from dissectors.manifest import Dissector
 from dissectors.profiles import Devices
 from dissectors.tracker import Transaction
+from sniff.analysis.plain import plain
 from sniff.bus.offline import Source, survey
-from sniff.cli import USAGE, Failure
+from sniff.cli import USAGE, Failure, arguments
 from sniff.cli.progress import Watched
 from sniff.cli.tables import safe_cell
-from sniff.engine.capture import Capture
+from sniff.engine.capture import Capture, CaptureError
 from sniff.engine.engine import Row
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.observer import Observer
@@ -25,7 +29,7 @@ from sniff.engine.session import Session
 from sniff.engine.verdict_join import Wanted
 from sniff.filter import Filter, FilterError, Scope, compile_filter
 from sniff.filter.compiling import field_of
-from sniff.filter.errors import nearest
+from sniff.filter.errors import OfOthers, nearest
 from sniff.filter.fields import ALIASES, COLUMN_TYPES, column_type, types_of
 
 MOST_WORDS = 12
@@ -49,17 +53,43 @@ def add_help_fields(parser: argparse.ArgumentParser) -> None:
 
 
 def filter_of(args: argparse.Namespace, capture: Source, session: Session, devices: Devices | None = None) -> Filter:
-    """What -Y says, for a capture; ends with exit code 2 where it cannot be read."""
+    """What -Y says, for a capture; ends with exit code 2 where it cannot be read, or asks for what frames of this
+    protocol cannot have. Of several captures, one at least must have it."""
     dissector = dissector_for(session)
     scope = Scope(session.started, devices or Devices())
     try:
-        wanted = compile_filter(args.filter, dissector, scope)
-        if "finding" in wanted.names:
-            found = _evidence(capture, session, scope.devices)
-            wanted = compile_filter(args.filter, dissector, Scope(session.started, scope.devices, {}, found))
+        return _compiled(args.filter, capture, session, scope)
+    except OfOthers as error:
+        refused = args.of_others = getattr(args, "of_others", frozenset()) | {id(capture)}
+        if len(refused) >= arguments.captures_open():
+            raise Failure(f"filter {args.filter!r}: {error}", USAGE) from None
+        print(f"sniff485: {plain(session.port)}: {plain(error)}", file=sys.stderr)
+        return compile_filter(args.filter, dissector, scope, others=True)
     except FilterError as error:
         raise Failure(f"filter {args.filter!r}: {error}", USAGE) from None
-    return wanted
+
+
+def _compiled(text: str, capture: Source, session: Session, scope: Scope) -> Filter:
+    """The filter with all that it asks for beside the rows: findings, values of points, lines with devices in them."""
+    dissector = dissector_for(session)
+    wanted = compile_filter(text, dissector, scope)
+    if "finding" in wanted.names:
+        scope = replace(scope, findings=_evidence(capture, session, scope.devices))
+    if wanted.points:
+        from sniff.bus.asked_rows import points_told
+
+        points = points_told(capture, session, scope.devices, wanted.points)
+        scope = replace(scope, told=points.of, telling=points.telling)
+    if "text" in wanted.names and scope.devices:
+        from sniff.bus.asked_rows import lines_said
+
+        scope = replace(scope, says=lines_said(capture, session, scope.devices))
+    if wanted.by_request:
+        from sniff.bus.asked_rows import fields_answered
+
+        scope = replace(scope, answered=fields_answered(capture, session, wanted.by_request))
+    again = wanted.points or wanted.by_request or wanted.names & {"finding", "text"}
+    return compile_filter(text, dissector, scope) if again else wanted
 
 
 def surveyed(
@@ -110,7 +140,8 @@ def _evidence(capture: Source, session: Session, devices: Devices) -> dict[int, 
     from sniff.analysis.judging import Judging
 
     judging = Judging(session, dissector_for(session), devices)
-    survey(capture, session, judging)
+    with contextlib.suppress(CaptureError):  # who shows the rows says so
+        survey(capture, session, judging)
     found: dict[int, frozenset[str]] = {}
     for finding in judging.findings():
         for no in finding.evidence:

@@ -7,6 +7,7 @@ Exit code 1 when something is wrong with a bus, 3 when a file could not be read.
 from __future__ import annotations
 
 import argparse
+import shutil
 import sys
 import time
 from collections.abc import Iterator
@@ -19,10 +20,11 @@ from sniff.cli import UNREADABLE, USAGE, Failure, arguments, json_output, writin
 from sniff.engine.capture import CaptureError
 from sniff.fleet import running
 from sniff.fleet.answer import Answer, answer, marks
-from sniff.fleet.archive import FileState, Task, files_below, is_being_written, tasks_of
+from sniff.fleet.archive import FileState, Task, Unreadable, files_below, is_being_written, tasks_of
 from sniff.fleet.bus_day import Archive, BusDay
 from sniff.fleet.index import NAME, Index
-from sniff.fleet.running import Done, Unreachable
+from sniff.fleet.pieces import cut
+from sniff.fleet.running import Collecting, Done, Unreachable
 
 WATCHED_EVERY = 60.0
 """Seconds between looks at an archive that is watched."""
@@ -37,7 +39,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--index", metavar="FILE", help=f"the index (default: {NAME} in the first folder)")
     parser.add_argument("--no-index", action="store_true", help="read everything again, keep nothing")
     parser.add_argument("--json", action="store_true", help="one JSON object a bus")
-    parser.add_argument("--all", action="store_true", help="all buses in the text, not only the worst")
+    parser.add_argument("--all", action="store_true", help="all buses in the text, whole lines, not one screen")
     parser.add_argument("--parquet", metavar="FILE", help="a row a bus, day and station as a Parquet file")
     parser.add_argument("--html", metavar="FILE", help="one page that stands alone")
     parser.add_argument("-f", "--force", action="store_true", help="overwrite files that are there")
@@ -65,11 +67,10 @@ def run(args: argparse.Namespace) -> int:
 def _once(args: argparse.Namespace, index: Index | None) -> int:
     now = time.time_ns()
     found = [one for one in _find(args) if not is_being_written(one[1], now)]
-    tasks, unreadable = tasks_of(found, args.since)
+    tasks, unreadable = tasks_of(found, args.since) if index is None else _known_tasks(index, found, args.since)
     archive = Archive(unreadable={one.file.path: one.why for one in unreadable})
     missing = []
-    for task in tasks:
-        known = index.get(task) if index is not None else None
+    for task, known in index.known(tasks) if index is not None else ((task, None) for task in tasks):
         if known is None:
             missing.append(task)
         for day in known or ():
@@ -87,6 +88,14 @@ def _once(args: argparse.Namespace, index: Index | None) -> int:
     return int(any(bus.troubles or bus.is_silent for bus in said.buses))
 
 
+def _known_tasks(
+    index: Index, found: list[tuple[str, FileState]], since: int | None
+) -> tuple[list[Task], list[Unreadable]]:
+    grouped = tasks_of(found, since, index.look())
+    index.keep_looks()
+    return grouped
+
+
 def _add(args: argparse.Namespace, archive: Archive, day: BusDay) -> None:
     """A day that was asked for: a file may hold some that were before."""
     if args.since is None or day.last is None or day.last >= args.since:
@@ -101,8 +110,13 @@ def _find(args: argparse.Namespace) -> list[tuple[str, FileState]]:
 
 
 def _read(args: argparse.Namespace, index: Index | None, archive: Archive, missing: list[Task], whole: int) -> None:
-    progress = _Progress(len(missing), whole)
-    for done in _run(args, missing):
+    pieces = [piece for task in missing for piece in cut(task)]
+    progress, collecting = _Progress(len(pieces), whole - len(missing)), Collecting(pieces)
+    for piece in _run(args, pieces):
+        progress.tell(piece)
+        done = collecting.add(piece)
+        if done is None:
+            continue
         if done.failed is not None:
             for file in done.task.files:
                 archive.unreadable[file.path] = done.failed
@@ -111,7 +125,8 @@ def _read(args: argparse.Namespace, index: Index | None, archive: Archive, missi
                 index.put(done.task, list(done.days))
             for day in done.days:
                 _add(args, archive, day)
-        progress.tell(done)
+    if index is not None:
+        index.flush()
     progress.clear()
 
 
@@ -147,7 +162,7 @@ def _index(args: argparse.Namespace) -> Index | None:
 
 
 def _write(args: argparse.Namespace, archive: Archive, said: Answer) -> None:
-    from sniff.fleet import text, values
+    from sniff.fleet import values
 
     if args.parquet:
         _write_parquet(args.parquet, archive)
@@ -162,8 +177,20 @@ def _write(args: argparse.Namespace, archive: Archive, said: Answer) -> None:
         for value in values.as_values(said):
             print(json_output.dumps(value))
     else:
-        for line in text.page(said, len(said.buses) if args.all else text.SHOWN):
+        for line in _page(said, args.all):
             print(line)
+
+
+def _page(said: Answer, whole: bool) -> Iterator[str]:
+    """On a terminal one screen, unless all is asked for."""
+    from sniff.fleet import text
+
+    if whole:
+        return text.page(said, len(said.buses))
+    if not sys.stdout.isatty():
+        return text.page(said)
+    size = shutil.get_terminal_size()
+    return text.page(said, len(said.buses), size.columns, size.lines - 1)
 
 
 def _write_parquet(place: str, archive: Archive) -> None:
@@ -191,8 +218,8 @@ def _day(word: str) -> int:
 class _Progress:
     """How far it is, on a terminal."""
 
-    def __init__(self, missing: int, whole: int) -> None:
-        self._missing, self._whole = missing, whole
+    def __init__(self, missing: int, known: int) -> None:
+        self._missing, self._known = missing, known
         self._done = self._failed = 0
         self._began = time.monotonic()
 
@@ -201,9 +228,8 @@ class _Progress:
         self._failed += done.failed is not None
         if sys.stderr.isatty() and time.monotonic() - self._began > 0.5:
             failed = f", {self._failed} failed" if self._failed else ""
-            known = self._whole - self._missing
             print(
-                f"\r\x1b[Kread {self._done} of {self._missing}{failed}; {known} known from the index; "
+                f"\r\x1b[Kread {self._done} of {self._missing}{failed}; {self._known} known from the index; "
                 f"{plain(done.task.name)[-60:]}",
                 end="", file=sys.stderr, flush=True,
             )  # fmt: skip

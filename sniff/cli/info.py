@@ -7,7 +7,7 @@ import sys
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from dissectors.line import MS
+from dissectors.line import MS, NS_PER_S
 from dissectors.tracker import Verdict
 from dissectors.words import milliseconds
 from sniff.analysis.nodes import Node
@@ -22,6 +22,9 @@ from sniff.engine.session import Adapter, LineEvent, Session, settings_change
 
 if TYPE_CHECKING:
     from sniff.engine.table import Table
+
+UNDATED = 366 * 86_400 * NS_PER_S
+"""ns since 1970: a capture from before has no date, but times since its begin or since midnight."""
 
 MOST_LISTED = 10
 """Kinds, errors and the like that are named in a line."""
@@ -139,8 +142,11 @@ def _print(path: str, capture: Capture, session: Session, summary: Summary, even
     if summary.load.first is None or summary.load.last is None:
         _line("content", "no octets" if not summary.searched else "only what was heard while searching for settings")
     else:
-        _line("from", iso(summary.load.first))
-        _line("to", f"{iso(summary.load.last)} ({_span(summary.seconds)})")
+        if session.started < UNDATED:
+            _line("times", f"{_span(summary.seconds)}; the file has no date")
+        else:
+            _line("from", iso(summary.load.first))
+            _line("to", f"{iso(summary.load.last)} ({_span(summary.seconds)})")
     _line("protocol", _settings(session))
     if summary.searched or session.unknown:
         _line("search", _search(session, summary, events))

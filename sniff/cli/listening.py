@@ -1,4 +1,4 @@
-"""What `live`, `record` and `demo` share: how a capture is started, run and ended."""
+"""Listening, as `live`, `record` and `demo` share it: how a capture is started, run and ended."""
 
 from __future__ import annotations
 
@@ -52,7 +52,10 @@ def start_all(
     link = start_link([target.source for target in targets], record, duration, count, watched)
     try:
         router = Router(link)
-        return [_live(link, router, bus, target, watched) for bus, target in enumerate(targets)]
+        lives = [_live(link, router, bus, target, watched) for bus, target in enumerate(targets)]
+        for live in lives:
+            live.beside_others = len(lives) > 1
+        return lives
     except BaseException:
         link.stop()  # a capture outlives its starter unless it is told to end
         raise
@@ -243,6 +246,9 @@ class _Meter:
             return
         self.next = now + 0.5
         lines = [self._line(printer, now) for printer in self.printers]
+        told = self.printers[0].telling
+        if told is not None and told.counted:
+            lines[0] += f"  {plain(told.counted)}"
         print(self._up() + "\n".join(f"\r\x1b[K{line}" for line in lines), end="", file=sys.stderr, flush=True)
         self._shown = len(lines)
 

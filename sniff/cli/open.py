@@ -1,11 +1,14 @@
 """Keys are shown at the foot of the screen and under `?`. Several captures are shown one after the other,
-the parts of one recording as one."""
+the parts of one recording as one, its buses beside each other: `b` goes from one to the next. --follow shows a
+recording while another process writes it, a second behind the bus.
+"""
 
 from __future__ import annotations
 
 import argparse
+from collections import Counter
 
-from sniff.cli import USAGE, Failure, arguments
+from sniff.cli import UNREADABLE, USAGE, Failure, arguments
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -13,17 +16,53 @@ def configure(parser: argparse.ArgumentParser) -> None:
     arguments.add_files(parser)
     arguments.add_line(parser)
     arguments.add_devices(parser)
+    parser.add_argument("--follow", action="store_true", help="go on with what is still being recorded into FILE")
 
 
 def run(args: argparse.Namespace) -> int:
     """Show captures in the terminal UI."""
+    if args.follow:
+        return _follow(args)
     captures = arguments.open_captures(args.files)
     if not arguments.on_terminal():
         raise Failure("open needs a terminal; use `sniff485 show` for text", USAGE)
     from sniff.bus.file_source import FileFeed
+    from sniff.bus.site import site_name
     from sniff.tui import run as run_tui
 
+    sites: dict[str, list[FileFeed]] = {}
+    shares = Counter(site_name(path) for path, _ in captures)
     for path, capture in captures:
-        session = arguments.settings_of(args, capture.session, path)
-        run_tui(FileFeed(path, capture, session, arguments.noted_devices(args, session)))
+        session, name = arguments.settings_of(args, capture.session, path), site_name(path)
+        feed = FileFeed(path, capture, session, arguments.noted_devices(args, session), shares[name])
+        sites.setdefault(name, []).append(feed)
+    for feeds in sites.values():
+        run_tui(feeds)
+    return 0
+
+
+def _follow(args: argparse.Namespace) -> int:
+    """A recording that grows is a source like a port, which is not recorded again."""
+    if len(args.files) > 1:
+        raise Failure("--follow: one recording at a time", USAGE)
+    from sniff.bus.row_source import LiveFeed
+    from sniff.capture.config import SourceSpec
+    from sniff.cli import listening
+    from sniff.engine.capture import CaptureError
+    from sniff.recording.following import Following
+    from sniff.tui import run as run_tui
+
+    path = args.files[0]
+    try:
+        session = arguments.settings_of(args, Following(path).session, path)
+    except CaptureError as error:
+        raise Failure(str(error), UNREADABLE) from None
+    if session.unknown:
+        raise Failure(f"{path}: its settings are still being searched for; try again, or name them with -s, -p", USAGE)
+    if not arguments.on_terminal():
+        raise Failure("open needs a terminal; use `sniff485 show` for text", USAGE)
+    devices = arguments.noted_devices(args, session)
+    bus = session.bus or "bus"
+    live = listening.start(SourceSpec(f"follow:{path}", session.line, session.protocol, bus), None, devices=devices)
+    run_tui(LiveFeed(live))
     return 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 import time
 from collections.abc import Callable, Iterable
@@ -11,14 +12,15 @@ from sniff.analysis.plain import plain
 from sniff.analysis.summary import Summary
 from sniff.bus.live import LiveBus, LiveItem, LiveTables
 from sniff.bus.triggers import Fired, Triggers
-from sniff.capture.wire import Ended, Status
+from sniff.capture.ipc import Ended, Status
 from sniff.cli import rows
 from sniff.engine.engine import Output
 from sniff.engine.session import LineEvent, LineEventKind
 from sniff.engine.table import Table
-from sniff.engine.verdict_join import Settled, Settling
+from sniff.engine.verdict_join import JudgedRow, VerdictJoin
 
 if TYPE_CHECKING:
+    from sniff.cli.outlets import Telling
     from sniff.outlets.alerts import Alerts
     from sniff.outlets.news import NewsDesk
 
@@ -40,11 +42,13 @@ class Printer:
         self.triggers: Triggers | None = None
         self.alerts: tuple[Alerts, NewsDesk] | None = None
         self.every_second: Callable[[], None] | None = None
+        self.names_bus = False  # whether each frame says of which bus it is
+        self.telling: Telling | None = None
         self._judge_at = 0.0
         self._session = live.session
         self._trouble = ""
         self._waited = False
-        self._settling = Settling(live.points)
+        self._settling = VerdictJoin(live.points)
 
     @property
     def summary(self) -> Summary:
@@ -74,6 +78,9 @@ class Printer:
         if asked and time.monotonic() >= self._judge_at:
             self._judge_at = time.monotonic() + JUDGED_EVERY
             self._judge()
+        for text in self.telling.take_said() if self.telling is not None else ():
+            self.before_saying()
+            print(f"sniff485: {plain(text)}", file=sys.stderr)
         if not self.quiet:
             sys.stdout.flush()
 
@@ -83,7 +90,7 @@ class Printer:
             self.every_second()
         if self.triggers is None and self.alerts is None:
             return
-        findings = self.live.model.findings()
+        findings = self.live.findings()
         if self.triggers is not None:
             self._fire(self.triggers.judge(findings))
         if self.alerts is not None:
@@ -117,7 +124,7 @@ class Printer:
     def _settle(self) -> None:
         """A search has ended: go on with what it found."""
         self._session = self.live.session
-        self._settling = Settling(self.live.points)  # what came before belongs to no transaction
+        self._settling = VerdictJoin(self.live.points)  # what came before belongs to no transaction
 
     def finish(self) -> None:
         """Print what still waits for a verdict."""
@@ -129,13 +136,16 @@ class Printer:
         for settled in self._settling.add(output):
             self._print(settled)
 
-    def _print(self, settled: Settled) -> None:
+    def _print(self, settled: JudgedRow) -> None:
         if self.quiet:
             return
+        session = self.live.session
         if self.as_json:
-            print(rows.json_line(settled, self.live.dissector, self.live.session))
+            line = rows.json_line(settled, self.live.dissector, session)
+            print(f'{{"bus": {json.dumps(session.bus)}, {line[1:]}' if self.names_bus else line)
         else:
-            print(rows.text_line(settled, self.live.dissector, self.live.session, self.colour))
+            line = rows.text_line(settled, self.live.dissector, session, self.colour)
+            print(f"{plain(session.bus)}  {line}" if self.names_bus else line)
 
     def _say(self, text: str) -> None:
         self.before_saying()

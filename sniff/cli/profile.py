@@ -114,6 +114,9 @@ def _show(args: argparse.Namespace) -> int:
             print(f"{family} longest frame: {limits.frame} octets")
         if limits.response is not None:
             print(f"{family} answers within: {limits.response / MS:g} ms")
+        if limits.responses:
+            by_rate = ", ".join(f"{rate} Bd {most / MS:g} ms" for rate, most in sorted(limits.responses.items()))
+            print(f"{family} answers within: {by_rate}")
         if limits.stations is not None:
             print(f"{family} station numbers: {limits.stations[0]} … {limits.stations[1]}")
         if limits.functions is not None:
@@ -185,7 +188,8 @@ def _print_codes(profile: Profile) -> None:
         for bit in entry.bits:
             print(f"  bit {bit.number:X}  {bit.on}" + (f", else {bit.off}" if bit.off else ""))
         if entry.reserved_bits:
-            print(f"  bits {' '.join(f'{bit:X}' for bit in entry.reserved_bits)}  reserved, to be written as 0")
+            bits = " ".join(f"{bit:X}" for bit in entry.reserved_bits)
+            print(f"  bits {bits}  reserved" + (", to be written as 0" if entry.access.writable else ""))
         for part in entry.parts:
             print(f"  bits {part.low:X}…{part.high:X}  {part.name}")
             for code, words in part.states.items():

@@ -8,10 +8,7 @@ from __future__ import annotations
 import argparse
 
 from sniff.capture.config import RecordSpec
-from sniff.cli import USAGE, Failure, arguments, listening, printing, targets, telling
-
-NAMED = 3
-"""Buses that the name of a new file names."""
+from sniff.cli import USAGE, Failure, arguments, listening, outlets, printing, targets, telling
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -50,11 +47,13 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--before", type=arguments.duration, metavar="TIME", help="keep only what surrounds a trigger:")
     parser.add_argument("--after", type=arguments.duration, metavar="TIME", help="so much before and after it")
     parser.add_argument(
-        "--metrics",
-        type=arguments.whole,
-        metavar="PORT",
-        help="serve OpenMetrics on the loopback at this port (/metrics; 0: any free one)",
+        "--json",
+        action="store_const",
+        const="-",
+        dest="json_lines",
+        help="values, findings and health on standard output: JSON Lines",
     )
+    outlets.add_outlets(parser)
     parser.add_argument("-q", "--quiet", action="store_true", help="no progress, no summary")
 
 
@@ -62,7 +61,7 @@ def run(args: argparse.Namespace) -> int:
     """Record until the end."""
     buses = targets.targets_of(args)
     path = args.write or (buses[0].record if len(buses) == 1 else None)
-    path = path or targets.new_recording("-".join(target.source.bus for target in buses[:NAMED]))
+    path = path or targets.new_recording("-".join(target.source.bus for target in buses[: targets.NAMED]))
     targets.refuse_recording(path)
     if (args.keep or args.keep_free) and not args.rotate:
         raise Failure(
@@ -72,12 +71,13 @@ def run(args: argparse.Namespace) -> int:
     before, after = (None if each is None else int(each * 1e9) for each in (args.before, args.after))
     if not args.on and (before is not None or after is not None):
         raise Failure("--before, --after: round which trigger? say with --on FILTER or --on CODE", USAGE)
+    told_to = outlets.prepare(outlets.settings_of(args))
     record = RecordSpec(path, args.rotate, args.keep, before, after, args.keep_free)
     lives = listening.start_all(buses, record, args.duration, args.count, watched=False)
     try:
         printers = [printing.Printer(live, quiet=True) for live in lives]
         telling.add_triggers(printers, args.on)
-        with telling.alerting(printers), telling.serving_metrics(printers, args.metrics):
+        with telling.alerting(printers), outlets.telling(lives, told_to) as printers[0].telling:
             code = listening.run(printers, not args.quiet)
     except KeyboardInterrupt:  # before anybody listened to signals: the capture must not go on
         lives[0].stop()

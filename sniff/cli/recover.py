@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import argparse
 import sys
+from pathlib import Path
 
 from sniff.analysis.plain import plain
-from sniff.cli import arguments, writing
+from sniff.cli import UNREADABLE, Failure, arguments, writing
+from sniff.engine.capture import CaptureError
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -21,6 +23,8 @@ def run(args: argparse.Namespace) -> int:
     """Write a whole file."""
     from dataclasses import replace
 
+    if args.bus is None and args.output.lower().endswith(".mcap") and _buses_recorded(args.file) > 1:
+        return _all_buses(args)
     capture = arguments.open_capture(args.file)
     session = capture.session
     before = capture.completeness()
@@ -30,4 +34,28 @@ def run(args: argparse.Namespace) -> int:
     complete = capture.completeness()
     said = "was whole" if complete.whole else complete.text
     print(f"sniff485: {args.file}: {plain(said)}", file=sys.stderr)
+    return 0
+
+
+def _buses_recorded(path: str) -> int:
+    """How many buses a recording has; 0 for other files."""
+    from sniff.recording.reader import buses_of
+
+    try:
+        return len(buses_of(path))
+    except CaptureError:
+        return 0
+
+
+def _all_buses(args: argparse.Namespace) -> int:
+    """A recording of several buses as one again."""
+    from sniff.recording.recovery import recover
+
+    writing.refuse_to_overwrite(Path(args.output), [args.file], args.force)
+    try:
+        before = recover(args.file, args.output)
+    except CaptureError as error:
+        raise Failure(str(error), UNREADABLE) from None
+    said = "was whole" if before.whole else before.text
+    print(f"sniff485: {plain(args.file)}: {plain(said)}", file=sys.stderr)
     return 0

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import argparse
 from typing import Any
 
-from dissectors.token_ring import TokenRing
+from dissectors.token_ring import StationTable, TokenRing
 from sniff.bus.offline import Source, survey
 from sniff.bus.watched_ring import WatchedRing
 from sniff.cli import tables
@@ -16,6 +17,15 @@ def ring_of(source: Source, session: Session, shown: TokenRing, reference: bool 
     watched = WatchedRing(shown.observer(session.timing))
     survey(source, session, watched, reference=reference)
     return watched.observer.ring()
+
+
+def show_stations(
+    source: Source, session: Session, shown: TokenRing, table: StationTable, args: argparse.Namespace
+) -> int:
+    """Print the stations that do not pass the token. Raises CaptureError as the source does."""
+    ring = ring_of(source, session, shown, args.reference)
+    tables.write(table.headings, table.rows(ring), args.style)
+    return 0
 
 
 def show(source: Source, session: Session, shown: TokenRing, style: str, reference: bool) -> int:

@@ -35,7 +35,7 @@ from sniff.engine.column_join import SettledRows
 from sniff.engine.engine import Row
 from sniff.engine.session import Session
 from sniff.engine.table import Table
-from sniff.engine.verdict_join import Settled
+from sniff.engine.verdict_join import JudgedRow
 
 _LATENCIES = {"latency_ms": "latency", "tx.latency_ms": "latency", "tx.latency_low_ms": "least"} | {
     "tx.latency_high_ms": "most"
@@ -113,7 +113,7 @@ class RowCells:
         pairs = zip(self._style.before, cells, strict=True)
         return b"".join(before + cell for before, cell in pairs) + self._style.end
 
-    def _values(self, item: Settled, names: Sequence[str]) -> list[Any]:
+    def _values(self, item: JudgedRow, names: Sequence[str]) -> list[Any]:
         values: dict[str, Any] = {}
         if any(name in rows.JSON_KEYS for name in names):
             values = rows.to_json(item, self._dissector, self._session)
@@ -142,7 +142,7 @@ class RowCells:
         return columns
 
     def _ask(self, row: Row, _: Stencil | None) -> bool:
-        cells = tuple(map(self._style.render, self._values(Settled(row, None), self._fields)))
+        cells = tuple(map(self._style.render, self._values(JudgedRow(row, None), self._fields)))
         if any(b"\0" in cell for cell in cells):
             return False
         self._cells.append(cells)

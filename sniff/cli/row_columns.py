@@ -19,7 +19,7 @@ from sniff.engine.column_join import SettledRows
 from sniff.engine.engine import Row
 from sniff.engine.session import Session
 from sniff.engine.table import Table, rows_at
-from sniff.engine.verdict_join import Settled
+from sniff.engine.verdict_join import JudgedRow
 
 MOST_SPECIMENS = 1 << 15
 
@@ -67,7 +67,7 @@ class RowColumns:
         if fixed:
             keys = list(_keys(settled, places))
             for key, row in _unknown(settled, places, keys, known):
-                known[key] = tuple(map(render, self._values(Settled(row, None), fixed)))
+                known[key] = tuple(map(render, self._values(JudgedRow(row, None), fixed)))
             nothing = (None,) * len(fixed)  # of odd rows, see below
             held = [known.get(key, nothing) for key in keys]
             columns.update(zip(fixed, map(list, zip(*held, strict=True)), strict=True))
@@ -82,7 +82,7 @@ class RowColumns:
                         columns[name][at] = render(value)
         return zip(*(columns[name] for name in names), strict=True)
 
-    def _values(self, item: Settled, names: Sequence[str], instants: bool = False) -> list[Cell]:
+    def _values(self, item: JudgedRow, names: Sequence[str], instants: bool = False) -> list[Cell]:
         values: dict[str, Cell] = {}
         if any(name in rows.JSON_KEYS for name in names):
             values = rows.to_json(item, self._dissector, self._session)

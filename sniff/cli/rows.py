@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from datetime import UTC, datetime
 from typing import Any
 
 from dissectors.frame import Frame, Role
 from dissectors.line import MS, NS_PER_S
 from dissectors.manifest import Dissector
+from sniff.analysis.json_text import iso as iso
 from sniff.analysis.plain import ascii_of
 from sniff.analysis.wording import describe, duration, is_error
 from sniff.cli import json_output
 from sniff.engine.session import Session
-from sniff.engine.verdict_join import Settled
+from sniff.engine.verdict_join import JudgedRow
 from sniff.formats.parquet import Kind
 
 JSON_KEYS = (
@@ -33,17 +33,7 @@ COLUMNS = {
 GOOD_VERDICTS = {"answered", "broadcast", "data", "open"}
 
 
-def iso(time: int) -> str:
-    """ns since the epoch as ISO 8601 in UTC with nine decimals."""
-    seconds, rest = divmod(time, NS_PER_S)
-    try:
-        stamp = datetime.fromtimestamp(seconds, UTC)
-    except (OverflowError, ValueError, OSError):  # a hostile file's time
-        return f"{time} ns"
-    return f"{stamp:%Y-%m-%dT%H:%M:%S}.{rest:09d}Z"
-
-
-def to_json(item: Settled, dissector: Dissector, session: Session, with_fields: bool = False) -> dict[str, Any]:
+def to_json(item: JudgedRow, dissector: Dissector, session: Session, with_fields: bool = False) -> dict[str, Any]:
     """One object a frame; the keys and their order are a promise. Noise has null where it has no such thing.
 
     What a search heard is an object too: "kind" is "searching", and "ok" null, for it is neither.
@@ -86,24 +76,24 @@ def since_start(time: int, session: Session) -> int:
     return max(0, time - session.started)
 
 
-def json_line(item: Settled, dissector: Dissector, session: Session, with_fields: bool = False) -> str:
+def json_line(item: JudgedRow, dissector: Dissector, session: Session, with_fields: bool = False) -> str:
     """The object on one line."""
     return json_output.dumps(to_json(item, dissector, session, with_fields))
 
 
-def typed(item: Settled, dissector: Dissector, session: Session) -> list[Any]:
+def typed(item: JudgedRow, dissector: Dissector, session: Session) -> list[Any]:
     """The values of `to_json` in the types of `COLUMNS`: the time is ns since the epoch."""
     return list({**to_json(item, dissector, session), "t": item.row.event.start}.values())
 
 
-def role_of(item: Settled) -> Role:
+def role_of(item: JudgedRow) -> Role:
     """The role as the tracker decided it."""
     if item.row.placement is not None:
         return item.row.placement.role
     return item.row.header.role if item.row.header is not None else Role.UNKNOWN
 
 
-def fields_of(item: Settled, dissector: Dissector) -> dict[str, int | float | str]:
+def fields_of(item: JudgedRow, dissector: Dissector) -> dict[str, int | float | str]:
     """Wireshark's names (ours under frame. and tx.) to values."""
     row, transaction = item.row, item.transaction
     event = row.event
@@ -126,7 +116,7 @@ def fields_of(item: Settled, dissector: Dissector) -> dict[str, int | float | st
     return fields
 
 
-def values_of(item: Settled, dissector: Dissector) -> list[dict[str, Any]]:
+def values_of(item: JudgedRow, dissector: Dissector) -> list[dict[str, Any]]:
     """Every register, object and property that a row tells, in the order of the wire; "name" and what follows it are
     null where no profile knows."""
     if item.meaning is None:
@@ -149,7 +139,7 @@ def values_of(item: Settled, dissector: Dissector) -> list[dict[str, Any]]:
     ]
 
 
-def text_line(item: Settled, dissector: Dissector, session: Session, colour: bool = False) -> str:
+def text_line(item: JudgedRow, dissector: Dissector, session: Session, colour: bool = False) -> str:
     """One line for people: number, seconds since the start, what it is, verdict and response time, doubts."""
     row, transaction = item.row, item.transaction
     seconds = since_start(row.event.start, session) / NS_PER_S

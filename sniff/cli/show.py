@@ -21,8 +21,9 @@ from sniff.cli.tables import Cell, plain_cell
 from sniff.engine.capture import Capture
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import Session
-from sniff.engine.verdict_join import Settled, Wanted
+from sniff.engine.verdict_join import JudgedRow, Wanted
 from sniff.filter import Filter
+from sniff.filter.fields import types_of
 from sniff.formats.parquet import ParquetWriter
 
 if TYPE_CHECKING:
@@ -77,7 +78,9 @@ def _show_all(args: argparse.Namespace, table: ParquetWriter | None) -> int:
         if args.explain:
             print(wanted.explain())
             continue
-        named = args.tree or args.fields  # then every register is named, with a profile or without
+        named = (
+            args.tree or args.fields or _by_request(args.names, session)
+        )  # then every register is named, with a profile or without
         spoken = devices if named or (devices and (not args.table or "text" in args.names)) else None
         ours = filtering.FieldCells(args.names, session, devices)
         if args.reference or spoken or named or ours or args.hex:
@@ -92,9 +95,15 @@ def _show_all(args: argparse.Namespace, table: ParquetWriter | None) -> int:
     return 0
 
 
+def _by_request(names: list[str], session: Session) -> bool:
+    """Whether answers have any of these fields by their request."""
+    types = types_of(dissector_for(session))
+    return any(types[name].by_request for name in names if name in types)
+
+
 def _settled(
     args: argparse.Namespace, capture: Capture, session: Session, devices: Devices | None, wanted: Wanted
-) -> Iterator[Settled]:
+) -> Iterator[JudgedRow]:
     watched = Watched(capture, prints=True)
     if args.reference:
         return settled(watched.items(), session, devices, wanted)
@@ -103,7 +112,7 @@ def _settled(
 
 def _show(
     args: argparse.Namespace,
-    items: Iterable[Settled],
+    items: Iterable[JudgedRow],
     session: Session,
     ours: FieldCells,
     left: int | None,
@@ -184,7 +193,7 @@ def _listed(
     return lambda some, places: standard_streams.write(made.lines(some, places))
 
 
-def _cells(item: Settled, names: list[str], dissector: Dissector, session: Session, ours: FieldCells) -> list[Cell]:
+def _cells(item: JudgedRow, names: list[str], dissector: Dissector, session: Session, ours: FieldCells) -> list[Cell]:
     fields = rows.fields_of(item, dissector)
     if any(name not in fields for name in names):
         fields = {**rows.to_json(item, dissector, session), **fields}
@@ -193,7 +202,7 @@ def _cells(item: Settled, names: list[str], dissector: Dissector, session: Sessi
     ]
 
 
-def _tree(item: Settled, dissector: Dissector) -> str:
+def _tree(item: JudgedRow, dissector: Dissector) -> str:
     return "\n".join(_tree_lines(tree_of(dissector, item.row, item.transaction, rows.iso, item.meaning), "        "))
 
 

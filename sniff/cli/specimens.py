@@ -1,4 +1,4 @@
-"""What rows say that depends on their octets: rows that are alike share one specimen, which is asked.
+"""Specimens: rows that are alike share one, which is asked what depends on their octets.
 
 Alike are rows of the same octets of which the same was made, between the same stations. Of lines of text those are
 alike too that differ only where a stencil (`dissectors/stencil.py`) says that nothing is read, or a plain number.

@@ -1,7 +1,8 @@
 """Tables: nodes (each station), health (bus and stations, and why), transactions (by kind and verdict), latency (each
-station's response times), load (by second or --every), ring (of a protocol that passes a token), polls (the master's
-programme: each request, how often it is asked, what became of it, and when that changed). Response times are uncertain
-by what the adapter may hold back: see `info`.
+station's response times), load (by second or --every), ring (of a protocol that passes a token), stations (that it
+serves: PROFIBUS slaves with lost, syncs, repeats, illegal), polls (the master's programme: each request, how often
+it is asked, what became of it, and when that changed). Response times are uncertain by what the adapter may hold
+back: see `info`.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ from sniff.engine.engine import Output
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import LineEvent
 
-TABLES = ("nodes", "health", "transactions", "latency", "load", "ring", "polls")
+TABLES = ("nodes", "health", "transactions", "latency", "load", "ring", "stations", "polls")
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -64,15 +65,19 @@ def run(args: argparse.Namespace) -> int:
     names = [name for name, _ in opened]
     session = arguments.settings_of(args, merged_session(captures, names), names[0])
     source = Merged(captures) if len(captures) > 1 else captures[0]
-    if args.filter and table in ("ring", "health"):
+    if args.filter and table in ("ring", "stations", "health"):
         raise Failure(f"{table}: of a whole bus; -Y does not go with it", USAGE)
-    if table == "ring":
+    if table in ("ring", "stations"):
         shown = dissector_for(session).ring
         if shown is None:
             passing = ", ".join(one.name for one in registry.usable() if one.ring is not None)
-            raise Failure(f"ring: {session.protocol} passes no token; this table is for {passing}", USAGE)
+            raise Failure(f"{table}: {session.protocol} passes no token; this table is for {passing}", USAGE)
+        if table == "stations" and shown.stations is None:
+            raise Failure(f"stations: {session.protocol} has masters only; see nodes and ring", USAGE)
         from sniff.cli import ring
 
+        if table == "stations" and shown.stations is not None:
+            return ring.show_stations(Watched(source), session, shown, shown.stations, args)
         return ring.show(Watched(source), session, shown, args.style, args.reference)
     if table == "health":
         devices = arguments.noted_devices(args, session)

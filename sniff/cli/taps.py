@@ -17,7 +17,7 @@ from sniff.engine.capture import Capture
 from sniff.engine.session import Session
 from sniff.taps.frames import TapEar
 from sniff.taps.matching import matched
-from sniff.taps.verdict import Fault, faults, traffic
+from sniff.taps.verdict import SegmentFault, faults, traffic
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -79,7 +79,7 @@ def _taps(words: Sequence[str]) -> list[tuple[str, Capture]]:
     return [by_name[name] for name in wanted]
 
 
-def _say(found: Sequence[Fault], heard: bool, common: bool, doubt: int, first: str, second: str) -> None:
+def _say(found: Sequence[SegmentFault], heard: bool, common: bool, doubt: int, first: str, second: str) -> None:
     from sniff.taps import words
 
     print(f"A: {plain(first)}, B: {plain(second)}; {words.certainty(doubt)}")

@@ -1,4 +1,4 @@
-"""Which buses are meant by what somebody names: ports, configured buses, all of them; where recordings go."""
+"""The buses that somebody names: ports, configured buses, all of them; where recordings go."""
 
 from __future__ import annotations
 
@@ -20,6 +20,9 @@ from sniff.cli import UNREADABLE, USAGE, Failure, arguments
 from sniff.cli.searching import Unknowns
 from sniff.config import AUTO, FILE, Config, ConfigError, load
 from sniff.engine.session import DEVICES_NOTE
+
+NAMED = 3
+"""Buses that the name of a new file names."""
 
 
 @dataclass(frozen=True, slots=True)

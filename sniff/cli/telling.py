@@ -1,4 +1,4 @@
-"""Whom a running capture tells: triggers mark it, alerts and metrics leave it."""
+"""The outlets of a running capture: triggers mark it, alerts and metrics leave it."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def serving_metrics(printers: Sequence[Printer], port: int | None) -> Iterator[N
     if port is None:
         yield
         return
-    from sniff.outlets.metrics import Told, exposition
+    from sniff.outlets.metrics import BusNow, exposition
     from sniff.outlets.metrics_server import HOST, MetricsServer
 
     try:
@@ -63,7 +63,7 @@ def serving_metrics(printers: Sequence[Printer], port: int | None) -> Iterator[N
 
     def publish() -> None:
         server.page = exposition(
-            [Told(each.live.model, each.live.status.lost, each.live.ended is None) for each in printers]
+            [BusNow(each.live.model, each.live.status.lost, each.live.ended is None) for each in printers]
         )
 
     printers[0].every_second = publish

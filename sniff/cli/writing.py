@@ -23,7 +23,7 @@ from sniff.engine.capture import BlockWriter, Capture, CaptureError, CaptureWrit
 from sniff.engine.engine import Output
 from sniff.engine.follow_settings import dissector_for, engine_for
 from sniff.engine.session import Item, LineEvent, Session
-from sniff.formats import parquet
+from sniff.formats import cut_capture, parquet
 from sniff.formats.parquet import Kind, ParquetWriter
 
 if TYPE_CHECKING:
@@ -107,6 +107,7 @@ def say_incomplete(path: str, capture: Capture) -> None:
     if not complete.whole:
         sys.stdout.flush()
         print(f"sniff485: {plain(path)}: {plain(complete.text)}", file=sys.stderr)
+        cut_capture.said(path)
 
 
 @dataclass(slots=True)

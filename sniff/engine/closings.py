@@ -1,4 +1,4 @@
-"""What became of rows, as columns: of each row of a table the transaction that it belongs to, where that has closed."""
+"""Closings, as columns: of each row of a table the transaction that it belongs to, where that has closed."""
 
 from __future__ import annotations
 

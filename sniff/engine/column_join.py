@@ -15,7 +15,7 @@ from dissectors.columns import Times, TransactionColumns
 from dissectors.tracker import Transaction
 from sniff.engine.closings import Closings
 from sniff.engine.table import Table, joined_columns, transaction_columns
-from sniff.engine.verdict_join import HELD, REMEMBERED, Settled
+from sniff.engine.verdict_join import HELD, REMEMBERED, JudgedRow
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,9 +45,9 @@ class SettledRows:
         numbers = np.arange(1, len(closed) + 1)
         return Closings(tx, 1, len(closed), [lambda name: numbers if name == "id" else getattr(closed, name)])
 
-    def item(self, place: int) -> Settled:
+    def item(self, place: int) -> JudgedRow:
         """The row at a place in the table, as an object."""
-        return Settled(self.table.row(place), self.transaction(place))
+        return JudgedRow(self.table.row(place), self.transaction(place))
 
 
 class ColumnJoin:

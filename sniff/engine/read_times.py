@@ -1,4 +1,4 @@
-"""How long octets were held back before they were read, told by when reads came and how many octets each held. Pure.
+"""Times of reads: how long octets were held back, told by when reads came and how much each held. Pure.
 
 A capture that names no adapter may have exact times (a logic analyser's, a simulation's) or be the work of a USB
 adapter with a latency timer. Two things tell, neither of them by what the octets mean:

@@ -1,4 +1,4 @@
-"""What a capture says about itself: the session, the adapter and its limits, and what happened to the line.
+"""A session: what a capture says about itself, the adapter and its limits, and what happened to the line.
 
 Frozen values without I/O; every source makes them, every format keeps as much of them as it can.
 """

@@ -9,7 +9,7 @@ import numpy as np
 
 from sniff.engine.engine import Output
 from sniff.engine.table import AT_ONCE, Table, rows_at
-from sniff.engine.verdict_join import Settled, Settling, Wanted
+from sniff.engine.verdict_join import JudgedRow, VerdictJoin, Wanted
 
 
 @runtime_checkable
@@ -26,10 +26,10 @@ class TableJoin:
 
     def __init__(self, wanted: Wanted | None = None) -> None:
         self._wanted = wanted
-        self._settling = Settling(None, wanted)
+        self._settling = VerdictJoin(None, wanted)
         self._awaited: set[int] = set()  # transactions of rows that were given to the join and had not closed
 
-    def add(self, table: Table) -> Iterator[Settled]:
+    def add(self, table: Table) -> Iterator[JudgedRow]:
         """Take the table that follows; give the rows that are settled by it."""
         places = self._wanted.candidates(table) if isinstance(self._wanted, Chooses) else None
         if places is None:
@@ -39,7 +39,7 @@ class TableJoin:
             rows = tuple(rows_at(table, places[begin : begin + AT_ONCE]))
             yield from self._settling.add(Output(rows, ()))
 
-    def flush(self) -> Iterator[Settled]:
+    def flush(self) -> Iterator[JudgedRow]:
         """Give all that is left."""
         yield from self._settling.flush()
 

@@ -20,7 +20,7 @@ Wanted = Callable[[Row, Transaction | None], bool]
 
 
 @dataclass(frozen=True, slots=True)
-class Settled:
+class JudgedRow:
     """A row with the transaction it belongs to (None: noise, or never closed), and what it means to its device."""
 
     row: Row
@@ -36,7 +36,7 @@ class Meanings(Protocol):
         ...
 
 
-class Settling:
+class VerdictJoin:
     """Holds rows until their transaction has closed, so that each can be shown with its verdict; keeps the order."""
 
     def __init__(self, points: Meanings | None = None, wanted: Wanted | None = None) -> None:
@@ -47,7 +47,7 @@ class Settling:
         self._closed: dict[int, Transaction] = {}
         self._in_order: deque[Transaction] = deque()  # the same, as they closed
 
-    def add(self, output: Output) -> Iterator[Settled]:
+    def add(self, output: Output) -> Iterator[JudgedRow]:
         """Take what the engine gave; give the rows that are settled by it."""
         self._rows.extend(output.rows)
         for transaction in output.transactions:
@@ -56,7 +56,7 @@ class Settling:
         while self._rows and (len(self._rows) > HELD or self._is_settled(self._rows[0])):
             yield from self._pop()
 
-    def flush(self) -> Iterator[Settled]:
+    def flush(self) -> Iterator[JudgedRow]:
         """Give all that is left."""
         while self._rows:
             yield from self._pop()
@@ -64,12 +64,12 @@ class Settling:
     def _is_settled(self, row: Row) -> bool:
         return row.placement is None or row.placement.tx in self._closed
 
-    def _pop(self) -> Iterator[Settled]:
+    def _pop(self) -> Iterator[JudgedRow]:
         row = self._rows.popleft()
         transaction = None if row.placement is None else self._closed.get(row.placement.tx)
         self._forget(row.no - REMEMBERED)
         if self._wanted is None or self._wanted(row, transaction):
-            yield Settled(row, transaction, None if self._points is None else self._points.meaning(row))
+            yield JudgedRow(row, transaction, None if self._points is None else self._points.meaning(row))
 
     def _forget(self, before: int) -> None:
         """Let go of what closed and has no row left that could ask for it."""

@@ -42,7 +42,8 @@ def leaf(of: Expression, accepts: Any, every: bool, words: str) -> Leaf:
                 unsure = part.unsure if unsure is None else unsure | part.unsure
         return (chosen, chosen) if unsure is None else (chosen & ~unsure, chosen | unsure)
 
-    return Leaf(ask, columns if held is not None else None, words, of.of_closing)
+    fixed = False if of.nowhere else None
+    return Leaf(ask, columns if held is not None else None, words, of.of_closing, fixed)
 
 
 def _of_several(parts: Sequence[Any], first: Masks, accepts: Any, remembered: Remembered, every: bool) -> Masks:

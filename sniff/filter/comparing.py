@@ -34,9 +34,9 @@ ALL_OF = frozenset(("!=", "==="))
 
 
 def compared(name: str, found: Value, wanted: Value) -> bool:
-    """Whether two values compare so; texts without regard to case; values of two sorts never do."""
+    """Whether two values compare so; values of two sorts never do."""
     if isinstance(found, str) and isinstance(wanted, str):
-        return COMPARE[name](found.lower(), wanted.lower())
+        return COMPARE[name](found, wanted)
     if isinstance(found, str) or isinstance(wanted, str) or isinstance(found, bytes) is not isinstance(wanted, bytes):
         return False
     return COMPARE[name](found, wanted)
@@ -181,13 +181,16 @@ class NotZero:
 
 @dataclass(frozen=True, slots=True)
 class Holding:
-    """Texts and octets that hold others."""
+    """Texts and octets that hold others. `alike`: capitals do not matter."""
 
     wanted: str | bytes
+    alike: bool = False
 
     def __call__(self, found: Value) -> bool:
-        if isinstance(self.wanted, str):
+        if isinstance(self.wanted, str) and self.alike:
             return isinstance(found, str) and self.wanted.lower() in found.lower()
+        if isinstance(self.wanted, str):
+            return isinstance(found, str) and self.wanted in found
         return isinstance(found, bytes) and self.wanted in found
 
 
@@ -211,13 +214,15 @@ class Fitting:
 
 
 def pattern_of(text: str, column: int) -> re.Pattern[str]:
-    """A regular expression, without regard to case. Raises FilterError."""
+    """A regular expression, without regard to case unless it begins with (?-i). Raises FilterError."""
+    minding = text.startswith("(?-i)")
+    text = text.removeprefix("(?-i)")
     if len(text) > _LONGEST:
         raise FilterError(f"a regular expression of more than {_LONGEST} characters", column)
     if posix := _POSIX.search(text):
         raise FilterError(f"regular expression: {posix[1]} is not known here: write [A-Za-z], [0-9] or such", column)
     try:
-        return re.compile(text, re.IGNORECASE | re.DOTALL)
+        return re.compile(text, re.DOTALL if minding else re.IGNORECASE | re.DOTALL)
     except (re.error, RecursionError, OverflowError) as error:
         raise FilterError(f"regular expression: {error}", column) from None
 

@@ -15,6 +15,10 @@ class FilterError(ValueError):
         self.column = column
 
 
+class OfOthers(FilterError):
+    """A filter that frames of this protocol can never fit, since it asks for what only others have."""
+
+
 def nearest(word: str, known: Iterable[str], most: int = 8) -> str:
     """ "did you mean 'late'?", or which there are."""
     names = list(dict.fromkeys(known))

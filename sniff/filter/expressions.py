@@ -23,7 +23,8 @@ NUMERIC = frozenset((Kind.NUMBER, Kind.STATION, Kind.TRUTH, Kind.DURATION, Kind.
 @dataclass(frozen=True, slots=True)
 class Expression:
     """What a row has of something: no value, one or several. `columns`: as tables hold it; `words`: as written.
-    `fixed`: the same of every row; `size`: how many octets or characters it always has."""
+    `fixed`: the same of every row; `size`: how many octets or characters it always has. `nowhere`: no frame of this
+    protocol has it; `told`: what frames tell of points; `letters`: "lower" or "upper" where all are such."""
 
     words: str
     type: FieldType
@@ -34,6 +35,9 @@ class Expression:
     field: str = ""
     fixed: bool = False
     size: int | None = None
+    nowhere: bool = False
+    told: bool = False
+    letters: str = ""
 
 
 def sliced(of: Expression, spans: Sequence[Span], words: str) -> Expression:
@@ -44,7 +48,8 @@ def sliced(of: Expression, spans: Sequence[Span], words: str) -> Expression:
 
     sizes = [_size(span) for span in spans]
     size = None if None in sizes else sum(one for one in sizes if one is not None)
-    return Expression(words, FieldType(of.type.kind, several=False), get, None, of.of_closing, of.spelled, size=size)
+    made = Expression(words, FieldType(of.type.kind, several=False), get, None, of.of_closing, of.spelled)
+    return replace(made, size=size, nowhere=of.nowhere)
 
 
 def _size(span: Span) -> int | None:
@@ -80,7 +85,11 @@ def counted(of: Expression, words: str) -> Expression:
 
 def each(of: Expression, words: str, type: FieldType, make: Callable[[Any], Value]) -> Expression:
     """Something of every value."""
-    return Expression(words, type, lambda row, tx: tuple(make(value) for value in of.get(row, tx)), None, of.of_closing)
+
+    def get(row: Row, tx: Transaction | None) -> Values:
+        return tuple(make(value) for value in of.get(row, tx))
+
+    return Expression(words, type, get, None, of.of_closing, nowhere=of.nowhere)
 
 
 def extreme(parts: Sequence[Expression], words: str, choose: Callable[[Any], Any]) -> Expression:
@@ -90,7 +99,14 @@ def extreme(parts: Sequence[Expression], words: str, choose: Callable[[Any], Any
         values = [value for part in parts for value in part.get(row, tx)]
         return (choose(values),) if values else ()
 
-    return Expression(words, replace(parts[0].type, words={}), get, None, any(part.of_closing for part in parts))
+    return Expression(
+        words,
+        replace(parts[0].type, words={}),
+        get,
+        None,
+        any(part.of_closing for part in parts),
+        nowhere=all(part.nowhere for part in parts),
+    )
 
 
 def constant(value: Value, words: str, type: FieldType) -> Expression:
@@ -126,7 +142,8 @@ def reckoned(operator: str, left: Expression, right: Expression, type: FieldType
     words = f"{left.words} {operator} {right.words}"
     closing = left.of_closing or right.of_closing
     whole = all(isinstance(number, int) for number in fixed)
-    return Expression(words, type, get, columns if there and not whole else None, closing)
+    nowhere = left.nowhere or right.nowhere
+    return Expression(words, type, get, columns if there and not whole else None, closing, nowhere=nowhere)
 
 
 def _reckon(operator: str, left: Any, right: Any) -> int | float | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 
@@ -41,12 +42,12 @@ _NUMBER, _TEXT, _STATION = Kind.NUMBER, Kind.TEXT, Kind.STATION
 _LINE_ERRORS = {one: (one.name or "").lower() for one in LineError}
 
 COLUMN_TYPES: Mapping[str, FieldType] = {
-    "no": FieldType(_NUMBER, "number of the row, from 1"),
+    "no": FieldType(_NUMBER, "number of the row, from 1", least=1),
     "frame.time": FieldType(Kind.TIME, "when it began, UTC"),
     "frame.time_relative": FieldType(Kind.DURATION, "since the capture began", unit="s"),
     "frame.time_delta": FieldType(Kind.DURATION, "from the begin of the row before to its own", unit="s"),
-    "start_ns": FieldType(_NUMBER, "ns since the capture began, of its begin"),
-    "end_ns": FieldType(_NUMBER, "the same of its end"),
+    "start_ns": FieldType(_NUMBER, "ns since the capture began, of its begin", least=0),
+    "end_ns": FieldType(_NUMBER, "the same of its end", least=0),
     "proto": FieldType(_TEXT, "protocol", closed=True),
     "src": FieldType(_STATION, "who sent it"),
     "dst": FieldType(_STATION, "to whom it was sent"),
@@ -55,25 +56,25 @@ COLUMN_TYPES: Mapping[str, FieldType] = {
     "kind": FieldType(_TEXT, "what it is"),
     "func": FieldType(_NUMBER, "function code, frame type or service"),
     "register": FieldType(_NUMBER, "first register or object named"),
-    "count": FieldType(_NUMBER, "how many of them"),
+    "count": FieldType(_NUMBER, "how many of them", least=0),
     "ok": FieldType(Kind.TRUTH, "a good frame"),
     "error": FieldType(_TEXT, "exception, or why it is damaged", several=False),
     "noise": FieldType(Kind.TRUTH, "octets that are no frame"),
     "searching": FieldType(Kind.TRUTH, "heard while settings were searched for"),
     "found": FieldType(_TEXT, "how its limits were found", texts(one.value for one in Found), closed=True),
     "damage": FieldType(_TEXT, "why it is not good", texts(one.value for one in Damage), closed=True),
-    "len": FieldType(_NUMBER, "octets"),
-    "noise_before": FieldType(_NUMBER, "octets of noise directly before it"),
-    "marks": FieldType(_NUMBER, "octets with a line error"),
+    "len": FieldType(_NUMBER, "octets", least=0),
+    "noise_before": FieldType(_NUMBER, "octets of noise directly before it", least=0),
+    "marks": FieldType(_NUMBER, "octets with a line error", least=0),
     "line.error": FieldType(_TEXT, "line errors of its octets", texts(_LINE_ERRORS.values()), closed=True),
-    "tx": FieldType(_NUMBER, "number of its exchange"),
+    "tx": FieldType(_NUMBER, "number of its exchange", least=0),
     "verdict": FieldType(_TEXT, "how its exchange ended", _VERDICTS, closed=True),
     "latency_ms": FieldType(Kind.DURATION, "end of request to begin of answer", unit="ms"),
     "tx.latency_low_ms": FieldType(Kind.DURATION, "the least that it can have been", unit="ms"),
     "tx.latency_high_ms": FieldType(Kind.DURATION, "the most that it can have been", unit="ms"),
-    "attempt": FieldType(_NUMBER, "which try its exchange was, from 1"),
+    "attempt": FieldType(_NUMBER, "which try its exchange was, from 1", least=1),
     "tx.station": FieldType(_STATION, "the station that its exchange is about"),
-    "tx.of": FieldType(_NUMBER, "the exchange that its own repeats, echoes or answers late"),
+    "tx.of": FieldType(_NUMBER, "the exchange that its own repeats, echoes or answers late", least=0),
     "finding": FieldType(_TEXT, "findings that it is evidence of", closed=True),
     "hex": FieldType(Kind.OCTETS, "its octets"),
     "frame.octets": FieldType(Kind.OCTETS, "its octets"),
@@ -83,8 +84,8 @@ COLUMN_TYPES: Mapping[str, FieldType] = {
 
 FLAGS = frozenset(("ok", "noise", "searching"))
 """Alone they ask whether it is so."""
-COUNTS = frozenset(("marks", "noise_before"))
-"""Alone they ask whether there are any."""
+SHARED_WORDS = frozenset(("kind", "finding"))
+"""Their words are those of all protocols."""
 SPELLED = frozenset(("hex",))
 """Octets of which texts in quotes are spelled in hex digits too."""
 
@@ -191,11 +192,16 @@ GETTERS: Mapping[str, Getter] = {
 """Durations and times are ns here."""
 
 
+Answered = Callable[[Row], Mapping[str, int | float | str]]
+"""What an answer says that only its request tells."""
+
+
 class Decoded:
     """The fields of a frame; those of the last one are remembered, for several tests may ask for them."""
 
-    def __init__(self, dissector: Dissector) -> None:
+    def __init__(self, dissector: Dissector, answered: Answered | None = None) -> None:
         self._dissector = dissector
+        self._answered = answered
         self._last: tuple[Row, Mapping[str, int | float | str]] | None = None
 
     def of(self, row: Row) -> Mapping[str, int | float | str]:
@@ -204,7 +210,8 @@ class Decoded:
             return {}
         if self._last is None or self._last[0] is not row:
             role = row.placement.role if row.placement is not None else Role.UNKNOWN
-            self._last = row, self._dissector.fields(row.event, role)
+            found = self._dissector.fields(row.event, role)
+            self._last = row, found if self._answered is None else {**found, **self._answered(row)}
         return self._last[1]
 
 
@@ -294,15 +301,35 @@ def column_type(name: str, dissector: Dissector) -> FieldType:
     if name == "finding":
         codes = {code: code for one in protocols(dissector) for code in one.rules}
         return replace(found, words={**codes, **{code: code for code in LINE_RULES}})
-    if name in ("kind", "func"):
-        own = types_of(dissector).get(name)
+    own = types_of(dissector).get(_SAID_BY.get(name, name))
+    if name == "error" and own is not None:
+        return replace(found, words={**own.words, **texts(one.value for one in Damage)})
+    if name == "kind":
         others = [types_of(one)[name] for one in protocols(dissector) if name in types_of(one)]
-        if name == "func":
-            return own or found
         silent = any("kind" not in types_of(one) for one in protocols(dissector))  # of a plug-in nobody knows them
         words = {word: word for one in others for word in one.words} | {"noise": "noise", "searching": "searching"}
         return replace(found, words=words, closed=not silent, also="|".join(one.also for one in others if one.also))
+    if own is not None and own.kind is found.kind:
+        return replace(own, says=own.says or found.says)
     return found
+
+
+_SAID_BY = {"src": "addr", "dst": "addr", "tx.station": "addr"}
+"""What a protocol says of one name for others too."""
+
+
+def having_word(name: str, value: str, dissector: Dissector) -> set[str]:
+    """The protocols whose frames may have such a `kind` or `finding`; empty where nobody can tell."""
+    if name == "finding":
+        return {one.name for one in protocols(dissector) if value in one.rules}
+    having = set()
+    for one in protocols(dissector):
+        type = types_of(one).get(name)
+        if type is None:
+            return set()
+        if value in type.words.values() or (type.also and re.fullmatch(type.also, value)):
+            having.add(one.name)
+    return having
 
 
 def known_names(dissector: Dissector) -> list[str]:
@@ -318,8 +345,11 @@ def layers(dissector: Dissector) -> dict[str, str]:
     return {prefix[:-1]: prefix for prefix in prefixes if prefix[:-1] not in known}
 
 
-def row_text(dissector: Dissector) -> Getter:
+def row_text(dissector: Dissector, scope: Scope) -> Getter:
     """The line that says what a row is."""
+    says = scope.says
+    if says is not None:
+        return lambda row, _: (says(row),)
     return lambda row, _: (describe(dissector, row),)
 
 

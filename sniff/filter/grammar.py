@@ -16,7 +16,7 @@ product    = bits { ("*" | "/" | "%") bits }
 bits       = signed { ("&" | "bitand") signed }
 signed     = [ "-" | "+" ] sliced
 sliced     = value { "[" part { "," part } "]" }            octets[2:2]  octets[-2:]  octets[0-3]  octets[5]
-value      = "(" either ")" | function "(" sum { "," sum } ")" | word | "text"
+value      = "(" either ")" | function "(" sum { "," sum } ")" | word | number unit | "text"
 """
 
 from __future__ import annotations
@@ -281,7 +281,15 @@ class _Parser:
         self._next()
         if self._is("(") and self._now.column == token.column + len(token.text):
             return self._call(token)
-        return Word(token.text, token.column)
+        return Word(token.text + self._unit(token), token.column)
+
+    def _unit(self, token: _Token) -> str:
+        """The unit behind a number: 30 Hz."""
+        now = self._now
+        if not token.text[0].isdigit() or now.kind != "word" or now.text[0].isdigit() or now.text in _BEFORE_VALUES:
+            return ""
+        self._next()
+        return f" {now.text}"
 
     def _call(self, token: _Token) -> Value:
         if token.text not in FUNCTIONS:
@@ -343,7 +351,7 @@ class _Parser:
     def _test(self, found: Node) -> Test:
         """A value alone asks whether there is such a thing."""
         if isinstance(found, Quoted):
-            return Contains(Word("text", found.column), found, found.column)
+            return Contains(Word("text", found.column), found, found.column, alike=True)
         return found if isinstance(found, _TESTS) else Present(found, found.column)
 
 

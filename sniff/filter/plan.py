@@ -46,15 +46,22 @@ class Node(Protocol):
         """Whether it asks what became of the row."""
         ...
 
+    @property
+    def fixed(self) -> bool | None:
+        """The answer, where it is the same of every row."""
+        ...
+
 
 @dataclass(frozen=True, slots=True)
 class Leaf:
-    """One question. `columns`: what columns say of it; `words`: as it was understood."""
+    """One question. `columns`: what columns say of it; `words`: as it was understood; `fixed`: the answer, where it is
+    the same of every row."""
 
     ask: Callable[[Row, Transaction | None], bool]
     columns: Callable[[Table, Closed | None], tuple[Masks, Masks] | None] | None
     words: str
     of_closing: bool = False
+    fixed: bool | None = None
 
     def test(self, row: Row, transaction: Transaction | None) -> bool:
         """Ask the row."""
@@ -102,6 +109,11 @@ class Opposite:
     def of_closing(self) -> bool:
         """As the other."""
         return self.inner.of_closing
+
+    @property
+    def fixed(self) -> bool | None:
+        """The other answer."""
+        return None if self.inner.fixed is None else not self.inner.fixed
 
     def lines(self, indent: str) -> Iterator[str]:
         """What is not to be."""
@@ -159,6 +171,15 @@ class Several:
         """Whether any part asks for it."""
         return any(part.of_closing for part in self.parts)
 
+    @property
+    def fixed(self) -> bool | None:
+        """What the parts say that are the same of every row, where that decides."""
+        said = [part.fixed for part in self.parts]
+        deciding = {"&&": False, "||": True}.get(self.operator)
+        if deciding is not None and deciding in said:
+            return deciding
+        return None if None in said else not deciding if deciding is not None else sum(map(bool, said)) % 2 == 1
+
     def lines(self, indent: str) -> Iterator[str]:
         """The parts."""
         yield f"{indent}{ {'&&': 'all of', '||': 'any of', '^^': 'an odd number of'}[self.operator] }"
@@ -212,13 +233,16 @@ class Begins:
 
 @dataclass(frozen=True, slots=True)
 class Filter:
-    """A test of rows with their transactions, made of a text. `names`: the fields that it asks for. `begins`: kept
-    where it asks for the time since the row before."""
+    """A test of rows with their transactions, made of a text. `names`: fields that it asks for; `points`: those that
+    frames tell, of which `Scope.told` must know; `by_request`: those that answers have by their request, which
+    `Scope.answered` must know. `begins`: kept where it asks for the time since the row before."""
 
     text: str
     root: Node | None = None
     names: frozenset[str] = frozenset()
     begins: Begins | None = None
+    points: frozenset[str] = frozenset()
+    by_request: frozenset[str] = frozenset()
 
     def __call__(self, row: Row, transaction: Transaction | None) -> bool:
         """Whether a row is accepted."""

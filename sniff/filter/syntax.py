@@ -91,12 +91,13 @@ class Among:
 
 @dataclass(frozen=True, slots=True)
 class Contains:
-    """Whether a value holds another."""
+    """Whether a value holds another. `alike`: capitals do not matter."""
 
     value: Value
     part: Value
     column: int
     quantifier: str = ""
+    alike: bool = False
 
 
 @dataclass(frozen=True, slots=True)

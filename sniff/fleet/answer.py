@@ -1,11 +1,12 @@
-"""What an archive says: its buses, the worst first, day by day, and what changed over the days. Pure."""
+"""The answer of an archive: its buses, the ill ones first, day by day, and what changed over the days. Pure."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from datetime import date, timedelta
 from enum import Enum
+from itertools import pairwise
 
 from dissectors.findings import Finding, Severity, merged
 from dissectors.histogram import Histogram
@@ -13,15 +14,7 @@ from dissectors.tracker import Verdict
 from sniff.analysis.health import Health
 from sniff.analysis.nodes import Node
 from sniff.fleet.bus_day import NO_DATE, Archive, BusDay
-
-DRIFTED = 1.25
-"""A station's median response time has drifted when it grew, or shrank, by this factor …"""
-
-DRIFT_DAYS = 3
-"""… from the first of so many days to the last …"""
-
-DRIFT_ANSWERS = 50
-"""… with so many answers in each half of them, by more than the adapters may have added."""
+from sniff.fleet.drift import Drift, drift
 
 
 class Fresh(Enum):
@@ -73,18 +66,18 @@ class Change(Enum):
 
 @dataclass(frozen=True, slots=True)
 class StationChange:
-    """One of them. `day`: the first day with it, or the last; `before`, `after`: median response times, ns."""
+    """One of them. `day`: the first day with it, or the last; `drift`: of one that got slower or faster."""
 
     station: int
     change: Change
     day: str
-    before: int | None = None
-    after: int | None = None
+    drift: Drift | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Bus:
-    """One bus of a site over all days. `missing`: days between others of which there is no capture."""
+    """One bus of a site over all days. `missing`: days between others of which there is no capture; `stopped`: the last
+    day with one, where others go on. `drifts`: response times over the days, of every station that has enough."""
 
     site: str
     bus: str
@@ -94,7 +87,9 @@ class Bus:
     health: Health
     troubles: tuple[Trouble, ...]
     changes: tuple[StationChange, ...]
+    drifts: tuple[Drift, ...]
     missing: tuple[str, ...]
+    stopped: str | None
     notes: tuple[str, ...]
     latency: int
 
@@ -102,6 +97,16 @@ class Bus:
     def name(self) -> str:
         """For people: "north/boiler-room"."""
         return f"{self.site}/{self.bus}" if self.site else self.bus
+
+    @property
+    def is_ill(self) -> bool:
+        """Whether something is wrong with it, or with its recording."""
+        return bool(self.troubles or self.silent or self.stopped)
+
+    @property
+    def silent(self) -> tuple[str, ...]:
+        """Days on which somebody recorded and nothing was heard."""
+        return tuple(day.day for day in self.days if day.is_silent)
 
     @property
     def worst(self) -> Day:
@@ -130,8 +135,11 @@ def answer(archive: Archive, before: Iterable[str] | None = None, noun: Mapping[
     by_bus: dict[tuple[str, str, str], list[BusDay]] = {}
     for day in archive.days.values():
         by_bus.setdefault((day.site, day.bus, day.protocol), []).append(day)
-    buses = [_bus(sorted(days, key=lambda day: day.day), known, noun or {}) for days in by_bus.values()]
-    buses.sort(key=lambda bus: (bus.health.score, -sum(len(one.days) for one in bus.troubles), bus.name))
+    newest = max((day.day for day in archive.days.values() if day.day != NO_DATE), default=NO_DATE)
+    buses = [_bus(sorted(days, key=lambda day: day.day), newest, known, noun or {}) for days in by_bus.values()]
+    buses.sort(
+        key=lambda bus: (not bus.is_ill, bus.health.score, -sum(len(one.days) for one in bus.troubles), bus.name)
+    )
     found = Answer(tuple(buses), dict(sorted(archive.unreadable.items())))
     if known is None:
         return found
@@ -148,43 +156,50 @@ def mark(bus: Bus, finding: Finding) -> str:
     return f"{bus.name}: {finding.code} {finding.subject}"
 
 
-def _bus(days: list[BusDay], known: set[str] | None, noun: Mapping[str, str]) -> Bus:
-    newest = days[-1]
-    told = tuple(_day(day) for day in days)
+def _bus(days: list[BusDay], newest: str, known: set[str] | None, noun: Mapping[str, str]) -> Bus:
+    last = days[-1]
+    findings = [day.findings for day in days]
+    told = tuple(_day(day, found) for day, found in zip(days, findings, strict=True))
+    dated = [day.day for day in days if day.day != NO_DATE]
+    missing = _missing(dated)
+    latency = max(day.latency for day in days)
+    drifts = _drifts(days)
     bus = Bus(
-        newest.site,
-        newest.bus,
-        newest.protocol,
-        noun.get(newest.protocol, "station"),
+        last.site,
+        last.bus,
+        last.protocol,
+        noun.get(last.protocol, "station"),
         told,
         min((day.health for day in reversed(told)), key=lambda health: health.score),
         (),
-        _changes(days),
-        _missing([day.day for day in days]),
+        tuple(sorted((*_changes(days), *_told_drifts(drifts, latency)), key=lambda one: one.station)),
+        drifts,
+        missing,
+        _stopped(dated, newest),
         tuple(sorted({note for day in days for note in day.notes})),
-        max(day.latency for day in days),
+        latency,
     )
-    return _with_troubles(bus, days, known)
+    return replace(bus, troubles=tuple(_troubles(bus, findings, known)))
 
 
-def _with_troubles(bus: Bus, days: list[BusDay], known: set[str] | None) -> Bus:
-    troubles = []
-    for finding in merged(day.findings for day in days):
-        if finding.severity < Severity.WARNING:
-            continue
-        on = tuple(day.day for day in days if any(one.key == finding.key for one in day.findings))
+def _troubles(bus: Bus, findings: list[tuple[Finding, ...]], known: set[str] | None) -> Iterator[Trouble]:
+    on: dict[tuple[str, str], list[str]] = {}
+    for day, found in zip(bus.days, findings, strict=True):
+        for one in found:
+            if one.severity >= Severity.WARNING:  # on other days it may be a consequence, and is told with its cause
+                on.setdefault(one.key, []).append(day.day)
+    for finding in merged([one for one in found if one.key in on] for found in findings):
         fresh = Fresh.UNKNOWN if known is None else Fresh.STAYS if mark(bus, finding) in known else Fresh.NEW
-        troubles.append(Trouble(finding, on, fresh))
-    return replace(bus, troubles=tuple(troubles))
+        yield Trouble(finding, tuple(on[finding.key]), fresh)
 
 
-def _day(day: BusDay) -> Day:
+def _day(day: BusDay, findings: tuple[Finding, ...]) -> Day:
     summary = day.summary
     asked = sum(node.asked for node in summary.nodes)
     unanswered = sum(node.unanswered for node in summary.nodes)
     return Day(
         day.day,
-        day.health().bus,
+        day.health(findings).bus,
         day.load,
         summary.frames,
         summary.octets,
@@ -201,8 +216,7 @@ def _is_there(node: Node) -> bool:
     return node.heard >= 2 or any(node.verdicts[verdict] for verdict in (Verdict.ANSWERED, Verdict.EXCEPTION))
 
 
-def _missing(told: list[str]) -> tuple[str, ...]:
-    days = [day for day in told if day != NO_DATE]
+def _missing(days: list[str]) -> tuple[str, ...]:
     if not days:
         return ()
     first, last = date.fromisoformat(days[0]), date.fromisoformat(days[-1])
@@ -214,44 +228,42 @@ def _missing(told: list[str]) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _changes(days: list[BusDay]) -> tuple[StationChange, ...]:
-    """Stations that came, that went, and whose response times drifted."""
+def _stopped(days: list[str], newest: str) -> str | None:
+    """The last day, where others were recorded for longer after it than this one ever paused."""
+    if len(days) < 2:
+        return None
+    numbers = [date.fromisoformat(day).toordinal() for day in days]
+    pause = max(later - earlier for earlier, later in pairwise(numbers))
+    return days[-1] if date.fromisoformat(newest).toordinal() - numbers[-1] > pause else None
+
+
+def _changes(days: list[BusDay]) -> Iterator[StationChange]:
+    """Stations that came and that went."""
     heard = [day for day in days if day.summary.octets]
-    if len(heard) < 2:
-        return ()
-    by_station: dict[int, list[tuple[str, Node]]] = {}
+    seen: dict[int, list[str]] = {}
     for day in heard:
         for node in day.summary.nodes:
             if _is_there(node):
-                by_station.setdefault(node.address, []).append((day.day, node))
-    found = []
-    for station, seen in sorted(by_station.items()):
-        first, last = seen[0][0], seen[-1][0]
-        if first != heard[0].day:
-            found.append(StationChange(station, Change.CAME, first))
-        if last != heard[-1].day:
-            found.append(StationChange(station, Change.WENT, last))
-        drift = _drift(station, seen, max(day.latency for day in heard))
-        if drift is not None:
-            found.append(drift)
-    return tuple(found)
+                seen.setdefault(node.address, []).append(day.day)
+    for station, on in seen.items():
+        if on[0] != heard[0].day:
+            yield StationChange(station, Change.CAME, on[0])
+        if on[-1] != heard[-1].day:
+            yield StationChange(station, Change.WENT, on[-1])
 
 
-def _drift(station: int, seen: list[tuple[str, Node]], latency: int) -> StationChange | None:
-    if len(seen) < DRIFT_DAYS:
-        return None
-    half = len(seen) // 2
-    early, late = _together(seen[:half]), _together(seen[-half:])
-    before, after = early.quantile(0.5), late.quantile(0.5)
-    if min(early.count, late.count) < DRIFT_ANSWERS or before is None or after is None:
-        return None
-    if abs(after - before) <= latency or not (after > DRIFTED * before or before > DRIFTED * after):
-        return None
-    return StationChange(station, Change.SLOWER if after > before else Change.FASTER, seen[half][0], before, after)
+def _drifts(days: list[BusDay]) -> tuple[Drift, ...]:
+    times: dict[int, list[tuple[str, Histogram]]] = {}
+    for day in days:
+        for node in day.summary.nodes:
+            if day.day != NO_DATE and _is_there(node):
+                times.setdefault(node.address, []).append((day.day, node.latency))
+    found = (drift(station, of_days) for station, of_days in sorted(times.items()))
+    return tuple(one for one in found if one is not None)
 
 
-def _together(seen: list[tuple[str, Node]]) -> Histogram:
-    whole = Histogram()
-    for _, node in seen:
-        whole = whole.merge(node.latency)
-    return whole
+def _told_drifts(drifts: Iterable[Drift], latency: int) -> Iterator[StationChange]:
+    for one in drifts:
+        if one.is_told(latency):
+            change = Change.SLOWER if one.after > one.before else Change.FASTER
+            yield StationChange(one.station, change, one.since, one)

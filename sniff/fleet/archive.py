@@ -1,15 +1,15 @@
-"""What an archive holds: captures found below folders, and the parts of recordings grouped into tasks.
+"""An archive: captures found below folders, and the parts of recordings grouped into tasks.
 
 A task is what one worker reads at a time: one capture, or the parts of one recording that began on one day. Only the
-beginning of each file is read here.
+beginning of each file is read here, and none that the index knows.
 """
 
 from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
 from glob import glob, has_magic
 from pathlib import Path
 
@@ -19,6 +19,7 @@ from sniff.formats.several_buses import buses_in
 from sniff.formats.table import suffixes
 from sniff.recording import scan
 from sniff.recording.reader import McapCapture
+from sniff.recording.rotated import joined
 
 NS_PER_S = 1_000_000_000
 NS_PER_DAY = 86_400 * NS_PER_S
@@ -36,14 +37,29 @@ class FileState:
 
 
 @dataclass(frozen=True, slots=True)
+class Window:
+    """From when (with it) until when (without it), ns; None: from the begin, to the end."""
+
+    begin: int | None
+    end: int | None
+
+
+@dataclass(frozen=True, slots=True)
 class Task:
     """What is read in one go: files that follow one another, of one site and one `bus` of several in them (None: the
-    only one). `protocol`: a registry name, "" where it is not known yet or cannot be."""
+    only one). `protocol`: a registry name, "" where it is not known yet or cannot be. `window`: of a piece of a task
+    that is too large (pieces.py)."""
 
     site: str
     files: tuple[FileState, ...]
     protocol: str = ""
     bus: str | None = None
+    window: Window | None = None
+
+    @property
+    def whole(self) -> Task:
+        """What a piece is a piece of."""
+        return replace(self, window=None)
 
     @property
     def name(self) -> str:
@@ -55,6 +71,17 @@ class Task:
     def size(self) -> int:
         """Octets of all files."""
         return sum(file.size for file in self.files)
+
+
+@dataclass(frozen=True, slots=True)
+class Begin:
+    """What the begin of a file tells of one bus in it. `bus`: its name, None for the only one; `protocol`: as in Task;
+    `part`: of a recording, from 1; `recording`: what parts that are read together have in common, empty for others."""
+
+    bus: str | None
+    protocol: str
+    part: int = 1
+    recording: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,32 +143,58 @@ def is_being_written(file: FileState, now: int) -> bool:
         return False
 
 
-def tasks_of(found: Sequence[tuple[str, FileState]], since: int | None = None) -> tuple[list[Task], list[Unreadable]]:
+Look = Callable[[FileState], "tuple[Begin, ...] | str"]
+"""What is known of a file: of each bus in it, or why it cannot be read."""
+
+
+def look(file: FileState) -> tuple[Begin, ...] | str:
+    """Read the begin of a file."""
+    try:
+        capture = read(file.path)
+    except CaptureError as error:
+        return _why(error, file)
+    buses = buses_in(capture)
+    return tuple(
+        Begin(bus.session.bus if len(buses) > 1 else None, bus.session.protocol, _part(bus), _recording(bus, file))
+        for bus in buses
+    )
+
+
+def tasks_of(
+    found: Sequence[tuple[str, FileState]], since: int | None = None, look: Look = look
+) -> tuple[list[Task], list[Unreadable]]:
     """Group files into tasks, in the order of their names. `since`: ns; files that ended before are left out.
 
-    Reads the begin of each file; those that cannot be read are given beside.
+    `look`: gives what is known of each file; those that cannot be read are given beside.
     """
-    groups: dict[tuple[str, ...], list[tuple[Capture, str | None, FileState]]] = {}
+    groups: dict[tuple[str, ...], list[tuple[int, FileState, Begin]]] = {}
     unreadable = []
     for site, file in found:
         if since is not None and file.changed < since:
             continue
-        try:
-            capture = read(file.path)
-        except CaptureError as error:
-            unreadable.append(Unreadable(file, site, _why(error, file)))
+        begins = look(file)
+        if isinstance(begins, str):
+            unreadable.append(Unreadable(file, site, begins))
             continue
-        buses = buses_in(capture)
-        for bus in buses:
-            name = bus.session.bus if len(buses) > 1 else None
-            key = (site, name or "", *_recording(bus, file))
-            groups.setdefault(key, []).append((bus, name, file))
+        for one in begins:
+            key = (site, one.bus or "", *(one.recording or (file.path,)))
+            groups.setdefault(key, []).append((one.part, file, one))
     tasks = []
     for (site, *_), members in groups.items():
-        members.sort(key=lambda one: (_part(one[0]), one[2].path))
-        first, name, _ = members[0]
-        tasks.append(Task(site, tuple(file for _, _, file in members), first.session.protocol, name))
+        members.sort(key=lambda one: (one[0], one[1].path))
+        first = members[0][2]
+        tasks.append(Task(site, tuple(file for _, file, _ in members), first.protocol, first.bus))
     return sorted(tasks, key=lambda task: (task.files[0].path, task.bus or "")), unreadable
+
+
+def opened(task: Task) -> list[Capture]:
+    """The captures of a task, parts of a recording as one. Raises CaptureError."""
+    return [capture for _, capture in joined([(file.path, _bus_of(task, read(file.path))) for file in task.files])]
+
+
+def _bus_of(task: Task, capture: Capture) -> Capture:
+    """The bus that a task is about."""
+    return next(bus for bus in buses_in(capture) if task.bus in (None, bus.session.bus))
 
 
 def _why(error: CaptureError, file: FileState) -> str:
@@ -159,5 +212,5 @@ def _recording(capture: Capture, file: FileState) -> tuple[str, ...]:
     session = capture.session
     is_part = isinstance(capture, McapCapture) and (capture.part > 1 or Path(file.path).stem.endswith("-0001"))
     if not (session.started and is_part and session.sample):
-        return (file.path,)
+        return ()
     return session.port, str(session.started), str(session.sample[0].time // NS_PER_DAY)

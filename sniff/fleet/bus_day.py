@@ -1,12 +1,17 @@
-"""What is known of one bus on one day: the unit of everything that a fleet's report says; mergeable."""
+"""One bus on one day: the unit of everything that a fleet's report says; mergeable."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cache, reduce
 
-from dissectors.findings import Finding, merged
+from dissectors import registry
+from dissectors.findings import Finding, Rule
 from dissectors.line import LineSettings
 from sniff.analysis.health import HealthReport, health_of
+from sniff.analysis.judgement import Judgement
+from sniff.analysis.judging import rules_over
 from sniff.analysis.summary import Summary
 
 NO_DATE = "no date"
@@ -16,14 +21,23 @@ Key = tuple[str, str, str, str]
 """Site, bus, protocol, day."""
 
 
+@dataclass(frozen=True, slots=True, order=True)
+class Judged:
+    """What the rules found in one capture or a stretch of it, which began at `first` (ns), from the file `source`."""
+
+    first: int
+    source: str
+    judgement: Judgement = field(compare=False)
+
+
 @dataclass(frozen=True, slots=True)
 class BusDay:
     """One bus on one day of UTC, from one capture or several.
 
     `site`, `bus`, `port`, `protocol`: which; `day`: "2026-03-01". `summary`: counts, stations, response times; its load
     is only a total. `busy`: ns with octets on the line, `listened`: ns between first and last octet, of all captures
-    together. `findings`: of the rules. `latency`: ns that the slowest adapter may have held octets back. `sources`: the
-    files. `notes`: what was wrong with them, in words.
+    together. `latency`: ns that the slowest adapter may have held octets back. `sources`: the
+    files. `notes`: what was wrong with them, in words. `judged`: of each capture, in any order.
     """
 
     site: str
@@ -37,7 +51,7 @@ class BusDay:
     listened: int = 0
     first: int | None = None
     last: int | None = None
-    findings: tuple[Finding, ...] = ()
+    judged: tuple[Judged, ...] = ()
     latency: int = 0
     sources: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
@@ -48,13 +62,19 @@ class BusDay:
         return self.site, self.bus, self.protocol, self.day
 
     @property
+    def findings(self) -> tuple[Finding, ...]:
+        """Of the rules, put together from all captures in the order of time; what explains what is settled over all."""
+        whole = reduce(Judgement.merge, (one.judgement for one in sorted(self.judged)), Judgement())
+        return whole.findings(_rules(self.protocol))
+
+    @property
     def load(self) -> float:
         """Bus load while somebody listened, 0 … 1."""
         return min(1.0, self.busy / self.listened) if self.listened else 0.0
 
-    def health(self) -> HealthReport:
-        """How the bus and its stations fared."""
-        return health_of(self.summary, self.findings)
+    def health(self, findings: Iterable[Finding] | None = None) -> HealthReport:
+        """How the bus and its stations fared. `findings`: this day's, where they are known already."""
+        return health_of(self.summary, self.findings if findings is None else findings)
 
     def merge(self, other: BusDay) -> BusDay:
         """Both together; the order does not matter. Raises ValueError for two buses or two days."""
@@ -70,11 +90,19 @@ class BusDay:
             listened=self.listened + other.listened,
             first=min(firsts, default=None),
             last=max(lasts, default=None),
-            findings=merged((low.findings, high.findings)),
+            judged=low.judged + high.judged,
             latency=max(self.latency, other.latency),
             sources=tuple(sorted({*self.sources, *other.sources})),
             notes=tuple(sorted({*self.notes, *other.notes})),
         )
+
+
+@cache
+def _rules(protocol: str) -> Mapping[str, Rule]:
+    try:
+        return rules_over(registry.get(protocol))
+    except registry.UnknownProtocol:
+        return {}
 
 
 def empty_summary(line: str) -> Summary:

@@ -10,10 +10,11 @@ from dissectors.findings import Finding, Severity
 from dissectors.histogram import Histogram
 from dissectors.subject import About, Subject
 from dissectors.tracker import Verdict
+from sniff.analysis.judgement import Heard, Judgement
 from sniff.analysis.nodes import Node
 from sniff.analysis.summary import Summary
 from sniff.engine.session import LineEventKind
-from sniff.fleet.bus_day import BusDay, empty_summary
+from sniff.fleet.bus_day import BusDay, Judged, empty_summary
 
 _COUNTS = ("frames", "damaged", "noise", "octets", "searched")
 _NAMED = ("kinds", "damages", "found", "marks")
@@ -35,7 +36,7 @@ def _day(day: BusDay) -> dict[str, Any]:
     plain = {name: getattr(day, name) for name in _PLAIN}
     return plain | {
         "summary": _summary(day.summary),
-        "findings": [_finding(one) for one in day.findings],
+        "judged": [_judged(one) for one in sorted(day.judged)],
         "sources": day.sources,
         "notes": day.notes,
     }
@@ -45,7 +46,7 @@ def _day_of(value: dict[str, Any]) -> BusDay:
     return BusDay(
         **{name: value[name] for name in _PLAIN},
         summary=_summary_of(value["summary"], value["line"]),
-        findings=tuple(_finding_of(one) for one in value["findings"]),
+        judged=tuple(_judged_of(one) for one in value["judged"]),
         sources=tuple(value["sources"]),
         notes=tuple(value["notes"]),
     )
@@ -114,6 +115,26 @@ def _histogram_of(value: list[Any]) -> Histogram:
         least,
         most,
     )
+
+
+_HEARD = ("octets", "in_frames", "rows", "good", "outside", "is_told")
+_PARTS = ("host", "overall", "line", "bus")
+
+
+def _judged(one: Judged) -> dict[str, Any]:
+    heard = one.judgement.heard
+    return {
+        "first": one.first,
+        "source": one.source,
+        "heard": [getattr(heard, name) for name in _HEARD],
+        "found": [[_finding(each) for each in getattr(one.judgement, part)] for part in _PARTS],
+    }
+
+
+def _judged_of(value: dict[str, Any]) -> Judged:
+    heard = Heard(**dict(zip(_HEARD, value["heard"], strict=True)))
+    found = (tuple(map(_finding_of, part)) for part in value["found"])
+    return Judged(value["first"], value["source"], Judgement(heard, **dict(zip(_PARTS, found, strict=True))))
 
 
 _FINDING = ("code", "subject", "first", "last", "count", "seen", "means", "next")

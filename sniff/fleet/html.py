@@ -8,7 +8,8 @@ from html import escape
 from sniff.analysis.plain import plain
 from sniff.fleet.answer import Answer, Bus, Day
 from sniff.fleet.bus_day import NO_DATE
-from sniff.fleet.text import change_words, trouble_words
+from sniff.fleet.drift import Drift
+from sniff.fleet.text import change_words, silence_words, sure_words, trouble_words
 
 _STYLE = """
 body{font:15px/1.45 system-ui,sans-serif;color:#1c2733;max-width:72rem;margin:2rem auto;padding:0 1rem}
@@ -28,7 +29,7 @@ def page(found: Answer, title: str = "Fieldbus archive") -> str:
 def _parts(found: Answer, title: str) -> Iterator[str]:
     yield f"<!doctype html><html lang=en><meta charset=utf-8><title>{_safe(title)}</title><style>{_STYLE}</style>"
     days = sorted({day.day for bus in found.buses for day in bus.days if day.day != NO_DATE})
-    ill = sum(bool(bus.troubles or bus.is_silent) for bus in found.buses)
+    ill = sum(bus.is_ill for bus in found.buses)
     span = f"{days[0]} to {days[-1]}" if days else "no day"
     yield f"<h1>{_safe(title)}</h1><p>{len(found.buses)} buses, {span}: {ill} with something wrong.</p>"
     yield "<table><tr><th>Bus<th class=n>Health<th>Day by day<th class=n>Load<th class=n>Damaged"
@@ -37,7 +38,7 @@ def _parts(found: Answer, title: str) -> Iterator[str]:
         yield from _line(number, bus)
     yield "</table>"
     for number, bus in enumerate(found.buses):
-        if bus.troubles or bus.changes or bus.is_silent or bus.notes or bus.missing:
+        if bus.is_ill or bus.changes or bus.notes or bus.missing:
             yield from _bus(number, bus)
     if found.gone:
         yield "<h2>Gone since the run before</h2><ul>"
@@ -69,11 +70,32 @@ def _bus(number: int, bus: Bus) -> Iterator[str]:
         yield f"<li><b>{_safe(trouble_words(trouble, bus))}</b><br>{_safe(trouble.finding.means)}<br>"
         yield f"<span class=grey>Next: {_safe(trouble.finding.next)}</span>"
     yield "".join(f"<li>{_safe(change_words(change, bus.noun))}" for change in bus.changes)
-    if bus.is_silent:
-        yield "<li>Nothing was heard on any day: is the tap connected, the bus switched on?"
+    silence = silence_words(bus)
+    if silence is not None:
+        yield f"<li>{_safe(silence[:1].upper() + silence[1:])}"
     if bus.missing:
         yield f"<li>No capture on {_safe(', '.join(bus.missing[:31]))}"
     yield "".join(f"<li>{_safe(note)}" for note in bus.notes) + "</ul>"
+    if bus.drifts:
+        yield "<table><tr><th>Median response time<th>Day by day<th class=n>Before, ms<th class=n>After, ms"
+        yield "<th class=n>ms in 30 days<th>How sure</tr>"
+        yield "".join(_drift(one, bus.noun) for one in bus.drifts) + "</table>"
+
+
+def _drift(one: Drift, noun: str) -> str:
+    times = [median for _, median in one.medians[-60:]]
+    most = max(times) or 1
+    bars = "".join(
+        f'<rect x="{8 * place}" y="{24 - height}" width="6" height="{2 + height}" fill="#4a6785"/>'
+        for place, height in enumerate(22 * time // most for time in times)
+    )
+    said = ", ".join(f"{day}: {time / 1e6:.1f} ms" for day, time in one.medians[-60:])
+    return (
+        f"<tr><td>{_safe(noun)} {one.station}"
+        f'<td><svg role=img width="{8 * len(times)}" height="26"><title>{_safe(said)}</title>{bars}</svg>'
+        f"<td class=n>{one.before / 1e6:.1f}<td class=n>{one.after / 1e6:.1f}<td class=n>{30 * one.slope / 1e6:+.1f}"
+        f"<td>{_safe(sure_words(one))}</tr>"
+    )
 
 
 def _picture(bus: Bus) -> str:

@@ -17,11 +17,12 @@ from sniff.engine.engine import Output
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import LineEvent, Session
 from sniff.engine.table import Table
-from sniff.fleet.archive import NS_PER_DAY, Task
-from sniff.fleet.bus_day import NO_DATE, BusDay
-from sniff.formats import read
-from sniff.formats.several_buses import buses_in
-from sniff.recording.rotated import joined
+from sniff.fleet.archive import NS_PER_DAY, Task, Window
+from sniff.fleet.bus_day import NO_DATE, BusDay, Judged
+from sniff.fleet.pieces import stretches
+
+FAR = 1 << 62
+"""ns; before and after everything."""
 
 NAMELESS = Session.__dataclass_fields__["bus"].default
 """What a session calls a bus that nobody named."""
@@ -32,22 +33,16 @@ FIRST_DATE = 365 * 86_400 * 1_000_000_000
 
 def read_task(task: Task) -> list[BusDay]:
     """What the captures of a task tell, a value a day. Raises CaptureError for what cannot be read at all."""
-    opened = joined([(file.path, _bus_of(task, read(file.path))) for file in task.files])
     days: list[BusDay] = []
-    for _, capture in opened:
+    for capture in stretches(task):
         days += _read(task, capture)
     return days
-
-
-def _bus_of(task: Task, capture: Capture) -> Capture:
-    """The bus that a task is about."""
-    return next(bus for bus in buses_in(capture) if task.bus in (None, bus.session.bus))
 
 
 def _read(task: Task, capture: Capture) -> Iterator[BusDay]:
     session = capture.session
     notes = []
-    by_day = ByDay(session)
+    by_day = ByDay(session, task.window)
     try:
         if session.unknown:
             notes.append(f"{' and '.join(session.unknown)} not known: nothing was found while it was recorded")
@@ -58,7 +53,9 @@ def _read(task: Task, capture: Capture) -> Iterator[BusDay]:
     except CaptureError as error:
         notes.append(str(error))
     sources = tuple(file.path for file in task.files)
-    parts = by_day.parts or {_day(session.started): Part(session)}
+    parts = by_day.parts
+    if not parts and (task.window is None or notes):
+        parts = {_day(session.started): Part(session)}
     for day, part in parts.items():
         yield BusDay(
             task.site,
@@ -72,7 +69,7 @@ def _read(task: Task, capture: Capture) -> Iterator[BusDay]:
             max(0, (part.summary.load.last or 0) - (part.summary.load.first or 0)),
             part.summary.load.first,
             part.summary.load.last,
-            part.judging.findings(),
+            (Judged(part.summary.load.first or 0, sources[0], part.judging.judgement()),),
             session.adapter.latency,
             sources,
             tuple(notes),
@@ -98,11 +95,15 @@ class Part:
 
 
 class ByDay:
-    """An observer that has others for each day. `parts`: by day of UTC, in the order of the capture."""
+    """An observer that has others for each day. `parts`: by day of UTC, in the order of the capture. `window`: the rows
+    that count are those that began in it; what closes without a row goes with the row before it."""
 
-    def __init__(self, session: Session) -> None:
+    def __init__(self, session: Session, window: Window | None = None) -> None:
         self.parts: dict[str, Part] = {}
         self._session = session
+        self._begin = window.begin if window is not None and window.begin is not None else -FAR
+        self._end = window.end if window is not None and window.end is not None else FAR
+        self._latest = -FAR
 
     def add(self, output: Output) -> None:
         """Take rows one by one."""
@@ -112,16 +113,23 @@ class ByDay:
     def add_table(self, table: Table) -> None:
         """Take rows; each belongs to the day on which it began."""
         if not len(table):
-            self._last_part(lambda part: part.add_table(table))
+            if self._begin <= self._latest < self._end:
+                self._last_part(lambda part: part.add_table(table))
             return
-        numbers = np.maximum.accumulate(table.frames.start // NS_PER_DAY)
-        edges = np.flatnonzero(np.append(True, numbers[1:] != numbers[:-1])).tolist()
-        for begin, end in zip(edges, [*edges[1:], len(table)], strict=True):
-            self._part(int(numbers[begin]) * NS_PER_DAY).add_table(table.part(begin, end))
+        starts = np.maximum(np.maximum.accumulate(table.frames.start), self._latest)
+        self._latest = int(starts[-1])
+        first, last = np.searchsorted(starts, (self._begin, self._end)).tolist()
+        if first >= last:
+            return
+        numbers = starts[first:last] // NS_PER_DAY
+        edges = (first + np.flatnonzero(np.append(True, numbers[1:] != numbers[:-1]))).tolist()
+        for begin, end in zip(edges, [*edges[1:], last], strict=True):
+            self._part(int(starts[begin])).add_table(table.part(begin, end))
 
     def add_line_event(self, event: LineEvent) -> None:
         """Take what happened to the line."""
-        self._part(event.time).add_line_event(event)
+        if self._begin <= event.time < self._end:
+            self._part(event.time).add_line_event(event)
 
     def _part(self, time: int) -> Part:
         day = _day(time)

@@ -9,14 +9,16 @@ from __future__ import annotations
 import contextlib
 import importlib.util
 import os
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from importlib import import_module
 from typing import Any
 
 from sniff.engine.capture import CaptureError
 from sniff.fleet.archive import Task
 from sniff.fleet.bus_day import BusDay
+from sniff.fleet.pieces import together
 from sniff.fleet.reading import read_task
 
 RETRIES = 3
@@ -41,6 +43,28 @@ class Done:
     task: Task
     days: tuple[BusDay, ...] = ()
     failed: str | None = None
+
+
+class Collecting:
+    """Pieces of tasks as they are done, in any order; a task is done when all its pieces are."""
+
+    def __init__(self, pieces: Iterable[Task]) -> None:
+        self._wanted = Counter(piece.whole for piece in pieces)
+        self._got: dict[Task, list[Done]] = {}
+
+    def add(self, done: Done) -> Done | None:
+        """Take a piece that is over; give the whole task where it was the last of it."""
+        whole = done.task.whole
+        got = self._got.setdefault(whole, [])
+        got.append(done)
+        if len(got) < self._wanted[whole]:
+            return None
+        del self._got[whole]
+        if len(got) == 1:
+            return replace(done, task=whole)
+        failed = next((one.failed for one in got if one.failed is not None), None)
+        days = () if failed is not None else together(day for one in got for day in one.days)
+        return Done(whole, tuple(days), failed)
 
 
 def available() -> bool:
@@ -79,7 +103,7 @@ def by_processes(tasks: Sequence[Task], workers: int | None = None) -> Iterator[
             threads_per_worker=1,
             processes=True,
             memory_limit=MEMORY,
-            dashboard_address=None,
+            dashboard_address="127.0.0.1:0",  # any free port; None takes a known one, or complains
             host="127.0.0.1",
         ) as cluster,
         distributed.Client(cluster) as client,

@@ -8,6 +8,7 @@ from dissectors.words import milliseconds
 from sniff.analysis.plain import plain
 from sniff.fleet.answer import Answer, Bus, Change, Day, Fresh, StationChange, Trouble
 from sniff.fleet.bus_day import NO_DATE
+from sniff.fleet.drift import Drift, Sure
 
 SHOWN = 12
 """Buses that are told in full; the others are counted."""
@@ -15,14 +16,40 @@ SHOWN = 12
 TROUBLES = 4
 """Findings of each."""
 
+WELL = 90
+"""Health below which the reasons are given where no finding does."""
+
+DAYS = 10
+"""Of the curve, so that a line fits 80 columns with a name of some length; the pages have more."""
+
 BARS = "▁▂▃▄▅▆▇█"
 
 
-def page(found: Answer, shown: int = SHOWN) -> Iterator[str]:
-    """Lines, without control characters."""
+def page(found: Answer, shown: int = SHOWN, width: int | None = None, height: int | None = None) -> Iterator[str]:
+    """Lines, without control characters. `shown`: most buses. `width`: of a screen, in columns: longer lines end with
+    "…" (what they end with is in the other forms of the answer); `height`: in lines: fewer buses, but at least one."""
+    head = list(_head(found))
+    foot = list(_foot(found, shown))
+    room = None if height is None else max(1, height - len(head) - len(foot) - 1)
+    told, used = 0, 0
+    blocks: list[list[str]] = []
+    for bus in found.buses[:shown]:
+        block = list(_bus(bus, _days(found)))
+        used += len(block)
+        if room is not None and blocks and used > room:
+            break
+        blocks.append(block)
+        told += 1
+    rest = found.buses[told:]
+    more = [f"… and {len(rest)} more, the worst of them at {rest[0].worst.health.score} (--all)"] if rest else []
+    for line in (*head, *(line for block in blocks for line in block), *more, *foot):
+        yield line if width is None else _clipped(line, width)
+
+
+def _head(found: Answer) -> Iterator[str]:
     days = sorted({day.day for bus in found.buses for day in bus.days if day.day != NO_DATE})
     sites = {bus.site for bus in found.buses}
-    ill = [bus for bus in found.buses if bus.troubles or bus.is_silent]
+    ill = [bus for bus in found.buses if bus.is_ill]
     span = f"{days[0]} … {days[-1]}" if days else "no day"
     yield (
         f"{_count(len(found.buses), 'bus', 'buses')} of {_count(len(sites), 'site')}, {span}: "
@@ -30,15 +57,11 @@ def page(found: Answer, shown: int = SHOWN) -> Iterator[str]:
     )
     if found.buses:
         yield ""
-        heading = f"{'health':>6}  {'worst day':10}  {'load':>5}  {'damaged':>7}  {'no answer':>9}  {'p95 ms':>7}"
-        yield f"{heading}  days, bus"
-    for bus in found.buses[:shown]:
-        yield from _bus(bus)
-    if len(found.buses) > shown:
-        rest = found.buses[shown:]
-        yield f"… and {len(rest)} more, the worst of them at {rest[0].health.score}"
+        yield f"health  worst day    load  damaged  no answer   p95 ms  {'days':{_days(found)}}  bus"
+
+
+def _foot(found: Answer, shown: int) -> Iterator[str]:
     if found.gone:
-        yield ""
         yield f"gone since the run before: {_some([plain(each) for each in found.gone])}"
     for path, why in list(found.unreadable.items())[:shown]:
         yield f"not read: {plain(path)}: {plain(why)}"
@@ -46,17 +69,28 @@ def page(found: Answer, shown: int = SHOWN) -> Iterator[str]:
         yield f"… and {len(found.unreadable) - shown} more that could not be read"
 
 
-def _bus(bus: Bus) -> Iterator[str]:
+def _days(found: Answer) -> int:
+    return max(4, max((min(DAYS, len(bus.days)) for bus in found.buses), default=0))
+
+
+def _clipped(line: str, width: int) -> str:
+    return line if len(line) <= width else line[: width - 1] + "…"
+
+
+def _bus(bus: Bus, days: int) -> Iterator[str]:
     worst = bus.worst
-    yield f"{worst.health.score:6}  {worst.day:10}  {numbers(worst)}  {curve(bus)} {plain(bus.name)}"
+    yield f"{worst.health.score:6}  {worst.day:10}  {numbers(worst)}  {curve(bus, days):{days}}  {plain(bus.name)}"
     for trouble in bus.troubles[:TROUBLES]:
         yield f"        {plain(trouble_words(trouble, bus))}"
     if len(bus.troubles) > TROUBLES:
         yield f"        … and {len(bus.troubles) - TROUBLES} more findings"
+    if not bus.troubles and worst.health.score < WELL:
+        yield f"        no finding; {plain('; '.join(worst.health.reasons))}"
     for change in bus.changes[:TROUBLES]:
         yield f"        {change_words(change, bus.noun)}"
-    if bus.is_silent:
-        yield "        nothing was heard on any day: is the tap connected, the bus switched on?"
+    silence = silence_words(bus)
+    if silence is not None:
+        yield f"        {silence}"
     if bus.missing:
         yield f"        no capture on {_some(list(bus.missing))}"
     for note in bus.notes[:2]:
@@ -70,30 +104,48 @@ def numbers(day: Day) -> str:
     return f"{day.load:5.0%}  {day.damaged:7.2%}  {day.unanswered:9.2%}  {late}"
 
 
-def curve(bus: Bus) -> str:
-    """Health day by day as bars, the newest 31 days."""
-    return "".join(BARS[min(len(BARS) - 1, day.health.score * len(BARS) // 101)] for day in bus.days[-31:])
+def curve(bus: Bus, days: int = DAYS) -> str:
+    """Health day by day as bars, the newest so many days."""
+    return "".join(BARS[min(len(BARS) - 1, day.health.score * len(BARS) // 101)] for day in bus.days[-days:])
 
 
 def trouble_words(trouble: Trouble, bus: Bus) -> str:
-    """A finding with its days: "MB001 station 3: no answer …; since 2026-03-02, 4 days, 812 times"."""
+    """A finding with its days: "MB001 station 3, since 03-02, 4 days, 812×: no answer to any of …"."""
     one, days = trouble.finding, trouble.days
-    since = f"since {days[0]}" if days[-1] == bus.days[-1].day else f"{days[0]} … {days[-1]}"
-    fresh = f" ({trouble.fresh.value})" if trouble.fresh is Fresh.NEW else ""
-    return f"{one.code}{fresh} {one.subject}: {one.seen}; {since}, {_count(len(days), 'day')}, {one.count}×"
+    newest = bus.days[-1].day
+    begin, end = (days[0][5:], days[-1][5:]) if days[0][:4] == newest[:4] and newest != NO_DATE else (days[0], days[-1])
+    when = f"since {begin}" if days[-1] == newest else begin if begin == end else f"{begin} … {end}"
+    fresh = " (new)" if trouble.fresh is Fresh.NEW else ""
+    many = f", {len(days)} days" if len(days) > 1 else ""
+    often = "" if one.is_once else f", {one.count}×"
+    return f"{one.code} {one.subject}{fresh}, {when}{many}{often}: {one.seen}"
 
 
 def change_words(change: StationChange, noun: str) -> str:
     """What happened to a station."""
     who = f"{noun} {change.station}"
-    if change.change is Change.CAME:
-        return f"{who} came on {change.day}"
-    if change.change is Change.WENT:
-        return f"{who} was heard last on {change.day}"
-    assert change.before is not None
-    assert change.after is not None
-    how = f"{milliseconds(change.before)} → {milliseconds(change.after)}"
-    return f"{who} answers {change.change.value} since about {change.day}: median {how}"
+    if change.drift is None:
+        return f"{who} {'came on' if change.change is Change.CAME else 'was heard last on'} {change.day}"
+    one = change.drift
+    how = f"{milliseconds(one.before)} → {milliseconds(one.after)}"
+    return f"{who} answers {change.change.value} since about {change.day}: median {how} ({sure_words(one)})"
+
+
+def sure_words(drift: Drift) -> str:
+    """How sure a drift is: "sure: 1 in 1000 by chance"."""
+    if drift.sure is Sure.UNSURE and len(drift.medians) < 5:
+        return f"{len(drift.medians)} days: too few to be sure"
+    odds = 1 / max(drift.chance, 1e-6)
+    return f"{drift.sure.value}: 1 in {odds:.0f} by chance" if odds >= 2 else f"{drift.sure.value}: as by chance"
+
+
+def silence_words(bus: Bus) -> str | None:
+    """That somebody recorded and heard nothing, or does not record any more."""
+    if bus.is_silent:
+        return "nothing was heard on any day: is the tap connected, the bus switched on?"
+    if bus.silent:
+        return f"nothing was heard on {_some(list(bus.silent))}: was the tap connected, the bus switched on?"
+    return f"no capture since {bus.stopped}, while other buses go on: does anybody record it?" if bus.stopped else None
 
 
 def _count(number: int, one: str, more: str = "") -> str:

@@ -8,6 +8,7 @@ from typing import Any
 from dissectors.histogram import Histogram
 from sniff.fleet.answer import Answer, Bus, Day
 from sniff.fleet.bus_day import Archive
+from sniff.fleet.drift import Drift
 from sniff.formats.parquet import Kind
 
 COLUMNS: dict[str, Kind] = {
@@ -33,16 +34,17 @@ COLUMNS: dict[str, Kind] = {
 def rows(archive: Archive) -> Iterator[tuple[Any, ...]]:
     """The table, ordered by site, bus, day, station."""
     for _, day in sorted(archive.days.items()):
-        health, summary = day.health(), day.summary
+        found, summary = day.findings, day.summary
+        health = day.health(found)
         head = (day.site, day.bus, day.protocol, day.day)
         asked = sum(node.asked for node in summary.nodes)
         unanswered = sum(node.unanswered for node in summary.nodes)
-        codes = sorted({finding.code for finding in day.findings})
+        codes = sorted({finding.code for finding in found})
         yield (*head, None, health.bus.score, day.load, summary.frames, summary.damaged, asked, unanswered,
                *_times(summary.latency), " ".join(codes))  # fmt: skip
         for node in sorted(summary.nodes, key=lambda one: one.address):
             score = health.stations.get(node.address)
-            codes = sorted({one.code for one in day.findings if one.about.station == node.address})
+            codes = sorted({one.code for one in found if one.about.station == node.address})
             yield (*head, node.address, score.score if score is not None else None, None, node.sent, node.damaged,
                    node.asked, node.unanswered, *_times(node.latency), " ".join(codes))  # fmt: skip
 
@@ -84,14 +86,27 @@ def _bus(bus: Bus) -> dict[str, Any]:
                 "station": one.station,
                 "change": one.change.value,
                 "day": one.day,
-                "before_ms": _ms(one.before),
-                "after_ms": _ms(one.after),
+                **(_drift(one.drift) if one.drift is not None else {}),
             }
             for one in bus.changes
         ],
+        "response_drift": [{"station": one.station, **_drift(one)} for one in bus.drifts],
+        "silent_days": list(bus.silent),
+        "no_capture_since": bus.stopped,
         "missing_days": list(bus.missing),
         "notes": list(bus.notes),
         "adapter_ms": _ms(bus.latency),
+    }
+
+
+def _drift(one: Drift) -> dict[str, Any]:
+    return {
+        "before_ms": _ms(one.before),
+        "after_ms": _ms(one.after),
+        "ms_in_30_days": round(30 * one.slope / 1e6, 3),
+        "days": len(one.medians),
+        "how_sure": one.sure.value,
+        "chance": round(one.chance, 6),
     }
 
 

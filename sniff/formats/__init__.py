@@ -54,13 +54,18 @@ def _opened(path: Path) -> Capture:
     try:
         found = _reader(place, start)(place)
     except CaptureError as error:
-        raise CaptureError(str(error).replace(str(place), str(path))) from None
-    return cut_short(found, damage) if damage else found
+        said = str(error).replace(str(place), str(path))
+        raise CaptureError(f"{said} ({damage})" if damage else said) from None
+    return cut_short(path, found, damage) if damage else found
 
 
 def _reader(path: Path, start: bytes) -> Callable[[Path], Capture]:
     """The function that opens it. Raises CaptureError, which says what was recognised and what to do."""
     found = table.told(start, path.name)
+    if found is not None and not found.last and not found.recognises(start) and _holds_frames(start):
+        from sniff.formats import raw_dump
+
+        return lambda place: raw_dump.RawDump(place, f"; its name says {found.name}, and it is none")
     if found is None or found.last:
         for magic, what in table.UNREADABLE:
             if start.startswith(magic):
@@ -68,7 +73,27 @@ def _reader(path: Path, start: bytes) -> Callable[[Path], Capture]:
     if found is None:
         raise CaptureError(f"{path}: an empty file")
     opened: Callable[[Path], Capture] = table.function(found.reader)
-    return opened
+    return opened if found.last or found.recognises(start) else _named_only(opened)
+
+
+def _named_only(opened: Callable[[Path], Capture]) -> Callable[[Path], Capture]:
+    """A reader of a file that is not what its name says; its error says the way out too."""
+
+    def read(path: Path) -> Capture:
+        try:
+            return opened(path)
+        except CaptureError as error:
+            raise CaptureError(f"{error}; name it .bin if it is octets as they were heard") from None
+
+    return read
+
+
+def _holds_frames(start: bytes) -> bool:
+    """Whether octets without any heading are frames of a field bus, for the most part."""
+    from sniff.formats.network_capture import SAMPLE as NEEDED
+    from sniff.formats.network_capture import protocol_of
+
+    return protocol_of([Chunk(0, start[:NEEDED])]) is not None
 
 
 def start_of(path: Path) -> bytes:

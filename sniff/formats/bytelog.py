@@ -17,6 +17,7 @@ them are an error, raised when all that was understood has been given.
 from __future__ import annotations
 
 import csv
+import re
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import islice
@@ -27,10 +28,11 @@ from dissectors.frame import Chunk
 from dissectors.line import MS
 from sniff.engine.capture import CaptureError
 from sniff.engine.session import Adapter, Completeness, Item, LineEvent, Session
-from sniff.formats.contents import is_utf16
+from sniff.formats.contents import utf16_of
 from sniff.formats.files import explain, open_capture
 from sniff.formats.log_assembly import Assembly
-from sniff.formats.log_lines import Kind, line_of, pieces
+from sniff.formats.log_lines import Kind, pieces
+from sniff.formats.log_margin import plain_signs
 from sniff.formats.log_plan import LOOKED_AT, LOOKED_AT_CHARACTERS, Plan, plan_of
 from sniff.formats.log_shapes import REMARK
 from sniff.formats.octet_table import Table, delimiter_of, heading_of
@@ -45,6 +47,9 @@ MOST_ROWS = 5_000_000
 
 MOST_STRANGE = 0.2
 """Share of lines that are not understood, of those that tell octets, from which on a log is not read."""
+
+_RULED = re.compile(r"[\s+|:=-]*")
+"""What stands between the rows of a table that is drawn."""
 
 TIMELESS = 50 * MS
 """What may lie between two octets of one frame where there are no times: LINE_END, and what a faster line leaves."""
@@ -110,8 +115,15 @@ class ByteLog:
             return Completeness(False, f"{self._strange_words()}, the first is line {counts.first} ({self.kind} log)")
         said = [f"{self.kind} log"]
         said += [f"{counts.same} lines that repeat others passed over"] if counts.same else []
+        said += self._times_said()
         said += [f"{counts.text} lines of other text passed over"] if counts.text else []
         return Completeness(True, f"complete ({'; '.join(said)})")
+
+    def _times_said(self) -> tuple[str, ...]:
+        """What was assumed of the times."""
+        if self._plan is not None:
+            return self._plan.times.said
+        return self._heading[1].times.said if self._heading is not None else ()
 
     def _strange_words(self) -> str:
         many = self._counts.strange
@@ -128,8 +140,8 @@ class ByteLog:
 
     def _adapter(self, lines: list[str], adapter: Adapter) -> Adapter:
         assert self._plan is not None
-        rows = self._plan.offsets is not None
-        stamps = [line.stamp for line in (line_of(text, rows=rows) for text in lines) if line.stamp is not None]
+        read = map(self._plan.line, self._plan.margin.joined(lines))
+        stamps = [line.stamp for line in read if line.stamp is not None]
         if not stamps:
             return replace(adapter, latency=TIMELESS, latency_from="assumed; the log has no times")
         tick = min(stamp.tick for stamp in stamps)
@@ -142,8 +154,8 @@ class ByteLog:
             try:
                 start = stream.read(1 << 12)
                 stream.seek(0)
-                if is_utf16(start):
-                    yield from _utf16_lines(stream, start)
+                if (codec := utf16_of(start)) is not None:
+                    yield from _utf16_lines(stream, codec)
                     return
                 while line := stream.readline(LONGEST_LINE):
                     text = line.decode("utf-8", "replace").rstrip("\r\n").removeprefix("\ufeff")
@@ -156,8 +168,8 @@ class ByteLog:
         assert self._plan is not None
         counts = self._counts
         assembly = Assembly(self._plan, self.session.line)
-        for number, text in enumerate(self._lines(), 1):
-            line = line_of(text, self._plan.base, rows=self._plan.offsets is not None)
+        for number, text in enumerate(self._plan.margin.joined(self._lines()), 1):
+            line = self._plan.line(text)
             yield from assembly.take(line, text)
             counts.add(assembly.was, line.kind, number)
         yield from assembly.close()
@@ -165,7 +177,7 @@ class ByteLog:
     def _table(self) -> Iterator[Item]:
         assert self._heading is not None
         at, table = self._heading
-        rows = csv.reader(islice(self._lines(), at, None), delimiter=table.delimiter)
+        rows = csv.reader(map(plain_signs, islice(self._lines(), at, None)), delimiter=table.delimiter)
         next(rows, None)
         found: list[Chunk] = []
         try:
@@ -174,7 +186,7 @@ class ByteLog:
                     continue
                 if len(found) >= MOST_ROWS:
                     raise CaptureError(f"{self.path}: a table of over {MOST_ROWS} rows; cut it into pieces")
-                if not table.holds(row):
+                if not table.holds(row) or all(_RULED.fullmatch(cell) for cell in row):
                     self._counts.text += 1
                     continue
                 try:
@@ -184,6 +196,9 @@ class ByteLog:
                     self._counts.pass_over(at + rows.line_num)
         except csv.Error:  # a field that never ends, a zero octet
             self._counts.pass_over(at + rows.line_num)
+        first = min((chunk.time - len(chunk.octets) * self.session.line.char for chunk in found), default=0)
+        if first < 0:  # counted from a trigger: no time is before 1970
+            found = [replace(chunk, time=chunk.time - first) for chunk in found]
         yield from sorted(found, key=lambda chunk: chunk.time)  # two lines of a bus are listed one after the other
 
 
@@ -212,7 +227,7 @@ class _Counts:
 
 def _heading(lines: list[str]) -> tuple[int, Table] | None:
     """The line with the headings of a table and what it says; remarks may stand before it."""
-    for number, line in enumerate(lines[:20]):
+    for number, line in enumerate(map(plain_signs, lines[:20])):
         if not line.strip() or line.lstrip().startswith(REMARK):
             continue
         table = heading_of(line, delimiter_of(line), lines[number + 1 : number + 500])
@@ -221,11 +236,11 @@ def _heading(lines: list[str]) -> tuple[int, Table] | None:
     return None
 
 
-def _utf16_lines(stream: object, start: bytes) -> Iterator[str]:
+def _utf16_lines(stream: object, codec: str) -> Iterator[str]:
     import codecs
     from typing import BinaryIO, cast
 
-    decoder = codecs.getincrementaldecoder("utf-16")("replace")
+    decoder = codecs.getincrementaldecoder(codec)("replace")
     rest = ""
     while octets := cast(BinaryIO, stream).read(1 << 16):
         *whole, rest = (rest + decoder.decode(octets)).split("\n")

@@ -27,6 +27,8 @@ DEEPEST = 3
 
 _AT_ONCE = 1 << 16
 _PIECE = 1 << 20
+_ZSTD_AT_ONCE = 1 << 9
+"""Octets given to its unpacker, which has no bound of its own: four of them may become a block of 128 KiB."""
 _WINDOW = 1 << 27
 """Octets that an unpacker may hold: what zstd itself allows without being asked."""
 _kept: list[tempfile.TemporaryDirectory[str]] = []  # until the program ends
@@ -120,10 +122,16 @@ def zstd_pieces(stream: BinaryIO) -> Iterator[bytes]:
     """What a zstd file holds: one frame after another."""
     import zstandard
 
-    unpacker = zstandard.ZstdDecompressor(max_window_size=_WINDOW)
-    reader = unpacker.stream_reader(stream, read_size=_AT_ONCE, read_across_frames=True)
-    while piece := reader.read(_PIECE):
-        yield piece
+    octets = stream.read(_ZSTD_AT_ONCE)
+    while octets:
+        unpacker = zstandard.ZstdDecompressor(max_window_size=_WINDOW).decompressobj()
+        while not unpacker.eof:
+            if not octets:
+                raise EOFError("it ends within")
+            if piece := unpacker.decompress(octets):
+                yield piece
+            octets = b"" if unpacker.eof else stream.read(_ZSTD_AT_ONCE)
+        octets = unpacker.unused_data or stream.read(_ZSTD_AT_ONCE)
 
 
 def _stream_pieces(stream: BinaryIO, unpacker: Any) -> Iterator[bytes]:

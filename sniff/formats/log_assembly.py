@@ -40,7 +40,9 @@ class Assembly:
         self._recent = b""
         self._last = 0
         self._any = False
+        self._shift = 0
         self._day = 0
+        self._date = 0  # of the line that told one last
         self._clock = -1
         self._held = bytearray()
         self._stamp: Stamp | None = None
@@ -98,6 +100,10 @@ class Assembly:
             return
         if role is not Role.DATA:
             self.was = Kind.STRANGE if role is None and line.spelling in self._plan.spellings else Kind.TEXT
+            return
+        if line.broken:  # what is left of it would be taken for a frame
+            self.was = Kind.STRANGE
+            yield from self._flush()
             return
         if line.cut:
             self.was = Kind.STRANGE
@@ -176,7 +182,7 @@ class Assembly:
             self.was = Kind.SHAPE
             return
         if line.kind is Kind.OCTETS:
-            self.was = Kind.TEXT if not line.bare else Kind.STRANGE
+            self.was = Kind.TEXT if not line.bare and not line.broken else Kind.STRANGE
         if line.kind is not Kind.REMARK:
             yield from self._flush()
             self._expected = 0
@@ -200,20 +206,28 @@ class Assembly:
                 self._last, int((self._samples[1] + self._plan.bit_samples) / self._plan.bit_samples * self._bit)
             )
         elif self._stamp is not None:
-            told = self._told(self._stamp)
+            told = self._told(self._stamp) + self._shift
             is_coarse = self._stamp.tick >= COARSE or (told == self._last and self._any)
             time = told
             if is_coarse and self._any and told > self._last - _BACKWARDS:
                 together = len(octets) == 1 and self._plan.octetwise
                 time = max(told, self._last + length + (0 if together else silence))
+        if not self._any:
+            self._shift = max(0, length - time)  # counted from a trigger, or since the last line: no time before 1970
+            time += self._shift
         self._last, self._any = time, True
         yield Chunk(time, octets)
 
     def _told(self, stamp: Stamp) -> int:
         """ns of a stamp; a time of day goes on after midnight."""
+        if self._plan.times.steps:
+            self._clock = max(self._clock, 0) + stamp.time
+            return self._clock
         if not stamp.daily:
+            if stamp.dated:
+                self._date, self._clock = stamp.time // DAY * DAY - self._day * DAY, stamp.time % DAY
             return stamp.time
         if self._clock >= 0 and stamp.time < self._clock - DAY // 2:
             self._day += 1
         self._clock = stamp.time
-        return self._day * DAY + stamp.time
+        return self._date + self._day * DAY + stamp.time

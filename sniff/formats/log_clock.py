@@ -9,7 +9,8 @@ from datetime import UTC, datetime
 from decimal import Decimal
 
 from dissectors.line import MS, NS_PER_S
-from sniff.formats.octet_table import seconds
+from sniff.formats.log_times import AS_WRITTEN, BARE, EPOCH, Order, Times, day_of
+from sniff.formats.octet_table import UNITS, seconds
 
 _TIME = (
     r"(?P<clock>\d{1,2}:\d{2}:\d{2}(?:[.,]\d{1,9}|:\d{3}(?![\d:]))?)(?!\d|:[0-9A-Za-z])(?: ?(?P<half>[AaPp][Mm])\b)?"
@@ -36,35 +37,35 @@ class Stamp:
 
 @dataclass(frozen=True, slots=True)
 class Clock:
-    """A way to write a time. `value`: match → ns; ValueError when it is none after all. `first`: only where nothing but
-    brackets stands before it.
+    """A way to write a time. `value`: match, order of a date → ns; ValueError when it is none after all. `first`: only
+    where nothing but brackets stands before it.
     """
 
     name: str
     pattern: re.Pattern[str]
-    value: Callable[[re.Match[str]], int]
+    value: Callable[[re.Match[str], Order | None], int]
     dated: bool = False
     daily: bool = False
     first: bool = False
 
 
-def _dated(match: re.Match[str]) -> int:
+def _dated(match: re.Match[str], order: Order | None) -> int:
     found = match.groupdict()
     zone = found.get("zone") or ""
     east = 0
     if zone[:1] in ("+", "-"):
         east = (int(zone[1:3]) * 60 + int(zone[-2:])) * 60 * NS_PER_S * (1 if zone[0] == "+" else -1)
-    return midnight(found["date"]) + _of_day(match) - east
+    return midnight(found["date"], order) + _of_day(match) - east
 
 
-def _named_month(match: re.Match[str]) -> int:
+def _named_month(match: re.Match[str], _order: Order | None) -> int:
     found = match.groupdict()
     year = int(found.get("year") or 1970)
     month = _MONTHS.index(found["month"].lower()[:3]) + 1
     return _midnight(year, month, int(found["day"])) + _of_day(match)
 
 
-def _of_day(match: re.Match[str]) -> int:
+def _of_day(match: re.Match[str], _order: Order | None = None) -> int:
     """ns since midnight."""
     hours, minutes, *rest = match["clock"].replace(",", ".").split(":")
     hour = int(hours)
@@ -74,8 +75,33 @@ def _of_day(match: re.Match[str]) -> int:
     return (hour * 60 + int(minutes)) * 60 * NS_PER_S + seconds(".".join(rest))
 
 
-def _scaled(unit: int) -> Callable[[re.Match[str]], int]:
-    return lambda match: int(Decimal(match["number"]) * unit)
+def _scaled(unit: int) -> Callable[[re.Match[str], Order | None], int]:
+    return lambda match, _order: int(Decimal(match["number"]) * unit)
+
+
+def _minutes(match: re.Match[str], _order: Order | None) -> int:
+    return int(match["m"]) * 60 * NS_PER_S + seconds(match["s"])
+
+
+def _dashed(match: re.Match[str], _order: Order | None) -> int:
+    hours, minutes, rest = match["dashed"].split("-")
+    return (int(hours) * 60 + int(minutes)) * 60 * NS_PER_S + seconds(rest)
+
+
+def _named(match: re.Match[str], _order: Order | None) -> int:
+    return int(Decimal(match["number"]) * _unit(match))
+
+
+def _unit(match: re.Match[str]) -> int:
+    """ns that the number of a named time counts: as its name says, or its size; parts of a second where it has any."""
+    said = match["unit"] or match["unit_behind"]
+    if said:
+        return UNITS[said.lower()]
+    number = Decimal(match["number"])
+    for unit in (NS_PER_S, MS, MS // 1000, 1):
+        if EPOCH[0] * NS_PER_S <= number * unit <= EPOCH[1] * NS_PER_S:
+            return unit
+    return NS_PER_S if "." in match["number"] else MS
 
 
 def _clock(pattern: str) -> re.Pattern[str]:
@@ -94,42 +120,54 @@ CLOCKS: tuple[Clock, ...] = (
     Clock("time of day", _clock(_TIME), _of_day, daily=True),
     Clock("ms since the epoch", _clock(r"(?P<number>1\d{12})(?=[\s:;,\])|])"), _scaled(MS), dated=True, first=True),
     Clock("minutes and seconds", _clock(r"(?P<clock>(?P<m>\d{1,3}):(?P<s>\d{2}\.\d{1,6}))(?![\d:])"),
-          lambda match: int(match["m"]) * 60 * NS_PER_S + seconds(match["s"]), first=True),
-    Clock("ms", _clock(r"\+?(?P<number>\d{1,12}(?:\.\d{1,6})?) ?ms\b"), _scaled(MS), first=True),
-    Clock("µs", _clock(r"\+?(?P<number>\d{1,15}(?:\.\d{1,6})?) ?[uµμ]s\b"), _scaled(MS // 1000), first=True),
-    Clock("seconds", _clock(r"\+?(?P<number>\d{1,10}\.\d{1,9})(?: ?s(?:ec)?\b)?(?=[\s:;,\])|])"), _scaled(NS_PER_S),
+          _minutes, first=True),
+    Clock("time of day with dashes", _clock(r"(?P<dashed>[0-2]?\d-[0-5]\d-[0-5]\d[.,]\d{1,6})(?!\d)"), _dashed,
+          daily=True, first=True),
+    Clock("ms", _clock(r"[+]?(?P<number>-?\d{1,12}(?:\.\d{1,6})?) ?ms\b"), _scaled(MS), first=True),
+    Clock("µs", _clock(r"[+]?(?P<number>-?\d{1,15}(?:\.\d{1,6})?) ?[uµμ]s\b"), _scaled(MS // 1000), first=True),
+    Clock("seconds", _clock(r"[+]?(?P<number>-?\d{1,10}\.\d{1,9})(?: ?s(?:ec)?\b)?(?=[\s:;,\])|])"), _scaled(NS_PER_S),
           first=True),
+    Clock("a named number", re.compile(
+              r"(?<![0-9A-Za-z])(?:ts|t|time|timestamp|zeit|uptime|elapsed|millis)(?:[_ ]?(?P<unit>ms|us|ns|s))?\"?"
+              r"\s*[:=]\s*\"?(?P<number>-?\d{1,19}(?:\.\d{1,9})?)(?:\s?(?P<unit_behind>ms|us|µs|ns|s))?(?![0-9A-Za-z:.-])",
+              re.IGNORECASE), _named),
     Clock("ms before a bar", _clock(r"(?P<number>\d{3,10})\|"), _scaled(MS), first=True),
 )  # fmt: skip
 """The most telling first."""
 
 _HEAD = 160
 """Characters at the begin of a line in which a time is looked for."""
-_ONLY_BRACKETS = re.compile(r"[\s\[({<#*|]*(?:\[?[A-Z]\]?[ ]?)?")
+_ONLY_BRACKETS = re.compile(r"(?:\s*\d{1,7}\s+)?[\s\[({<#*|]*(?:\[?[A-Z]\]?[ ]?)?")
 
 
-def stamp_of(line: str) -> Stamp | None:
+def stamp_of(line: str, times: Times = AS_WRITTEN) -> Stamp | None:
     """The time in a line, None when there is none."""
     head = line[:_HEAD]
+    if times.unit and (bare := BARE.match(head)) is not None:
+        text = bare["number"].replace(",", ".")
+        tick = max(1, times.unit // 10 ** len(text.partition(".")[2]))
+        return Stamp(int(Decimal(text) * times.unit), tick, *bare.span("number"), times.since_1970)
     for clock in CLOCKS:
         match = clock.pattern.search(head)
         if match is None or (clock.first and not _ONLY_BRACKETS.fullmatch(head[: match.start()])):
             continue
         try:
-            time = clock.value(match)
+            time = clock.value(match, times.order)
         except ValueError:
             continue
-        tick = _tick(match)
-        return Stamp(time, tick, match.start(), match.end(), clock.dated, clock.daily)
+        dated = clock.dated or ("number" in match.groupdict() and time >= EPOCH[0] * NS_PER_S)
+        return Stamp(time, _tick(match), match.start(), match.end(), dated, clock.daily)
     return None
 
 
 def _tick(match: re.Match[str]) -> int:
     """ns: the place of the last digit."""
     found = match.groupdict()
-    text = found.get("clock") or found.get("number") or ""
+    text = found.get("clock") or found.get("dashed") or found.get("number") or ""
     unit = NS_PER_S
-    if found.get("clock") is None:
+    if "unit_behind" in found:
+        unit = _unit(match)
+    elif found.get("number") is not None:
         tail = match[0].lstrip("+")[len(text) :].strip()
         unit = (
             MS
@@ -145,18 +183,16 @@ def _tick(match: re.Match[str]) -> int:
     return max(1, tick)
 
 
-def midnight(date: str) -> int:
+def midnight(date: str, order: Order | None = None) -> int:
     """ns since the epoch, as UTC; 13.02.2006 is day first, 2/13/2006 is month first (day first where it must be),
-    2006-02-13 year first. 0 for no such day.
+    2006-02-13 year first, unless `order` says otherwise. 0 for no such day.
     """
     first, second, third = (int(part) for part in re.split(r"[-./]", date))
     if first > 31:
-        year, month, day = first, second, third
-    elif "." in date or first > 12 or "-" in date:
-        day, month, year = first, second, third
-    else:
-        month, day, year = first, second, third
-    return _midnight(year if year > 99 else 2000 + year, month, day)
+        first, second, third, order = third, second, first, Order.DAY_FIRST
+    elif order is None:
+        order = Order.DAY_FIRST if "." in date or first > 12 or "-" in date else Order.MONTH_FIRST
+    return (day_of((first, second, third), order) or 0) * DAY
 
 
 def _midnight(year: int, month: int, day: int) -> int:

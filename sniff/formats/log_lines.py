@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from enum import Enum
 
 from sniff.formats.log_clock import Stamp, stamp_of
-from sniff.formats.log_octets import PAIRS_ONLY, Run, numbers_in, octets_in
+from sniff.formats.log_octets import PAIRS_ONLY, Run, number_in, numbers_in, octets_in
 from sniff.formats.log_shapes import COLOURS, REMARK, STAMP, WAYS, Role, shape_of
+from sniff.formats.log_times import AS_WRITTEN, Times
 
 LONGEST = 1 << 13
 """Characters of a line that are looked at; a frame of a field bus is far shorter."""
@@ -70,6 +71,12 @@ class Line:
     offset: str = ""
     samples: tuple[int, int] | None = None
     cut: bool = False
+    broken: bool = False
+    """Whether one of its octets is none that can be read."""
+    wordy: bool = False
+    """Whether its octets may as well be words."""
+    lower: bool = False
+    """Whether its digits are small letters."""
     more: tuple[tuple[str, bytes], ...] = ()
     """Way and octets of what stands behind on the same line, as the answer beside its request."""
     goes_on: bool = False
@@ -79,14 +86,16 @@ class Line:
 EMPTY, REMARKED = Line(Kind.EMPTY), Line(Kind.REMARK)
 
 
-def line_of(text: str, base: int = PAIRS_ONLY, rows: bool = True) -> Line:
-    """A line taken apart. `base`: of numbers (`octets_in`); `rows`: whether an offset may stand before octets."""
+def line_of(text: str, base: int = PAIRS_ONLY, rows: bool = True, times: Times = AS_WRITTEN) -> Line:
+    """A line taken apart. `base`: of numbers (`octets_in`); `rows`: whether an offset may stand before octets;
+    `times`: how its times are read.
+    """
     text = _SPACES.sub("   ", COLOURS.sub("", text))[:LONGEST].rstrip()
     if not text.strip():
         return EMPTY
     if text.lstrip().startswith(REMARK):
         return REMARKED
-    stamp, text = _without_stamps(text)
+    stamp, text = _without_stamps(text, times)
     known = shape_of(text)
     if rows and (known is None or known[0].role is not Role.DATA or "octets" not in known[1].re.groupindex):
         row = _row(text, stamp)
@@ -113,7 +122,8 @@ def line_of(text: str, base: int = PAIRS_ONLY, rows: bool = True) -> Line:
         way = _way(text[: run.begin])
     return Line(
         Kind.OCTETS, stamp, way, run.octets, shape.tool, False, Role.DATA, shape.tool, run.spelling,
-        samples=samples, cut=bool(groups.get("cut")), more=_more(text, run, base) if told is None else (),
+        samples=samples, cut=bool(groups.get("cut")), broken=run.broken,
+        more=_more(text, run, base) if told is None else (),
     )  # fmt: skip
 
 
@@ -136,7 +146,8 @@ def numbers_of(text: str) -> tuple[str, ...]:
     text = _SPACES.sub("   ", COLOURS.sub("", text))[:LONGEST].rstrip()
     if text.lstrip().startswith(REMARK):
         return ()
-    return numbers_in(_without_stamps(text)[1])
+    text = _without_stamps(text)[1]
+    return numbers_in(text) or ((alone,) if (alone := number_in(text)) else ())
 
 
 def _general(text: str, stamp: Stamp | None, base: int) -> Line:
@@ -151,8 +162,14 @@ def _general(text: str, stamp: Stamp | None, base: int) -> Line:
     goes_on = text.rstrip().endswith((",", "\\"))
     return Line(
         Kind.OCTETS, stamp, way, run.octets, label if not bare else "", bare, None, "", run.spelling,
+        cut=len(run.octets) > 3 and _LEFT_OUT.fullmatch(text, run.end) is not None,
+        broken=run.broken, wordy=run.wordy, lower=text[run.begin : run.end].upper() != text[run.begin : run.end],
         goes_on=goes_on, more=_more(text, run, base),
     )  # fmt: skip
+
+
+_LEFT_OUT = re.compile(r" ?(?:\.\.\.|…)\s*(?:[\[(<]?\d+ more.*)?")
+"""What stands behind octets of which a tool left out the rest."""
 
 
 def _more(text: str, run: Run, base: int) -> tuple[tuple[str, bytes], ...]:
@@ -188,13 +205,22 @@ def _way(lead: str) -> str:
 def _looks(text: str) -> bool:
     """Whether a line that tells no octets looks as if it did, or is no words either."""
     found = len(_HEXLIKE.findall(text))
-    return found >= 3 or (found > 0 and not _WORDS.search(text) and STAMP not in text)
+    if found >= max(3, len(_WORDS.findall(text))) or (
+        found > 0 and not _WORDS.search(text) and (STAMP not in text or bool(_way(text)))
+    ):
+        return True
+    joined = _JOINED.search(text)  # digits without space, of which a few are none
+    return joined is not None and sum(sign in _HEX for sign in joined[1]) >= 0.8 * len(joined[1])
 
 
-def _without_stamps(text: str) -> tuple[Stamp | None, str]:
+_HEX = frozenset("0123456789ABCDEFabcdef")
+_JOINED = re.compile(r"(?:^|[\s:>=\]])(?=[0-9A-Za-z?]*[0-9A-Fa-f]{4})(?=(?:[A-Za-z?]*\d){4})([0-9A-Za-z?]{10,})\s*$")
+
+
+def _without_stamps(text: str, times: Times = AS_WRITTEN) -> tuple[Stamp | None, str]:
     first: Stamp | None = None
     for _ in range(MOST_STAMPS):
-        stamp = stamp_of(text)
+        stamp = stamp_of(text, times)
         if stamp is None:
             break
         first = first or stamp

@@ -8,13 +8,16 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 SURELY = 4
 """Octets in a run that are no number of the line, no time and no length."""
 
 PAIRS_ONLY = 0
 """No base: numbers are no octets."""
+
+_MOSTLY = 0.7
+"""Share of a run's tokens that are octets, from which on the others are meant as octets."""
 
 _SEPARATOR = r"(?:[ ]?[,;][ ]?|[:._-]|[ \t]{1,2})"
 CONTROLS = [
@@ -79,12 +82,16 @@ class Spelling:
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """Octets found in a line, and where their text stands."""
+    """Octets found in a line, and where their text stands. `broken`: beside them stands what should be an octet of
+    theirs and is none, so that they are not all. `wordy`: hexadecimal without any decimal digit, as words may be.
+    """
 
     begin: int
     end: int
     octets: bytes
     spelling: str
+    broken: bool = False
+    wordy: bool = False
 
 
 def _by(pattern: str, base: int) -> Callable[[str], bytes]:
@@ -138,6 +145,14 @@ def _explained(text: str) -> bytes:
     return bytes(found)
 
 
+def _codes(text: str) -> bytes:
+    """Numbers of characters, as Pascal writes them: `#1#3#123`; two digits in each are hexadecimal."""
+    tokens = text.split("#")[1:]
+    if all(len(token) == 2 for token in tokens):
+        raise ValueError("pairs")
+    return bytes(int(token) for token in tokens)
+
+
 def _controls(text: str) -> bytes:
     """Characters, and names in angle brackets for those that are none: `<SOH><ETX>A`."""
     found = bytearray()
@@ -177,6 +192,7 @@ SPELLINGS: tuple[Spelling, ...] = (
     Spelling("0x and digits", r"0[xX][0-9A-Fa-f]{1,2}(?![0-9A-Za-z])", r"['\"]?[ ]?[,;:/|]?[ \t]{0,2}['\"]?",
              _by(r"0[xX]([0-9A-Fa-f]{1,2})", 16), 2),
     Spelling("digits and h", rf"{_H2}[hH]", _SEPARATOR, _by(rf"({_H2})[hH]", 16), 2),
+    Spelling("character codes", r"#\d{1,3}", "", _codes, SURELY, before=r"(?<![0-9A-Za-z_])"),
     Spelling("digits after a sign", rf"[$%&#]{_H2}", r"[ ,;]{0,2}", _HEX, 2, before=r"(?<![0-9A-Za-z_])"),
 )  # fmt: skip
 """Those whose digits need no guess, the most special first."""
@@ -185,13 +201,13 @@ _PATTERNS = [(one, one.pattern()) for one in SPELLINGS]
 
 _DIGITS = re.compile(
     r"(?<![0-9A-Za-z_#.])[0-9A-Fa-f]{1,3}(?![0-9A-Za-z_])"
-    r"(?:(?P<between>[ ]?[,;][ ]?|[:._/-]|[ \t]{1,2})[0-9A-Fa-f]{1,3}(?![0-9A-Za-z_])"
+    r"(?:(?P<between>[ ]?[,;][ ]?|[:._/|-]|[ \t]{1,2})[0-9A-Fa-f]{1,3}(?![0-9A-Za-z_])"
     r"(?:(?P=between)[ \t]?[0-9A-Fa-f]{1,3}(?![0-9A-Za-z_]))*)?"
 )
 """A run of one to three digits with the same between any two (one space more is a column)."""
 _WORDS = re.compile(
     r"(?<![0-9A-Za-z_#.])(?:[0-9A-Fa-f]{2}){1,8}(?: (?:[0-9A-Fa-f]{2}){1,8})+(?![0-9A-Za-z_])"
-    r"|(?<![0-9A-Za-z_.])(?:[0-9A-Fa-f]{2}){2,4096}(?![0-9A-Za-z_])"
+    r"|(?:(?<![0-9A-Za-z_.])|(?<=0[xX]))(?:[0-9A-Fa-f]{2}){2,4096}(?![0-9A-Za-z_])"
 )
 _TOKEN = re.compile(r"[0-9A-Fa-f]{1,3}")
 
@@ -207,8 +223,14 @@ def octets_in(line: str, base: int = PAIRS_ONLY) -> Run | None:
             except (ValueError, SyntaxError):
                 continue
             if octets:
-                return Run(match.start(), match.end(), octets, spelling.name)
-    return _digits(line, base) or _words(line) or _single(line)
+                broken = is_broken(line, match.start(), match.end())
+                return Run(match.start(), match.end(), octets, spelling.name, broken)
+    run = _digits(line, base) or _words(line) or _single(line, base)
+    if run is None or base == 10:
+        return run
+    text = line[run.begin : run.end]
+    wordy = not any(sign.isdigit() for sign in text) and len(set(run.octets)) > 1
+    return replace(run, wordy=True) if wordy else run
 
 
 def numbers_in(line: str) -> tuple[str, ...]:
@@ -222,7 +244,7 @@ def _digits(line: str, base: int) -> Run | None:
     while (match := _DIGITS.search(line, at)) is not None:
         tokens = _TOKEN.findall(match[0])
         at = match.start() + len(tokens[0]) if len(tokens) < 4 else match.end()  # a number may stand before the octets
-        run = _numbers(match, tokens, base) if len(tokens) > 1 else None
+        run = _numbers(line, match, tokens, base) if len(tokens) > 1 else None
         if run is not None and (best is None or len(run.octets) > len(best.octets)):
             best = run
             if len(run.octets) >= SURELY:
@@ -230,16 +252,113 @@ def _digits(line: str, base: int) -> Run | None:
     return best
 
 
-def _numbers(match: re.Match[str], tokens: list[str], base: int) -> Run | None:
-    if base != PAIRS_ONLY:
-        try:
-            octets = bytes(int(token, base) for token in tokens)
-        except ValueError:
+def _numbers(line: str, match: re.Match[str], tokens: list[str], base: int) -> Run | None:
+    begin, end = match.span()
+    if base == PAIRS_ONLY and len(tokens) > SURELY and len(tokens[0]) != 2:
+        begin += len(tokens[0]) + len(match["between"])  # the number of the line, or of octets
+        tokens = tokens[1:]
+    numbers = [_octet(token, base) for token in tokens]
+    octets = bytes(number for number in numbers if number is not None)
+    name = "pairs" if base == PAIRS_ONLY else "numbers"
+    if len(octets) == len(tokens):
+        if _is_number(line, end, match["between"]):
             return None
-        return Run(match.start(), match.end(), octets, "numbers")
-    if all(len(token) == 2 for token in tokens):
-        return Run(match.start(), match.end(), bytes(int(token, 16) for token in tokens), "pairs")
+        return Run(begin, end, octets, name, is_broken(line, begin, end))
+    if len(tokens) > SURELY and len(octets) >= _MOSTLY * len(tokens):
+        return Run(begin, end, octets, name, broken=True)
     return None
+
+
+def _octet(token: str, base: int) -> int | None:
+    """The octet that one writes so; None where it is none."""
+    if base == PAIRS_ONLY:
+        return int(token, 16) if len(token) == 2 else None
+    try:
+        number = int(token, base)
+    except ValueError:
+        return None
+    return number if number < 256 else None
+
+
+_LONG_NUMBER = re.compile(r"[ \t]?\d{4,}")
+
+
+def _is_number(line: str, end: int, between: str | None) -> bool:
+    """Whether two or three numbers go on in one that is no octet: a date, a version."""
+    text = line[end:]
+    return (
+        bool(between) and text.startswith(between or " ") and _LONG_NUMBER.match(text, len(between or "")) is not None
+    )
+
+
+# -- octets that are none --------------------------------------------------------------------------------------
+
+_TOKEN_END = r"(?=[\s,;:|)\]}>\"']|$)"
+_NONE_BEHIND = re.compile(
+    r"[ ]?[\[<({](?=[^\])>}]*[0-9A-Fa-f?*])(?![A-Fa-f]?[G-Zg-z]{2})[^\s\])>}]{1,3}[\])>}]"  # [0G], behind brackets
+    r"|\s?\\x"
+    r"|['\"]?[ ]?[,;:/|]?[ \t]{0,2}['\"]?0[xX][^\s,;]{0,3}"
+)
+_BEHIND = re.compile(
+    rf"(?P<between>[ ]?[,;][ ]?|[:._/|-]|[ \t]{{1,2}})(?P<token>[0-9A-Za-z?*]{{1,3}}){_TOKEN_END}(?P<next>.{{0,4}})"
+)
+_AHEAD = re.compile(
+    r"(?P<before>.{0,4}?)(?<![0-9A-Za-z])(?P<token>[0-9A-Za-z?*]{2})(?P<between>[ ]?[,;][ ]?|[:._/|-]|[ \t])$"
+)
+_PAIR_BEHIND = re.compile(r"[\s,;:._/|-]{1,2}[0-9A-Fa-f]{2}(?![0-9A-Za-z])")
+_PAIR_AHEAD = re.compile(r"(?:^|[\s,;:._/|-])[0-9A-Fa-f]{2}[\s,;:._/|-]{1,2}$")
+_UNIT = re.compile(r"\d(?:[smhSMH]|[.:])")
+
+
+def is_broken(line: str, begin: int, end: int) -> bool:
+    """Whether what stands beside a run of octets, written as they are, is meant as one and is none: 0G, O1, ??."""
+    rest, lead = line[end : end + 24], line[max(0, begin - 8) : begin]
+    inside = line[begin:end]
+    brackets = inside[:1] in ("[", "<", "(", "{") and inside[-1:] in ("]", ">", ")", "}")
+    if (match := _NONE_BEHIND.match(rest)) is not None:
+        sign = match[0].strip(" ,;:|'\"\t")[:2]
+        if (sign[:1] in "[<({" and brackets and sign[:1] == inside[0]) or (
+            sign.startswith(("\\x", "0x", "0X")) and inside.startswith(("\\", "0x", "0X", "b", "'", '"'))
+        ):
+            return True
+    if brackets:
+        return False
+    behind = _BEHIND.match(rest)
+    if behind is not None and behind["between"].strip() == _between(inside):
+        token = behind["token"]
+        follows = _PAIR_BEHIND.match(behind["next"]) is not None
+        if _is_meant(token, follows):
+            return True
+    ahead = _AHEAD.search(lead)
+    if ahead is None or ahead["between"].strip() != _between(inside):
+        return False
+    token = ahead["token"]
+    if _PAIR_AHEAD.search(ahead["before"]):
+        return _is_meant(token, True)
+    return token[0].isdigit() and token[1].isalpha() and not _UNIT.match(token) and token[1] not in _HEX_LETTERS
+
+
+_HEX_LETTERS = "ABCDEFabcdef"
+
+
+def _is_meant(token: str, among: bool) -> bool:
+    """Whether a token was meant as an octet and is none. `among`: octets stand before it and behind it."""
+    if _TOKEN.fullmatch(token) and len(token) == 2:
+        return False
+    if among:
+        return len(token) == 2 and token.lower() not in ("tx", "rx", "to", "in")
+    if any(sign.isdigit() for sign in token):
+        return len(token) <= 2 and (len(token) == 2 or not token.isalpha())
+    return token in ("??", "**")
+
+
+def _between(inside: str) -> str:
+    """What stands between the octets of a run, without spaces."""
+    match = re.search(r"[0-9A-Fa-f]([ ]?[,;][ ]?|[:._/|-]|[ \t]{1,2})", inside)
+    return match[1].strip() if match is not None else ""
+
+
+_DATE = re.compile(r"[0-3]\d [01]\d (?:19|20)\d\d")
 
 
 def _words(line: str) -> Run | None:
@@ -248,21 +367,38 @@ def _words(line: str) -> Run | None:
         digits = match[0].replace(" ", "")
         if len(digits) == len(match[0].split()) * 2 and " " in match[0]:
             continue  # pairs, of which one was cut
+        if _DATE.fullmatch(match[0]):
+            continue
         alone = match.end() == len(line.rstrip())
         before = line[match.start() - 1] if match.start() else ""
         enough = 12 if not alone else 8 if before == " " else 4 if before in "#:=" else 12
+        if before in ("x", "X"):  # a shorter one is an address
+            enough = 10 if alone else 18
         if len(digits) >= enough and (best is None or len(digits) > 2 * len(best.octets)):
             best = Run(match.start(), match.end(), bytes.fromhex(digits), "digits without space")
     return best
 
 
-_ALONE = re.compile(rf"(?:^|.*[\s:>\]|#,-])(?P<octet>(?:0[xX])?{_H2})\s*(?:\(\S{{1,6}}\)|'.'|\".\"|[|;].*)?\s*")
+_BEHIND_ONE = r"\s*(?:\(\S{1,6}\)|'.'|\".\"|[|;].*)?\s*"
+_ALONE = re.compile(rf"(?:^|.*[\s:>\]|#,-])(?P<octet>(?:0[xX])?{_H2}){_BEHIND_ONE}")
+_ALONE_UNPADDED = re.compile(rf"(?:^|.*[\s:>\]|#,=-])(?P<octet>[0-9A-Fa-f]{{1,3}}){_BEHIND_ONE}")
 
 
-def _single(line: str) -> Run | None:
+def _single(line: str, base: int) -> Run | None:
     """One octet, as the last word of a line."""
-    match = _ALONE.fullmatch(line)
+    match = _ALONE.fullmatch(line) if base == PAIRS_ONLY else None
+    if base != PAIRS_ONLY:
+        match = _ALONE_UNPADDED.fullmatch(line)
     if match is None:
         return None
-    octet = bytes((int(match["octet"], 16),))
+    try:
+        octet = bytes((int(match["octet"], base or 16),))
+    except ValueError:
+        return None
     return Run(match.start("octet"), match.end("octet"), octet, "one octet")
+
+
+def number_in(line: str) -> str:
+    """The token that one octet would be, as the last word of a line; "" where there is none."""
+    match = _ALONE_UNPADDED.fullmatch(line)
+    return match["octet"] if match is not None else ""

@@ -10,11 +10,14 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 from sniff.formats.log_lines import Kind, Line, line_of, numbers_of
+from sniff.formats.log_margin import NO_MARGIN, Margin, margin_of
 from sniff.formats.log_octets import PAIRS_ONLY
 from sniff.formats.log_shapes import Role
+from sniff.formats.log_times import AS_WRITTEN, Times, counted, number_ahead, order_of
 
 LOOKED_AT = 2000
 """Lines of a log that are looked at."""
@@ -27,6 +30,10 @@ WINDOW = 2048
 
 _REPEATS = 0.6
 _ROWS_LEAST = 0.7
+_NUMBERED = 0.6
+_MOSTLY = 0.8
+_TELLING = 3
+_BACK = 0.2
 _FIXED_LEAST = 3  # lines of one width, before they are taken for the width of a table
 _WIDTHS = (8, 10, 12, 16, 20, 24, 32, 40, 48, 64)
 
@@ -38,7 +45,8 @@ class Plan:
     with octets say a direction, so that others need a reason to count. `width`: octets of the lines of a table without
     offsets, whose ends say nothing; None where a line is a frame, or part of one that a tool got at once. `octetwise`:
     an octet a line. `bit_samples`: samples of a bit, of a logic analyser; 0 where there are none.
-    `spellings`: how octets are written.
+    `spellings`: how octets are written. `margin`, `times`: what is no part of the lines, how their times are read.
+    `labelled`: whether lines with octets have a label; `lower`: whether their digits are small letters.
     """
 
     kind: str
@@ -50,13 +58,24 @@ class Plan:
     octetwise: bool = False
     bit_samples: float = 0.0
     spellings: frozenset[str] = frozenset()
+    margin: Margin = NO_MARGIN
+    times: Times = AS_WRITTEN
+    labelled: bool = False
+    lower: bool = False
+
+    def line(self, text: str) -> Line:
+        """A line taken apart as this log writes it."""
+        return line_of(self.margin.without(text), self.base, self.offsets is not None, self.times)
 
     def role(self, line: Line, recent: bytes) -> Role | None:
         """What a line with octets is; None: nobody knows. `recent`: the octets told last."""
         if line.role is not None:
             return line.role
+        if line.wordy and line.bare and (line.lower is not self.lower or (self.labelled and len(line.octets) > 2)):
+            return Role.NOTHING  # "be a bad fed"
         if line.family in self.roles and not line.bare:
-            return self.roles[line.family]
+            role = self.roles[line.family]
+            return Role.NOTHING if role is None and (line.wordy or len(line.octets) < _TELLING) else role
         if line.bare or line.way:
             return Role.DATA
         if line.octets in recent:
@@ -66,16 +85,48 @@ class Plan:
 
 def plan_of(texts: Sequence[str]) -> Plan | None:
     """The plan for a log that begins so; None when no line of it tells octets."""
-    base = _base([numbers_of(text) for text in texts])
-    lines = [line_of(text, base) for text in texts]
+    margin = margin_of(texts)
+    found = _plan([margin.without(text) for text in margin.joined(texts)])
+    return replace(found, margin=margin) if found is not None else None
+
+
+def _plan(texts: Sequence[str]) -> Plan | None:
+    base = _base([numbers_of(text) for text in texts if text.strip()])
+    times = order_of(texts)
+    lines = [line_of(text, base, times=times) for text in texts]
     offsets = _offsets([line for line in lines if line.kind is Kind.ROW])
     rows = sum(len(line.octets) for line in lines if line.kind is Kind.ROW)
     others = sum(len(line.octets) for line in lines if line.kind is Kind.OCTETS)
     if offsets is not None and rows >= others:
         tools = Counter(line.tool for line in lines if line.tool)
-        return Plan(f"hexdump ({tools.most_common(1)[0][0]})" if tools else "hexdump", base, offsets)
-    lines = [line_of(text, base, rows=False) for text in texts]
-    return _of_labels([line for line in lines if line.kind is not Kind.EMPTY], base)
+        name = f"hexdump ({tools.most_common(1)[0][0]})" if tools else "hexdump"
+        return Plan(name, base, offsets, times=times)
+    lines = [line_of(text, base, False, times) for text in texts]
+    ahead = _times_ahead(texts, lines, times)
+    if ahead.unit:
+        times, lines = ahead, [line_of(text, base, False, ahead) for text in texts]
+    times = _steps(lines, times)
+    plan = _of_labels([line for line in lines if line.kind is not Kind.EMPTY], base)
+    return replace(plan, times=times) if plan is not None else None
+
+
+def _times_ahead(texts: Sequence[str], lines: Sequence[Line], times: Times) -> Times:
+    """The times with those that numbers ahead of the lines tell, where hardly a line has another."""
+    told = [(text, line) for text, line in zip(texts, lines, strict=True) if line.kind is Kind.OCTETS]
+    bare = [(text, line) for text, line in told if line.stamp is None]
+    numbers = [(number, line) for text, line in bare if (number := number_ahead(text)) is not None]
+    if 2 * len(bare) < len(told) or _NUMBERED * len(bare) > len(numbers):
+        return times
+    return counted([number for number, _ in numbers], [len(line.octets) for _, line in numbers], times)
+
+
+def _steps(lines: Sequence[Line], times: Times) -> Times:
+    """Whether times that go back again and again are those since the line before."""
+    stamps = [line.stamp for line in lines if line.stamp is not None and line.kind is Kind.OCTETS]
+    if len(stamps) < _FIXED_LEAST or any(stamp.dated or stamp.daily for stamp in stamps):
+        return times
+    back = sum(later.time < earlier.time for earlier, later in pairwise(stamps))
+    return replace(times, steps=True) if back > _BACK * len(stamps) else times
 
 
 def _of_labels(lines: Sequence[Line], base: int) -> Plan | None:
@@ -83,10 +134,15 @@ def _of_labels(lines: Sequence[Line], base: int) -> Plan | None:
     written = sum(line.kind is not Kind.REMARK for line in lines)
     singles = [line for line in with_octets if line.spelling == "one octet"]
     known = [line for line in with_octets if line.tool]
+    ways = {line.family for line in singles if line.way}
     multiple = {line.family for line in with_octets if line.spelling != "one octet"}
     # words that end in "be" or "20" are no octets, but the rest of a frame is, and so is what is nothing but octets
-    many = Counter(line.family for line in singles if not line.family or line.way)
-    trusted = {family for family, count in many.items() if 2 * count >= written} | (multiple - {""})
+    many = Counter(line.family for line in singles)
+    trusted = {
+        family
+        for family, count in many.items()
+        if 2 * count >= written and (not family or family in ways or count > max(2, _MOSTLY * written))
+    } | (multiple - {""})
     with_octets = [line for line in with_octets if line.spelling != "one octet" or line.tool or line.family in trusted]
     if not with_octets:
         return None
@@ -97,8 +153,7 @@ def _of_labels(lines: Sequence[Line], base: int) -> Plan | None:
         if line.way or line.tool:
             directed.add(line.family)
     main = max(amounts, key=lambda name: amounts[name])
-    ways = [name for name in amounts if name in directed]
-    best = max(ways, key=lambda name: amounts[name], default=None)
+    best = max((name for name in amounts if name in directed), key=lambda name: amounts[name], default=None)
     if best is not None and 4 * amounts[best] >= amounts[main]:
         main = best
     roles = _roles(with_octets, main, directed)
@@ -113,6 +168,7 @@ def _of_labels(lines: Sequence[Line], base: int) -> Plan | None:
         _name(data, lines), base, None, roles, main in directed, _width(data), octetwise,
         _bit_samples([line.samples for line in data if line.samples is not None]),
         frozenset(line.spelling for line in data),
+        labelled=main != "", lower=2 * sum(line.lower for line in data) > len(data),
     )  # fmt: skip
 
 
@@ -127,16 +183,19 @@ def _roles(lines: Sequence[Line], main: str, directed: set[str]) -> dict[str, Ro
         if line.family == main:
             at += len(line.octets)
             continue
-        count = seen.setdefault(line.family, [0, 0])
+        count = seen.setdefault(line.family, [0, 0, 0])
         count[0] += 1
         count[1] += line.octets in text[max(0, at - WINDOW) : at + WINDOW]
+        count[2] += len(line.octets)
     roles: dict[str, Role | None] = {main: Role.DATA}
-    for family, (many, found) in seen.items():
+    said = {line.way for line in lines if line.family == main}
+    one_way = main in directed and len(said) == 1  # what goes the other way has another label
+    for family, (many, found, octets) in seen.items():
         if family == "":
             roles[family] = Role.DATA
-        elif found >= _REPEATS * many:
+        elif found >= _REPEATS * many and (octets >= _TELLING * many or many >= _FIXED_LEAST):  # a few are anywhere
             roles[family] = Role.SAME
-        elif family in directed or (main not in directed and family in alike):
+        elif family in directed or ((main not in directed or (one_way and octets > 4 * many)) and family in alike):
             roles[family] = Role.DATA
         else:
             roles[family] = None
@@ -147,7 +206,10 @@ def _base(numbers: Sequence[Sequence[str]]) -> int:
     """How numbers are written: in pairs of hexadecimal digits in most lines, or in as many digits as they have; then
     in decimal where one has three of them, or none is a letter.
     """
-    runs = [tokens for tokens in numbers if tokens]
+    alone = [tokens[0] for tokens in numbers if len(tokens) == 1]
+    runs = [tokens for tokens in numbers if len(tokens) > 1]
+    if len(alone) > _MOSTLY * len(numbers) and not runs:  # an octet a line
+        runs = [alone]
     mixed = [tokens for tokens in runs if len(tokens) > 3 and _is_unpadded(tokens)]
     if 2 * len(mixed) <= len(runs):
         return PAIRS_ONLY

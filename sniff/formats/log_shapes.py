@@ -59,9 +59,10 @@ SHAPES: tuple[Shape, ...] = (
     _shape("interceptty", rf"^(?P<way>[<>])\s+0x(?P<octets>{_H})\s+\(.{{1,6}}\)"),
     _shape("socat", rf"^(?P<way>[<>]) {_S} +length=\d+ from=\d+ to=\d+", Role.HEADING),
     _shape("socat", r"^--$", Role.NOTHING),
-    _shape("sigrok", r"^(?:(?P<begin>\d+)-(?P<end>\d+)\s+)?[\w /.-]+?: ?(?:.*?\b(?P<way>[RrTt][Xx])(?:[ -]data)?: ?)?"
+    _shape("sigrok", r"^(?:(?P<begin>\d+)-(?P<end>\d+)\s+[\w /.-]+?|\w+-\d+): ?"
+                     r"(?:.*?\b(?P<way>[RrTt][Xx])(?:[ -]data)?: ?)?"
                      r"(?P<octets>[0-9A-Fa-f]{2})$"),
-    _shape("sigrok", r"^(?:\d+-\d+\s+)?[\w /.-]+?: ?(?:.*: ?)?"
+    _shape("sigrok", r"^(?:\d+-\d+\s+[\w /.-]+?|\w+-\d+): ?(?:.*: ?)?"
                      r"(?:[Ss]tart bit|[Ss]top bit|[Pp]arity|[01]$|Frame error|Break)",
            Role.NOTHING),
     _shape("minimalmodbus", r"MinimalModbus debug mode\. (?:Will write|Writing|Response)"),

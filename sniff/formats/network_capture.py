@@ -68,11 +68,14 @@ class _Talk:
 def read(file: RecordFile) -> Capture:
     """The buses in a file. Raises CaptureError, saying what is in it, when there is none."""
     talks, snaps, others = _look(file)
+    hosts = _of_hosts(file)
     buses: list[Capture] = []
     passed: Counter[str] = others
     names = Counter(shown(talk.server) for talk in talks.values())
     for key, talk in talks.items():
         protocol = protocol_of(talk.sample)
+        if protocol is None and not key[0] and any(_holds(one, key, talk) for one in hosts):
+            continue
         if protocol is None:
             passed[_named(key)] += talk.packets
             continue
@@ -82,8 +85,12 @@ def read(file: RecordFile) -> Capture:
         buses.append(
             NetworkBus(file, name, protocol, talk.first, f"{via}, {client} to {server}", _talk_reader(key, talk))
         )
+    for protocol, first in hosts.items():
+        told = _datagram_reader(protocol)
+        buses.append(NetworkBus(file, "hosts", protocol, first, "UDP, all hosts", told))
     for kind, (protocol, first) in snaps.items():
         buses.append(NetworkBus(file, f"snap-{kind.hex()}", protocol, first, "Ethernet SNAP", _snap_reader(kind)))
+    buses.sort(key=lambda bus: bus.session.protocol in registry.RELATIVES)  # buses of lines first
     if not buses:
         raise CaptureError(
             f"{file.path}: a capture of a network in which no connection carries a field bus{_list(passed)}"
@@ -94,14 +101,67 @@ def read(file: RecordFile) -> Capture:
     return one_or_several(file.path, buses)
 
 
+def _of_hosts(file: RecordFile) -> dict[str, int]:
+    """Protocols whose frames are datagrams among all hosts, with the time of the first; told by their first octets."""
+    samples: dict[str, list[Chunk]] = {}
+    left = dict.fromkeys(_by_datagram(), SAMPLE)
+    for record in file.records():
+        segment = carried(record.link_type, record.data) if record.link_type in NETWORK else None
+        for name, begin in _by_datagram().items():
+            if isinstance(segment, Segment) and left[name] > 0 and (octets := _with_ends(segment, begin)):
+                samples.setdefault(name, []).append(Chunk(record.time, octets))
+                left[name] -= len(octets)
+    return {name: chunks[0].time for name, chunks in samples.items() if _says(name, chunks)}
+
+
+def _says(protocol: str, chunks: list[Chunk]) -> bool:
+    """Whether nearly all of these are whole frames of a protocol."""
+    framer = registry.get(protocol).framer(Timing(LineSettings.parse(registry.get(protocol).default_line), 0))
+    events = [event for chunk in chunks for event in framer.feed(chunk)] + framer.close()
+    good = sum(len(event.octets) for event in events if isinstance(event, Frame) and event.ok)
+    return 2 * good > sum(len(chunk.octets) for chunk in chunks)
+
+
+def _with_ends(segment: Segment, begin: bytes) -> bytes | None:
+    """A datagram behind who sends it and who is spoken to; None of anything else than IPv4 that begins so."""
+    if segment.sequence is not None or not segment.payload.startswith(begin) or len(segment.source[0]) != 4:
+        return None
+    ends = (segment.source, segment.destination)
+    return b"".join(address + port.to_bytes(2, "big") for address, port in ends) + segment.payload
+
+
+def _holds(protocol: str, _key: Key, talk: _Talk) -> bool:
+    """Whether datagrams of a pair of hosts belong to the bus of all hosts."""
+    begin = _by_datagram()[protocol]
+    return bool(talk.sample) and all(chunk.octets.startswith(begin) for chunk in talk.sample)
+
+
+def _by_datagram() -> dict[str, bytes]:
+    held = [(one.name, one.packet_file) for one in registry.relatives()]
+    return {name: file.datagrams for name, file in held if file is not None and file.datagrams}
+
+
+def _datagram_reader(protocol: str) -> Reader:
+    def items(records: Iterator[Record]) -> Iterator[Item]:
+        begin = _by_datagram()[protocol]
+        for record in records:
+            segment = carried(record.link_type, record.data) if record.link_type in NETWORK else None
+            octets = _with_ends(segment, begin) if isinstance(segment, Segment) else None
+            if octets:
+                yield Chunk(record.time, octets)
+
+    return items
+
+
 def protocol_of(sample: list[Chunk]) -> str | None:
     """The protocol whose good frames say most for it; None where none says enough."""
     octets = sum(len(chunk.octets) for chunk in sample)
     best: tuple[float, str] | None = None
-    for one in registry.usable():
+    streams = [one for one in registry.relatives() if one.name not in _by_datagram()]
+    for one in (*registry.usable(), *streams):
         framer = one.framer(Timing(LineSettings.parse(one.default_line), FOREIGN_LATENCY))
         events = [event for chunk in sample for event in framer.feed(chunk)] + framer.close()
-        good = [event for event in events if isinstance(event, Frame) and _is_good(event)]
+        good = [event for event in events if isinstance(event, Frame) and _is_good(event, one.name)]
         bits = sum(min(_MOST_BITS, one.bits(frame)) for frame in good)
         covered = sum(len(frame.octets) for frame in good)
         if bits >= LEAST_BITS and covered >= COVERED_LEAST * octets and (best is None or bits > best[0]):
@@ -109,8 +169,9 @@ def protocol_of(sample: list[Chunk]) -> str | None:
     return best[1] if best is not None else None
 
 
-def _is_good(frame: Frame) -> bool:
-    return frame.damage is None and frame.check is Check.GOOD
+def _is_good(frame: Frame, protocol: str) -> bool:
+    """A check may be absent only where the network has one."""
+    return frame.damage is None and (frame.check is Check.GOOD or (frame.ok and protocol in registry.RELATIVES))
 
 
 # -- the first look --------------------------------------------------------------------------------------------

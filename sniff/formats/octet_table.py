@@ -6,9 +6,11 @@
 binary or as characters; which one is told by the whole column |
 | begin, s | t_start_s, start, start_s, begin; start_time, time [s] (Saleae Logic: begin of the start bit) |
 | end, s | t_end_s, end, end_s, time, time_s, timestamp, t; or a duration beside the begin |
-| unit | behind the name: time[ns], time (ms); a time may also be a date and time |
+| unit | behind the name: time[ns], time (ms), t_us; else told by the numbers; a time may also be a date and time |
 | errors | parity error, framing error (anything but empty, 0 and false); error: words that name them |
 | kind | type: rows of another type than data hold no octet |
+
+Where no name is known, the column is told by its cells: numbers or dates that rise are times, runs of octets octets.
 """
 
 from __future__ import annotations
@@ -17,8 +19,10 @@ import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
+from itertools import pairwise
 
 from dissectors.frame import Chunk, LineError, Mark
+from sniff.formats.log_times import AS_WRITTEN, UNIT_NAMES, Times, is_count, order_of, unit_of
 
 OCTET = (
     "octet",
@@ -44,8 +48,19 @@ ANY_ERROR = "error"
 TYPE = "type"
 TYPES_WITH_OCTETS = ("", "data", "result", "rx", "tx", "read", "write", "irp_mj_read", "irp_mj_write")
 
+TIME_WORDS = re.compile(
+    r"(?:ts|t|time|timestamp|when|zeit|zeitstempel|uhrzeit|datum|date|время|дата|temps|hora|heure|clock|epoch|uptime|"
+    r"elapsed|millis)"
+)
+"""Words of which a time is named."""
+
 UNITS = {"s": 1_000_000_000, "ms": 1_000_000, "us": 1000, "µs": 1000, "μs": 1000, "ns": 1}
-_UNIT = re.compile(r"(?P<name>[^\[(]*)[\[(](?P<unit>s|ms|us|µs|μs|ns)[\])]")
+_UNIT = re.compile(
+    r"(?P<name>[^\[(]*)[\[(](?P<unit>s|ms|us|µs|μs|ns)[\])]"
+    r"|(?P<stem>.+?)[_ ,/-]+(?:in[_ ])?"
+    r"(?P<last>s|secs?|seconds|ms|millis(?:econds)?|us|µs|μs|micros(?:econds)?|ns|nanos)"
+)
+_LONG = {"sec": "s", "millis": "ms", "micros": "us", "nanos": "ns"}
 _DELIMITERS = (",", ";", "\t", "|")
 
 MOST_CELL = 1 << 16
@@ -78,6 +93,8 @@ class Table:
     kind: int | None = None
     errors: tuple[tuple[int, LineError | None], ...] = ()
     """Column → the error it tells; None: it names the error itself."""
+    times: Times = AS_WRITTEN
+    """How dates are read, and what was assumed."""
 
     @property
     def exact(self) -> bool:
@@ -102,8 +119,8 @@ class Table:
 
     def _end(self, row: Sequence[str], length: int) -> int:
         if self.end is not None:
-            return time_of(_cell(row, self.end), self.unit)
-        begin = time_of(_cell(row, self.begin), self.unit)
+            return time_of(_cell(row, self.end), self.unit, self.times)
+        begin = time_of(_cell(row, self.begin), self.unit, self.times)
         return begin + (time_of(_cell(row, self.duration), self.unit) if self.duration is not None else length)
 
     def _marks(self, row: Sequence[str]) -> tuple[Mark, ...]:
@@ -130,36 +147,126 @@ def heading_of(heading: str, delimiter: str, rows: Sequence[str]) -> Table | Non
     if len(heading) > LONGEST_HEADING:
         return None
     written = [name.strip().strip('"').strip().lower() for name in heading.split(delimiter)]
-    units = [_UNIT.fullmatch(name) for name in written]
-    names = [name if unit is None else unit["name"].strip() for name, unit in zip(written, units, strict=True)]
+    names, units = zip(*(_named(name) for name in written), strict=True)
 
     def place(known: Iterable[str]) -> int | None:
-        return next((names.index(name) for name in known if name in names), None)
+        found = (
+            written.index(name) if name in written else names.index(name)
+            for name in known
+            if name in (*written, *names)
+        )
+        return next(found, None)
 
+    cells = [[cell.strip().strip('"').strip() for cell in row.split(delimiter)] for row in rows if row.strip()]
     begin, end = place(BEGIN), place(END)
     if "time [s]" in written:  # of Saleae Logic
         begin, end = written.index("time [s]"), None
     octet = place(OCTET)
     if octet is None:
         octet = next((number for number, name in enumerate(names) if ANALYSER.fullmatch(name)), None)
+    if begin is None and end is None:
+        end = next((number for number, name in enumerate(names) if TIME_WORDS.fullmatch(name)), None)
+    if _is_heading(written, cells):
+        octet = octet if octet is not None else _column(cells, len(written), _are_octets)
+        if begin is None and end is None:
+            end = _column(cells, len(written), lambda column: _are_times(column) and not _are_octets(column))
     when = begin if begin is not None else end
-    if octet is None or when is None or len(names) < 2:
+    if octet is None or when is None or octet == when or len(names) < 2:
         return None
-    unit = units[when]
     errors = [(names.index(name), error) for name, error in ERRORS.items() if name in names]
     named = [(names.index(ANY_ERROR), None)] if ANY_ERROR in names else []
     kind = names.index(TYPE) if TYPE in names else None
-    cells = [row.split(delimiter) for row in rows]
-    shown = [
-        cell[octet].strip().strip('"')
+    data = [
+        cell
         for cell in cells
-        if octet < len(cell)
-        and (kind is None or kind >= len(cell) or cell[kind].strip('" ').lower() in TYPES_WITH_OCTETS)
+        if max(octet, when) < len(cell)
+        and (kind is None or kind >= len(cell) or cell[kind].lower() in TYPES_WITH_OCTETS)
     ]
+    read = spelling_of([cell[octet] for cell in data])
+    unit, times = _times_of([cell[when] for cell in data], [cell[octet] for cell in data], read, units[when])
     return Table(
-        octet, spelling_of(shown), delimiter, begin, end, place(DURATION), UNITS[unit["unit"]] if unit else UNITS["s"],
-        kind, (*errors, *named),
+        octet, read, delimiter, begin, end, place(DURATION), unit, kind, (*errors, *named), times
     )  # fmt: skip
+
+
+def _named(name: str) -> tuple[str, str]:
+    """The name of a column without its unit, and the unit, "" where it has none."""
+    match = _UNIT.fullmatch(name)
+    if match is None:
+        return name, ""
+    if match["unit"] is not None:
+        return match["name"].strip(), match["unit"]
+    return match["stem"].strip(), _short(match["last"])
+
+
+def _short(unit: str) -> str:
+    """ "ms" of "milliseconds"."""
+    return next((short for start, short in _LONG.items() if unit.startswith(start)), unit)
+
+
+def _is_heading(names: Sequence[str], cells: Sequence[Sequence[str]]) -> bool:
+    """Whether a line is one of names: nothing in it is a number, and the rows below have as many cells."""
+    if (
+        len(names) < 2
+        or len(cells) < 2
+        or any(name.replace(" ", "").isdigit() or _fits(octets_of, name) for name in names if name)
+    ):
+        return False
+    return sum(len(row) == len(names) for row in cells) >= 0.8 * len(cells) and sum(bool(name) for name in names) >= 2
+
+
+def _column(cells: Sequence[Sequence[str]], many: int, wanted: Callable[[Sequence[str]], bool]) -> int | None:
+    """The first column whose cells are as wanted."""
+    for number in range(many):
+        column = [row[number] for row in cells if number < len(row) and row[number]]
+        if len(column) >= 2 and wanted(column):
+            return number
+    return None
+
+
+def _are_octets(column: Sequence[str]) -> bool:
+    """Whether cells are runs of octets: more than one in most."""
+    found = 0
+    for cell in column[:200]:
+        try:
+            found += len(octets_of(cell)) > 1 and not (cell.isdigit() and len(cell) < 6)
+        except ValueError:
+            continue
+    return found >= 0.8 * len(column[:200])
+
+
+def _are_times(column: Sequence[str]) -> bool:
+    """Whether cells are dates, or numbers that rise and do not just number the rows."""
+    try:
+        found = [time_of(cell, 1) for cell in column]
+    except ValueError:
+        return False
+    rising = sum(later >= earlier for earlier, later in pairwise(found))
+    many = len(set(found))
+    return many > 1 and rising >= 0.9 * (len(found) - 1) and not is_count([Decimal(time) for time in found])
+
+
+def _times_of(
+    cells: Sequence[str], octets: Sequence[str], read: Callable[[str], bytes], named: str
+) -> tuple[int, Times]:
+    """ns that a number of the column of times counts, and how its dates are read."""
+    if named:
+        return UNITS[named], AS_WRITTEN
+    numbers: list[Decimal] = []
+    lengths: list[int] = []
+    for cell, told in zip(cells, octets, strict=True):
+        try:
+            number = Decimal(cell.replace(",", "."))
+            lengths.append(len(read(told)))
+        except (InvalidOperation, ValueError):
+            continue
+        if not number.is_finite():
+            continue
+        numbers.append(number)
+    if 2 * len(numbers) < len(cells) or len(numbers) < 2:
+        return UNITS["s"], order_of(cells)
+    unit, _, is_sure = unit_of(numbers, lengths[: len(numbers)])
+    return unit, AS_WRITTEN if is_sure else Times(said=(f"times taken as {UNIT_NAMES[unit]}",))
 
 
 def spelling_of(cells: Sequence[str]) -> Callable[[str], bytes]:
@@ -234,14 +341,14 @@ def _as_in_a_line(text: str) -> bytes:
     return run.octets
 
 
-def time_of(text: str, unit: int) -> int:
+def time_of(text: str, unit: int, times: Times = AS_WRITTEN) -> int:
     """A cell with a time → ns: a number of `unit`s (ns), or a date and time. Raises ValueError."""
     from sniff.formats.log_clock import stamp_of
 
     try:
-        return seconds(text) * unit // UNITS["s"] if unit != UNITS["s"] else seconds(text)
+        return scaled(text, unit)
     except ValueError:
-        stamp = stamp_of(text.strip())
+        stamp = stamp_of(text.strip(), times)
         if stamp is None or stamp.begin:
             raise
         return stamp.time
@@ -249,13 +356,18 @@ def time_of(text: str, unit: int) -> int:
 
 def seconds(text: str) -> int:
     """Seconds as a decimal number → ns, exactly. Raises ValueError."""
+    return scaled(text, UNITS["s"])
+
+
+def scaled(text: str, unit: int) -> int:
+    """A decimal number of `unit`s (ns) → ns, exactly. Raises ValueError."""
     try:
         number = Decimal(text.strip().replace(",", "."))
     except InvalidOperation:
         raise ValueError(f"time {text[:20]!r}: expected seconds") from None
-    if not number.is_finite() or abs(number) > LATEST:
+    if not number.is_finite() or abs(number) * unit > LATEST * UNITS["s"]:
         raise ValueError(f"time {text[:20]!r}: expected seconds, less than {LATEST}")
-    return int(number * 1_000_000_000)
+    return int(number * unit)
 
 
 def _cell(row: Sequence[str], place: int | None) -> str:

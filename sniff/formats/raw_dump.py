@@ -30,10 +30,11 @@ def read(path: Path) -> RawDump:
 
 
 class RawDump:
-    """A raw dump as a capture."""
+    """A raw dump as a capture. `note`: what else there is to say of it."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, note: str = "") -> None:
         self.path = path
+        self._note = note
         with open_capture(path) as stream:
             start = stream.read(_HEADING_MOST)
         if not start:
@@ -62,4 +63,4 @@ class RawDump:
 
     def completeness(self) -> Completeness:
         """Always whole: such a file has no end mark."""
-        return Completeness(True, "complete (raw dump: octets without times)")
+        return Completeness(True, f"complete (raw dump: octets without times{self._note})")

@@ -5,6 +5,7 @@ Source: the OpenMetrics specification 1.0: counters end in _total, label values 
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -12,15 +13,20 @@ from dissectors.findings import Severity
 from dissectors.histogram import Histogram
 from dissectors.line import NS_PER_S
 from sniff.analysis.plain import plain
+from sniff.analysis.points import Point
 from sniff.bus.model import BusModel
+from sniff.outlets.outlet import Outlet
 
 CONTENT_TYPE = "application/openmetrics-text; version=1.0.0; charset=utf-8"
 MOST_FINDINGS = 200
 """Series of findings a bus; more are counted in one number."""
 
+MOST_VALUES = 2000
+"""Points of a bus whose last value is told: those seen first. Single bits of a register are not among them."""
+
 
 @dataclass(frozen=True, slots=True)
-class Told:
+class BusNow:
     """A bus as it stands: its model, octets that were lost to the file, and whether it is still heard."""
 
     model: BusModel
@@ -43,15 +49,26 @@ _FAMILIES = (
     ("sniff485_response_seconds", "summary", "seconds", "response times of a station"),
     ("sniff485_finding", "gauge", "", "1 for what a rule has found, by severity"),
     ("sniff485_findings", "gauge", "", "findings by severity"),
+    ("sniff485_value", "gauge", "", "last value of a point that is a number, in the unit of its label"),
+    ("sniff485_value_timestamp_seconds", "gauge", "seconds", "when it was heard last, since the epoch"),
+    ("sniff485_points", "gauge", "", "points of which values were heard"),
+    ("sniff485_outlet_up", "gauge", "", "whether what an outlet is told gets through"),
+    ("sniff485_outlet_sent", "counter", "", "messages that an outlet delivered"),
+    ("sniff485_outlet_dropped", "counter", "", "messages that an outlet could not deliver in time"),
 )
 
 
-def exposition(buses: Sequence[Told]) -> str:
+def exposition(buses: Sequence[BusNow], outlets: Sequence[Outlet] = ()) -> str:
     """The page of /metrics."""
     samples: dict[str, list[str]] = {name: [] for name, *_ in _FAMILIES}
     for bus in buses:
         for family, line in _samples(bus):
             samples[family].append(line)
+    for outlet in outlets:
+        label = _labels({"outlet": outlet.name})
+        samples["sniff485_outlet_up"].append(f"sniff485_outlet_up{label} {int(not outlet.trouble)}")
+        samples["sniff485_outlet_sent"].append(f"sniff485_outlet_sent_total{label} {outlet.sent}")
+        samples["sniff485_outlet_dropped"].append(f"sniff485_outlet_dropped_total{label} {outlet.dropped}")
     lines = []
     for name, kind, unit, text in _FAMILIES:
         lines.append(f"# TYPE {name} {kind}")
@@ -62,12 +79,12 @@ def exposition(buses: Sequence[Told]) -> str:
     return "\n".join([*lines, "# EOF", ""])
 
 
-def _samples(told: Told) -> Iterator[tuple[str, str]]:
+def _samples(told: BusNow) -> Iterator[tuple[str, str]]:
     model, summary = told.model, told.model.summary
     bus = {"bus": model.session.bus, "protocol": model.session.protocol}
 
     def one(family: str, value: float, suffix: str = "", **labels: object) -> tuple[str, str]:
-        return family, f"{family}{suffix}{_labels({**bus, **labels})} {value:g}"
+        return family, f"{family}{suffix}{_labels({**bus, **labels})} {value!r}"
 
     def total(family: str, value: int, **labels: object) -> tuple[str, str]:
         return family, f"{family}_total{_labels({**bus, **labels})} {value}"
@@ -95,6 +112,18 @@ def _samples(told: Told) -> Iterator[tuple[str, str]]:
     for finding in [one for one in findings if one.severity >= Severity.WARNING][:MOST_FINDINGS]:
         labels = {"code": finding.code, "severity": finding.severity.label, "subject": finding.subject}
         yield one("sniff485_finding", 1, **labels)
+    yield one("sniff485_points", len(model.points))
+    for point in _told_points(model):
+        sample = point.sample
+        labels = {"device": sample.station, "point": sample.name}
+        yield one("sniff485_value", float(sample.value.value), **labels, unit=sample.value.unit)
+        yield one("sniff485_value_timestamp_seconds", sample.time / NS_PER_S, **labels)
+
+
+def _told_points(model: BusModel) -> Iterator[Point]:
+    """Points whose last value is a number, as many as are told."""
+    numbers = (point for point in model.points if not point.sample.value.bit and point.sample.finite)
+    yield from itertools.islice(numbers, MOST_VALUES)
 
 
 def _summary(latency: Histogram, labels: dict[str, object]) -> Iterator[str]:

@@ -46,6 +46,10 @@ class NewsDesk:
         self._every = every
         self._known: dict[tuple[str, str], _Known] = {}
 
+    def another(self) -> NewsDesk:
+        """One for something else, as strict."""
+        return NewsDesk(self._least, self._every)
+
     def look(self, findings: Iterable[Finding], now: int) -> list[News]:
         """What is to be told at `now` (ns on the capture's clock)."""
         told = []

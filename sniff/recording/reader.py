@@ -42,6 +42,9 @@ from sniff.recording.topics import (
     topics_of,
 )
 
+FAR = (1 << 63) - 1
+"""ns; after everything."""
+
 MOST_PROFILE = 1 << 20
 """Octets of an attached device profile; a longer one is passed over."""
 MOST_PROFILES = 64
@@ -49,10 +52,14 @@ MOST_PROFILES = 64
 
 def read(path: str | Path) -> McapCapture | SeveralBuses:
     """Open a recording, of one bus or of several. Raises CaptureError."""
+    buses = buses_of(path)
+    return buses[0] if len(buses) == 1 else SeveralBuses(buses[0].path, buses)
+
+
+def buses_of(path: str | Path) -> list[McapCapture]:
+    """Every bus of a recording, at least one. Raises CaptureError."""
     first = McapCapture(Path(path))
-    if len(first.sessions) < 2:
-        return first
-    return SeveralBuses(first.path, [first, *(McapCapture(first.path, bus) for bus in range(1, len(first.sessions)))])
+    return [first, *(McapCapture(first.path, bus) for bus in range(1, len(first.sessions)))]
 
 
 class McapCapture:
@@ -137,7 +144,7 @@ class McapCapture:
         clean = CleanBatches()
         with self._pass(since) as one:
             try:
-                for head, batch in self._raw(one, joiner):
+                for head, batch in self.batches_of(one, joiner):
                     if one.jumped:
                         joiner.next, one.jumped = None, False
                     if since is not None and head[2] < since:
@@ -165,9 +172,17 @@ class McapCapture:
             return self._completeness
         joiner = self._joiner(None)
         with self._pass() as one:
-            for head, batch in self._raw(one, joiner):
+            for head, batch in self.batches_of(one, joiner):
                 joiner.skip(head[1], batch)
             return self._note(one, joiner)
+
+    def chunk_index(self) -> scan.ChunkIndex:
+        """Where the chunks of the file are; none of them is read. Raises CaptureError."""
+        with self._pass(FAR) as one:
+            for _ in one.messages():
+                pass
+            self._index = one.report.chunks
+        return self._index
 
     # what else is in the file
 
@@ -204,7 +219,7 @@ class McapCapture:
 
     # inside
 
-    def _raw(self, one: MessagePass, joiner: Joiner) -> Iterator[tuple[Head, Batch]]:
+    def batches_of(self, one: MessagePass, joiner: Joiner) -> Iterator[tuple[Head, Batch]]:
         """Batches of a pass; what is on /line goes to the joiner."""
         for topic, head, data in one.messages():
             if topic == self._line_topic:
@@ -221,6 +236,15 @@ class McapCapture:
                 yield MessagePass(stream, scan.Report(os.fstat(stream.fileno()).st_size), since, start, self._known)
             except OSError as error:
                 raise explain(self.path, error) from None
+
+    @property
+    def known_topics(self) -> list[str]:
+        """Of the first channels, by number: known before the file says so."""
+        return self._known
+
+    def joiner(self) -> Joiner:
+        """What puts the batches of this file in order from its begin."""
+        return self._joiner(None)
 
     def _joiner(self, since: int | None) -> Joiner:
         return Joiner(self.first_chunk if since is None and self._known_first else None)

@@ -1,4 +1,4 @@
-"""When a recording goes on in a new file, what the files are called, and which are kept.
+"""Rotation: when a recording goes on in a new file, what the files are called, and which are kept.
 
 Every part carries its final name from the start (`night-0007.mcap`): it can be opened while it is written, and after
 a power cut nothing needs to be renamed. Whether it is whole, its own end says.
@@ -10,6 +10,7 @@ import contextlib
 import os
 import re
 import shutil
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
@@ -92,13 +93,16 @@ def parts(path: Path) -> list[tuple[int, Path]]:
 class NewestParts:
     """The parts that one recorder began, of which the newest `keep` stay (None: all of them).
 
-    Only files that were added here are ever removed: not a part of an earlier recording of the same name, and not
-    another file that has taken the place of one that was moved away.
+    Only files that were added here or given as `earlier` are ever removed: else not a part of an earlier recording of
+    the same name, and never another file that has taken the place of one that was begun here and moved away.
     """
 
-    def __init__(self, keep: int | None) -> None:
+    def __init__(self, keep: int | None, earlier: Iterable[Path] = ()) -> None:
+        """`earlier`: parts that were there before, oldest first, which count like those to come."""
         self._keep = None if keep is None else max(1, keep)
-        self._begun: list[tuple[Path, os.stat_result]] = []
+        self._begun: list[tuple[Path, os.stat_result | None]] = []
+        if keep is not None:
+            self._begun += [(path, None) for path in earlier]
 
     def add(self, path: Path, stream: BinaryIO) -> None:
         """Remember a part that was begun just now, open as `stream`. Raises OSError."""
@@ -143,10 +147,10 @@ def _free(folder: Path) -> int:
         return 1 << 62
 
 
-def _removed(path: Path, begun: os.stat_result) -> bool:
-    """Remove a file if it is still the one that was begun; whether it is gone from there."""
+def _removed(path: Path, begun: os.stat_result | None) -> bool:
+    """Remove a file if it is still the one that was begun, where that is known; whether it is gone from there."""
     try:
-        if os.path.samestat(path.lstat(), begun):
+        if begun is None or os.path.samestat(path.lstat(), begun):
             path.unlink()
     except FileNotFoundError:
         return True

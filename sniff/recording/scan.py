@@ -40,15 +40,20 @@ _BLOCK = 1 << 20
 
 
 class ChunkIndex:
-    """Where the chunks of a file are, in its order, with the latest message time (ns) up to the end of each."""
+    """Where the chunks of a file are, in its order, with the latest message time (ns) up to the end of each.
+
+    `backward`: whether a chunk ends before the one before it.
+    """
 
     def __init__(self) -> None:
         self.offsets = array("q")
         self.latest = array("Q")
+        self.backward = False
 
     def add(self, offset: int, end: int) -> None:
         """Take the next chunk; `end`: the latest time in it."""
         self.offsets.append(offset)
+        self.backward = self.backward or bool(self.latest and end < self.latest[-1])
         self.latest.append(max(end, self.latest[-1]) if self.latest else end)
 
     def find(self, since: int) -> int | None:

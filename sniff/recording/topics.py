@@ -1,4 +1,4 @@
-"""What a recording holds, as data: topics, encodings and the schema record of each.
+"""The topics of a recording, as data: encodings and the schema record of each.
 
 JSON schemas are flat (a root object, one scalar type a property), so that a stock Foxglove or PlotJuggler plots them.
 Binary layouts are written down in words in the schema record, so that a file explains itself.

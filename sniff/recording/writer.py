@@ -3,8 +3,8 @@
 A recorder never waits for the disk: the capture's thread only collects octets; another thread packs, writes and
 rotates, and one more syncs. Loss is bounded in time by the caller's `tick`: a chunk is in the file within 1 s and on
 the disk within 10 s. When the disk does not take it, `trouble` says so in words, `behind` for how long, up to
-`keeper.MOST_WAITING` octets wait in memory, and what comes after that is counted in `lost_octets` and, where it is
-missing, in the file. Nothing is raised into the capture but a file that cannot be created at the start.
+`writer_thread.MOST_WAITING` octets wait in memory, and what comes after that is counted in `lost_octets` and, where
+it is missing, in the file. Nothing is raised into the capture but a file that cannot be created at the start.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from __future__ import annotations
 import threading
 from collections import deque
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -28,13 +28,13 @@ from sniff.engine.session import (
     settings_change,
 )
 from sniff.formats.files import NewFile, explain
-from sniff.recording import keeper
+from sniff.recording import writer_thread
 from sniff.recording.batch import Batcher, Message, loss_message, stamp
 from sniff.recording.block_batches import add_block
-from sniff.recording.keeper import CHECK, CLOSE, SYNC, Changed, Flush, Keeper, Parcel
 from sniff.recording.part import PartFile
 from sniff.recording.rotation import Rotation
 from sniff.recording.topics import LINE, RAW
+from sniff.recording.writer_thread import CHECK, CLOSE, SYNC, Changed, Flush, Keeper, WriteBatch
 
 if TYPE_CHECKING:
     from sniff.engine.blocks import Block
@@ -63,13 +63,34 @@ def create(path: str | Path, session: Session) -> McapWriter:
     return McapWriter(NewFile(Path(path)), session)
 
 
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where in a recording a part stands: its number, and what the parts before it held of each bus (number of the
+    first read, octets)."""
+
+    number: int = 1
+    first_chunks: tuple[int, ...] = (0,)
+    octets_before: tuple[int, ...] = (0,)
+
+    def before(self) -> list[dict[str, int]]:
+        """As `PartFile` takes it."""
+        pairs = zip(self.first_chunks, self.octets_before, strict=True)
+        return [{"first_chunk": first, "octets_before": octets} for first, octets in pairs]
+
+
+def create_part(path: str | Path, sessions: Sequence[Session], place: Place) -> McapWriter:
+    """The same for a part of a recording, of one bus or of several. Raises CaptureError."""
+    return McapWriter(NewFile(Path(path)), *sessions, place=place)
+
+
 class McapWriter:
     """Writes a capture that is already there. An empty chunk says nothing and is not written."""
 
-    def __init__(self, file: NewFile, session: Session) -> None:
+    def __init__(self, file: NewFile, *sessions: Session, place: Place | None = None) -> None:
         self._file = file
-        self._batcher = Batcher()
-        self._part = PartFile(file.stream, [session])
+        place = place or Place(1, (0,) * len(sessions), (0,) * len(sessions))
+        self._batchers = [Batcher(first) for first in place.first_chunks]
+        self._part = PartFile(file.stream, sessions, place.number, place.before())
         self._sequences: dict[str, int] = {}
 
     def derived(
@@ -88,23 +109,24 @@ class McapWriter:
         self._sequences[topic] = (sequence + 1) % (1 << 32)
         self._part.add(Message(topic, stamp(log_time), stamp(publish_time), sequence, data), schema_name, metadata)
 
-    def write(self, item: Item) -> None:
+    def write(self, item: Item, bus: int = 0) -> None:
         """Add a chunk or line event. Raises CaptureError."""
         if isinstance(item, LineEvent):
-            self._batcher.add_event(item)
+            self._batchers[bus].add_event(item)
         else:
-            self._add(self._batcher.add(item))
+            self._add(self._batchers[bus].add(item), bus)
 
-    def write_block(self, block: Block) -> None:
+    def write_block(self, block: Block, bus: int = 0) -> None:
         """Add reads; the same file as one after the other. Raises CaptureError."""
-        for messages in add_block(self._batcher, block):
-            self._add(messages)
+        for messages in add_block(self._batchers[bus], block):
+            self._add(messages, bus)
 
     def close(self) -> None:
         """Finish the file and give it its name; again is harmless. Raises CaptureError."""
         if self._file.stream.closed:
             return
-        self._add(self._batcher.close())
+        for bus, batcher in enumerate(self._batchers):
+            self._add(batcher.close(), bus)
         try:
             self._part.finish()
         except OSError as error:
@@ -112,9 +134,9 @@ class McapWriter:
             raise explain(self._file.path, error) from None
         self._file.close()
 
-    def _add(self, messages: list[Message]) -> None:
+    def _add(self, messages: list[Message], bus: int = 0) -> None:
         for message in messages:
-            self._part.add(message)
+            self._part.add(message, bus=bus)
         if self._part.waiting > 1 << 20:
             try:
                 self._part.flush()
@@ -147,9 +169,11 @@ class SharedFile:
         rotation: Rotation | None = None,
         keep: int | None = None,
         keep_free: int | None = None,
+        keep_of_all: bool = False,
     ) -> None:
-        """`keep_free`: octets of the disk that stay free; the oldest parts of this name go for them."""
-        self.keeper = Keeper(Path(path), sessions, rotation, keep, keep_free)
+        """`keep_free`: octets of the disk that stay free; the oldest parts of this name go for them. `keep_of_all`:
+        `keep` counts the parts of earlier recordings of this name, too."""
+        self.keeper = Keeper(Path(path), sessions, rotation, keep, keep_free, keep_of_all)
         self._sessions = sessions
         self._thread = threading.Thread(target=self.keeper.run, name="recorder", daemon=True)
         self._thread.start()
@@ -262,12 +286,12 @@ class Recorder:
     ) -> None:
         """Record a result of the engine, best effort. `schema_name`: one of `topics.SCHEMAS`; `metadata`: of the
         channel, taken when the topic is new in a file. /raw and /line are not for results."""
-        if self._closed or topic in (RAW, LINE) or self._full(keeper.MOST_DERIVED):
+        if self._closed or topic in (RAW, LINE) or self._full(writer_thread.MOST_DERIVED):
             return
         sequence = self._sequences.get(topic, 0)
         self._sequences[topic] = (sequence + 1) % (1 << 32)
         message = Message(topic, stamp(log_time), stamp(publish_time), sequence, data)
-        self._send(Parcel([message], 0, self._batcher.first, schema_name, metadata, self._bus))
+        self._send(WriteBatch([message], 0, self._batcher.first, schema_name, metadata, self._bus))
         self._note(log_time if self._now is None else self._now)
 
     def tick(self, now_ns: int) -> None:
@@ -284,7 +308,7 @@ class Recorder:
             self._close_batch()
             self._closed = True
             if self._gap_octets:  # nothing came after it
-                self._send(Parcel([self._gap(self._now or 0)], 0, self._following, bus=self._bus))
+                self._send(WriteBatch([self._gap(self._now or 0)], 0, self._following, bus=self._bus))
             self._keeper.orders.put(CLOSE)
 
     @property
@@ -410,7 +434,7 @@ class Recorder:
 
     def _send_raw(self, messages: list[Message], following: int) -> None:
         octets, self._open_octets = self._open_octets, 0
-        if self._full(keeper.MOST_WAITING):
+        if self._full(writer_thread.MOST_WAITING):
             self._dropped_octets += octets
             self._gap_octets += octets
             self._gap_reads += following - self._following
@@ -419,7 +443,7 @@ class Recorder:
         if self._gap_octets and messages[-1].topic == RAW:
             messages = [self._gap(messages[-1].publish_time), *messages]
         self._following = following
-        self._send(Parcel(messages, octets, following, bus=self._bus))
+        self._send(WriteBatch(messages, octets, following, bus=self._bus))
 
     def _gap(self, time: int) -> Message:
         """What says in the file how much is missing before a batch."""
@@ -432,7 +456,7 @@ class Recorder:
     def _full(self, limit: int) -> bool:
         return self._sent - self._share.taken + self._keeper.waiting > limit
 
-    def _send(self, parcel: Parcel) -> None:
+    def _send(self, parcel: WriteBatch) -> None:
         self._sent += parcel.weight
         self._keeper.orders.put(parcel)
 

@@ -1,4 +1,4 @@
-"""What a report tells that no statistic holds: what happened to the line, and what troubles each station."""
+"""Happenings that no statistic holds: what happened to the line, and what troubles each station."""
 
 from __future__ import annotations
 

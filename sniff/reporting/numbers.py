@@ -1,4 +1,4 @@
-"""What a report says, as plain values: the page is made of these and of nothing else; `to_json` gives the same.
+"""The numbers of a report, as plain values: the page is made of these alone; `to_json` gives the same.
 
 Durations are ms, times seconds since the capture's start, shares 0 … 1, unless a name says otherwise. None: not known.
 """

@@ -22,7 +22,7 @@ from dissectors.frame import Chunk
 from dissectors.line import LineSettings
 from dissectors.simulated_faults import Fault
 from sniff.simulation import hub
-from sniff.simulation.hub import NO_STATIONS, Plan, Report
+from sniff.simulation.hub import NO_STATIONS, HubPlan, HubReport
 from sniff.simulation.ports import HAS_PTY, Port
 from sniff.simulation.scenarios import Scenario
 from sniff.simulation.wire import Factory, Sent
@@ -59,7 +59,7 @@ class VirtualBus:
         paused: bool = False,
     ) -> None:
         self.line = line
-        self._plan = Plan(line, stations, tuple(faults), seed, gap, slice)
+        self._plan = HubPlan(line, stations, tuple(faults), seed, gap, slice)
         self._paused = paused
         self._process: multiprocessing.process.BaseProcess | None = None
         self._control: Any = None
@@ -173,9 +173,9 @@ class VirtualBus:
         truths: list[Sent] = self._ask("truth")
         return truths
 
-    def report(self) -> Report:
+    def report(self) -> HubReport:
         """Counts so far."""
-        report: Report = self._ask("report")
+        report: HubReport = self._ask("report")
         return report
 
     def _ask(self, *request: Any) -> Any:

@@ -26,7 +26,7 @@ from dissectors.frame import Chunk, Mark
 from dissectors.line import LineSettings, Timing
 from dissectors.simulated_faults import Fault
 from sniff.capture.priority import raise_priority
-from sniff.simulation.line_mix import Received
+from sniff.simulation.collision import ReceivedOctets
 from sniff.simulation.ports import HAS_PTY, GatewayPort, MemoryPort, Port, PtyPort
 from sniff.simulation.wire import Burst, Factory, Sent, Wire
 
@@ -37,7 +37,7 @@ NO_STATIONS: Factory = tuple
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
+class HubPlan:
     """Everything the process needs to know to begin; see `VirtualBus`."""
 
     line: LineSettings
@@ -49,7 +49,7 @@ class Plan:
 
 
 @dataclass(frozen=True, slots=True)
-class Report:
+class HubReport:
     """What a bus did so far.
 
     `written`: octets that each attached party wrote. `delivered`: octets written to each port. `unread`: octets that a
@@ -75,7 +75,7 @@ class Report:
 class Hub:
     """The loop: wait for the next moment of the line or for octets from outside, and do what is due."""
 
-    def __init__(self, plan: Plan, control: Connection, priority: str = "") -> None:
+    def __init__(self, plan: HubPlan, control: Connection, priority: str = "") -> None:
         self._plan = plan
         self._control = control
         self._priority = priority
@@ -133,7 +133,7 @@ class Hub:
         for burst in self._wire.advance(min(until, self._now())):
             self._finish(burst)
 
-    def _deliver(self, received: Received, until: int) -> None:
+    def _deliver(self, received: ReceivedOctets, until: int) -> None:
         ready = bisect_right(received.ends, until)
         if ready <= self._given:
             return
@@ -253,10 +253,10 @@ class Hub:
         self._truths.clear()
         return truths
 
-    def do_report(self) -> Report:
+    def do_report(self) -> HubReport:
         """Counts so far."""
         ports = self._ports.values()
-        return Report(
+        return HubReport(
             written={port.name: port.written for port in ports},
             delivered={port.name: port.delivered for port in ports},
             unread={port.name: port.unread for port in ports},
@@ -271,7 +271,7 @@ class Hub:
         )
 
 
-def main(plan: Plan, control: Connection) -> None:
+def main(plan: HubPlan, control: Connection) -> None:
     """Entry of the process. Interrupts from the keyboard are the parent's business."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     Hub(plan, control, raise_priority()).run()

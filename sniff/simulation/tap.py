@@ -1,4 +1,4 @@
-"""What a sniffer behind a serial adapter would have read of a simulated line: bursts in, chunks and line events out.
+"""A tap: what a sniffer behind a serial adapter would have read of a simulated line. Bursts in, chunks and events out.
 
 Pure. An octet's way, and where it is held back:
 

@@ -21,7 +21,7 @@ from dissectors.line import LineSettings
 from dissectors.simulated import Party as Party
 from dissectors.simulated import Send
 from dissectors.simulated_faults import NOISE, Fault, Transmission
-from sniff.simulation.line_mix import Received, low_times, receive
+from sniff.simulation.collision import ReceivedOctets, low_times, receive
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +83,7 @@ class Wire:
         self._busy_until: dict[str, int] = {}  # of each party's own driver
         self._current: list[Transmission] = []  # those in the burst now on the line
         self._current_end = 0
-        self._received: Received | None = None
+        self._received: ReceivedOctets | None = None
         self._quiet_since = start - 86_400 * 1_000_000_000
         self._wakes: list[int | None] = [party.station.next_wake() for party in self._parties]
 
@@ -120,7 +120,7 @@ class Wire:
             yield from self._step(time)
         self.now = max(self.now, until)
 
-    def on_line(self) -> Received | None:
+    def on_line(self) -> ReceivedOctets | None:
         """The burst now on the line as receivers will have got it if nothing more runs into it; None in silence.
 
         Octets whose end has passed do not change any more.
@@ -222,7 +222,7 @@ class Wire:
         self._count += 1
         heappush(self._coming, (sent.start, self._count, sent))
 
-    def _mix(self) -> Received:
+    def _mix(self) -> ReceivedOctets:
         """What receivers get: each octet in its place while the drivers keep apart, else bits mixed in time."""
         line = self.line
         if _overlap(self._current, line) or any(sent.held for sent in self._current):
@@ -241,9 +241,9 @@ class Wire:
         for part in parts:
             marks += [Mark(offset + mark.offset, mark.error) for mark in part.marks]
             offset += len(part.octets)
-        return Received(b"".join(p.octets for p in parts), [end for p in parts for end in p.ends], tuple(marks))
+        return ReceivedOctets(b"".join(p.octets for p in parts), [end for p in parts for end in p.ends], tuple(marks))
 
-    def _truths(self, current: Sequence[Transmission], received: Received) -> tuple[Sent, ...]:
+    def _truths(self, current: Sequence[Transmission], received: ReceivedOctets) -> tuple[Sent, ...]:
         if len(current) == 1:
             return (self._truth(current[0], received.octets == current[0].meant),)
         collided = _overlap(current, self.line)
@@ -255,7 +255,7 @@ class Wire:
                 truths.append(self._truth(sent, _alone(self.line, sent).octets == sent.meant))
         return tuple(truths)
 
-    def _survived(self, sent: Transmission, received: Received) -> bool:
+    def _survived(self, sent: Transmission, received: ReceivedOctets) -> bool:
         """Whether a transmission came through a collision: all its octets, right and in step, between others or not."""
         first = bisect_left(received.ends, sent.start + self.line.char)
         count = len(sent.meant)
@@ -268,7 +268,7 @@ class Wire:
         return Sent(sent.party, sent.start, sent.end(self.line), sent.meant, intact, sent.faults)
 
 
-def _alone(line: LineSettings, sent: Transmission) -> Received:
+def _alone(line: LineSettings, sent: Transmission) -> ReceivedOctets:
     """A transmission that nothing ran into."""
     char = line.char
     first = sent.start + char
@@ -276,7 +276,7 @@ def _alone(line: LineSettings, sent: Transmission) -> Received:
     whole = (1 << line.data_bits) - 1
     if not sent.flips:
         octets = sent.octets if line.data_bits == 8 else bytes(octet & whole for octet in sent.octets)
-        return Received(octets, ends, ())
+        return ReceivedOctets(octets, ends, ())
     changed = bytearray(octet & whole for octet in sent.octets)
     marks: list[Mark] = []
     for offset, mask in sorted(sent.flips.items()):
@@ -285,7 +285,7 @@ def _alone(line: LineSettings, sent: Transmission) -> Received:
             seen = mask if line.parity in "EO" else mask & ~whole  # mark and space parity say nothing of the data
             if line.parity != "N" and seen.bit_count() & 1:
                 marks.append(Mark(offset, LineError.PARITY))
-    return Received(bytes(changed), ends, tuple(marks))
+    return ReceivedOctets(bytes(changed), ends, tuple(marks))
 
 
 def _overlap(current: Sequence[Transmission], line: LineSettings) -> bool:

@@ -1,4 +1,4 @@
-"""Where chunks come from: a serial port, a gateway on the network, a capture file. All of them only listen."""
+"""Sources of chunks: a serial port, a gateway on the network, a capture file. All of them only listen."""
 
 from __future__ import annotations
 
@@ -60,7 +60,8 @@ _URL = re.compile(r"(?P<scheme>[a-z][a-z0-9+.-]*)://", re.IGNORECASE)
 
 
 def open_source(spec: str, line: LineSettings, clock: Clock | None = None) -> Source:
-    """Open what `spec` names: "socket://host:port", "rfc2217://host:port", a capture file, else a serial port.
+    """Open what `spec` names: "socket://host:port", "rfc2217://host:port", a capture file, "follow:FILE" for a
+    recording that is still being written, else a serial port.
 
     `clock`: the capture's clock, a new one when None. Raises PortError.
     """
@@ -70,6 +71,10 @@ def open_source(spec: str, line: LineSettings, clock: Clock | None = None) -> So
         from sniff.sources.gateway import open_gateway
 
         return open_gateway(spec, line, clock)
+    if spec.startswith("follow:"):
+        from sniff.sources.growing_recording import SCHEME, GrowingRecordingSource
+
+        return GrowingRecordingSource(spec.removeprefix(SCHEME), clock)
     from sniff.formats.table import suffixes
 
     if Path(spec).is_file() or spec.lower().endswith(suffixes()):

@@ -1,4 +1,4 @@
-"""What serial drivers can report and how long they hold octets back; a table, from the drivers' sources.
+"""Serial drivers: what they can report and how long they hold octets back; a table, from their sources.
 
 Linux kernel: drivers/usb/serial, drivers/usb/class/cdc-acm.c, drivers/tty/serial, drivers/tty/n_tty.c. Times marked
 "assumed" have no such source: adapters differ, and only a measurement tells.

@@ -1,4 +1,4 @@
-"""How a port is recognised when it comes back after it was unplugged."""
+"""The identity of a port: how it is recognised when it comes back after it was unplugged."""
 
 from __future__ import annotations
 

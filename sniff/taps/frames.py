@@ -1,4 +1,4 @@
-"""What one tap heard: its frames as columns, kept from the tables of its bus."""
+"""The frames of one tap as columns, kept from the tables of its bus."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which frame at one tap is which at the other: in order, by octets, never further apart in time than a line can hold.
+"""Matches of frames at two taps: in order, by octets, never further apart in time than a line can hold.
 
 Frames that are good at both taps are paired first; what lies between two such pairs is then compared: a good frame
 beside something damaged at the same moment was damaged, beside nothing it is missing, beside another good frame it was
@@ -33,7 +33,7 @@ _TOGETHER = 4096
 """Rows that are compared in one step."""
 
 
-class Outcome(Enum):
+class CrossingOutcome(Enum):
     """What became of a frame between the taps."""
 
     DAMAGED = "damaged"
@@ -46,7 +46,7 @@ class Crossing:
     """One frame. `first`, `second`: places at either tap, None where it is missing. `good_at`: 0 or 1, the tap that
     heard it as it was sent."""
 
-    outcome: Outcome
+    outcome: CrossingOutcome
     first: int | None
     second: int | None
     good_at: int = 0
@@ -160,30 +160,30 @@ class _Comparison:
     def crossings(self) -> list[Crossing]:
         """Of all that is left: damaged ones first, so that nobody else takes what is theirs."""
         found = []
-        for outcome, good in ((Outcome.DAMAGED, False), (Outcome.CHANGED, True)):
+        for outcome, good in ((CrossingOutcome.DAMAGED, False), (CrossingOutcome.CHANGED, True)):
             for tap in (0, 1):
                 found += list(self._beside(tap, outcome, good))
         for tap in (0, 1):
             for at, place in enumerate(self._left[tap]):
                 if self._good[tap][at] and not self._taken[tap][at]:
                     here = (place, None) if tap == 0 else (None, place)
-                    found.append(Crossing(Outcome.MISSING, here[0], here[1], tap))
+                    found.append(Crossing(CrossingOutcome.MISSING, here[0], here[1], tap))
         return found
 
-    def _beside(self, tap: int, outcome: Outcome, good: bool) -> Iterator[Crossing]:
+    def _beside(self, tap: int, outcome: CrossingOutcome, good: bool) -> Iterator[Crossing]:
         """Good frames of one tap that something at the other stands for."""
         frames, other = self._taps[tap], 1 - tap
         for at, place in enumerate(self._left[tap]):
             if self._taken[tap][at] or not self._good[tap][at]:
                 continue
             delay = self._delays.get(int(frames.sender[place]), self._delays[EVERYBODY])
-            if outcome is Outcome.CHANGED and (delay < 0) != (tap == 1):
+            if outcome is CrossingOutcome.CHANGED and (delay < 0) != (tap == 1):
                 continue  # it is seen from where it was sent
             there = self._nearest(other, self._ends[tap][at] + (delay if tap == 0 else -delay), good)
             if there is None:
                 continue
             same_length = frames.length[place] == self._taps[other].length[self._left[other][there]]
-            if outcome is Outcome.CHANGED and not same_length:
+            if outcome is CrossingOutcome.CHANGED and not same_length:
                 continue
             self._taken[tap][at] = self._taken[other][there] = True
             far = self._left[other][there]

@@ -15,7 +15,7 @@ from enum import Enum
 import numpy as np
 
 from sniff.taps.frames import TapFrames
-from sniff.taps.matching import Crossing, Matched, Outcome
+from sniff.taps.matching import Crossing, CrossingOutcome, Matched
 
 LEAST = 3
 """Frames that must be hit before anything is said."""
@@ -36,7 +36,7 @@ ALIKE = 0.8
 """Share of damaged frames that are damaged in the same way."""
 
 
-class Place(Enum):
+class FaultPlace(Enum):
     """Where the fault is."""
 
     BETWEEN = "between the taps"
@@ -44,7 +44,7 @@ class Place(Enum):
     EITHER = "between the taps or at the tap"
 
 
-class Kind(Enum):
+class SegmentFaultKind(Enum):
     """What it does to frames."""
 
     DEAD = "nothing passes"
@@ -55,7 +55,7 @@ class Kind(Enum):
     CHANGED = "octets are changed, with a good check"
 
 
-class Side(Enum):
+class TapSide(Enum):
     """On which side of the taps somebody stands, told by where his frames come first."""
 
     FIRST = 0
@@ -75,7 +75,7 @@ class Traffic:
     missing: list[int] = field(default_factory=lambda: [0, 0])
     changed: list[int] = field(default_factory=lambda: [0, 0])
     delays: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
-    damages: list[list[Kind]] = field(default_factory=lambda: [[], []])
+    damages: list[list[SegmentFaultKind]] = field(default_factory=lambda: [[], []])
 
     @property
     def heard(self) -> int:
@@ -90,24 +90,24 @@ class Traffic:
         """The same of all, 0 … 1."""
         return self.hit(tap) / self.heard if self.heard else 0.0
 
-    def side(self, doubt: int) -> Side:
+    def side(self, doubt: int) -> TapSide:
         """Where he stands, when his frames are later at one tap than the adapters' `doubt` (ns) explains."""
         if not len(self.delays):
-            return Side.UNKNOWN
+            return TapSide.UNKNOWN
         usual = int(np.median(self.delays))
         if abs(usual) <= doubt:
-            return Side.UNKNOWN
-        return Side.FIRST if usual > 0 else Side.SECOND
+            return TapSide.UNKNOWN
+        return TapSide.FIRST if usual > 0 else TapSide.SECOND
 
 
 @dataclass(frozen=True, slots=True)
-class Fault:
+class SegmentFault:
     """One fault. `tap`: 0 or 1, where frames are not well; the way towards it is meant. `senders`: who is hit;
     `spared`: who is not. `hit` of `heard` frames."""
 
-    place: Place
+    place: FaultPlace
     tap: int
-    kind: Kind
+    kind: SegmentFaultKind
     senders: tuple[int, ...]
     spared: tuple[int, ...]
     hit: int
@@ -133,9 +133,9 @@ def _count(found: dict[int, Traffic], first: TapFrames, second: TapFrames, cross
     assert place is not None
     one = found.setdefault(int(heard_at.sender[place]), Traffic())
     hurt_at = 1 - crossing.good_at
-    if crossing.outcome is Outcome.MISSING:
+    if crossing.outcome is CrossingOutcome.MISSING:
         one.missing[hurt_at] += 1
-    elif crossing.outcome is Outcome.CHANGED:
+    elif crossing.outcome is CrossingOutcome.CHANGED:
         one.changed[hurt_at] += 1
     else:
         one.damaged[hurt_at] += 1
@@ -145,17 +145,17 @@ def _count(found: dict[int, Traffic], first: TapFrames, second: TapFrames, cross
         one.damages[hurt_at].append(damage(heard_at.octets_at(place), other.octets_at(hurt)))
 
 
-def damage(sent: bytes, came: bytes) -> Kind:
+def damage(sent: bytes, came: bytes) -> SegmentFaultKind:
     """How a frame was damaged. `sent`: as the other tap heard it."""
     if 0 < len(came) < len(sent):
         if sent.endswith(came):
-            return Kind.BEGIN
+            return SegmentFaultKind.BEGIN
         if sent.startswith(came):
-            return Kind.END
-    return Kind.BITS
+            return SegmentFaultKind.END
+    return SegmentFaultKind.BITS
 
 
-def faults(senders: Mapping[int, Traffic], doubt: int) -> list[Fault]:
+def faults(senders: Mapping[int, Traffic], doubt: int) -> list[SegmentFault]:
     """What can be said: nothing where not one frame was heard at both. `doubt`: ns by which both adapters together may
     misplace a frame."""
     if not any(one.both for one in senders.values()):
@@ -163,14 +163,14 @@ def faults(senders: Mapping[int, Traffic], doubt: int) -> list[Fault]:
     return [fault for tap in (1, 0) if (fault := _fault(senders, tap, doubt)) is not None]
 
 
-def _fault(senders: Mapping[int, Traffic], tap: int, doubt: int) -> Fault | None:
+def _fault(senders: Mapping[int, Traffic], tap: int, doubt: int) -> SegmentFault | None:
     hit = {name: one for name, one in senders.items() if one.hit(tap) >= LEAST and one.share(tap) >= SHARE}
     if not hit:
         return None
     count, heard = sum(one.hit(tap) for one in hit.values()), sum(one.heard for one in hit.values())
     spared = _spared({name: one for name, one in senders.items() if name not in hit}, tap, count / heard)
     place = _place(hit, spared, tap, doubt)
-    return Fault(place, tap, _kind(hit.values(), tap), tuple(hit), spared, count, heard)
+    return SegmentFault(place, tap, _kind(hit.values(), tap), tuple(hit), spared, count, heard)
 
 
 def _spared(others: Mapping[int, Traffic], tap: int, share: float) -> tuple[int, ...]:
@@ -192,23 +192,23 @@ def _is_rare(count: int, expected: float) -> bool:
     return total < CHANCE
 
 
-def _place(hit: Mapping[int, Traffic], spared: tuple[int, ...], tap: int, doubt: int) -> Place:
-    own_side = Side(tap)
+def _place(hit: Mapping[int, Traffic], spared: tuple[int, ...], tap: int, doubt: int) -> FaultPlace:
+    own_side = TapSide(tap)
     if any(one.side(doubt) is own_side and one.heard >= KNOWN for one in hit.values()):
-        return Place.TAP  # what reaches the other tap whole passed this one before
-    return Place.BETWEEN if spared else Place.EITHER
+        return FaultPlace.TAP  # what reaches the other tap whole passed this one before
+    return FaultPlace.BETWEEN if spared else FaultPlace.EITHER
 
 
-def _kind(hit: Iterable[Traffic], tap: int) -> Kind:
+def _kind(hit: Iterable[Traffic], tap: int) -> SegmentFaultKind:
     hit = list(hit)
     heard = sum(one.heard for one in hit)
     missing, changed = sum(one.missing[tap] for one in hit), sum(one.changed[tap] for one in hit)
     damages = [kind for one in hit for kind in one.damages[tap]]
     if missing >= DEAD * heard:
-        return Kind.DEAD
+        return SegmentFaultKind.DEAD
     if changed > missing + len(damages):
-        return Kind.CHANGED
-    for kind in (Kind.BEGIN, Kind.END):
+        return SegmentFaultKind.CHANGED
+    for kind in (SegmentFaultKind.BEGIN, SegmentFaultKind.END):
         if damages and damages.count(kind) >= ALIKE * len(damages) and len(damages) >= missing:
             return kind
-    return Kind.LOST if missing > len(damages) else Kind.BITS
+    return SegmentFaultKind.LOST if missing > len(damages) else SegmentFaultKind.BITS

@@ -1,4 +1,4 @@
-"""What two taps tell, in words for people."""
+"""The words of what two taps tell, for people."""
 
 from __future__ import annotations
 
@@ -8,23 +8,23 @@ import numpy as np
 
 from dissectors.columns import NONE
 from dissectors.words import milliseconds
-from sniff.taps.verdict import Fault, Kind, Place, Traffic
+from sniff.taps.verdict import FaultPlace, SegmentFault, SegmentFaultKind, Traffic
 
 _WHAT = {
-    Kind.DEAD: "does not arrive",
-    Kind.LOST: "is lost now and then",
-    Kind.BEGIN: "arrives without its first octets",
-    Kind.END: "arrives without its last octets",
-    Kind.BITS: "arrives damaged",
-    Kind.CHANGED: "arrives with other octets and a good check",
+    SegmentFaultKind.DEAD: "does not arrive",
+    SegmentFaultKind.LOST: "is lost now and then",
+    SegmentFaultKind.BEGIN: "arrives without its first octets",
+    SegmentFaultKind.END: "arrives without its last octets",
+    SegmentFaultKind.BITS: "arrives damaged",
+    SegmentFaultKind.CHANGED: "arrives with other octets and a good check",
 }
 _LOOK = {
-    Kind.DEAD: "look for a broken wire, a repeater that does not drive this side, an isolator without supply",
-    Kind.LOST: "look for a repeater or gateway that is overrun or switches its direction too late",
-    Kind.BEGIN: "look for a driver that is switched on late: a repeater's direction control",
-    Kind.END: "look for a driver that is switched off early: a repeater's direction control",
-    Kind.BITS: "look at termination, bias and shield on this stretch, and for what disturbs beside it",
-    Kind.CHANGED: "look for a gateway that rewrites what it passes on",
+    SegmentFaultKind.DEAD: "look for a broken wire, a repeater that does not drive this side, a dead isolator",
+    SegmentFaultKind.LOST: "look for a repeater or gateway that is overrun or switches its direction too late",
+    SegmentFaultKind.BEGIN: "look for a driver that is switched on late: a repeater's direction control",
+    SegmentFaultKind.END: "look for a driver that is switched off early: a repeater's direction control",
+    SegmentFaultKind.BITS: "look at termination, bias and shield on this stretch, and for what disturbs beside it",
+    SegmentFaultKind.CHANGED: "look for a gateway that rewrites what it passes on",
 }
 
 
@@ -42,19 +42,19 @@ def senders(names: Sequence[int]) -> str:
     return " and ".join(said)
 
 
-def sentence(fault: Fault) -> str:
+def sentence(fault: SegmentFault) -> str:
     """A fault, where it is, and what to look for."""
     here, there = TAPS[fault.tap], TAPS[1 - fault.tap]
-    everybody = fault.place is Place.EITHER and len(fault.senders) > 2
+    everybody = fault.place is FaultPlace.EITHER and len(fault.senders) > 2
     who = "everybody" if everybody else senders(fault.senders)
     verb = "sends" if everybody else _send(fault.senders)
     share = f"{fault.hit} of {fault.heard} frames"
     what = f"what {who} {verb} {_WHAT[fault.kind]} at {here} ({share})"
-    if fault.kind is not Kind.CHANGED:
+    if fault.kind is not SegmentFaultKind.CHANGED:
         what += f" and is whole at {there}"
-    if fault.place is Place.TAP:
+    if fault.place is FaultPlace.TAP:
         where = f"it passed {here} before: the fault is at {here} itself, its adapter or its wiring to the line"
-    elif fault.place is Place.BETWEEN:
+    elif fault.place is FaultPlace.BETWEEN:
         whole = f"what {senders(fault.spared)} {_send(fault.spared)} is whole at both"
         where = f"{whole}: the fault lies between the taps, on the way from {there} to {here}"
         if len(fault.senders) == 1 and fault.senders[0] != NONE and len(fault.spared) > 1:
@@ -132,7 +132,7 @@ def certainty(doubt: int) -> str:
     return f"delays run from A to B, negative from B to A; they are right to ± {off}, as far as the adapters allow"
 
 
-def as_value(fault: Fault) -> dict[str, object]:
+def as_value(fault: SegmentFault) -> dict[str, object]:
     """A fault for programs; the master, whom frames do not name, is null among the senders."""
     return {
         "fault": fault.kind.name.lower(),

@@ -21,7 +21,7 @@ from sniff.devices import noted, noted_devices
 from sniff.engine.engine import Output, Row
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import Completeness, LineEvent, Session
-from sniff.engine.verdict_join import Settled
+from sniff.engine.verdict_join import JudgedRow
 from sniff.formats import read
 
 
@@ -38,7 +38,7 @@ class CaptureReading:
     path: Path
     session: Session
     dissector: Dissector
-    rows: tuple[Settled, ...]
+    rows: tuple[JudgedRow, ...]
     transactions: tuple[Transaction, ...]
     line_events: tuple[LineEvent, ...]
     counts: Summary
@@ -75,7 +75,7 @@ def read_capture(path: str | Path, said: Devices | None = None) -> CaptureReadin
         session=session,
         dissector=dissector,
         rows=tuple(
-            Settled(row, closed.get(row.placement.tx) if row.placement is not None else None) for row in kept.rows
+            JudgedRow(row, closed.get(row.placement.tx) if row.placement is not None else None) for row in kept.rows
         ),
         transactions=tuple(closed.values()),
         line_events=tuple(kept.events),

@@ -13,7 +13,7 @@ from dissectors.line import MS
 from sniff.analysis.plain import plain
 from sniff.analysis.points import Point
 from sniff.analysis.wording import describe, mark_names
-from sniff.engine.verdict_join import Settled
+from sniff.engine.verdict_join import JudgedRow
 from sniff.testing.capture_reading import CaptureReading
 
 MAGIC = "#!sniff-expect 1"
@@ -80,7 +80,7 @@ def _point(point: Point) -> str:
     return f"{point.sample.station} {point.sample.name} = {shown}"
 
 
-def _row(reading: CaptureReading, item: Settled) -> str:
+def _row(reading: CaptureReading, item: JudgedRow) -> str:
     row = item.row
     event = row.event
     start, end = (event.start - reading.session.started), (event.end - reading.session.started)

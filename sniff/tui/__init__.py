@@ -3,23 +3,27 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 
 from sniff.bus.feed import Feed
 
 
-def run(feed: Feed, start_screen: str = "frames") -> None:
-    """Show a feed until the user quits; then say where a recording is. Closes the feed in every case."""
+def run(feed: Feed | Sequence[Feed], start_screen: str = "frames") -> None:
+    """Show a feed, or those of several buses, until the user quits; then say where a recording is. Closes the feeds in
+    every case."""
     from sniff.tui.app import SnifferApp
 
+    feeds = feed if isinstance(feed, Sequence) else [feed]
     try:
-        SnifferApp(feed, start_screen).run()
-        status = feed.status()
+        SnifferApp(feeds, start_screen).run()
+        ended = [(status.port, status.ended) for status in (each.status() for each in feeds) if status.ended]
     finally:
-        feed.close()
-    if status.ended:
-        sys.stdout.write(f"{_plain(status.port)}: {_plain(status.ended)}\n")
-    recording = feed.status().recording  # as it is now that its files are closed
-    if status.live and recording:
+        for each in feeds:
+            each.close()
+    for port, why in ended:
+        sys.stdout.write(f"{_plain(port)}: {_plain(why)}\n")
+    now = [each.status() for each in feeds]  # as it is now that the files are closed
+    for recording in dict.fromkeys(status.recording for status in now if status.live and status.recording):
         sys.stdout.write(f"recorded to {_plain(recording)}\n")
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Sequence
 
 from textual.app import App
 from textual.message_pump import MessagePump
@@ -10,22 +11,43 @@ from textual.message_pump import MessagePump
 from sniff.bus.feed import FeedStatus
 from sniff.bus.rows import Store
 from sniff.tui.health_meter import HealthMeter
+from sniff.tui.seats import BusLine
 from sniff.tui.viewing import Viewing
 
 
 class Analyzer(App[None]):
-    """`status`: of the feed, ten times a second. `viewing`: how the user looks at things.
-    `tabs`: key and title of each screen. `health`: of the bus, a look every now and then."""
+    """`tabs`: key and title of each screen. Of several buses all but `buses` is that of the one which is shown."""
 
-    status: FeedStatus
-    viewing: Viewing
     tabs: tuple[tuple[str, str], ...]
-    health: HealthMeter
+
+    @property
+    @abstractmethod
+    def status(self) -> FeedStatus:
+        """Of the feed, ten times a second."""
+
+    @property
+    @abstractmethod
+    def health(self) -> HealthMeter:
+        """Health of the bus, a look every now and then."""
+
+    @property
+    @abstractmethod
+    def viewing(self) -> Viewing:
+        """How the user looks at things."""
+
+    @property
+    @abstractmethod
+    def buses(self) -> Sequence[BusLine]:
+        """What the bar says of each bus; none where there is only one."""
 
     @property
     @abstractmethod
     def store(self) -> Store:
         """The rows."""
+
+    @abstractmethod
+    def show_bus(self, name: str) -> None:
+        """Show the bus of this name."""
 
     @abstractmethod
     def draw_screen(self) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from functools import partial
 from typing import ClassVar
 
@@ -17,6 +18,7 @@ from sniff.config import ConfigError, nearest
 from sniff.config import load as load_config
 from sniff.filter import FilterError
 from sniff.tui.analyzer import Analyzer
+from sniff.tui.busbar import BusBar
 from sniff.tui.header import StatusHeader, why_ended
 from sniff.tui.health_meter import HealthMeter
 from sniff.tui.help import HelpScreen
@@ -26,6 +28,7 @@ from sniff.tui.plain import plain
 from sniff.tui.prompt import Prompt
 from sniff.tui.screens import SCREENS, Entry, load
 from sniff.tui.screens.base import ViewScreen
+from sniff.tui.seats import BusLine, Seat
 from sniff.tui.viewing import Viewing
 
 POLL_SECONDS = 0.1
@@ -56,37 +59,93 @@ class SnifferApp(Analyzer):
                 Binding(entry.key, f"switch('{entry.name}')", entry.title, tooltip=f"screen {entry.title}", show=False)
                 for entry in SCREENS
             ),
+            Binding("b", "bus(1)", "bus", tooltip="the next bus, of several; the others are listened to meanwhile"),
+            Binding("B", "bus(-1)", "bus", tooltip="the bus before", show=False),
             Binding("T", "theme", "theme", tooltip="dark or light theme", show=False),
             Binding("ctrl+p", "command_palette", "commands", tooltip="all commands by name", show=False),
             Binding("ctrl+q,ctrl+c", "quit", "quit", tooltip="quit at once", show=False),
         ]
     )
 
-    def __init__(self, feed: Feed, start_screen: str = "frames") -> None:
+    def __init__(self, feed: Feed | Sequence[Feed], start_screen: str = "frames") -> None:
+        """`feed`: of one bus, or those of several; the first is shown first."""
         if start_screen not in {entry.name for entry in SCREENS}:
             raise ValueError(f"screen {start_screen!r}: expected one of {', '.join(entry.name for entry in SCREENS)}")
         self.DEFAULT_MODE = start_screen  # type: ignore[misc]  # textual reads it from the instance
         super().__init__()
+        feeds = feed if isinstance(feed, Sequence) else [feed]
+        self.seats = [Seat.of(each, start_screen) for each in feeds]
+        self.here = 0  # which of them is shown
+        self._polled = 0  # which file was polled last of those that are not shown
         for entry in SCREENS:
-            self.add_mode(entry.name, partial(_make, entry))
-        self.feed = feed
-        self.status: FeedStatus = feed.status()
-        self.viewing = Viewing(feed.store, follow=self.status.live)
-        self.viewing.take_marks()
+            for number in range(len(self.seats)):
+                self.add_mode(_mode(entry.name, number), partial(_make, entry))
         self.tabs = tuple((entry.key, entry.title) for entry in SCREENS)
-        self.health = HealthMeter()
-        self.visited = [start_screen]
         self._worker: Timer | None = None
-        self._told_end = False
-        self._told_dropped = False
-        self._told_trouble = ""
         self._asked_to_quit = 0.0
         self._pressed = 0.0  # when the last key was
 
+    # -- the bus that is shown ---------------------------------------------------------------------------------
+
+    @property
+    def seat(self) -> Seat:
+        """The bus that is shown."""
+        return self.seats[self.here]
+
+    @property
+    def feed(self) -> Feed:
+        """What fills it."""
+        return self.seat.feed
+
     @property
     def store(self) -> Store:
-        """The rows."""
+        """Its rows."""
         return self.feed.store
+
+    @property
+    def status(self) -> FeedStatus:
+        """How its feed is doing."""
+        return self.seat.status
+
+    @property
+    def health(self) -> HealthMeter:
+        """Its health, a look every now and then."""
+        return self.seat.health
+
+    @property
+    def viewing(self) -> Viewing:
+        """How the user looks at it."""
+        return self.seat.viewing
+
+    @property
+    def visited(self) -> list[str]:
+        """The screens that `q` walks back over."""
+        return self.seat.visited
+
+    @property
+    def buses(self) -> Sequence[BusLine]:
+        """What the bar says of each; none where there is only one."""
+        if len(self.seats) < 2:
+            return ()
+        return [seat.line(number == self.here) for number, seat in enumerate(self.seats)]
+
+    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
+        """There is no other bus to show where there is only one."""
+        return len(self.seats) > 1 if action == "bus" else super().check_action(action, parameters)
+
+    def action_bus(self, step: int) -> None:
+        """Show another bus, on the screen that was shown of it last."""
+        self._go_to((self.here + step) % len(self.seats))
+
+    def show_bus(self, name: str) -> None:
+        """Show the bus of this name."""
+        self._go_to(next((number for number, seat in enumerate(self.seats) if seat.name == name), self.here))
+
+    def _go_to(self, number: int) -> None:
+        if number == self.here:
+            return
+        self.here = number
+        self.switch_mode(_mode(self.visited[-1], number))
 
     async def on_event(self, event: Event) -> None:
         """Note when somebody is at work here."""
@@ -99,7 +158,9 @@ class SnifferApp(Analyzer):
     def on_mount(self) -> None:
         """Start to poll."""
         try:
-            self.viewing.colour_rules(load_config().colours)
+            colours = load_config().colours
+            for seat in self.seats:
+                seat.viewing.colour_rules(colours)
         except (ConfigError, FilterError) as error:
             self.notify(plain(error), severity="error", markup=False)
         self._take_keys()
@@ -126,46 +187,64 @@ class SnifferApp(Analyzer):
         """Take what the feed has and show it."""
         if not self.screen_stack:  # the app is ending
             return
-        changed = self.feed.poll()
-        was_searching, was_reading, self.status = self.status.searching, self.status.reading, self.feed.status()
-        if was_searching and not self.status.searching:
-            self._take_what_was_found()
-        self._tell()
-        if self._worker is not None and (self.status.reading or self.status.judged < 1):
+        changed = self._poll(self.seat)
+        self._poll_others()
+        if self._worker is not None and any(seat.is_still_read for seat in self.seats):
             self._worker.resume()
         if changed:
             self.viewing.take_marks()
             self.draw_screen()
-        if was_reading and not self.status.reading:  # there is nothing to follow any more
-            self.viewing.follow = False
         self._draw_header()
 
-    def _tell(self) -> None:
+    def _poll(self, seat: Seat) -> bool:
+        """Take what has come of a bus; whether anything has."""
+        changed = seat.feed.poll()
+        before, seat.status = seat.status, seat.feed.status()
+        if before.searching and not seat.status.searching:
+            self._take_what_was_found(seat)
+        if before.reading and not seat.status.reading:  # there is nothing to follow any more
+            seat.viewing.follow = False
+        self._tell(seat)
+        return changed
+
+    def _poll_others(self) -> None:
+        """The buses that are not shown: those of a capture all, of files one at a time, so that keys are answered."""
+        others = [seat for number, seat in enumerate(self.seats) if number != self.here]
+        files = [seat for seat in others if not seat.status.live]
+        self._polled += 1
+        for seat in [one for one in others if one.status.live] + files[self._polled % max(1, len(files)) :][:1]:
+            self._poll(seat)
+
+    def _tell(self, seat: Seat) -> None:
         """Say once what happened to the recording, to the view and to the capture."""
-        trouble = self.status.trouble
-        if trouble != self._told_trouble:
-            self._told_trouble = trouble
-            said = plain(trouble) or "it goes on"
+        bus = f"{plain(seat.name)}: " if len(self.seats) > 1 else ""
+        status, store = seat.status, seat.feed.store
+        trouble = status.trouble
+        if trouble != seat.told_trouble:
+            seat.told_trouble = trouble
+            said = bus + (plain(trouble) or "it goes on")
             self.notify(said, title="recording", severity="error" if trouble else "information", markup=False)
-        if self.store.dropped_rows and not self._told_dropped:
-            self._told_dropped = True
-            file = "the file keeps all" if self.status.in_file else "nothing is recorded"
-            self.notify(f"the oldest rows leave the view, {self.store.keep} stay; {file}", title="memory", markup=False)
-        if self.status.ended and not self._told_end:
-            self._told_end = True
-            said = plain(why_ended(self.status, self.store)[1])
+        if store.dropped_rows and not seat.told_dropped:
+            seat.told_dropped = True
+            file = "the file keeps all" if status.in_file else "nothing is recorded"
+            said = f"{bus}the oldest rows leave the view, {store.keep} stay; {file}"
+            self.notify(said, title="memory", markup=False)
+        if status.ended and not seat.told_end:
+            seat.told_end = True
+            said = bus + plain(why_ended(status, store)[1])
             self.notify(said, title="the capture has ended", severity="warning", markup=False)
 
-    def _take_what_was_found(self) -> None:
+    def _take_what_was_found(self, seat: Seat) -> None:
         """A search for settings has ended: say so, and read the filter with what was found."""
-        if self.status.ended:
+        if seat.status.ended:
             return
-        said = plain(f"found: {self.status.protocol}, {self.status.line}")
+        bus = f"{seat.name}: " if len(self.seats) > 1 else ""
+        said = plain(f"{bus}found: {seat.status.protocol}, {seat.status.line}")
         self.notify(said, title="the search has ended", markup=False)
         try:
-            self.viewing.set_filter(self.viewing.filter)
+            seat.viewing.set_filter(seat.viewing.filter)
         except FilterError:  # it names fields of another protocol
-            self.viewing.set_filter("")
+            seat.viewing.set_filter("")
 
     def draw_screen(self) -> None:
         """Bring the shown screen up to date."""
@@ -184,10 +263,15 @@ class SnifferApp(Analyzer):
 
     def _work(self) -> None:
         screen = self.shown
-        busy = time.monotonic() - self._pressed < CALM_SECONDS or self.feed.work()
+        busy = time.monotonic() - self._pressed < CALM_SECONDS or self._work_of_feeds()
         busy |= screen is not None and _is_whole(screen) and screen.work_left() and screen.work()
         if not busy and self._worker is not None:
             self._worker.pause()
+
+    def _work_of_feeds(self) -> bool:
+        """Do a piece of what can wait, first for the bus that is shown; whether more is left."""
+        others = (seat for number, seat in enumerate(self.seats) if number != self.here)
+        return any(seat.feed.work() for seat in (self.seat, *others))
 
     def _draw_header(self) -> None:
         status = self.status
@@ -195,21 +279,23 @@ class SnifferApp(Analyzer):
             self.health.look(self.store, final=status.judged >= 1 and not status.live)
         for header in self.screen.query(StatusHeader):
             header.bring_up()
+        for bar in self.screen.query(BusBar):
+            bar.bring_up()
 
     # -- what keys do everywhere -------------------------------------------------------------------------------
 
     def action_switch(self, name: str) -> None:
         """Show a screen; `q` comes back from it."""
-        if name == self.current_mode:
+        if name == self.visited[-1]:
             return
-        self.visited = with_step(self.visited, name)
-        self.switch_mode(name)
+        self.seat.visited = with_step(self.visited, name)
+        self.switch_mode(_mode(name, self.here))
 
     def action_go_back(self) -> None:
         """Go to the screen before; quit at the first one, asking again while a recording runs."""
         if len(self.visited) > 1:
             self.visited.pop()
-            self.switch_mode(self.visited[-1])
+            self.switch_mode(_mode(self.visited[-1], self.here))
             return
         if self.status.live and self.status.recording and time.monotonic() - self._asked_to_quit > SURE_SECONDS:
             self._asked_to_quit = time.monotonic()
@@ -296,6 +382,11 @@ def with_step(path: list[str], name: str) -> list[str]:
     if len(longer) >= 4 and longer[-2:] == longer[-4:-2]:
         longer = longer[:-2]
     return longer[-PATH:]
+
+
+def _mode(name: str, bus: int) -> str:
+    """What a screen of a bus is called: each bus has its own, with its own cursor."""
+    return f"{name} of {bus}" if bus else name
 
 
 def _make(entry: Entry) -> Screen[None]:

@@ -32,7 +32,7 @@ NOT_OURS = {"screen.copy_text", "help_quit", "app.focus_next", "app.focus_previo
 """Actions that the framework binds; they count here only where a screen explains them (a binding with a tooltip)."""
 ALWAYS = ("help", "back")
 """Descriptions of the keys that the bar never leaves out."""
-FIRST = ("filter", "", "freeze", "follow", "error", "pair", "mark", "time", "open", "go to")
+FIRST = ("bus", "filter", "", "freeze", "follow", "error", "pair", "mark", "time", "open", "go to")
 """The order of wanting by description; "" stands for all that are not named here."""
 
 

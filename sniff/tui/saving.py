@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
@@ -11,9 +12,19 @@ from sniff.bus.rows import Store
 from sniff.engine.session import Item
 from sniff.formats import FRAMES, ITEMS, table
 
+GUEST = "SNIFF485_GUEST"
+"""Set in the environment of screens that are shown elsewhere: they write no files here."""
+
+
+def is_guest() -> bool:
+    """Whether this screen is for somebody at another machine (`serve --allow-remote` says so)."""
+    return bool(os.environ.get(GUEST))
+
 
 def why_not(path: str) -> str:
     """What keeps a capture of that name from being written; "" for nothing."""
+    if is_guest():
+        return "who looks from another machine saves nothing here"
     suffixes = (*table.writers(ITEMS), *table.writers(FRAMES))
     if not path.strip().lower().endswith(suffixes):
         return f"expected a name that ends in {', '.join(suffixes)}"

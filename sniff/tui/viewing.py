@@ -16,6 +16,7 @@ from sniff.engine.session import LineEvent, LineEventKind
 from sniff.filter import Filter, FilterError, Scope, compile_filter
 from sniff.filter.compiling import field_of
 from sniff.filter.completion import shown_value
+from sniff.filter.told import told
 from sniff.tui.times import TimeMode
 
 COUNTED = 2000
@@ -87,13 +88,13 @@ class Viewing:
         if text:
             self.filters = [*(one for one in self.filters if one != text), text][-MOST_FILTERS:]
 
-    def compiled(self, text: str) -> Filter:
-        """A filter for these rows. Raises FilterError."""
-        return compile_filter(text, self.store.dissector, self._scope(text))
+    def compiled(self, text: str, others: bool = False) -> Filter:
+        """A filter for these rows. `others`: what other protocols have is no mistake in it. Raises FilterError."""
+        return compile_filter(text, self.store.dissector, self._scope(text), others)
 
     def colour_rules(self, colours: Mapping[str, str]) -> None:
         """Take the filters by colour. Raises FilterError."""
-        self.colours = [(colour, self.compiled(text)) for colour, text in colours.items()]
+        self.colours = [(colour, self.compiled(text, others=True)) for colour, text in colours.items()]
 
     def colour_of(self, row: Row, transaction: Transaction | None) -> str:
         """The colour of a row; "" for none."""
@@ -121,7 +122,16 @@ class Viewing:
             for one in store.findings():
                 for no in one.evidence:
                     findings[no] = findings.get(no, frozenset()) | {one.code}
-        return Scope(store.session.started, store.devices, {}, findings, self._begin_of)
+        return Scope(
+            store.session.started,
+            store.devices,
+            {},
+            findings,
+            self._begin_of,
+            told=lambda no: [told(value) for value in store.told(no)],
+            says=store.text,
+            answered=store.answered,
+        )
 
     def _begin_of(self, no: int) -> int | None:
         row = self.store.by_no(no)

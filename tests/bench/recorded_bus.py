@@ -13,7 +13,7 @@ from dissectors.frame import Chunk
 from dissectors.line import LineSettings
 from dissectors.profiles import Devices
 from sniff.bus.live import LiveBus
-from sniff.capture.wire import Ended, Message, Received, Tick
+from sniff.capture.ipc import Ended, Message, ReceivedMessage, Tick
 from sniff.engine.session import Adapter, Session
 from sniff.recording.writer import Recorder
 
@@ -96,7 +96,7 @@ def record(
                 live.poll()
             due = min(due + BEAT, max(recorder.due or due + BEAT, due + 1))
         recorder.chunk(chunk)
-        link.messages.append(Received(0, chunk))
+        link.messages.append(ReceivedMessage(0, chunk))
     link.messages.append(Ended("stopped"))
     while live.ended is None:
         live.poll()

@@ -19,10 +19,10 @@ import pytest
 
 from dissectors.frame import Chunk
 from sniff.bus.live import LiveBus
-from sniff.capture.wire import Received, Tick
+from sniff.capture.ipc import ReceivedMessage, Tick
 from sniff.engine.session import LineEvent, LineEventKind
 from sniff.formats import read
-from sniff.recording import keeper
+from sniff.recording import writer_thread
 from sniff.recording.rotation import Rotation
 from sniff.recording.writer import Recorder
 from tests.bench.recorded_bus import BASE, BEAT, SESSION, Link, polls
@@ -108,7 +108,7 @@ class Run:
             self.heard += len(chunk.octets)
             self.recorder.chunk(chunk)
             if self.front is not None:
-                self.front[0].messages.append(Received(0, chunk))
+                self.front[0].messages.append(ReceivedMessage(0, chunk))
         for _, what in ends:
             self._end(what, due)
         self.recorder.close()
@@ -173,11 +173,11 @@ def full_bus(seconds: float) -> Iterator[Chunk]:
 def test_endurance(benchmark: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str) -> None:
     if kind.startswith("full"):
         hours = float(os.environ.get("ENDURANCE_FULL_HOURS", "0.1"))
-        monkeypatch.setattr(keeper, "MOST_WAITING", 500_000)  # so that something is lost at all
+        monkeypatch.setattr(writer_thread, "MOST_WAITING", 500_000)  # so that something is lost at all
         run, chunks = Run(tmp_path, decode=False), full_bus(hours * 3600)
     else:
         hours = float(os.environ.get("ENDURANCE_HOURS", "0.5"))
-        monkeypatch.setattr(keeper, "MOST_WAITING", 60_000)
+        monkeypatch.setattr(writer_thread, "MOST_WAITING", 60_000)
         run, chunks = Run(tmp_path, decode=True), polls(hours * 3600)
     benchmark.pedantic(run.run, (chunks, hours), rounds=1)
     paths = sorted(tmp_path.glob("*.mcap"))

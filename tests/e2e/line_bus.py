@@ -28,7 +28,7 @@ from sniff.capture import link  # noqa: E402
 from sniff.capture.spawn import Spawned  # noqa: E402
 from sniff.capture.waiting import Call, Waiting  # noqa: E402
 from sniff.engine.session import Adapter, Item, LineEvent, LineEventKind, SettingsChange  # noqa: E402
-from sniff.simulation.line_mix import low_times, receive  # noqa: E402
+from sniff.simulation.collision import low_times, receive  # noqa: E402
 from sniff.simulation.scenarios import bursts, scenario  # noqa: E402
 from sniff.simulation.wire import Burst  # noqa: E402
 from sniff.sources.clock import Clock  # noqa: E402

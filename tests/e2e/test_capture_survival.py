@@ -16,9 +16,9 @@ import pytest
 
 from dissectors.frame import Chunk
 from dissectors.line import NS_PER_S, LineSettings
+from sniff.capture.ipc import Message, ReceivedMessage, Status, Tick
+from sniff.capture.ipc_sender import BACKLOG
 from sniff.capture.link import CaptureLink, RecordSpec, SourceSpec
-from sniff.capture.outlet import BACKLOG
-from sniff.capture.wire import Message, Received, Status, Tick
 from sniff.formats import read
 
 pytest.importorskip("termios")
@@ -99,7 +99,7 @@ def promised(messages: list[Message]) -> int:
     gives it no turn stops that clock too."""
     now = max((one.now for one in messages if isinstance(one, Tick)), default=0)
     behind = max((one.behind for one in messages if isinstance(one, Status)), default=0.0)
-    chunks = [one.item for one in messages if isinstance(one, Received) and isinstance(one.item, Chunk)]
+    chunks = [one.item for one in messages if isinstance(one, ReceivedMessage) and isinstance(one.item, Chunk)]
     return sum(len(chunk.octets) for chunk in chunks if chunk.time < now - (1.2 + behind) * NS_PER_S)
 
 
@@ -181,7 +181,7 @@ def test_a_main_process_that_does_not_read_costs_neither_octets_nor_memory(bus, 
         after = resident(link.pid)
         messages = link.stop()
     status = [message for message in messages if isinstance(message, Status)][-1]
-    shown = sum(len(m.item.octets) for m in messages if isinstance(m, Received) and isinstance(m.item, Chunk))
+    shown = sum(len(m.item.octets) for m in messages if isinstance(m, ReceivedMessage) and isinstance(m.item, Chunk))
     assert status.dropped > 0
     assert status.lost == 0
     assert shown < BACKLOG + 1_000_000 < bus.fed, "no more is held than the backlog and what the socket takes"

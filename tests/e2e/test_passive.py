@@ -12,8 +12,8 @@ import pytest
 
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
+from sniff.capture.ipc import ReceivedMessage
 from sniff.capture.link import CaptureLink, RecordSpec, SourceSpec
-from sniff.capture.wire import Received
 
 ROOT = Path(__file__).parents[2]
 FOLDERS = ("sniff/sources", "sniff/capture")
@@ -27,7 +27,7 @@ SENDING = {
 
 ALLOWED = {
     # to the main process and back, never to a port
-    ("sniff/capture/outlet.py", "Outlet.flush", "send"),
+    ("sniff/capture/ipc_sender.py", "Outlet.flush", "send"),
     ("sniff/capture/link.py", "CaptureLink._send", "send"),
     ("sniff/capture/link.py", "CaptureLink._greet", "sendall"),
     ("sniff/capture/process.py", "main", "sendall"),
@@ -107,7 +107,7 @@ def test_not_one_octet_leaves(tmp_path, token) -> None:
                     rest = rest[os.write(master, rest[:1500]) :]
                 heard += listen(master)
                 for message in link.receive(0.01):
-                    if isinstance(message, Received) and isinstance(message.item, Chunk):
+                    if isinstance(message, ReceivedMessage) and isinstance(message.item, Chunk):
                         taken += message.item.octets
             link.reconfigure(0, LineSettings.parse("9600,7O2"))
             link.receive(0.2)

@@ -24,8 +24,8 @@ from dissectors.line import LineSettings, Timing
 from dissectors.simulated_faults import LateResponse, LostResponse
 from dissectors.tracker import Transaction, Verdict
 from sniff.capture.config import SourceSpec
+from sniff.capture.ipc import ReceivedMessage
 from sniff.capture.link import CaptureLink
-from sniff.capture.wire import Received
 from sniff.engine.engine import Engine, Row
 from sniff.simulation.bus import WHOLE, VirtualBus
 from sniff.simulation.ports import HAS_PTY
@@ -97,7 +97,7 @@ class Conversation:
                 messages = link.stop()
                 self.timing = link.session(0).timing
             assert bus.report().tap_octets == 0, "the sniffer wrote to the bus"
-        self.chunks = [m.item for m in messages if isinstance(m, Received) and isinstance(m.item, Chunk)]
+        self.chunks = [m.item for m in messages if isinstance(m, ReceivedMessage) and isinstance(m.item, Chunk)]
 
     def ask(self, name: str, verdict: str | None = None) -> None:
         """One of the client's questions."""

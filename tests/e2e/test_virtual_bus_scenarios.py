@@ -11,8 +11,8 @@ from dissectors import registry
 from dissectors.frame import Chunk, Frame
 from dissectors.line import NS_PER_S
 from sniff.capture.config import SourceSpec
+from sniff.capture.ipc import Message, ReceivedMessage
 from sniff.capture.link import CaptureLink
-from sniff.capture.wire import Message, Received
 from sniff.engine.engine import Engine, Row
 from sniff.simulation import scenarios
 from sniff.simulation.bus import WHOLE, VirtualBus
@@ -34,7 +34,7 @@ def _lasts(truth: list[Sent]) -> float:
 
 def _arrived(messages: list[Message], bus: int, truth: list[Sent]) -> bool:
     """Whether as many octets were received as were sent."""
-    received = [one.item for one in messages if isinstance(one, Received) and one.bus == bus]
+    received = [one.item for one in messages if isinstance(one, ReceivedMessage) and one.bus == bus]
     return sum(len(item.octets) for item in received if isinstance(item, Chunk)) >= sum(len(s.octets) for s in truth)
 
 
@@ -66,7 +66,7 @@ def listen(plans: list[Scenario], seconds: float) -> list[tuple[list[Row], list[
         assert [bus.report().tap_octets for bus in buses] == [0] * len(buses), "the sniffer wrote to a bus"
     rows: list[list[Row]] = [[] for _ in plans]
     for message in messages:
-        if isinstance(message, Received) and isinstance(message.item, Chunk):
+        if isinstance(message, ReceivedMessage) and isinstance(message.item, Chunk):
             rows[message.bus] += engines[message.bus].feed(message.item).rows
     for index, engine in enumerate(engines):
         rows[index] += engine.close().rows

@@ -231,7 +231,7 @@ def _mstp_parties(
 ) -> list[Party]:
     from dissectors.bacnet.application import Application
     from dissectors.bacnet.f510 import f510
-    from dissectors.bacnet.simulated import Faults, Node, Poller
+    from dissectors.bacnet.simulated import Faults, Poller, SimulatedNode
     from tests.faults.ring_nodes import Greedy
 
     timing = Timing(MSTP_LINE)
@@ -247,7 +247,7 @@ def _mstp_parties(
     for mac in present:
         frames = max(requests, 2 if mac == 1 else 1)
         faults = Faults(**node_faults.get(mac, {}))  # type: ignore[arg-type]
-        node: Station = Node(
+        node: Station = SimulatedNode(
             mac,
             timing,
             applications[mac],
@@ -258,6 +258,6 @@ def _mstp_parties(
         )
         parties.append(Party(f"mac {mac}", change[mac](node) if mac in change else node, answers=False))
     if twin_of is not None:
-        twin = Node(twin_of, timing, f510(777), max_master=31, faults=Faults(use_delay=4 * MS))
+        twin = SimulatedNode(twin_of, timing, f510(777), max_master=31, faults=Faults(use_delay=4 * MS))
         parties.append(Party("twin", twin, answers=False))
     return parties

@@ -8,7 +8,7 @@ from functools import partial
 
 from dissectors.bacnet.application import Poller, Quiet, read_property
 from dissectors.bacnet.envelope import npdu_frame
-from dissectors.bacnet.simulated import Node
+from dissectors.bacnet.simulated import SimulatedNode
 from dissectors.line import LineSettings, Timing
 from dissectors.modbus.simulated_master import read_holding, write_register, write_registers
 from dissectors.simulated import Station
@@ -20,6 +20,7 @@ from tests.faults.hearing import busy_host, hidden_latency
 from tests.faults.misbehaving import ScansOnce
 from tests.faults.n2_clean_cases import n2_clean_cases
 from tests.faults.profibus_cases import profibus
+from tests.faults.profibus_clean_cases import profibus_clean_cases
 from tests.faults.ring_nodes import TestsItself
 from tests.faults.ring_programs import Lister, Scans, Segmenting, controller, drive
 from tests.faults.uneven_stations import Waits
@@ -170,7 +171,7 @@ def _looking_for_devices() -> Poller:
 
 
 def _slave(mac: int, *, seed: int) -> Station:
-    return NeverByItself(Node(mac, Timing(MSTP_LINE), drive(mac)))
+    return NeverByItself(SimulatedNode(mac, Timing(MSTP_LINE), drive(mac)))
 
 
 def _asks_slaves(*, seed: int) -> Station:
@@ -256,6 +257,7 @@ def clean_cases(seconds: float) -> Iterator[Case]:
             heard = seconds / 6 if shorter else seconds
             yield Case(f"{kind.name}, {tap.name}", kind.make, (), tap, heard, kind.hear)
     yield from n2_clean_cases(seconds / 6)
+    yield from profibus_clean_cases(seconds / 6)
     yield from unsteady_cases()
 
 

@@ -9,7 +9,7 @@ from random import Random
 from dissectors.frame import Chunk, LineError, Mark
 from dissectors.line import LineSettings
 from sniff.engine.session import Adapter, Item, LineEvent, LineEventKind
-from sniff.simulation.line_mix import low_times, receive
+from sniff.simulation.collision import low_times, receive
 from sniff.simulation.scenarios import Scenario, simulate
 from sniff.simulation.tap import TapModel
 from sniff.simulation.wire import Burst

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from dissectors.bacnet.simulated import Node
+from dissectors.bacnet.simulated import SimulatedNode
 from dissectors.frame import Place
 from dissectors.line import LineSettings, Timing
 from dissectors.modbus.simulated_master import read_holding, write_register
@@ -73,7 +73,7 @@ def _dying(*units: int) -> dict[int, partial[Dies]]:
 
 def _bacnet_drive(*, seed: int) -> Station:
     """A drive whose port still speaks BACnet MS/TP; it looks for other masters as soon as nobody speaks."""
-    return Node(7, Timing(RTU_8N1), max_master=127)
+    return SimulatedNode(7, Timing(RTU_8N1), max_master=127)
 
 
 def _dies(address: int, delay: int) -> Station:

@@ -11,7 +11,7 @@ from dissectors.frame import Chunk
 from dissectors.line import LineSettings
 from dissectors.simulated_faults import NOISE, Transmission
 from sniff.engine.session import Item
-from sniff.simulation.line_mix import low_times, receive
+from sniff.simulation.collision import low_times, receive
 from sniff.simulation.scenarios import Scenario, simulate
 from sniff.simulation.tap import TapModel
 from tests.faults.case import Heard

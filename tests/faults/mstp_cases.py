@@ -7,7 +7,7 @@ from functools import partial
 from dissectors.bacnet.application import WRITE_PROPERTY, Application, Outgoing, confirmed
 from dissectors.bacnet.envelope import npdu_frame
 from dissectors.bacnet.frame_types import EXPECTING, FrameType
-from dissectors.bacnet.simulated import Faults, Node
+from dissectors.bacnet.simulated import Faults, SimulatedNode
 from dissectors.frame import Place
 from dissectors.line import Timing
 from dissectors.simulated import Station
@@ -81,7 +81,9 @@ def _twin(mac: int, *, seed: int) -> Station:
     for target, held in other.objects.items():
         if target.type == 0:
             held.properties[85] = 77.0
-    return Node(mac, Timing(MSTP_LINE), other, max_master=31, faults=Faults(use_delay=4 * MS, reply_delay=25 * MS))
+    return SimulatedNode(
+        mac, Timing(MSTP_LINE), other, max_master=31, faults=Faults(use_delay=4 * MS, reply_delay=25 * MS)
+    )
 
 
 def _answers_tests(*, seed: int) -> Station:
@@ -99,7 +101,7 @@ def _wrong_write() -> Application:
     return Sends(Outgoing(9, confirmed(3, WRITE_PROPERTY, values), expects_reply=True), every=S)
 
 
-def _dawdling(node: Node) -> Station:
+def _dawdling(node: SimulatedNode) -> Station:
     """Each station has its own patience, else two tokens go round in step for ever."""
     return Dawdles(waiting(node, 26 * MS), every=3 * S, by=40 * MS)
 

@@ -6,17 +6,20 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 
+from dissectors.frame import Place
 from dissectors.line import LineSettings
 from dissectors.profibus.f510 import RUN, drive, outputs
 from dissectors.profibus.simulated_master import Job, Master, Ring
 from dissectors.profibus.simulated_slave import Slave
 from dissectors.profibus.telegram import SC, SD2, Telegram, parse, telegram
 from dissectors.simulated import Send, Station
-from dissectors.simulated_faults import BitFlips, CutShort, Fault, LostResponse
+from dissectors.simulated_faults import BitFlips, CutShort, Fault, LostResponse, NoiseInGaps
 from sniff.simulation.scenarios import Scenario
+from sniff.simulation.tap import FTDI
 from sniff.simulation.wire import Party
 from tests.faults.buses import MS, Change
-from tests.faults.case import Case
+from tests.faults.case import Case, Said
+from tests.faults.profibus_stations import Off, from_the_middle
 from tests.faults.stations import Dies, Wrapped
 
 LINE = LineSettings.parse("187500,8E1")
@@ -44,15 +47,18 @@ def profibus(
     ring: Ring = RING,
     also_second: Sequence[int] = (),
     rogue: bool = False,
+    also: dict[str, Callable[[], Station]] | None = None,
+    others: Sequence[int] = (),
     seed: int = 0,
 ) -> Scenario:
     """A controller with drives 5 and 6, a second master with valve 12.
 
     `absent`: slaves of the controller that are not there. `change`: what to make of a party. `slave`: who is drive 6
     instead. `ring`: of the controller. `also_second`: slaves that the second master wants too. `rogue`: a tool at
-    address 3 asks without a token.
+    address 3 asks without a token. `also`: further stations; `others`: those of them in the ring.
     """
-    parties = partial(_parties, tuple(absent), change or {}, slave, ring, tuple(also_second), rogue)
+    added: dict[str, Callable[[], Station]] = {**(also or {}), **({"tool": Tool} if rogue else {})}
+    parties = partial(_parties, tuple(absent), change or {}, slave, ring, tuple(also_second), added, tuple(others))
     return Scenario("profibus", "profibus", LINE, parties, tuple(faults), seed)
 
 
@@ -62,19 +68,19 @@ def _parties(
     slave: Callable[[], Station] | None,
     ring: Ring,
     also_second: tuple[int, ...],
-    rogue: bool,
+    added: dict[str, Callable[[], Station]],
+    others: tuple[int, ...],
 ) -> list[Party]:
     jobs = [Job(address, outputs=running) for address in (5, 6, *absent)]
     second = [Job(12, 0x80C8, VALVE, no_output, user=b""), *(Job(address, outputs=running) for address in also_second)]
     stations: dict[str, Station] = {
-        "controller": Master(1, LINE, jobs, others=(2,), ring=ring),
-        "second master": Master(2, LINE, second, others=(1,), ring=replace(RING, highest=ring.highest)),
+        "controller": Master(1, LINE, jobs, others=(2, *others), ring=ring),
+        "second master": Master(2, LINE, second, others=(1, *others), ring=replace(RING, highest=ring.highest)),
         "drive 5": Slave(5, LINE, process=drive, tsdr=40),
         "drive 6": slave() if slave is not None else Slave(6, LINE, process=drive, tsdr=50),
         "valve": Slave(12, LINE, ident=0x80C8, configuration=VALVE),
     }
-    if rogue:
-        stations["tool"] = Tool()
+    stations |= {name: make() for name, make in added.items()}
     return [
         Party(name, change.get(name, _same)(station), answers=isinstance(station, Slave | Wrapped))
         for name, station in stations.items()
@@ -305,6 +311,72 @@ PROFIBUS_CASES: tuple[Case, ...] = (
         partial(profibus, rogue=True),
         (("PB015", "bus"),),
         struck=("station 3", "station 5"),
+    ),
+    Case(
+        "PROFIBUS token lost, FTDI 16 ms",
+        partial(profibus, change={"second master": FallsSilent}),
+        (("PB013", "bus"),),
+        FTDI,
+        struck=("station 2",),
+        never=("PB015",),
+        seeds=1,
+    ),
+    Case(
+        "PROFIBUS token lost, heard from the middle on",
+        partial(profibus, change={"second master": FallsSilent}),
+        (("PB013", "bus"),),
+        hear=from_the_middle,
+        struck=("station 2",),
+        never=("PB015",),
+        seeds=1,
+    ),
+    Case(
+        "PROFIBUS slave switched off",
+        partial(profibus, change={"drive 6": partial(Off, at=5 * S)}),
+        (("PB002", "station 6"),),
+        never=("PB001", "PB007", "PB010"),
+        seeds=1,
+    ),
+    Case(
+        "PROFIBUS master switched off",
+        partial(profibus, change={"second master": partial(Off, at=5 * S)}),
+        (("PB014", "station 2"),),
+        never=("PB001", "PB007", "PB015"),
+        seeds=1,
+    ),
+    Case(
+        "PROFIBUS noise between telegrams",
+        partial(profibus, (NoiseInGaps(0.02, places=(Place.BETWEEN, Place.AFTER)),)),
+        (Said(("bus",), ("LN203", "LN204", "PB008")),),
+        never=("PB001", "PB007", "PB010", "PB013", "PB015"),
+    ),
+    Case(
+        "PROFIBUS noise between telegrams, FTDI 16 ms",
+        partial(profibus, (NoiseInGaps(0.02, places=(Place.BETWEEN, Place.AFTER)),)),
+        (Said(("bus",), ("LN203", "LN204", "PB008")),),
+        FTDI,
+        never=("PB001", "PB007", "PB010", "PB013", "PB015"),
+    ),
+    Case(
+        "PROFIBUS address twice, FTDI 16 ms",
+        partial(profibus, change={"drive 6": Twin}),
+        (("PB010", "station 6"),),
+        FTDI,
+        seeds=1,
+    ),
+    Case(
+        "PROFIBUS slave restarts, FTDI 16 ms",
+        partial(profibus, slave=partial(Restarts, 6, LINE, process=drive)),
+        (("PB007", "station 6"),),
+        FTDI,
+        seeds=1,
+    ),
+    Case(
+        "PROFIBUS bit errors everywhere, FTDI 16 ms",
+        partial(profibus, (BitFlips(3e-3),)),
+        (("PB008", "bus"),),
+        FTDI,
+        never=("PB007", "PB010", "PB013", "PB015"),
     ),
     Case("PROFIBUS GAP polls", profibus, (("PB016", "station 1"),), seeds=1),
     Case(

@@ -8,7 +8,7 @@ from dataclasses import replace
 from dissectors.bacnet.application import Outgoing, Poller
 from dissectors.bacnet.envelope import frame
 from dissectors.bacnet.frame_types import FrameType
-from dissectors.bacnet.simulated import Faults, Node
+from dissectors.bacnet.simulated import Faults, SimulatedNode
 from dissectors.line import LineSettings
 from dissectors.simulated import Send
 from tests.faults.stations import Wrapped
@@ -28,7 +28,7 @@ class Greedy(Poller):
 class FailsFor(Wrapped):
     """A node with other faults from `at` on, and without any from `until` on."""
 
-    def __init__(self, inner: Node, at: int, until: int | None, faults: Faults) -> None:
+    def __init__(self, inner: SimulatedNode, at: int, until: int | None, faults: Faults) -> None:
         super().__init__(inner)
         self.node, self.at, self.until, self.faults = inner, at, until, faults
 
@@ -48,7 +48,7 @@ class FailsFor(Wrapped):
 class SlowToBeFound(Wrapped):
     """Answers a Poll For Master `by` ns later than it wants."""
 
-    def __init__(self, inner: Node, by: int) -> None:
+    def __init__(self, inner: SimulatedNode, by: int) -> None:
         super().__init__(inner)
         self.by = by
 
@@ -62,7 +62,7 @@ class SlowToBeFound(Wrapped):
 class AlsoSends(Wrapped):
     """Sends `extra` too, before each n-th token or poll: an error of its program."""
 
-    def __init__(self, inner: Node, line: LineSettings, every: int, extra: bytes) -> None:
+    def __init__(self, inner: SimulatedNode, line: LineSettings, every: int, extra: bytes) -> None:
         super().__init__(inner)
         self.every, self.extra, self.counted = every, extra, 0
         self.more = (len(extra) + 6) * line.char  # with a pause behind it
@@ -90,7 +90,7 @@ class TestsItself(Wrapped):
 
     __test__ = False  # no test of pytest's
 
-    def __init__(self, inner: Node, line: LineSettings, every: int = 0, wait: int = 30_000_000) -> None:
+    def __init__(self, inner: SimulatedNode, line: LineSettings, every: int = 0, wait: int = 30_000_000) -> None:
         super().__init__(inner)
         self.node, self.char, self.every, self.wait = inner, line.char, every, wait
         self.next: int | None = 0
@@ -154,7 +154,7 @@ class SpeaksUnasked:
 class PollsOnlyTo(Wrapped):
     """A node whose Max_Master is set to `max_master` at `at`: whoever is above it is never polled again."""
 
-    def __init__(self, inner: Node, at: int, max_master: int) -> None:
+    def __init__(self, inner: SimulatedNode, at: int, max_master: int) -> None:
         super().__init__(inner)
         self.node, self.at, self.max_master = inner, at, max_master
 
@@ -167,7 +167,7 @@ class PollsOnlyTo(Wrapped):
 class Dawdles(Wrapped):
     """A node that takes `by` ns for one token every `every` ns. A token that comes meanwhile it uses as well."""
 
-    def __init__(self, inner: Node, every: int, by: int) -> None:
+    def __init__(self, inner: SimulatedNode, every: int, by: int) -> None:
         super().__init__(inner)
         self.node, self.every, self.by = inner, every, by
         self.next = every
@@ -195,7 +195,7 @@ class Dawdles(Wrapped):
         return due if self.kept is None else min(self.node._busy_until, due or self.node._busy_until)
 
 
-def waiting(node: Node, usage: int) -> Node:
+def waiting(node: SimulatedNode, usage: int) -> SimulatedNode:
     """The node waits `usage` ns until somebody uses its token: 20 … 35 ms, up to 100 ms by older texts."""
     node._usage_timeout = usage
     return node

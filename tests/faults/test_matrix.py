@@ -31,6 +31,8 @@ TIMED = (
     "Clear",
     "restarts",
     "expires",
+    "switched off",
+    "heard from the middle",
     "line, ",
 )  # something happens at a time of the run
 DRIVE = "drive"  # wrong in each round

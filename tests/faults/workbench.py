@@ -185,12 +185,12 @@ class Ring:
         return Scenario("mstp", "mstp", MSTP_LINE, partial(self._parties, seed), self.faults, seed, 0, self.devices)
 
     def _parties(self, seed: int) -> list[Party]:
-        from dissectors.bacnet.simulated import Faults, Node
+        from dissectors.bacnet.simulated import Faults, SimulatedNode
 
         parties = []
         for member in self.members:
             settings = {"max_master": 31, **member.settings}
             faults = Faults(**settings.pop("faults", {}))
-            node = Node(member.mac, Timing(MSTP_LINE), member.application(), faults=faults, **settings)
+            node = SimulatedNode(member.mac, Timing(MSTP_LINE), member.application(), faults=faults, **settings)
             parties.append(Party(f"mac {member.mac}", member.change(node), answers=False))
         return parties + [Party(name, make(seed=seed), answers=False) for name, make in self.others.items()]

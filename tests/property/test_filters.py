@@ -14,7 +14,7 @@ from sniff.bus.offline import settled, settled_columns
 from sniff.engine.column_join import SettledRows
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import Session
-from sniff.engine.verdict_join import Settled
+from sniff.engine.verdict_join import JudgedRow
 from sniff.filter import Scope, compile_filter
 from sniff.filter.choosing import chosen
 from sniff.filter.fields import COLUMN_TYPES, column_type, types_of
@@ -33,12 +33,12 @@ NAMES = (
 ANY = ("==", "!=", "===", "!==")
 SLICES = (("0", "03"), ("1:2", "03:00"), ("-2:2", "55:ff"), ("0-2", "01:03:00"), ("4:", "00:00"), ("-1", "06"))
 ORDER = ("<", "<=", ">", ">=")
-NUMBERS = st.sampled_from(("0", "1", "2", "3", "5", "8", "0x10", "40", "300", "-1", "9473"))
+NUMBERS = ("0", "1", "2", "3", "5", "8", "0x10", "40", "300", "-1", "9473")
 TIMES = ("10:00", "10:00:00.2", "2026-03-01", "2026-03-01T10:00:00.5Z", "2026-03-01T11:00:01+01:00")
 
 
 @cache
-def capture_of(name: str) -> tuple[Session, list[Settled], list[SettledRows]]:
+def capture_of(name: str) -> tuple[Session, list[JudgedRow], list[SettledRows]]:
     """Its rows one by one, and as columns."""
     capture = read(CAPTURES / f"{name}.cap.txt")
     rows = list(settled(capture.items(), capture.session))
@@ -49,7 +49,7 @@ def literals(type: FieldType) -> st.SearchStrategy[str]:
     """What such a field may be compared with."""
     words = [f'"{word}"' for word in type.words if '"' not in word]
     if type.kind in (Kind.NUMBER, Kind.STATION):
-        return st.one_of(NUMBERS, st.sampled_from(words)) if words else NUMBERS
+        return st.sampled_from([*(number for number in NUMBERS if can_be(type, int(number, 0))), *words])
     if type.kind is Kind.TRUTH:
         return st.sampled_from(("0", "1", "true", "false"))
     if type.kind is Kind.DURATION:
@@ -59,6 +59,18 @@ def literals(type: FieldType) -> st.SearchStrategy[str]:
     if type.kind is Kind.OCTETS:
         return st.sampled_from(("03", "55:ff", "00:00", "0x01", "01:03:00", "06"))
     return st.sampled_from(words or ['"read"', '"a"', '"CRC"', '"1"', '""'])
+
+
+def can_be(type: FieldType, number: int) -> bool:
+    """Whether a field can be such a number."""
+    return (type.least is None or number >= type.least) and (type.most is None or number <= type.most)
+
+
+def parts(type: FieldType) -> st.SearchStrategy[str]:
+    """What such a text may hold."""
+    if not type.closed:
+        return literals(FieldType(type.kind))
+    return st.sampled_from([f'"{str(word)[1:5]}"' for word in type.words.values() if '"' not in str(word)])
 
 
 @cache
@@ -85,12 +97,12 @@ def relations(draw: st.DrawFn, capture: str) -> str:
         items = draw(st.lists(literals(type), min_size=1, max_size=3))
         return f"{name} {draw(st.sampled_from(('in', 'not in')))} {{{', '.join(items)}}}"
     if shape == 2 and numeric:
-        return f"{name} in {{{draw(st.integers(0, 5))}..{draw(st.integers(5, 400))}, 7}}"
+        return f"{name} in {{{draw(st.integers(1, 5))}..{draw(st.integers(5, min(400, type.most or 400)))}, 7}}"
     if shape == 3 and type.kind is Kind.OCTETS:
         place, octets = draw(st.sampled_from(SLICES))
         return f"{name}[{place}] {draw(st.sampled_from(ANY))} {octets}"
     if shape == 4 and type.kind in (Kind.OCTETS, Kind.TEXT):
-        return f"{name} contains {draw(literals(FieldType(type.kind)))}"
+        return f"{name} contains {draw(parts(type))}"
     if shape == 5 and type.kind in (Kind.OCTETS, Kind.TEXT):
         return f'{name} matches "{draw(st.sampled_from(("^0?1", "re.d", "[a-c]$", "00")))}"'
     if shape == 6 and numeric:
@@ -130,7 +142,7 @@ def test_columns_accept_what_rows_accept(name: str, data: st.DataObject) -> None
     session, rows, columns = capture_of(name)
     text = data.draw(filters(name))
     scope = Scope(session.started)
-    by_rows, by_columns = (compile_filter(text, dissector_for(session), scope) for _ in range(2))
+    by_rows, by_columns = (compile_filter(text, dissector_for(session), scope, others=True) for _ in range(2))
     expected = [item.row.no for item in rows if by_rows(item.row, item.transaction)]
     found = [place + some.table.first for some in columns for place in chosen(some, by_columns)]
     assert found == expected, text

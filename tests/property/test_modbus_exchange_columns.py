@@ -18,7 +18,7 @@ from dissectors.line import LineSettings, Timing
 from dissectors.modbus import RTU
 from dissectors.modbus.envelope import readable_adu
 from dissectors.modbus.exchange import Exchange, Seen
-from dissectors.modbus.exchange_columns import Exchanges, exchanges, placed
+from dissectors.modbus.exchange_columns import ExchangeColumns, exchanges, placed
 from dissectors.modbus.exchange_memory import holding, passed
 from dissectors.modbus.tracker import ModbusTracker, PassedBy
 from dissectors.tracker import Placement, Transaction
@@ -127,7 +127,7 @@ def _row_of(
     return row if frame_at(frames, row, octets, RTU.name, timing.latency)[0] == event else NONE
 
 
-def _is_framed(rows: list[int], at: int, found: Exchanges, place: int, end: int) -> bool:
+def _is_framed(rows: list[int], at: int, found: ExchangeColumns, place: int, end: int) -> bool:
     """Whether the framer gave all rows of exchanges [place, end), from event `at` on."""
     first, last = int(found.request[place]), int(found.last[end - 1])
     return rows[at : at + last - first + 1] == list(range(first, last + 1))
@@ -137,7 +137,7 @@ def _compare(
     tracker: ModbusTracker,
     events: list[tuple[int, Event]],
     at: int,
-    found: Exchanges,
+    found: ExchangeColumns,
     frames: FrameColumns,
     place: int,
     end: int,

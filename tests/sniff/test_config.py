@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from sniff.config import ConfigError, load, parse
+from sniff.config import BoxSettings, ConfigError, load, parse
 
 
 def write(folder: Path, text: str) -> Path:
@@ -82,3 +82,29 @@ def test_a_wrong_filter_is_named_with_its_place(tmp_path: Path, text: str, expec
     with pytest.raises(ConfigError) as caught:
         parse(write(tmp_path, text))
     assert expected in str(caught.value)
+
+
+def test_the_box(tmp_path: Path) -> None:
+    path = tmp_path / "sniff485.toml"
+    path.write_text('[box]\nfolder = "/data"\nrotate = "time:1h"\nkeep = 9\nkeep_free = "2GB"\nstatus = 0\n')
+    assert parse(path).box == BoxSettings("/data", None, "time:1h", 9, "2GB", None, 0)
+    path.write_text("[filters]\n")
+    assert parse(path).box == BoxSettings()
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ('folders = "/data"', "did you mean 'folder'"),
+        ("keep = 0", "expected a whole number from 1 on, not 0"),
+        ("keep = true", "expected a whole number"),
+        ('name = "a/b"', "name files"),
+        ("rotate = 7", "expected a text in quotes"),
+    ],
+)
+def test_what_a_box_cannot_be_told(tmp_path: Path, line: str, said: str) -> None:
+    path = tmp_path / "sniff485.toml"
+    path.write_text(f"[box]\n{line}\n")
+    with pytest.raises(ConfigError, match=r"sniff485\.toml:2: ") as caught:
+        parse(path)
+    assert said in str(caught.value)

@@ -10,6 +10,7 @@ import pytest
 
 from dissectors.checksums import crc16_modbus
 from dissectors.frame import Chunk, Frame
+from dissectors.pseudonyms import Blanks
 from sniff.bus.capture_writer import create
 from sniff.bus.offline import settled
 from sniff.editing.anonymising import anonymised, anonymous_session
@@ -221,6 +222,29 @@ def test_a_recovered_recording_is_whole_and_says_what_was_lost(
     assert recovered.completeness().whole
     assert octets(list(read(source).items())).startswith(octets(items))
     assert "recovered" in recovered.session.notes
+
+
+@pytest.mark.parametrize("name", ["ms-tp-forbidden-address", "ms-tp-number-is-taken", "rtu-address-250"])
+def test_anonymising_keeps_findings(name: str, tmp_path: Path, sniff485: Callable[..., tuple[int, str, str]]) -> None:
+    """What is forbidden to one class of addresses, and texts that differ: both must still be so."""
+    path, out = OURS / "findings" / f"{name}.cap.txt", tmp_path / "nobody.cap.txt"
+    assert sniff485("anonymise", path, "-o", out)[0] == 0
+
+    def codes(of: Path) -> list[tuple[str, str]]:
+        found = [json.loads(line) for line in sniff485("check", "--json", of)[1].splitlines()]
+        return [(one["code"], one["severity"]) for one in found if "code" in one]
+
+    assert codes(out) == codes(path)
+    assert codes(out)
+
+
+def test_equal_texts_stay_equal_and_others_stay_others() -> None:
+    blanks = Blanks()
+    texts = [b"Boiler room", b"Pump cellar", b"Boiler room", b"roof"]
+    assert [blanks.of(text) for text in texts] == [b"x" * 11, b"x" * 10 + b"a", b"x" * 11, b"xxxx"]
+    many = [blanks.of(b"%08d" % number) for number in range(2_000)]
+    assert len(set(many)) == 2_000
+    assert {len(each) for each in many} == {8}
 
 
 def test_diff_of_a_capture_with_itself_is_silent(sniff485: Callable[..., tuple[int, str, str]]) -> None:

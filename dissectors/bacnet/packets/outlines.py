@@ -16,7 +16,7 @@ from collections.abc import Iterable, Sequence
 from dissectors.bacnet import tags as tagging
 from dissectors.bacnet.codec import VALUE_ONLY, Outline, plain
 from dissectors.bacnet.tags import Tag
-from dissectors.bacnet.values import Enumerated, ObjectId, Record, escape, show, show_tag
+from dissectors.bacnet.values import ConstructedValue, Enumerated, ObjectId, escape, show, show_tag
 from dissectors.meaning import Node
 
 _UNITS, _PRESENT = 117, 85
@@ -73,7 +73,7 @@ def _tag(tag: Tag, outline: Outline, depth: int, units: str, place: int) -> Node
     return Node(name or f"[{tag.number}]", count, tag.start, tag.end, tuple(children))
 
 
-def _record(record: Record, units: str, place: int) -> tuple[str, str]:
+def _record(record: ConstructedValue, units: str, place: int) -> tuple[str, str]:
     """What a record is about: an object, a property with its value, else its type."""
     thing = next((value for _, value in record if isinstance(value, ObjectId)), None)
     which = record.get("property-identifier")
@@ -99,16 +99,16 @@ def _about(nodes: Sequence[Node]) -> tuple[str, str] | None:
     return name, value.text if value is not None else ""
 
 
-def _reference(record: Record) -> str:
+def _reference(record: ConstructedValue) -> str:
     index = record.get("property-array-index")
     return f"{record['property-identifier']}" + (f"[{index}]" if index is not None else "")
 
 
-def _value_of(record: Record) -> str | None:
+def _value_of(record: ConstructedValue) -> str | None:
     result = record.get("read-result")
-    if isinstance(result, Record):
+    if isinstance(result, ConstructedValue):
         ((kind, value),) = result.entries
-        if kind == "property-access-error" and isinstance(value, Record):
+        if kind == "property-access-error" and isinstance(value, ConstructedValue):
             return "error: " + " ".join(str(part) for _, part in value)
         return _plain(value)
     for name in ("property-value", "value"):
@@ -121,11 +121,11 @@ def _plain(value: object) -> str:
     return show(plain(value)) if isinstance(value, Tag) else show(value)
 
 
-def _units(record: Record) -> str:
+def _units(record: ConstructedValue) -> str:
     """The unit of an object whose properties are told together."""
     results = record.get("list-of-results")
     for item in results if isinstance(results, Iterable) else ():
-        which = item.get("property-identifier") if isinstance(item, Record) else None
+        which = item.get("property-identifier") if isinstance(item, ConstructedValue) else None
         if isinstance(which, Enumerated) and which.value == _UNITS:
             return _value_of(item) or ""
     return ""

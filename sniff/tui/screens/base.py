@@ -10,6 +10,7 @@ from textual.widget import Widget
 
 from sniff.bus.rows import Store
 from sniff.tui.analyzer import analyzer
+from sniff.tui.busbar import BusBar
 from sniff.tui.header import StatusHeader
 from sniff.tui.key_names import named
 from sniff.tui.keybar import KeyBar
@@ -36,8 +37,10 @@ class ViewScreen(Screen[None]):
         super().__init_subclass__(**kwargs)
 
     def compose(self) -> ComposeResult:
-        """Header, the view, prompt, keys."""
+        """Header, the bar of buses where there are several, the view, prompt, keys."""
         yield StatusHeader(self.TITLE)
+        if analyzer(self).buses:
+            yield BusBar()
         yield from self.compose_view()
         yield Prompt()
         yield KeyBar()

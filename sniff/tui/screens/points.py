@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from typing import ClassVar
 
@@ -14,7 +13,7 @@ from textual.widgets import DataTable, Static
 
 from dissectors.line import MS, NS_PER_S
 from dissectors.profiles.decoding import Quality, Value, number
-from sniff.analysis.guessed_points import GuessedPoint, guess_of, guesses_of
+from sniff.analysis.guessed_points import GuessedPoint, LatestGuesses, guess_of
 from sniff.analysis.points import Point
 from sniff.tui.analyzer import analyzer
 from sniff.tui.charts import BARS
@@ -68,9 +67,6 @@ WIDE: tuple[str, ...] = (*NARROW, "±", "low", "high", "trend", "what it is")
 FROM = 110
 """Width from which on all columns are shown."""
 
-GUESSED_EVERY = 5.0
-"""Seconds between two looks at what registers without a profile may be."""
-
 TALL = 30
 """Height from which on the plot is shown at once."""
 
@@ -102,7 +98,7 @@ class PointsScreen(TableScreen):
     LEGEND = (
         ("^", "pinned to the top (p)"),
         ("→", "a command: written to the device"),
-        ("?", "uncertain value; behind a value: a guess of what a register without a profile holds"),
+        ("?", "uncertain value, or one that was guessed of registers that nobody described"),
         ("!", "value out of its range"),
         ("*", "before a value: it changed in the last two seconds; then it is bold too"),
         ("age", "how long ago the value was seen, at the time of the newest row"),
@@ -127,9 +123,8 @@ class PointsScreen(TableScreen):
         self._drawn: tuple[int, tuple[object, ...]] | None = None
         self._columns: tuple[str, ...] = ()
         self._plotted: bool | None = None
-        self._guesses: dict[Key, GuessedPoint] = {}
-        self._guessed_at = -GUESSED_EVERY
         self._guessed: tuple[tuple[Key, int] | None, GuessedPoint | None] = (None, None)
+        self._guesses = LatestGuesses()
 
     def compose_view(self) -> ComposeResult:
         """The table, and more about the point under the cursor."""
@@ -167,13 +162,12 @@ class PointsScreen(TableScreen):
         self._drawn = state
         newest = self.store.by_no(self.store.last_no)
         now = newest.event.end if newest is not None else 0
-        points = self._chosen()
-        if time.monotonic() - self._guessed_at >= GUESSED_EVERY:
-            self._guessed_at = time.monotonic()
-            self._guesses = guesses_of(self.store.points, self.store.model.series, self.store.devices)
+        guesses = self._guesses.of(self.store.points, self.store.model.series)
+        told = [(point, guesses.get(_place(point)) if point.entry is None else None) for point in self._chosen()]
+        points = [(point, guess) for point, guess in told if guess is None or not guess.is_covered]
         self.query_one(StationTable).fill(
-            (_key(point), _cells(point, now, self._pinned, self._guesses.get(_place(point)))[: len(self._columns)])
-            for point in points[:SHOWN]
+            (_key(point), _cells(point, now, self._pinned, guess)[: len(self._columns)])
+            for point, guess in points[:SHOWN]
         )
         self._hidden = max(0, len(points) - SHOWN)
         self._draw_detail()
@@ -329,19 +323,14 @@ def _key(point: Point) -> str:
     return "/".join(_place(point))
 
 
-def _cells(point: Point, now: int, pinned: list[Key], guess: GuessedPoint | None = None) -> list[Text]:
-    """`guess`: what it may be, of a register that no profile names."""
+def _cells(point: Point, now: int, pinned: list[Key], guess: GuessedPoint | None) -> list[Text]:
     sample, value, entry = point.sample, point.sample.value, point.entry
-    is_number = not value.words
-    shown, low, high, guessed = shown_value(value), point.low, point.high, ""
-    if guess is not None:
-        guessed = guess.words
-        low, high = guess.low, guess.high
-        if guess.is_covered:
-            shown, low, high = "with the one before", None, None
-        elif guess.value is not None:
-            shown = f"{guess.value:.6g} ?"
-    mark = ("^" if _place(point) in pinned else "") + ("→" if point.is_command else "") + MARKS.get(point.quality, "")
+    is_number = not value.words  # of states and flags the numbers between say nothing
+    shown, low, high = shown_value(value), point.low, point.high
+    quality = MARKS.get(point.quality, "")
+    if guess is not None and guess.value is not None and not guess.is_itself:
+        shown, low, high, quality = f"{guess.value:.7g}", guess.low, guess.high, MARKS[Quality.UNCERTAIN]
+    mark = ("^" if _place(point) in pinned else "") + ("→" if point.is_command else "") + quality
     fresh = bool(point.changed) and now - point.changed <= FRESH
     style = "bold" if fresh else ""
     return [
@@ -356,5 +345,5 @@ def _cells(point: Point, now: int, pinned: list[Key], guess: GuessedPoint | None
         Text(f"{low:.5g}" if low is not None and is_number else "–", justify="right"),
         Text(f"{high:.5g}" if high is not None and is_number else "–", justify="right"),
         Text(trend([number for _, number in point.history])),
-        Text(plain(guessed if guessed or entry is None else entry.title)),
+        Text(plain(entry.title if entry is not None else guess.words if guess is not None else "")),
     ]

@@ -15,8 +15,9 @@ from typing import Any
 
 from dissectors.bacnet import apdu as apdus
 from dissectors.bacnet import codec, services
+from dissectors.bacnet.dates import Date, Time
 from dissectors.bacnet.frame_types import FrameType
-from dissectors.bacnet.values import Date, Enumerated, Record, Time
+from dissectors.bacnet.values import ConstructedValue, Enumerated
 from tests.dissectors.bacnet.segmented_bus import (
     READ,
     READ_MULTIPLE,
@@ -172,7 +173,7 @@ def wrong_dates() -> list[Step]:
         (Date(255, 12, 24, 5), Time(255, 255, 255, 255)),
     )
     for day, hour in whens:
-        when = Record("DateTime", (("date", day), ("time", hour)))
+        when = ConstructedValue("DateTime", (("date", day), ("time", hour)))
         body = codec.encode(services.UNCONFIRMED[TIME_SYNCHRONIZATION], {"time": when})
         octets = apdus.encode(1, body, service=TIME_SYNCHRONIZATION)
         bus.send("time", bus.client, octets, FrameType.DATA_NOT_EXPECTING_REPLY, False)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from dissectors.bacnet import MSTP, RingObserver, judge
+from dissectors.bacnet import MSTP, MstpRingObserver, judge
 from dissectors.bacnet.ring import Ring
-from dissectors.bacnet.simulated import Node
+from dissectors.bacnet.simulated import SimulatedNode
 from dissectors.findings import Finding
 from dissectors.frame import Chunk, Event, Frame, Header
 from dissectors.line import LineSettings, Timing
@@ -45,7 +45,7 @@ class Heard:
 
 
 def run(
-    nodes: Sequence[Node],
+    nodes: Sequence[SimulatedNode],
     seconds: float,
     *,
     line: LineSettings = LINE,
@@ -56,7 +56,7 @@ def run(
     """Let the nodes run; `after` (seconds, what to do) changes them on the way."""
     timing = Timing(line, latency)
     wire = Wire(line, [Party(f"{n}: {node.mac}", node) for n, node in enumerate(nodes)])
-    framer, tracker, observer, heard = MSTP.framer(timing), MSTP.tracker(timing), RingObserver(timing), Heard()
+    framer, tracker, observer, heard = MSTP.framer(timing), MSTP.tracker(timing), MstpRingObserver(timing), Heard()
     no = 0
 
     def listen(bursts: list[Burst], end: bool) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from dissectors.bacnet import MSTP, RingObserver, judge
+from dissectors.bacnet import MSTP, MstpRingObserver, judge
 from dissectors.bacnet.envelope import frame, npdu_frame
 from dissectors.bacnet.ring import Ring
 from dissectors.bacnet.rules import RULES
@@ -72,7 +72,7 @@ class Read:
 def script(steps: Iterable[Step], latency: float = 0, line: LineSettings = LINE) -> Read:
     """Each step is one read; steps of no silence at all come in one read with the one before."""
     timing = Timing(line, int(latency * MS))
-    framer, tracker, observer = MSTP.framer(timing), MSTP.tracker(timing), RingObserver(timing)
+    framer, tracker, observer = MSTP.framer(timing), MSTP.tracker(timing), MstpRingObserver(timing)
     chunks: list[Chunk] = []
     now = 10**18
     for silence, octets in steps:

@@ -15,10 +15,11 @@ from dissectors.bacnet import apdu as apdus
 from dissectors.bacnet import codec, layout, names, npdu, services
 from dissectors.bacnet.apdu import MORE_FOLLOWS, SEGMENTED, SEGMENTED_ACCEPTED, PduType
 from dissectors.bacnet.choices import CHOICES
+from dissectors.bacnet.dates import Date, Time
 from dissectors.bacnet.enumerations import BIT_STRINGS, ENUMERATIONS
 from dissectors.bacnet.envelope import frame, npdu_frame
 from dissectors.bacnet.property_types import PROPERTY_TYPES
-from dissectors.bacnet.values import BitString, Date, Double, Enumerated, ObjectId, Record, Signed, Time, base
+from dissectors.bacnet.values import BitString, ConstructedValue, Double, Enumerated, ObjectId, Signed, base
 from tests.dissectors.bacnet.generate_tables import types_by_object
 
 SEEDS = 25
@@ -93,12 +94,12 @@ class _Maker:
             field = rng.choice(shallow if depth > 3 and shallow else list(alternatives))
             if wanted is not None:
                 field = next(f for f in alternatives if f.name == wanted)
-            return Record(type_name, ((field.name, self.of_type(field.type, depth + 1)),))
+            return ConstructedValue(type_name, ((field.name, self.of_type(field.type, depth + 1)),))
         fields = layout.sequence(type_name)
         assert fields is not None, type_name
         return self.record(fields, type_name, depth)
 
-    def record(self, fields: tuple[layout.Field, ...], type_name: str | None, depth: int = 0) -> Record:
+    def record(self, fields: tuple[layout.Field, ...], type_name: str | None, depth: int = 0) -> ConstructedValue:
         entries = []
         for field in fields:
             if field.optional and (depth >= 4 or self._rng.random() >= 0.6):
@@ -108,10 +109,10 @@ class _Maker:
             if field.name == "priority" and field.type == "Unsigned":
                 value = self._rng.randint(1, 16)
             entries.append((field.name, value))
-        return Record(type_name, tuple(entries))
+        return ConstructedValue(type_name, tuple(entries))
 
 
-def parameters_of(kind: int, choice: int, seed: int, *, complete: bool = False) -> Record:
+def parameters_of(kind: int, choice: int, seed: int, *, complete: bool = False) -> ConstructedValue:
     """Random parameters of a service; `complete`: with all optional ones of the first level."""
     fields = layout.parse(LAYOUTS[kind][choice])
     if complete:
@@ -126,7 +127,7 @@ def parameters_of(kind: int, choice: int, seed: int, *, complete: bool = False) 
     return _Maker(Random(seed)).record(fields, None)
 
 
-def apdu_of(kind: int, choice: int, values: Record, invoke_id: int = 7) -> bytes:
+def apdu_of(kind: int, choice: int, values: ConstructedValue, invoke_id: int = 7) -> bytes:
     """The APDU of a service with these parameters."""
     return apdus.encode(kind, codec.encode(LAYOUTS[kind][choice], values), invoke_id=invoke_id, service=choice)
 
@@ -151,9 +152,9 @@ def every_service() -> Iterator[Sample]:
             yield sent(name, apdu_of(kind, choice, values, seed))
 
 
-def _holding(object_type: int, number: int, value: Any) -> Record:
+def _holding(object_type: int, number: int, value: Any) -> ConstructedValue:
     """Parameters of a ReadProperty acknowledgement."""
-    return Record(
+    return ConstructedValue(
         None,
         (
             ("object-identifier", ObjectId(object_type, 1)),

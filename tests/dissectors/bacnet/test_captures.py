@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from dissectors.bacnet import MSTP, RingObserver, fields, judge, packet, peek, text
+from dissectors.bacnet import MSTP, MstpRingObserver, fields, judge, packet, peek, text
 from dissectors.bacnet import apdu as apdus
 from dissectors.bacnet import message as messages
 from dissectors.bacnet import npdu as npdus
@@ -255,7 +255,7 @@ def test_the_tracker_pairs_the_object_list_walk():
 
 def test_the_ring_of_a_real_capture():
     """A workstation (0) and three controllers; 27 dies near the end and 12 looks for another neighbour."""
-    observer = RingObserver(TIMING)
+    observer = MstpRingObserver(TIMING)
     for no, event in enumerate(drive([Chunk(time, octets) for time, octets in _records("mstp-kargs-2009")])):
         observer.see(no, event, peek(event) if isinstance(event, Frame) else None)
     ring = observer.ring()
@@ -270,7 +270,7 @@ def test_the_ring_of_a_real_capture():
 
 def test_a_long_capture_raises_no_false_alarm(capture: Capture):
     """No real capture here has a lost token, a second one, or two stations with one address."""
-    observer, no = RingObserver(TIMING), 0
+    observer, no = MstpRingObserver(TIMING), 0
     for events in capture[2]:
         for event in events:
             observer.see(no, event, peek(event) if isinstance(event, Frame) else None)

@@ -13,10 +13,11 @@ from dissectors.bacnet import MSTP, codec, npdu, services
 from dissectors.bacnet import apdu as apdus
 from dissectors.bacnet.content import Odd, ReplyFlaw, oddities
 from dissectors.bacnet.content_findings import ContentFindings
+from dissectors.bacnet.dates import Date, Time, WhenFlaw
 from dissectors.bacnet.envelope import frame
 from dissectors.bacnet.station_address import mac_text, remote
-from dissectors.bacnet.summary import text
-from dissectors.bacnet.values import Date, ObjectId, Record, Time, WhenFlaw
+from dissectors.bacnet.text import text
+from dissectors.bacnet.values import ConstructedValue, ObjectId
 from dissectors.frame import Chunk, Frame, Role
 from dissectors.line import LineSettings, Timing
 from sniff.analysis.packet_tree import fields_of
@@ -250,11 +251,11 @@ def test_addresses_are_written_as_their_network_writes_them(address: str, words:
     ("mac", "words"), [(b"\x3d", "61"), (b"", "broadcast"), (bytes.fromhex("c0a80114bac0"), "192.168.1.20:")]
 )
 def test_addresses_in_parameters_are_written_alike(mac: bytes, words: str):
-    binding = Record(
+    binding = ConstructedValue(
         "AddressBinding",
         (
             ("device-object-identifier", ObjectId(8, 61)),
-            ("device-address", Record("DeviceAddress", (("network-number", 13), ("mac-address", mac)))),
+            ("device-address", ConstructedValue("DeviceAddress", (("network-number", 13), ("mac-address", mac)))),
         ),
     )
     event = frame_of(answer("device,1", 30, (binding,)))

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from dissectors.bacnet import MSTP, RingObserver, fields, packet, peek, text
+from dissectors.bacnet import MSTP, MstpRingObserver, fields, packet, peek, text
 from dissectors.bacnet import message as messages
 from dissectors.bacnet import packets as layers
 from dissectors.bacnet.envelope import frame, npdu_frame
@@ -215,7 +215,7 @@ def test_whatever_a_good_frame_carries(frame_type: int, data: bytes):
 )
 def test_whatever_the_octets(pieces: list[bytes]):
     events = drive([Chunk(10**18 + n * 10**7, piece) for n, piece in enumerate(pieces)])
-    tracker, observer, findings = MSTP.tracker(TIMING), RingObserver(TIMING), MSTP.judge(TIMING)
+    tracker, observer, findings = MSTP.tracker(TIMING), MstpRingObserver(TIMING), MSTP.judge(TIMING)
     for no, event in enumerate(events):
         header = None
         if isinstance(event, Frame):

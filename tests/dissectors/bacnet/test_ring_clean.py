@@ -7,9 +7,9 @@ from random import Random
 
 import pytest
 
-from dissectors.bacnet import MSTP, RingObserver, judge
+from dissectors.bacnet import MSTP, MstpRingObserver, judge
 from dissectors.bacnet.envelope import frame
-from dissectors.bacnet.simulated import Faults, Node, Poller, f510
+from dissectors.bacnet.simulated import Faults, Poller, SimulatedNode, f510
 from dissectors.findings import Severity
 from dissectors.frame import Chunk, Frame
 from dissectors.line import LineSettings, Timing
@@ -60,11 +60,14 @@ def trickling(items: Iterable[Item], dice: Random) -> Iterator[Item]:
             now += 700_000
 
 
-def ring(slow: bool = False, **more: int) -> list[Node]:
+def ring(slow: bool = False, **more: int) -> list[SimulatedNode]:
     targets = [(5, "analog-input,4", "present-value"), (9, "binary-input,0", "object-name")]
     applications = {2: Poller(targets, every=300 * MS), 5: f510(510), 9: f510(511), 20: None}
     faults = Faults(use_delay=11 * MS, reply_delay=200 * MS) if slow else None
-    return [Node(mac, Timing(LINE), made, max_master=24, faults=faults, **more) for mac, made in applications.items()]
+    return [
+        SimulatedNode(mac, Timing(LINE), made, max_master=24, faults=faults, **more)
+        for mac, made in applications.items()
+    ]
 
 
 @pytest.mark.parametrize("slow", [False, True])
@@ -73,7 +76,7 @@ def ring(slow: bool = False, **more: int) -> list[Node]:
 def test_a_ring_in_order(tap: TapModel, host: Host, slow: bool):
     wire = Wire(LINE, [Party(str(node.mac), node) for node in ring(slow)])
     timing = Timing(LINE, tap.latency(LINE))
-    framer, observer = MSTP.framer(timing), RingObserver(timing)
+    framer, observer = MSTP.framer(timing), MstpRingObserver(timing)
     events = []
     for item in host(Tap(LINE, tap, 1).tap(wire.run(12 * 10**9)), Random(3)):
         assert isinstance(item, Chunk)

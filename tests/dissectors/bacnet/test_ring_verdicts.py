@@ -6,7 +6,7 @@ import pytest
 
 from dissectors.bacnet.envelope import frame
 from dissectors.bacnet.frame_types import FrameType
-from dissectors.bacnet.ring import What
+from dissectors.bacnet.ring import RingEventKind
 from dissectors.findings import Severity
 from dissectors.frame import Flaw, Frame
 from dissectors.tracker import Verdict
@@ -27,7 +27,7 @@ def test_a_token_used_late_accuses_the_slow_station_alone():
     assert "two tokens for a moment" in read.of("MS103").seen
     assert read.of("MS102").cause == ("MS103", "MAC 5")
     assert read.ring.nodes[1].use.most < 3_000_000
-    assert not any(what is What.TWO_TOKENS for what, _ in read.ring.happened)
+    assert not any(what is RingEventKind.TWO_TOKENS for what, _ in read.ring.happened)
 
 
 def both_used(times: int, damage: int = 6) -> list[Step]:
@@ -73,7 +73,7 @@ def test_damage_between_a_token_and_the_poll_after_it_may_have_been_its_use():
         steps += [(2, token(1, 8)), (2, spoil(token(8, 20), 6)), (30, poll(1, 9)), (25, poll(1, 8)), (2, found(8, 1))]
         steps += [(2, token(1, 8)), (2, token(8, 20)), (2, token(20, 1)), *rounds(10, 1, 8, 20)]
     happened = script(steps).ring.happened
-    assert not {what for what, _ in happened} & {What.LEFT, What.REJOINED}
+    assert not {what for what, _ in happened} & {RingEventKind.LEFT, RingEventKind.REJOINED}
 
 
 def test_a_poll_after_a_token_that_failed_is_no_use_of_it():
@@ -92,7 +92,7 @@ def test_a_second_token_names_only_who_made_it():
     read = script(steps)
     assert {code for code, _ in read.graves()} == {"MS104"}
     assert read.of("MS104").seen.startswith("MAC 9 sent")
-    assert {mac for what, mac in read.ring.happened if what is What.TWO_TOKENS} == {9}
+    assert {mac for what, mac in read.ring.happened if what is RingEventKind.TWO_TOKENS} == {9}
 
 
 @pytest.mark.parametrize("mac", [200, 77])
@@ -318,8 +318,8 @@ def test_a_lost_token_through_an_adapter_that_holds_reads_back(silence: float):
 def test_a_silence_that_cannot_be_500_ms_loses_no_token():
     """At 470 ms it is a second token, whatever the adapter does."""
     read = script(lost(470, 20), latency=17.5)
-    assert not [what for what, _ in read.ring.happened if what is What.LOST_TOKEN]
-    assert read.ring.of(What.TWO_TOKENS, 20).count == 3
+    assert not [what for what, _ in read.ring.happened if what is RingEventKind.LOST_TOKEN]
+    assert read.ring.of(RingEventKind.TWO_TOKENS, 20).count == 3
 
 
 @pytest.mark.parametrize("silence", [490, 510])
@@ -327,4 +327,4 @@ def test_one_that_had_the_token_has_not_surely_made_a_new_one(silence: float):
     """8 has the token, or 1 has just passed it: either may go on, unless even the shortest reading is 500 ms."""
     for maker in (1, 8):
         read = script(lost(silence, maker, 20), latency=17.5)
-        assert not [what for what, _ in read.ring.happened if what is What.LOST_TOKEN]
+        assert not [what for what, _ in read.ring.happened if what is RingEventKind.LOST_TOKEN]

@@ -16,7 +16,7 @@ from dissectors.bacnet.envelope import frame
 from dissectors.bacnet.frame_types import CARRIES_NPDU
 from dissectors.bacnet.npdu import EXPECTS_REPLY
 from dissectors.bacnet.readings import readings
-from dissectors.bacnet.segmentation import OCTETS_MAX, OPEN_MAX
+from dissectors.bacnet.reassembly import OCTETS_MAX, OPEN_MAX
 from dissectors.findings import Finding
 from dissectors.frame import Assembly, Chunk, Frame, Role
 from dissectors.tracker import Transaction, Verdict

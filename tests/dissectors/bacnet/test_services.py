@@ -17,14 +17,8 @@ from hypothesis import strategies as st
 
 from dissectors.bacnet import codec, layout, names, services, tags
 from dissectors.bacnet.choices import CHOICES
-from dissectors.bacnet.values import (
-    BitString,
-    Date,
-    Enumerated,
-    ObjectId,
-    Record,
-    Time,
-)
+from dissectors.bacnet.dates import Date, Time
+from dissectors.bacnet.values import BitString, ConstructedValue, Enumerated, ObjectId
 from tests.dissectors.bacnet.generate_tables import kebab
 from tests.dissectors.bacnet.samples import LAYOUTS, SEEDS, WITH_PARAMETERS, apdu_of, parameters_of
 
@@ -103,7 +97,7 @@ def _tag_octets(tag: Any) -> bytes:
 
 def ours(value: Any) -> Any:
     """The same of ours."""
-    if isinstance(value, Record):
+    if isinstance(value, ConstructedValue):
         return tuple((name, ours(item)) for name, item in value)
     if isinstance(value, ObjectId):
         return ("object", value.type, value.instance)
@@ -149,8 +143,10 @@ def test_what_we_write_bacpypes3_reads_to_the_same_values_and_writes_alike(kind:
     for seed in range(SEEDS):
         values = parameters_of(kind, choice, seed, complete=(kind, choice) in THEIRS_WANTS_ALL)
         if (kind, choice) == (1, 10):  # their reader stumbles over other kinds of value
-            value = Record("ChannelValue", (("real", 1.5),))
-            values = _with(values, "change-list", (Record("GroupChannelValue", (("channel", 9), ("value", value))),))
+            value = ConstructedValue("ChannelValue", (("real", 1.5),))
+            values = _with(
+                values, "change-list", (ConstructedValue("GroupChannelValue", (("channel", 9), ("value", value))),)
+            )
         if _names(values) & THEIRS_OTHERWISE:
             continue
         octets = apdu_of(kind, choice, values)
@@ -164,13 +160,13 @@ def test_what_we_write_bacpypes3_reads_to_the_same_values_and_writes_alike(kind:
 
 def _names(values: Any) -> set[str]:
     """Names of all parts, at every depth."""
-    if isinstance(values, Record):
+    if isinstance(values, ConstructedValue):
         return {name for name, _ in values}.union(*(_names(value) for _, value in values))
     return set().union(*map(_names, values)) if isinstance(values, tuple) else set()
 
 
-def _with(values: Record, name: str, value: Any) -> Record:
-    return Record(values.type, tuple((key, value if key == name else old) for key, old in values.entries))
+def _with(values: ConstructedValue, name: str, value: Any) -> ConstructedValue:
+    return ConstructedValue(values.type, tuple((key, value if key == name else old) for key, old in values.entries))
 
 
 def plain_service(value: Any) -> Any:

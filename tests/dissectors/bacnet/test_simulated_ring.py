@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import pytest
 
-from dissectors.bacnet import RingObserver, judge
-from dissectors.bacnet.ring import Ring, What
-from dissectors.bacnet.simulated import Device, Faults, Node, Poller, f510
+from dissectors.bacnet import MstpRingObserver, judge
+from dissectors.bacnet.ring import Ring, RingEventKind
+from dissectors.bacnet.simulated import Device, Faults, Poller, SimulatedNode, f510
 from dissectors.findings import Severity
 from dissectors.frame import Frame
 from dissectors.line import LineSettings, Timing
@@ -18,17 +18,17 @@ from tests.dissectors.bacnet.ring_bus import MS, TIMING, Heard, S, run
 POLLED = [(5, "analog-input,4", "present-value"), (5, "device,510", "model-name"), (9, "binary-input,0", "object-name")]
 
 
-def ring(timing: Timing = TIMING, faults: dict[int, Faults] | None = None, **more: object) -> list[Node]:
+def ring(timing: Timing = TIMING, faults: dict[int, Faults] | None = None, **more: object) -> list[SimulatedNode]:
     """Four masters: 2 reads, 5 and 9 are drives, 20 is quiet."""
     faults = faults or {}
     applications = {2: Poller(POLLED, every=300 * MS), 5: f510(510), 9: f510(511), 20: None}
     return [
-        Node(mac, timing, application, max_master=24, faults=faults.get(mac), **more)  # type: ignore[arg-type]
+        SimulatedNode(mac, timing, application, max_master=24, faults=faults.get(mac), **more)  # type: ignore[arg-type]
         for mac, application in applications.items()
     ]
 
 
-def switch(node: Node, faults: Faults):
+def switch(node: SimulatedNode, faults: Faults):
     def change() -> None:
         node.faults = faults
 
@@ -103,7 +103,7 @@ def test_a_lost_token_names_the_holder_and_who_began_anew():
     assert finding.severity is Severity.ERROR
     assert finding.subject == "MAC 9"
     assert "begun anew by MAC 2" in finding.seen
-    lost = heard.ring.of(What.LOST_TOKEN, 9)
+    lost = heard.ring.of(RingEventKind.LOST_TOKEN, 9)
     assert lost.count >= 2
     assert all(event.value is not None and event.value >= 500 * MS for event in lost.events)
     for event in lost.events:
@@ -133,7 +133,7 @@ def test_a_deaf_station():
 
 
 def test_two_stations_with_one_address():
-    nodes = [*ring(), Node(9, TIMING, f510(777), max_master=24, faults=Faults(use_delay=4 * MS))]
+    nodes = [*ring(), SimulatedNode(9, TIMING, f510(777), max_master=24, faults=Faults(use_delay=4 * MS))]
     heard = run(nodes, 30)
     finding = heard.finding("MS501")
     assert (finding.subject, finding.severity) == ("MAC 9", Severity.ERROR)
@@ -143,7 +143,7 @@ def test_two_stations_with_one_address():
 
 def test_another_device_in_its_place_is_only_noted():
     """The first one is off for good when the other begins: it may have been replaced."""
-    nodes = [*ring(), Node(9, TIMING, f510(777), max_master=24, faults=Faults(off=True))]
+    nodes = [*ring(), SimulatedNode(9, TIMING, f510(777), max_master=24, faults=Faults(off=True))]
     heard = run(
         nodes,
         20,
@@ -156,8 +156,8 @@ def test_another_device_in_its_place_is_only_noted():
 
 def test_two_stations_seen_by_their_device_instances_in_turns():
     """Each says who it is when it is switched on."""
-    nodes = [*ring(), Node(9, TIMING, f510(777), max_master=24, faults=Faults(off=True))]
-    again = Node(9, TIMING, f510(511), max_master=24, faults=Faults(off=True))
+    nodes = [*ring(), SimulatedNode(9, TIMING, f510(777), max_master=24, faults=Faults(off=True))]
+    again = SimulatedNode(9, TIMING, f510(511), max_master=24, faults=Faults(off=True))
     heard = run(
         [*nodes, again],
         30,
@@ -235,7 +235,7 @@ def test_damaged_frames():
 
 
 def test_a_station_alone():
-    heard = run([Node(3, TIMING)], 15)
+    heard = run([SimulatedNode(3, TIMING)], 15)
     assert heard.codes == {"MS109"}
     assert heard.finding("MS109").subject == "MAC 3"
 
@@ -252,7 +252,7 @@ def test_two_halves_add_up(clean: Heard):
     cut = len(clean.events) // 2
     halves = []
     for part in (range(cut), range(cut, len(clean.events))):
-        observer = RingObserver(TIMING)
+        observer = MstpRingObserver(TIMING)
         for no in part:
             observer.see(no, clean.events[no], clean.headers[no])
         halves.append(observer.ring())

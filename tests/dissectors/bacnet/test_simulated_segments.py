@@ -7,15 +7,15 @@ import pytest
 from dissectors.bacnet import Reassembler
 from dissectors.bacnet import apdu as apdus
 from dissectors.bacnet.application import thing
-from dissectors.bacnet.segmenting import RETRIES, SEGMENT_TIMEOUT, Receiver, Sender
-from dissectors.bacnet.simulated import Device, Faults, Node, Poller
+from dissectors.bacnet.segmenting import RETRIES, SEGMENT_TIMEOUT, SegmentReceiver, SegmentSender
+from dissectors.bacnet.simulated import Device, Faults, Poller, SimulatedNode
 from dissectors.bacnet.values import ObjectId
 from dissectors.frame import Assembly, Frame
 from dissectors.tracker import Verdict
 from tests.dissectors.bacnet.ring_bus import MS, TIMING, Heard, run
 
 
-def ring(faults: Faults | None = None, max_apdu: int = 90, objects: int = 60) -> list[Node]:
+def ring(faults: Faults | None = None, max_apdu: int = 90, objects: int = 60) -> list[SimulatedNode]:
     """2 reads the object list of 5 again and again; 9 is quiet. Simulated stations hear a frame when it has ended: one
     that takes longer than the usage timeout would be taken for a token that nobody used."""
     held = {ObjectId(2, number): thing(ObjectId(2, number), f"value {number}", 1.0) for number in range(objects)}
@@ -23,9 +23,9 @@ def ring(faults: Faults | None = None, max_apdu: int = 90, objects: int = 60) ->
     device = Device(70, held, max_apdu=max_apdu, segments=True)
     poller = Poller([(5, "device,70", "object-list")], every=700 * MS)
     return [
-        Node(2, TIMING, poller, max_master=12),
-        Node(5, TIMING, device, max_master=12, max_info_frames=3, faults=faults),
-        Node(9, TIMING, max_master=12),
+        SimulatedNode(2, TIMING, poller, max_master=12),
+        SimulatedNode(5, TIMING, device, max_master=12, max_info_frames=3, faults=faults),
+        SimulatedNode(9, TIMING, max_master=12),
     ]
 
 
@@ -60,7 +60,7 @@ def test_damaged_segments_are_refused_or_sent_again():
 
 
 def test_a_sender_gives_up_after_its_retries():
-    sender = Sender.of(1, 12, bytes(300), 50)
+    sender = SegmentSender.of(1, 12, bytes(300), 50)
     assert len(sender.window_of_segments()) == 1
     now, sent = 0, 0
     while not sender.is_over:
@@ -70,7 +70,7 @@ def test_a_sender_gives_up_after_its_retries():
 
 
 def test_windows_and_acknowledgements_fit():
-    sender, receiver = Sender.of(1, 12, bytes(range(250)) * 5, 50), Receiver(window=3)
+    sender, receiver = SegmentSender.of(1, 12, bytes(range(250)) * 5, 50), SegmentReceiver(window=3)
     segments, taken, acknowledged = sender.window_of_segments(), b"", 0
     while segments:
         answers = []

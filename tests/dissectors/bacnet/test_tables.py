@@ -6,7 +6,7 @@ import pytest
 
 from dissectors.bacnet import layout
 from dissectors.bacnet.enumerations import BIT_STRINGS, ENUMERATIONS
-from dissectors.bacnet.newer_numbers import NEWER
+from dissectors.bacnet.enumerations_later import NEWER
 from dissectors.bacnet.property_types import BY_OBJECT, PROPERTY_TYPES
 from tests.dissectors.bacnet.generate_tables import FOLDER, bit_strings, enumerations, render
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from dissectors.bacnet import MSTP
 from dissectors.bacnet.envelope import frame
-from dissectors.bacnet.simulated import Node, Poller, f510
+from dissectors.bacnet.simulated import Poller, SimulatedNode, f510
 from dissectors.bacnet.turn import Turn
 from dissectors.frame import Check, Chunk, Damage, Flaw, Found, Frame, Noise, Role
 from dissectors.line import LineSettings, Timing
@@ -52,10 +52,10 @@ def begin_missing(octets: bytes, dice: Random) -> bytes:
     return octets[dice.randrange(1, 3) :] if dice.random() < 0.1 else octets
 
 
-def ring() -> list[Node]:
+def ring() -> list[SimulatedNode]:
     targets = [(5, "analog-input,4", "present-value"), (9, "analog-input,5", "present-value")]
     applications = {1: Poller(targets, every=100_000_000), 2: Poller(targets), 5: f510(5), 9: f510(9)}
-    return [Node(mac, TIMING, made, max_master=31, polls_every=10) for mac, made in applications.items()]
+    return [SimulatedNode(mac, TIMING, made, max_master=31, polls_every=10) for mac, made in applications.items()]
 
 
 @cache

@@ -7,8 +7,8 @@ from dataclasses import replace
 from dissectors.findings import Finding, Severity, with_consequences
 from dissectors.frame import Check, Damage, Flaw, Frame, Repair
 from dissectors.modbus.envelope import seal_rtu
-from dissectors.modbus.findings import ModbusFindings
 from dissectors.modbus.header import peek_rtu
+from dissectors.modbus.observer import ModbusFindings
 from dissectors.modbus.rules import RULES
 from dissectors.modbus.tracker import ModbusTracker
 

@@ -8,8 +8,8 @@ import pytest
 
 from dissectors.frame import Frame
 from dissectors.line import LineSettings, Timing
-from dissectors.modbus.findings import ModbusFindings
 from dissectors.modbus.header import peek_rtu
+from dissectors.modbus.observer import ModbusFindings
 from dissectors.tracker import Placement
 
 MS = 1_000_000

@@ -7,7 +7,7 @@ from random import Random
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dissectors.modbus.response_groups import ANSWERS_KEPT, ANSWERS_LEAST, Answered, Groups, SameRequest
+from dissectors.modbus.response_groups import ANSWERS_KEPT, ANSWERS_LEAST, AnsweredRequest, Groups, SameRequest
 from dissectors.modbus.station_record import ResponseTimes
 from dissectors.tracker import Interval
 
@@ -18,7 +18,7 @@ def groups_of(times: list[int], slack: int = 0, octets: list[bytes] | None = Non
     same = SameRequest()
     for no, time in enumerate(times, 1):
         latency = Interval(time, max(0, time - slack), time + slack)
-        same.answers.append(Answered(no, no * 50 * MS, latency, octets[no - 1] if octets else b"\1"))
+        same.answers.append(AnsweredRequest(no, no * 50 * MS, latency, octets[no - 1] if octets else b"\1"))
     return same.groups()
 
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dissectors.frame import Check, Damage, Found, Frame
 from dissectors.n2.blame import blamed
 from dissectors.n2.commands import parse_command
-from dissectors.n2.masters import HASTE, Asked, Masters
-from dissectors.n2.record import Damages, Missing, Station
+from dissectors.n2.masters import HASTE, Masters, OpenCommand
+from dissectors.n2.record import Damages, Missing, N2StationRecord
+from dissectors.strikes import Strikes
 
 MS = 1_000_000
 READ, OTHER = b">0111010387\r", b">02110A0398\r"
@@ -19,8 +20,14 @@ def sender(octets: int, bad: int) -> Damages:
     return made
 
 
-def blame(**senders: tuple[int, int]) -> dict[str, int]:
-    return {name: tally.count for name, tally in blamed({n: sender(*s) for n, s in senders.items()}).items()}
+def blame(in_a_row: bool = False, **senders: tuple[int, int]) -> dict[str, int]:
+    strikes = Strikes()
+    for name, (_, bad) in senders.items():
+        for _ in range(bad):
+            strikes.struck(name)
+            if not in_a_row:
+                strikes.whole()
+    return {name: tally.count for name, tally in blamed({n: sender(*s) for n, s in senders.items()}, strikes).items()}
 
 
 def test_noise_in_everybodys_share_of_the_time_is_the_bus():
@@ -28,13 +35,19 @@ def test_noise_in_everybodys_share_of_the_time_is_the_bus():
 
 
 def test_a_sender_with_far_more_than_its_share_is_named_alone():
-    assert blame(master=(5000, 1), first=(5000, 0), second=(5000, 60)) == {"second": 60, "master": 1}
+    assert blame(master=(5000, 1), first=(5000, 0), second=(5000, 60)) == {"second": 60, "bus": 1}
     assert blame(master=(5000, 0), first=(5000, 50), second=(5000, 60)) == {"bus": 110}
 
 
 def test_the_only_one_that_is_struck_is_named():
-    assert blame(master=(5000, 0), first=(5000, 2)) == {"first": 2}
+    assert blame(master=(5000, 0), first=(5000, 5)) == {"first": 5}
+    assert blame(master=(5000, 0), first=(5000, 2)) == {"bus": 2}
     assert blame(master=(5000, 0), first=(5000, 0)) == {}
+
+
+def test_what_is_repeated_into_one_disturbance_is_one_strike():
+    assert blame(master=(5000, 0), first=(5000, 8)) == {"first": 8}
+    assert blame(True, master=(5000, 0), first=(5000, 8)) == {"bus": 8}
 
 
 def test_who_sends_most_of_the_time_is_struck_most_and_not_to_blame():
@@ -53,16 +66,16 @@ def test_what_is_answered_late_is_not_missing():
     assert (tally.count, tally.first, tally.last) == (39, 0, 38 * MS)
 
 
-def asked(octets: bytes, start: int, damage: Damage | None = None) -> Asked:
+def asked(octets: bytes, start: int, damage: Damage | None = None) -> OpenCommand:
     check = Check.GOOD if damage is None else Check.ABSENT
     frame = Frame("n2", octets, start, start + len(octets) * MS, check, Found.DELIMITER, damage)
-    return Asked(start, frame, parse_command(octets))
+    return OpenCommand(start, frame, parse_command(octets))
 
 
-def seen(*commands: Asked, quickest: int | None = 50 * MS, answered: int = 20) -> int:
+def seen(*commands: OpenCommand, quickest: int | None = 50 * MS, answered: int = 20) -> int:
     masters = Masters()
     for command in commands:
-        masters.see_command(command, Station(answered=answered, quickest=quickest))
+        masters.see_command(command, N2StationRecord(answered=answered, quickest=quickest))
     return masters.seen.count
 
 
@@ -80,7 +93,7 @@ def test_a_command_in_the_middle_of_another_is_not_the_same_masters():
 
 
 def test_something_between_two_commands_may_have_been_an_answer():
-    masters, station = Masters(), Station(answered=20, quickest=50 * MS)
+    masters, station = Masters(), N2StationRecord(answered=20, quickest=50 * MS)
     masters.see_command(asked(READ, 0), station)
     masters.see_other()
     masters.see_command(asked(OTHER, 20 * MS), station)

@@ -31,7 +31,7 @@ def test_what_a_gsd_file_says() -> None:
     assert profile.facts["Ident_Number"] == 0x80AB
     assert profile.facts["Max_Input_Len"] == 4
     assert profile.facts["Module_1"] == '"2 words in" 0x51'
-    assert profile.limits_on("profibus").response == 6_250_000  # 60 bits at 9.6 kBd
+    assert profile.limits_on("profibus").responses == {9_600: 6_250_000, 12_000_000: 66_666}  # 60 and 800 bits
     assert profile.document == PUMP
 
 

@@ -24,7 +24,7 @@ from sniff.analysis.autodetect import (
     bits_of,
     candidates,
 )
-from sniff.simulation.line_mix import low_times, receive
+from sniff.simulation.collision import low_times, receive
 from sniff.simulation.scenarios import bursts, scenario
 from sniff.simulation.wire import Burst
 

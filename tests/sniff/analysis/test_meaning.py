@@ -13,7 +13,7 @@ from sniff.analysis.row_tree import tree_of
 from sniff.analysis.wording import describe
 from sniff.bus.offline import settled
 from sniff.engine.follow_settings import dissector_for
-from sniff.engine.verdict_join import Settled
+from sniff.engine.verdict_join import JudgedRow
 from sniff.formats import text as text_format
 
 CAPTURES = Path(__file__).parents[3] / "captures"
@@ -24,7 +24,7 @@ ACN = Devices(default=packaged("automationdirect-acn"))
 HEAD = "#!sniff-capture 1\n# line: 19200,8E1\n# protocol: modbus-rtu\n# start: 2026-03-01T10:00:00Z\n"
 
 
-def read(path: Path, devices: Devices) -> tuple[list[Settled], list[str]]:
+def read(path: Path, devices: Devices) -> tuple[list[JudgedRow], list[str]]:
     """The rows of a capture, and their lines."""
     capture = text_format.read(path)
     dissector = dissector_for(capture.session)
@@ -32,7 +32,7 @@ def read(path: Path, devices: Devices) -> tuple[list[Settled], list[str]]:
     return rows, [describe(dissector, item.row, item.meaning) for item in rows]
 
 
-def modbus(tmp_path: Path, frames: tuple[str, ...], devices: Devices) -> tuple[list[Settled], list[str]]:
+def modbus(tmp_path: Path, frames: tuple[str, ...], devices: Devices) -> tuple[list[JudgedRow], list[str]]:
     from dissectors.checksums import crc16_modbus
 
     lines = []
@@ -44,7 +44,7 @@ def modbus(tmp_path: Path, frames: tuple[str, ...], devices: Devices) -> tuple[l
     return read(path, devices)
 
 
-def tree(item: Settled) -> dict[str, str]:
+def tree(item: JudgedRow) -> dict[str, str]:
     """Names and values of everything in the tree."""
     found: dict[str, str] = {}
 
@@ -58,7 +58,7 @@ def tree(item: Settled) -> dict[str, str]:
     return found
 
 
-def dissector_for_protocol(item: Settled) -> object:
+def dissector_for_protocol(item: JudgedRow) -> object:
     from dissectors import registry
 
     assert item.row.header is not None

@@ -12,7 +12,7 @@ from dissectors.line import LineSettings
 from dissectors.modbus.envelope import seal_ascii, seal_rtu
 from sniff.analysis.other_settings import Fit, what_fits
 from sniff.analysis.slower_bus import slower_by
-from sniff.simulation.line_mix import low_times, receive
+from sniff.simulation.collision import low_times, receive
 
 LINE = LineSettings.parse("9600,8N1")
 MS = 1_000_000

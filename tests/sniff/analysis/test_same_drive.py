@@ -57,7 +57,7 @@ def n2(line: LineSettings) -> list[Party]:
 
 def mstp(line: LineSettings) -> list[Party]:
     from dissectors.bacnet.f510 import f510
-    from dissectors.bacnet.simulated import Node, Poller
+    from dissectors.bacnet.simulated import Poller, SimulatedNode
     from dissectors.bacnet.values import Enumerated, ObjectId
 
     device = f510(STATION)
@@ -68,7 +68,7 @@ def mstp(line: LineSettings) -> list[Party]:
         device.objects[ObjectId.parse(name)].properties[85] = value
     poller = Poller([(STATION, name, "present-value") for name in (*held, *on)], every=50 * MS)
     timing = Timing(line)
-    nodes = (Node(1, timing, poller, max_master=8), Node(STATION, timing, device, max_master=8))
+    nodes = (SimulatedNode(1, timing, poller, max_master=8), SimulatedNode(STATION, timing, device, max_master=8))
     return [Party(f"node {number}", node, answers=False) for number, node in enumerate(nodes)]
 
 

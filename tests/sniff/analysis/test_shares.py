@@ -10,7 +10,7 @@ import pytest
 from dissectors.findings import Finding, Severity
 from dissectors.frame import Place
 from dissectors.simulated_faults import BitFlips, Break, MarkParity, NoiseInGaps
-from sniff.analysis.shares import at_least, standing_out
+from sniff.analysis.shares import at_least, only_struck, standing_out
 from sniff.simulation.tap import EXACT, FTDI, UART, TapModel
 from tests.faults.buses import modbus, mstp, n2
 from tests.faults.case import Case
@@ -84,3 +84,9 @@ def test_ringing_after_everybodys_frames_is_one_finding_about_the_bus() -> None:
 def test_noise_before_one_station_is_its_own(tap: TapModel) -> None:
     before = Of("unit 2", NoiseInGaps(0.1, places=(Place.BEFORE,)))
     assert graves(partial(modbus, (before,)), tap) == {("LN201", "station 2")}
+
+
+def test_the_only_one_that_is_struck_often_enough() -> None:
+    assert only_struck({"1": (3, 1.0), "2": (0, 1.0), "master": (0, 2.0)}) == {"1"}
+    assert only_struck({"1": (1, 1.0), "2": (0, 1.0), "master": (0, 2.0)}) == set()
+    assert only_struck({"1": (9, 1.0), "2": (1, 1.0)}) == only_struck({}) == only_struck({"1": (0, 0.0)}) == set()

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from dissectors.line import LineSettings
-from sniff.capture.wire import Batch, Ended
+from sniff.capture.ipc import Batch, Ended
 from sniff.engine.session import Session
 
 

@@ -9,7 +9,7 @@ import pytest
 from dissectors.line import LineSettings
 from sniff.analysis.autodetect import Detecting
 from sniff.bus.autodetect import Search
-from sniff.capture.wire import Received
+from sniff.capture.ipc import ReceivedMessage
 from sniff.engine.session import LineEvent, LineEventKind, Session, refusal, refused_line
 
 FIRST, OTHER = LineSettings.parse("9600,8N1"), LineSettings.parse("4800,7E1")
@@ -36,7 +36,9 @@ def searching() -> Search:
 def test_settings_that_are_refused_are_tried_no_more() -> None:
     search = searching()
     wanted = search.detecting.wanted
-    search.take(Received(0, LineEvent(5, LineEventKind.REFUSED, refusal(wanted, "cannot be set: no such speed"))))
+    search.take(
+        ReceivedMessage(0, LineEvent(5, LineEventKind.REFUSED, refusal(wanted, "cannot be set: no such speed")))
+    )
     assert search.detecting.wanted != wanted
 
 
@@ -44,7 +46,7 @@ def test_settings_that_are_refused_are_tried_no_more() -> None:
 def test_words_that_name_the_settings_refuse_nothing(kind: LineEventKind) -> None:
     search = searching()
     wanted = search.detecting.wanted
-    search.take(Received(0, LineEvent(5, kind, f"disk is slow; {wanted} is in force")))
+    search.take(ReceivedMessage(0, LineEvent(5, kind, f"disk is slow; {wanted} is in force")))
     assert search.detecting.wanted == wanted
 
 

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from dissectors import registry
-from dissectors.bacnet import RingObserver
-from dissectors.bacnet.ring import What
+from dissectors.bacnet import MstpRingObserver
+from dissectors.bacnet.ring import RingEventKind
 from dissectors.simulated_faults import LostResponse
 from sniff.analysis.judging import Judging
 from sniff.bus.derived_topics import BUS, NODE, BusChannels
@@ -32,11 +32,11 @@ S = 10**9
 Told = list[tuple[str, dict[str, Any]]]
 
 
-def told(session: Any, items: Any) -> tuple[Told, RingObserver, int]:
+def told(session: Any, items: Any) -> tuple[Told, MstpRingObserver, int]:
     """All messages but findings, what the ring was in all, and the number of frames."""
     dissector = registry.get(session.protocol)
     model = BusModel(session, dissector)
-    channels, ring, frames, messages = BusChannels(model), RingObserver(session.timing), 0, []
+    channels, ring, frames, messages = BusChannels(model), MstpRingObserver(session.timing), 0, []
     now = 0
     for item in outputs(items, session):
         if not isinstance(item, Output):
@@ -72,7 +72,7 @@ def test_windows_of_a_ring_add_up() -> None:
     bus = f"/bus/{session.bus}"
     assert total(messages, bus, "frames") == frames
     assert total(messages, bus, "tokens") == sum(edge.tokens for edge in ring.edges.values()) > 500
-    lost = sum(one.count for (what, _), one in ring.happened.items() if what is What.LOST_TOKEN)
+    lost = sum(one.count for (what, _), one in ring.happened.items() if what is RingEventKind.LOST_TOKEN)
     assert total(messages, bus, "tokens_lost") == lost > 0
     for mac, node in ring.nodes.items():
         topic = f"/nodes/{session.bus}/{mac}"

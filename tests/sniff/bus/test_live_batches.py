@@ -10,7 +10,7 @@ from dissectors.line import LineSettings
 from dissectors.profiles import Devices
 from sniff.bus.live import LiveBus
 from sniff.bus.recorded_values import RecordedValues
-from sniff.capture.wire import Ended, Heard, Received, Tick
+from sniff.capture.ipc import Ended, HeardOctets, ReceivedMessage, Tick
 from sniff.engine.blocks import Block, reads_of
 from sniff.engine.bulk import tables
 from sniff.engine.engine import Output
@@ -35,8 +35,8 @@ def polls(begin: int, count: int) -> list[Chunk]:
     return chunks
 
 
-def heard(chunks: list[Chunk]) -> Heard:
-    return Heard(0, Block(reads_of(chunks)))
+def heard(chunks: list[Chunk]) -> HeardOctets:
+    return HeardOctets(0, Block(reads_of(chunks)))
 
 
 def live(paths: tuple[str, ...] = (), watched: bool = True) -> tuple[LiveBus, GivenLink]:
@@ -77,7 +77,7 @@ def test_without_a_face_reads_are_gathered_but_never_over_half_a_second() -> Non
 def test_a_line_event_stands_where_it_happened() -> None:
     bus, link = live(watched=False)
     event = LineEvent(1100 * MS, LineEventKind.NOTE, "here")
-    link.messages = [heard(polls(1000, 25)), Received(0, event), heard(polls(1200, 25)), Ended("over")]
+    link.messages = [heard(polls(1000, 25)), ReceivedMessage(0, event), heard(polls(1200, 25)), Ended("over")]
     items = bus.poll_tables()
     assert items.index(event) not in (0, len(items) - 1)
     assert bus.model.summary.frames == 100
@@ -95,7 +95,7 @@ def test_a_read_with_line_errors_keeps_its_place() -> None:
     bus, link = live()
     before, *after = polls(1000, 20)
     marked = Chunk(after[0].time, after[0].octets, (Mark(1, LineError.PARITY),))
-    link.messages = [heard([before]), Received(0, marked), heard(after[1:]), Tick(0, 1200 * MS)]
+    link.messages = [heard([before]), ReceivedMessage(0, marked), heard(after[1:]), Tick(0, 1200 * MS)]
     rows = [row for item in bus.poll() if isinstance(item, Output) for row in item.rows]
     assert [bool(row.event.marks) for row in rows[:3]] == [False, True, False]
 

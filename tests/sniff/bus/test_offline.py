@@ -5,7 +5,7 @@ from __future__ import annotations
 from dissectors import registry
 from dissectors.frame import Chunk
 from sniff.engine.engine import Engine
-from sniff.engine.verdict_join import REMEMBERED, Settled, Settling
+from sniff.engine.verdict_join import REMEMBERED, JudgedRow, VerdictJoin
 from sniff.simulation.scenarios import scenario, simulate
 from sniff.simulation.tap import EXACT
 
@@ -13,8 +13,8 @@ from sniff.simulation.tap import EXACT
 def test_every_row_once_in_order_with_its_verdict_and_nothing_kept() -> None:
     plan = scenario("modbus-rtu-busy", seed=3)
     session, items = simulate(plan, 90, EXACT)
-    engine, settling = Engine(registry.get(plan.protocol), session.timing), Settling()
-    rows: list[Settled] = []
+    engine, settling = Engine(registry.get(plan.protocol), session.timing), VerdictJoin()
+    rows: list[JudgedRow] = []
     most = 0
     for item in items:
         if isinstance(item, Chunk):

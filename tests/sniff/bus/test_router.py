@@ -9,7 +9,7 @@ from dissectors.frame import Chunk
 from sniff.bus import router as router_module
 from sniff.bus.live import LiveBus
 from sniff.bus.router import Router
-from sniff.capture.wire import Ended, Message, Received, Status, Tick
+from sniff.capture.ipc import Ended, Message, ReceivedMessage, Status, Tick
 from sniff.engine.engine import Output
 from tests.property.modbus_adus import rtu
 from tests.sniff.bus.given_link import GivenLink
@@ -20,8 +20,8 @@ REQUEST, ANSWER = rtu(bytes.fromhex("010300000001")), rtu(bytes.fromhex("0103020
 
 def said(bus: int, at: int) -> list[Message]:
     return [
-        Received(bus, Chunk(at * MS, REQUEST)),
-        Received(bus, Chunk((at + 20) * MS, ANSWER)),
+        ReceivedMessage(bus, Chunk(at * MS, REQUEST)),
+        ReceivedMessage(bus, Chunk((at + 20) * MS, ANSWER)),
         Tick(bus, (at + 100) * MS),
     ]
 

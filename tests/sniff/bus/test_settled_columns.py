@@ -13,7 +13,7 @@ from sniff.engine.bulk import tables
 from sniff.engine.column_join import ColumnJoin
 from sniff.engine.session import Item, LineEvent
 from sniff.engine.table import Table, rows_at
-from sniff.engine.verdict_join import Settled
+from sniff.engine.verdict_join import JudgedRow
 from sniff.formats import read
 
 CAPTURES = sorted((Path(__file__).parents[3] / "captures").glob("*.cap.txt"))
@@ -34,7 +34,7 @@ def in_parts(path: Path, size: int) -> Iterator[Table]:
 @pytest.mark.parametrize("size", [1, 7, 100_000])
 def test_every_row_comes_once_with_its_transaction(path: Path, size: int) -> None:
     capture, joining = read(path), ColumnJoin()
-    joined: list[Settled] = []
+    joined: list[JudgedRow] = []
     for table in in_parts(path, size):
         joined += [some.item(place) for some in joining.add(table) for place in range(some.begin, some.end)]
     joined += [some.item(place) for some in joining.flush() for place in range(some.begin, some.end)]

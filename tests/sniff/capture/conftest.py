@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import pytest
 
 from dissectors.frame import Chunk
+from sniff.capture.ipc import Message, ReceivedMessage
 from sniff.capture.link import CaptureLink
-from sniff.capture.wire import Message, Received
 
 pytest.importorskip("termios")
 
@@ -76,7 +76,7 @@ def octets() -> Callable[..., bytes]:
         return b"".join(
             message.item.octets
             for message in messages
-            if isinstance(message, Received) and message.bus == bus and isinstance(message.item, Chunk)
+            if isinstance(message, ReceivedMessage) and message.bus == bus and isinstance(message.item, Chunk)
         )
 
     return octets

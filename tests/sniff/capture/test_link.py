@@ -11,8 +11,8 @@ import pytest
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
 from sniff.capture.config import RecordSpec, SourceSpec
+from sniff.capture.ipc import Ended, ReceivedMessage, Status, Tick
 from sniff.capture.link import CaptureLink
-from sniff.capture.wire import Ended, Received, Status, Tick
 from sniff.engine.capture import CaptureError
 from sniff.engine.session import LineEvent, LineEventKind
 from sniff.sources import PortError
@@ -33,7 +33,7 @@ def test_octets_and_times_arrive_and_every_bus_keeps_its_own(make_pty, collect, 
         done = link.clock.now()
     for number in range(3):
         assert octets(messages, number) == bytes([number]) * 100 + b"\xff\x00"
-    times = [message.item.time for message in messages if isinstance(message, Received)]
+    times = [message.item.time for message in messages if isinstance(message, ReceivedMessage)]
     assert times == sorted(times)
     assert begun < times[0]
     assert times[-1] < done
@@ -44,7 +44,7 @@ def test_a_tick_vouches_for_all_that_came_before(pty, collect) -> None:
         messages = []
         for _ in range(20):
             pty.feed(b"\x01\x02\x03")
-            messages += collect(link, lambda got: any(isinstance(message, Received) for message in got))
+            messages += collect(link, lambda got: any(isinstance(message, ReceivedMessage) for message in got))
         messages += collect(link, lambda got: sum(isinstance(message, Tick) for message in got) >= 3)
         messages += link.stop()
     told = 0
@@ -52,7 +52,7 @@ def test_a_tick_vouches_for_all_that_came_before(pty, collect) -> None:
         if isinstance(message, Tick):
             assert message.now >= told
             told = message.now
-        elif isinstance(message, Received):
+        elif isinstance(message, ReceivedMessage):
             assert message.item.time >= told
 
 
@@ -113,7 +113,7 @@ def test_unplugged_port_ends_the_capture(pty, collect) -> None:
     messages = []
     while link.ended is None:
         messages += link.receive(1)
-    assert [m.item.kind for m in messages if isinstance(m, Received)] == [LineEventKind.UNPLUGGED]
+    assert [m.item.kind for m in messages if isinstance(m, ReceivedMessage)] == [LineEventKind.UNPLUGGED]
     assert link.ended == Ended("nothing more to read", at_end=True)
     link.stop()
 
@@ -122,8 +122,8 @@ def test_one_of_two_ports_gone_is_no_end(make_pty, collect, octets) -> None:
     gone, stays = make_pty(), make_pty()
     with CaptureLink.start([SourceSpec(gone.path, LINE, bus="a"), SourceSpec(stays.path, LINE, bus="b")]) as link:
         gone.unplug()
-        messages = collect(link, lambda got: any(isinstance(message, Received) for message in got))
-        assert [m.bus for m in messages if isinstance(m, Received)] == [0]
+        messages = collect(link, lambda got: any(isinstance(message, ReceivedMessage) for message in got))
+        assert [m.bus for m in messages if isinstance(m, ReceivedMessage)] == [0]
         stays.feed(b"still here")
         collect(link, lambda got: octets(got, 1) == b"still here")
 
@@ -131,8 +131,8 @@ def test_one_of_two_ports_gone_is_no_end(make_pty, collect, octets) -> None:
 def test_settings_change_without_closing(pty, collect, octets) -> None:
     with CaptureLink.start([SourceSpec(pty.path, LINE)]) as link:
         link.reconfigure(0, LineSettings.parse("76800,8N1"))
-        messages = collect(link, lambda got: any(isinstance(message, Received) for message in got))
-        events = [message.item for message in messages if isinstance(message, Received)]
+        messages = collect(link, lambda got: any(isinstance(message, ReceivedMessage) for message in got))
+        events = [message.item for message in messages if isinstance(message, ReceivedMessage)]
         assert [(event.kind, event.text) for event in events] == [(LineEventKind.SETTINGS, "line=76800,8N1")]
         pty.feed(b"\xff\x01")
         collect(link, lambda got: octets(got) == b"\xff\x01")
@@ -229,7 +229,7 @@ def test_a_capture_as_a_bus(tmp_path, collect) -> None:
     while link.ended is None:
         messages += link.receive(1)
     link.stop()
-    chunks = [message.item for message in messages if isinstance(message, Received)]
+    chunks = [message.item for message in messages if isinstance(message, ReceivedMessage)]
     assert [chunk.octets for chunk in chunks if isinstance(chunk, Chunk)] == [b"\x01\x02", b"\x03", b"\x04"]
     ticks = [message.now for message in messages if isinstance(message, Tick)]
     assert ticks == sorted(ticks)
@@ -254,8 +254,8 @@ def test_results_find_their_way_into_the_file(pty, tmp_path) -> None:
 
 
 def test_a_clock_step_is_told(monkeypatch) -> None:
+    from sniff.capture.ipc_sender import IpcSender
     from sniff.capture.loop import CaptureLoop
-    from sniff.capture.outlet import Outlet
     from sniff.sources.clock import Clock
 
     class Stepping(Clock):
@@ -285,7 +285,7 @@ def test_a_clock_step_is_told(monkeypatch) -> None:
     here, there = socket.socketpair()
     with here, there:
         kept: list[LineEvent] = []
-        outlet = Outlet(here, 1)
+        outlet = IpcSender(here, 1)
         monkeypatch.setattr(outlet, "item", lambda bus, item: kept.append(item))
         loop = CaptureLoop(Stepping(0, 0), [Silent()], [], outlet)
         monkeypatch.setattr("sniff.capture.loop.STATUS_EVERY", 0)

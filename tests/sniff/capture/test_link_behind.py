@@ -11,9 +11,9 @@ import pytest
 
 from dissectors.frame import Chunk
 from sniff.capture import link as link_module
+from sniff.capture.ipc import LOSSY, Ended, ReceivedMessage, encode_ended, encode_item
 from sniff.capture.link import CaptureLink
 from sniff.capture.spawn import Spawned
-from sniff.capture.wire import LOSSY, Ended, Received, encode_ended, encode_item
 from sniff.engine.session import LineEventKind
 
 
@@ -51,7 +51,7 @@ def test_it_keeps_so_much_and_says_what_is_missing(ends, monkeypatch) -> None:
     messages = ends.link.receive()
     ends.theirs.sendall(chunks(1000, 1))
     messages += ends.link.receive(1)
-    items = [message.item for message in messages if isinstance(message, Received)]
+    items = [message.item for message in messages if isinstance(message, ReceivedMessage)]
     kept = [item for item in items if isinstance(item, Chunk)]
     holes = [item for item in items if not isinstance(item, Chunk)]
     assert 50 < len(kept) < 150

@@ -10,8 +10,8 @@ from pathlib import Path
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
 from sniff.capture.config import RecordSpec, SourceSpec
+from sniff.capture.ipc import ReceivedMessage
 from sniff.capture.link import CaptureLink
-from sniff.capture.wire import Received
 from sniff.engine.session import LineEvent, LineEventKind, SettingsChange
 from sniff.formats import read
 from tests.e2e.recording_bus import octets_of, wait_until
@@ -25,7 +25,7 @@ def changes(items) -> list[str]:
 
 
 def seen(messages) -> list:
-    return [message.item for message in messages if isinstance(message, Received)]
+    return [message.item for message in messages if isinstance(message, ReceivedMessage)]
 
 
 def parts(items) -> list[bytes | str]:

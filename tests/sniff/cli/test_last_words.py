@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
+from sniff.capture.ipc import Ended, Status
 from sniff.capture.link import CaptureLink
-from sniff.capture.wire import Ended, Status
 from sniff.cli.listening import say_recorded
 
 

@@ -54,7 +54,13 @@ NOISE = Row(8, Noise(b"\x00\x00", 2, 3, Place.BETWEEN, Reason.NO_FRAME))
         ("dst == 4 or dst == 3", True),
         ("!(dst == 3)", False),
         ("not dst == 4 and ok", True),
-        ('kind contains "WRITE"', True),
+        ('kind contains "write"', True),
+        ('kind contains "WRITE"', False),  # as in Wireshark, capitals matter
+        ('upper(kind) contains "WRITE"', True),
+        ('kind matches "WRITE"', True),
+        ('kind matches "(?-i)WRITE"', False),
+        ('kind == "Write Multiple Registers"', True),  # one of its words
+        ('lower(kind) == "write-multiple-registers"', True),
         ('kind matches "^write-(single|multiple)"', True),
         ("verdict in {no-response, late}", True),
         ('verdict == "no answer"', True),
@@ -103,10 +109,12 @@ NOISE = Row(8, Noise(b"\x00\x00", 2, 3, Place.BETWEEN, Reason.NO_FRAME))
         ("frame.time_delta", False),
         ("test", True),
         ("modbus-rtu", False),
-        ("!noise_before && !marks", True),
+        ("noise_before && marks", True),  # a name alone asks whether it is there, also for 0
+        ("noise_before > 0 || marks > 0", False),
         ("noise", False),
         ("error", False),
         ('"3 ← write"', True),
+        ('"3 ← WRITE"', True),  # a text alone is looked for as people look for it
         ("hex contains 0310", True),
         ("role eq request", True),
     ],

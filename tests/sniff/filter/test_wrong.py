@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from sniff.cli import main
+from sniff.filter import FilterError, check_filter
 
 CAPTURE = str(Path(__file__).parents[3] / "captures" / "rtu-usual-faults.cap.txt")
 
@@ -98,6 +99,59 @@ WRONG = (
     ("noise_before == 1.5", "noise_before is a whole number"),
     ("dst in {1.5}", "dst is a whole number"),
     ("error == 5", 'write "5" in quotes'),
+    ("dst == 300", "dst is 0 … 255, never 300"),
+    ("dst > 300", "dst is 0 … 255, never 300"),
+    ("dst < 300", "dst is 0 … 255, never 300"),
+    ("dst != 300", "dst is 0 … 255, never 300"),
+    ("300 == dst", "dst is 0 … 255, never 300"),
+    ("dst == -1", "dst is 0 … 255, never -1"),
+    ("dst in {1..300}", "dst is 0 … 255, never 300"),
+    ("dst not in {3, 300}", "dst is 0 … 255, never 300"),
+    ("max(dst, 300) == 3", "dst is 0 … 255, never 300"),
+    ("mbrtu.unit_id == 256", "mbrtu.unit_id is 0 … 255"),
+    ("register == 70000", "register is 0 … 65535"),
+    ("count == 0x10000", "count is 0 … 65535, never 0x10000"),
+    ("func == 128", "func is 0 … 127"),
+    ("modbus.func_code & 0x80", "modbus.func_code is 0 … 127"),
+    ("modbus.regval_uint16 == 70000", "modbus.regval_uint16 is 0 … 65535"),
+    ("modbus.regval_uint16 == 1.5", "is a whole number, 1.5 is none"),
+    ("modbus.exception_code in {2..256}", "modbus.exception_code is 0 … 255"),
+    ("len == -1", "len is 0 or more"),
+    ("no == 0", "no is 1 or more"),
+    ('mstp.frame_type == "Token"', "mstp.frame_type is a field of BACnet MS/TP; these frames are Modbus RTU"),
+    ("dst == 3 && mstp.src == 2", "did you mean src?"),
+    ("mbascii.unit_id == 3", "did you mean mbrtu.unit_id?"),
+    ("!bacapp.type", "bacapp.type is a field of BACnet MS/TP"),
+    ("n2.region in {1..3}", "n2.region is a field of Metasys N2"),
+    ("pb.da == 3", "pb.da is a field of PROFIBUS DP"),
+    ("kind == token", "'token' is a kind of BACnet MS/TP and PROFIBUS DP; these frames are Modbus RTU"),
+    ("kind in {token, poll-for-master}", "'token' is a kind of"),
+    ("finding == MS701", "'MS701' is a finding of BACnet MS/TP"),
+    ("func == Token", "unknown func 'Token'"),
+    ('kind contains "WRITE"', "contains minds capitals"),
+    ('kind contains "tokn"', "no kind holds"),
+    ('verdict contains "Late"', "'late' does otherwise written"),
+    ('lower(error) == "Illegal"', "lower(error) is all in lower case"),
+    ('upper(kind) contains "write"', "upper(kind) is all in upper case"),
+    ("modbus.response_time > 5ms", "unknown name 'modbus.response_time'"),
+    ("dst == 3 Hz", "'3 Hz' is none"),
+    ("point == foo", "no station has a profile (-d STATION=PROFILE)"),
+    ("value > 30 Hz", "no point has a unit here"),
+    ("output-frequency > 30", "unknown name 'output-frequency'"),
+    ("point > a", "have no order"),
+)
+
+WRONG_OF_DRIVES = (
+    ("output-frequency > 30 A", "output-frequency is in Hz, not in 'A'"),
+    ("output-frequency > fast", "output-frequency is a number, 'fast' is not"),
+    ("output-frequncy > 30", "did you mean 'output-frequency'?"),
+    ('point == "output frequncy"', "did you mean"),
+    ("value > 30 kg", "not in 'kg'"),
+    ("value == runing", "unknown value 'runing'"),
+    ("fault == ovrcurrent", "unknown fault 'ovrcurrent'"),
+    ("fault > overcurrent", "unknown fault"),
+    ("output-frequency in {50..30}", "the range ends before it begins"),
+    ("dst == teco-f510", "did you mean 'teco-e510'?"),
 )
 
 
@@ -108,6 +162,34 @@ def test_it_says_what_is_wrong(text: str, said: str, capsys: pytest.CaptureFixtu
     assert shown.out == ""
     assert said in shown.err
     assert " at column " in shown.err
+
+
+@pytest.mark.parametrize(("text", "said"), WRONG_OF_DRIVES)
+def test_it_says_what_is_wrong_with_points(text: str, said: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["show", CAPTURE, "-d", "1=teco-e510", "-Y", text]) == 2
+    shown = capsys.readouterr()
+    assert shown.out == ""
+    assert said in shown.err
+    assert " at column " in shown.err
+
+
+def test_one_of_several_captures_must_have_the_field(capsys: pytest.CaptureFixture[str]) -> None:
+    other = CAPTURE.replace("rtu-usual", "n2-usual")
+    assert main(["show", other, CAPTURE, "-Y", "modbus.func_code == 8"]) == 0
+    shown = capsys.readouterr()
+    assert len(shown.out.splitlines()) == 2
+    assert "these frames are Metasys N2" in shown.err
+    assert main(["show", other, CAPTURE, "-Y", "mstp.src == 8"]) == 2
+
+
+def test_a_filter_for_several_protocols_is_none_of_one_alone(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["show", CAPTURE, "-Y", "modbus.func_code == 8 || mstp.frame_type == Token"]) == 0
+    assert len(capsys.readouterr().out.splitlines()) == 2
+    for text in ('mstp.frame_type == "Token"', "kind == token", "dst == 200", "func == Token"):
+        check_filter(text)
+    for text in ("mstp.frame_typ == 0", "dst == 300", "mstp.src == 3 && modbus.func_code == 3"):
+        with pytest.raises(FilterError):
+            check_filter(text)
 
 
 @pytest.mark.parametrize("command", ["info", "stats", "check", "points", "diff", "snapshot", "show"])

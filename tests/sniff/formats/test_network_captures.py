@@ -139,8 +139,8 @@ def test_datagrams_are_read_too(tmp_path: Path) -> None:
 def test_a_network_without_any_is_said(tmp_path: Path, write: Callable[..., Path]) -> None:
     packets = [
         (START, tcp(CLIENT, (SERVER[0], 443), 1, random.Random(1).randbytes(900))),
-        (START, udp(CLIENT, (SERVER[0], 47808), b"\x81\x0a\x00\x08\x01\x20\xff\xff")),
-        (START, tcp(CLIENT, (SERVER[0], 502), 1, bytes.fromhex("000100000006010300000002"))),
+        (START, udp(CLIENT, (SERVER[0], 47808), b"\x82\x0a\x00\x08\x01\x20\xff\xff")),  # of IPv6
+        (START, tcp(CLIENT, (SERVER[0], 502), 1, bytes.fromhex("000100010006010300000002"))),  # of another protocol
     ]
     path = write(tmp_path / "x.pcap", packets)
     with pytest.raises(CaptureError) as refused:
@@ -153,6 +153,74 @@ def test_a_network_without_any_is_said(tmp_path: Path, write: Callable[..., Path
     ):
         assert words in str(refused.value)
     assert main(["check", str(path)]) == 3
+
+
+@pytest.mark.parametrize("write", [as_pcap, as_pcapng])
+def test_modbus_tcp_is_paired_by_its_transactions(
+    tmp_path: Path, write: Callable[..., Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    server, other = (SERVER[0], 502), (b"\xc0\0\2\2", 40001)
+    said = (
+        "000700000006010300100002",
+        "000800000006020300200001",
+        "0008000000050203020009",
+        "000700000007010304000A000B",
+    )
+    packets = [(START, tcp(CLIENT, server, 1, b"", SYN))]
+    number = {CLIENT: 2, server: 1, other: 1}
+    for place, text in enumerate(said):
+        source, target = (CLIENT, server) if place < 2 else (server, CLIENT)
+        octets = bytes.fromhex(text)
+        packets.append((START + place * 10_000_000, tcp(source, target, number[source], octets)))
+        number[source] += len(octets)
+    packets.append((START + 90_000_000, tcp(other, server, 1, bytes.fromhex("000100000006030100000001"))))
+    path = write(tmp_path / "x.pcap", packets)
+    capture = read(path)
+    assert isinstance(capture, SeveralBuses)
+    assert [bus.session.protocol for bus in capture.buses] == ["modbus-tcp", "modbus-tcp"]
+    assert main(["show", str(path), "--bus", capture.names[0]]) == 0
+    shown = capsys.readouterr().out.splitlines()
+    assert [line.split("  #")[1].split()[0] for line in shown] == ["7", "8", "8", "7"]
+    assert "1 → 2 registers: 10 11" in shown[3]
+    assert main(["stats", str(path), "--bus", capture.names[0]]) == 0
+    assert main(["convert", str(path), str(tmp_path / "y.mcap"), "--bus", capture.names[0]]) == 0
+    assert read(tmp_path / "y.mcap").session.protocol == "modbus-tcp"
+
+
+@pytest.mark.parametrize("write", [as_pcap, as_pcapng])
+def test_bacnet_ip_of_all_hosts_is_one_bus(
+    tmp_path: Path, write: Callable[..., Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    here, there, all_of_them = ((bytes((192, 0, 2, last)), 47808) for last in (1, 9, 255))
+    said = [
+        (here, all_of_them, "810b000c0120ffff00ff1008"),
+        (here, there, "810a001101040005010c0c000000011955"),
+        (there, here, "810a0017010030010c0c0000000119553e4441b800003f"),
+    ]
+    packets = [
+        (START + place * 10_000_000, udp(source, target, bytes.fromhex(text)))
+        for place, (source, target, text) in enumerate(said)
+    ]
+    path = write(tmp_path / "x.pcap", packets)
+    capture = read(path)
+    assert (capture.session.protocol, capture.session.bus) == ("bacnet-ip", "hosts")
+    assert main(["show", str(path)]) == 0
+    out = capsys.readouterr().out
+    assert "analog-input,1 present-value = 23" in out
+    assert "ms" in out.splitlines()[2]  # paired
+    assert main(["points", str(path)]) == 0
+    assert "analog-input/1" in capsys.readouterr().out
+
+
+def test_a_log_of_a_gateway_is_told_too(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "x.log"
+    frames = ("000700000006010300100002", "000700000007010304000A000B") * 4
+    lines = [f"{'RX' if no % 2 else 'TX'}: {bytes.fromhex(text).hex(' ')}\n" for no, text in enumerate(frames)]
+    path.write_text("".join(lines))
+    assert main(["show", str(path)]) == 0
+    out, err = capsys.readouterr()
+    assert out.count("2 registers: 10 11") == 4
+    assert "Modbus TCP (sure" in err
 
 
 def test_cut_and_mutated_files_are_read_or_refused(tmp_path: Path) -> None:
@@ -182,9 +250,11 @@ def test_frames_in_ethernet_snap(tmp_path: Path) -> None:
     if not folder.is_dir():
         pytest.skip("the shared captures are not here")
     capture = read(folder / "BACnet-MSTP-SNAP-Mixed.cap")
-    assert capture.session.protocol == "mstp"
-    assert _octets(capture) == _octets(read(folder / "derived_linktype165.pcap"))
-    assert "68 of UDP port 47808 (BACnet/IP)" in capture.completeness().text
+    assert isinstance(capture, SeveralBuses)
+    line, network = capture.buses
+    assert (line.session.protocol, network.session.protocol) == ("mstp", "bacnet-ip")
+    assert _octets(line) == _octets(read(folder / "derived_linktype165.pcap"))
+    assert len([item for item in network.items() if isinstance(item, Chunk)]) == 68
 
 
 @pytest.mark.parametrize("link_type", [147, 148, 149, 155, 162])

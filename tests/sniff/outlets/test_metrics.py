@@ -19,18 +19,18 @@ from sniff.bus.model import BusModel
 from sniff.bus.offline import survey
 from sniff.engine.follow_settings import dissector_for
 from sniff.formats import read
-from sniff.outlets.metrics import Told, exposition
+from sniff.outlets.metrics import BusNow, exposition
 from sniff.outlets.metrics_server import READERS, MetricsServer
 
 CAPTURES = Path(__file__).parents[3] / "captures"
 
 
-def told(name: str, bus: str = "boiler") -> Told:
+def told(name: str, bus: str = "boiler") -> BusNow:
     capture = read(CAPTURES / f"{name}.cap.txt")
     session = replace(capture.session, bus=bus)
     model = BusModel(session, dissector_for(session))
     survey(capture, session, model)
-    return Told(model, 7)
+    return BusNow(model, 7)
 
 
 @pytest.fixture

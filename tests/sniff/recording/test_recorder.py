@@ -19,7 +19,7 @@ from dissectors.line import LineSettings
 from sniff.engine.capture import CaptureError
 from sniff.engine.session import Item, LineEvent, LineEventKind, Session
 from sniff.formats import read
-from sniff.recording import keeper
+from sniff.recording import writer_thread
 from sniff.recording.reader import McapCapture
 from sniff.recording.rotation import Rotation, part_name
 from sniff.recording.topics import VALUE_SCHEMA
@@ -117,7 +117,7 @@ def test_a_lone_event_is_in_the_file_within_a_second(tmp_path: Path) -> None:
 def test_synced_within_ten_seconds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     recorder = Recorder(tmp_path / "a.mcap", SESSION)
     synced: list[int] = []
-    monkeypatch.setattr("sniff.recording.syncing.os.fsync", lambda number: synced.append(number))
+    monkeypatch.setattr("sniff.recording.sync_thread.os.fsync", lambda number: synced.append(number))
     now = BASE
     for step in range(100 * 4):
         now += S // 4
@@ -126,6 +126,8 @@ def test_synced_within_ten_seconds(tmp_path: Path, monkeypatch: pytest.MonkeyPat
         recorder.tick(now)
     eventually(lambda: recorder._keeper.orders.empty(), "the thread is stuck")
     eventually(lambda: len(synced) >= 10, "100 s of traffic")
+    syncer = recorder._keeper._syncer
+    eventually(lambda: syncer._orders.empty() and not syncer.busy, "the syncs of the traffic do not end")
     quiet = len(synced)
     for _ in range(100 * 4):
         now += S // 4
@@ -225,7 +227,7 @@ def test_disk_full_then_room_again(tmp_path: Path) -> None:
 
 def test_disk_full_for_too_long(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Memory stays bounded, what is lost is counted, the file shows the hole and goes on after it."""
-    monkeypatch.setattr(keeper, "MOST_WAITING", 4000)
+    monkeypatch.setattr(writer_thread, "MOST_WAITING", 4000)
     recorder = Recorder(tmp_path / "a.mcap", SESSION)
     disk = fill(recorder, 3000)
     items = [Chunk(BASE + number * 20_000_000, os.urandom(64)) for number in range(3000)]
@@ -370,7 +372,7 @@ def test_a_part_that_cannot_be_opened(tmp_path: Path, monkeypatch: pytest.Monkey
     """The old part goes on, and rotation is tried again."""
     recorder = Recorder(tmp_path / "night.mcap", SESSION, Rotation(count=500))
     items = some_items(3000)
-    monkeypatch.setattr(keeper, "part_name", lambda path, number: path.parent / "gone" / path.name)
+    monkeypatch.setattr(writer_thread, "part_name", lambda path, number: path.parent / "gone" / path.name)
     give(recorder, items[:1500])
     eventually(lambda: recorder._keeper.orders.empty(), "the thread is stuck")
     assert recorder.trouble is not None

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from dissectors.bacnet import MSTP
-from dissectors.bacnet.ring import Ring, What
+from dissectors.bacnet.ring import Ring, RingEventKind
 from dissectors.frame import Chunk, Frame
 from sniff.bus.offline import outputs
 from sniff.cli import main
@@ -93,7 +93,9 @@ def test_the_ring_of_the_parts_is_the_ring_of_the_whole(files: tuple[Path, list[
     found = ring(as_one(parts))
     assert found == ring(read(whole))
     assert found.order == (1, 2, 5, 9)
-    assert What.LOST_TOKEN in {what for what, _ in found.happened}  # the scenario loses some, but none at a seam
+    assert RingEventKind.LOST_TOKEN in {
+        what for what, _ in found.happened
+    }  # the scenario loses some, but none at a seam
     assert found.masters == (1, 2, 5, 9)
 
 
@@ -107,9 +109,9 @@ def test_a_ring_observed_on_over_the_seam_adds_up_to_the_counts_of_parts(files: 
     assert merged.order == one.order
     assert abs(merged.frames - one.frames) <= 2 * len(parts)
     assert set(merged.edges) == set(one.edges)
-    lost = sum(happened.count for (what, _), happened in one.happened.items() if what is What.LOST_TOKEN)
-    assert sum(h.count for (what, _), h in merged.happened.items() if what is What.LOST_TOKEN) == lost
-    assert not {What.LEFT, What.TWO_TOKENS} & {what for what, _ in merged.happened}
+    lost = sum(happened.count for (what, _), happened in one.happened.items() if what is RingEventKind.LOST_TOKEN)
+    assert sum(h.count for (what, _), h in merged.happened.items() if what is RingEventKind.LOST_TOKEN) == lost
+    assert not {RingEventKind.LEFT, RingEventKind.TWO_TOKENS} & {what for what, _ in merged.happened}
 
 
 def test_a_part_that_is_not_given_is_a_hole_and_no_silence(files: tuple[Path, list[Path]]) -> None:
@@ -121,7 +123,14 @@ def test_a_part_that_is_not_given_is_a_hole_and_no_silence(files: tuple[Path, li
     assert capture.completeness().text == "part 2 not given"
     found = ring(capture)
     alone = [ring(read(path)) for path in given]
-    for what in (What.LOST_TOKEN, What.LATE_USE, What.LEFT, What.TWO_TOKENS, What.NO_REPLY, What.DAMAGED_REPLY):
+    for what in (
+        RingEventKind.LOST_TOKEN,
+        RingEventKind.LATE_USE,
+        RingEventKind.LEFT,
+        RingEventKind.TWO_TOKENS,
+        RingEventKind.NO_REPLY,
+        RingEventKind.DAMAGED_REPLY,
+    ):
         count = sum(h.count for key, h in found.happened.items() if key[0] is what)
         apart = sum(h.count for one in alone for key, h in one.happened.items() if key[0] is what)
         assert count <= apart, what

@@ -15,7 +15,7 @@ from dissectors.frame import Chunk
 from dissectors.line import LineSettings
 from sniff.engine.session import LineEvent, LineEventKind, Session
 from sniff.formats import read
-from sniff.recording import keeper
+from sniff.recording import writer_thread
 from sniff.recording.rotation import Rotation
 from sniff.recording.writer import Recorder
 
@@ -118,7 +118,7 @@ def test_a_write_that_hangs_is_told_by_how_far_it_is_behind_and_costs_nothing(ru
 def test_a_sync_that_hangs_does_not_keep_octets_from_the_system(
     running: Running, gate: Gate, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("sniff.recording.syncing.os.fsync", lambda _: gate.pass_through())
+    monkeypatch.setattr("sniff.recording.sync_thread.os.fsync", lambda _: gate.pass_through())
     recorder = running.recorder
     gate.open.clear()
     running.run(12)
@@ -157,7 +157,7 @@ def test_memory_lasts_for_five_minutes_of_a_full_bus(running: Running, gate: Gat
 def test_what_memory_cannot_hold_is_counted_in_the_file_and_at_the_end(
     running: Running, gate: Gate, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(keeper, "MOST_WAITING", 20_000)
+    monkeypatch.setattr(writer_thread, "MOST_WAITING", 20_000)
     recorder = running.recorder
     slow_writes(recorder, gate)
     running.run(2)
@@ -183,7 +183,7 @@ def test_what_memory_cannot_hold_is_counted_in_the_file_and_at_the_end(
 def test_what_is_missing_at_the_end_is_in_the_file_too(
     running: Running, gate: Gate, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(keeper, "MOST_WAITING", 20_000)
+    monkeypatch.setattr(writer_thread, "MOST_WAITING", 20_000)
     recorder = running.recorder
     slow_writes(recorder, gate)
     gate.open.clear()
@@ -211,7 +211,7 @@ def test_a_disk_that_never_answers_again(running: Running, gate: Gate) -> None:
 
 
 def test_results_give_way_first(running: Running, gate: Gate, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(keeper, "MOST_DERIVED", 5_000)
+    monkeypatch.setattr(writer_thread, "MOST_DERIVED", 5_000)
     recorder = running.recorder
     slow_writes(recorder, gate)
     gate.open.clear()

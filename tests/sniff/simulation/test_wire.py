@@ -26,7 +26,7 @@ from dissectors.simulated_faults import (
     MarkParity,
     NoiseInGaps,
 )
-from sniff.simulation.line_mix import low_times, receive
+from sniff.simulation.collision import low_times, receive
 from sniff.simulation.wire import Burst, Party, Sent, Wire
 
 LINE = LineSettings.parse("19200,8E1")

@@ -13,7 +13,7 @@ from sniff.engine.blocks import blocks_of
 from sniff.engine.session import Adapter, Session
 from sniff.taps.frames import TapEar, TapFrames
 from sniff.taps.matching import matched
-from sniff.taps.verdict import Fault, Kind, Place, Side, Traffic, faults, traffic
+from sniff.taps.verdict import FaultPlace, SegmentFault, SegmentFaultKind, TapSide, Traffic, faults, traffic
 from sniff.taps.words import sentence
 from tests.bus_delivery import FTDI_LATENCY, MS, Wire, exact, ftdi
 from tests.sniff.taps.segment import (
@@ -31,37 +31,58 @@ LINE = LineSettings.parse("19200,8E1")
 ADAPTERS = {"exact": 0, "16 ms": FTDI_LATENCY}
 BEHIND_A, BEHIND_B = {-1, 1, 2, 3, 4}, {5, 6, 7, 8}
 
-FAULTS: dict[str, tuple[Callable[[], Segment], set[tuple[Place, int, Kind]]]] = {
-    "bit errors onward": (lambda: Segment(onward=bit_errors(0.05)), {(Place.BETWEEN, 1, Kind.BITS)}),
-    "few bit errors onward": (lambda: Segment(onward=bit_errors(0.015)), {(Place.BETWEEN, 1, Kind.BITS)}),
-    "bit errors back": (lambda: Segment(back=bit_errors(0.05)), {(Place.BETWEEN, 0, Kind.BITS)}),
+FAULTS: dict[str, tuple[Callable[[], Segment], set[tuple[FaultPlace, int, SegmentFaultKind]]]] = {
+    "bit errors onward": (lambda: Segment(onward=bit_errors(0.05)), {(FaultPlace.BETWEEN, 1, SegmentFaultKind.BITS)}),
+    "few bit errors onward": (
+        lambda: Segment(onward=bit_errors(0.015)),
+        {(FaultPlace.BETWEEN, 1, SegmentFaultKind.BITS)},
+    ),
+    "bit errors back": (lambda: Segment(back=bit_errors(0.05)), {(FaultPlace.BETWEEN, 0, SegmentFaultKind.BITS)}),
     "bit errors both ways": (
         lambda: Segment(onward=bit_errors(0.05), back=bit_errors(0.08)),
-        {(Place.BETWEEN, 1, Kind.BITS), (Place.BETWEEN, 0, Kind.BITS)},
+        {(FaultPlace.BETWEEN, 1, SegmentFaultKind.BITS), (FaultPlace.BETWEEN, 0, SegmentFaultKind.BITS)},
     ),
-    "back is dead": (lambda: Segment(back=dead), {(Place.BETWEEN, 0, Kind.DEAD)}),
-    "first octet onward": (lambda: Segment(onward=without_begin(0.1)), {(Place.BETWEEN, 1, Kind.BEGIN)}),
-    "first octets back": (lambda: Segment(back=without_begin(0.2, 3)), {(Place.BETWEEN, 0, Kind.BEGIN)}),
-    "last octets onward": (lambda: Segment(onward=without_end(0.1)), {(Place.BETWEEN, 1, Kind.END)}),
-    "last octet back": (lambda: Segment(back=without_end(0.1, 1)), {(Place.BETWEEN, 0, Kind.END)}),
-    "frames lost onward": (lambda: Segment(onward=lost(0.05)), {(Place.BETWEEN, 1, Kind.LOST)}),
-    "frames lost back": (lambda: Segment(back=lost(0.05)), {(Place.BETWEEN, 0, Kind.LOST)}),
-    "a gateway rewrites": (lambda: Segment(back=rewritten(0.1), delay=40 * MS), {(Place.BETWEEN, 0, Kind.CHANGED)}),
+    "back is dead": (lambda: Segment(back=dead), {(FaultPlace.BETWEEN, 0, SegmentFaultKind.DEAD)}),
+    "first octet onward": (
+        lambda: Segment(onward=without_begin(0.1)),
+        {(FaultPlace.BETWEEN, 1, SegmentFaultKind.BEGIN)},
+    ),
+    "first octets back": (
+        lambda: Segment(back=without_begin(0.2, 3)),
+        {(FaultPlace.BETWEEN, 0, SegmentFaultKind.BEGIN)},
+    ),
+    "last octets onward": (lambda: Segment(onward=without_end(0.1)), {(FaultPlace.BETWEEN, 1, SegmentFaultKind.END)}),
+    "last octet back": (lambda: Segment(back=without_end(0.1, 1)), {(FaultPlace.BETWEEN, 0, SegmentFaultKind.END)}),
+    "frames lost onward": (lambda: Segment(onward=lost(0.05)), {(FaultPlace.BETWEEN, 1, SegmentFaultKind.LOST)}),
+    "frames lost back": (lambda: Segment(back=lost(0.05)), {(FaultPlace.BETWEEN, 0, SegmentFaultKind.LOST)}),
+    "a gateway rewrites": (
+        lambda: Segment(back=rewritten(0.1), delay=40 * MS),
+        {(FaultPlace.BETWEEN, 0, SegmentFaultKind.CHANGED)},
+    ),
     "a gateway loses onward": (
         lambda: Segment(onward=lost(0.05), delay=30 * MS, jitter=10 * MS),
-        {(Place.BETWEEN, 1, Kind.LOST)},
+        {(FaultPlace.BETWEEN, 1, SegmentFaultKind.LOST)},
     ),
     "bit errors behind a gateway": (
         lambda: Segment(back=bit_errors(0.05), delay=25 * MS, jitter=5 * MS),
-        {(Place.BETWEEN, 0, Kind.BITS)},
+        {(FaultPlace.BETWEEN, 0, SegmentFaultKind.BITS)},
     ),
-    "the tap at B reads badly": (lambda: Segment(at_b=bit_errors(0.05)), {(Place.EITHER, 1, Kind.BITS)}),
-    "the tap at A reads badly": (lambda: Segment(at_a=bit_errors(0.05)), {(Place.EITHER, 0, Kind.BITS)}),
+    "the tap at B reads badly": (
+        lambda: Segment(at_b=bit_errors(0.05)),
+        {(FaultPlace.EITHER, 1, SegmentFaultKind.BITS)},
+    ),
+    "the tap at A reads badly": (
+        lambda: Segment(at_a=bit_errors(0.05)),
+        {(FaultPlace.EITHER, 0, SegmentFaultKind.BITS)},
+    ),
     "the tap at B reads badly behind a gateway": (
         lambda: Segment(at_b=bit_errors(0.05), delay=40 * MS),
-        {(Place.TAP, 1, Kind.BITS)},
+        {(FaultPlace.TAP, 1, SegmentFaultKind.BITS)},
     ),
-    "the tap at B hears nothing for a while": (lambda: Segment(at_b=lost(0.1)), {(Place.EITHER, 1, Kind.LOST)}),
+    "the tap at B hears nothing for a while": (
+        lambda: Segment(at_b=lost(0.1)),
+        {(FaultPlace.EITHER, 1, SegmentFaultKind.LOST)},
+    ),
 }
 CLEAN = {
     "cable": Segment,
@@ -90,11 +111,11 @@ class _Capture:
         return blocks_of(iter(self._chunks))
 
 
-def judged(segment: Segment, latency: int) -> tuple[dict[int, Traffic], list[Fault]]:
+def judged(segment: Segment, latency: int) -> tuple[dict[int, Traffic], list[SegmentFault]]:
     return compared([tap(wire, latency) for wire in segment.run(Timing(LINE))], 2 * (latency + LINE.char))
 
 
-def compared(taps: list[TapFrames], doubt: int) -> tuple[dict[int, Traffic], list[Fault]]:
+def compared(taps: list[TapFrames], doubt: int) -> tuple[dict[int, Traffic], list[SegmentFault]]:
     first, second = taps
     senders = traffic(first, second, matched(first, second, doubt))
     return senders, faults(senders, doubt)
@@ -107,7 +128,7 @@ def test_the_right_side_is_named(name: str, adapter: str) -> None:
     _, found = judged(make(), ADAPTERS[adapter])
     assert {(fault.place, fault.tap, fault.kind) for fault in found} == expected
     for fault in found:
-        if fault.place is Place.BETWEEN:
+        if fault.place is FaultPlace.BETWEEN:
             hit, spared = (BEHIND_A, BEHIND_B) if fault.tap == 1 else (BEHIND_B, BEHIND_A)
             assert set(fault.senders) <= hit
             assert set(fault.spared) & spared
@@ -136,7 +157,7 @@ def test_delays_are_those_of_the_stretch(delay: int) -> None:
     for name, one in senders.items():
         usual = sorted(one.delays)[len(one.delays) // 2]
         assert usual == (delay if name in BEHIND_A else -delay)
-        side = Side.UNKNOWN if not delay else Side.FIRST if name in BEHIND_A else Side.SECOND
+        side = TapSide.UNKNOWN if not delay else TapSide.FIRST if name in BEHIND_A else TapSide.SECOND
         assert one.side(2 * LINE.char) is side
 
 
@@ -145,13 +166,13 @@ def test_delays_are_those_of_the_stretch(delay: int) -> None:
     ("name", "expected"),
     [
         ("clean", set()),
-        ("onward", {(Place.BETWEEN, 1, Kind.BITS)}),
-        ("back", {(Place.BETWEEN, 0, Kind.LOST)}),
-        ("tap", {(Place.EITHER, 0, Kind.BITS)}),
+        ("onward", {(FaultPlace.BETWEEN, 1, SegmentFaultKind.BITS)}),
+        ("back", {(FaultPlace.BETWEEN, 0, SegmentFaultKind.LOST)}),
+        ("tap", {(FaultPlace.EITHER, 0, SegmentFaultKind.BITS)}),
     ],
 )
 def test_on_a_token_ring_whose_frames_are_all_alike(
-    name: str, adapter: str, expected: set[tuple[Place, int, Kind]]
+    name: str, adapter: str, expected: set[tuple[FaultPlace, int, SegmentFaultKind]]
 ) -> None:
     segment = {
         "clean": Segment(delay=100_000),

@@ -64,6 +64,8 @@ def test_every_capture_has_its_expectation() -> None:
 
 def test_every_rule_has_a_capture_that_shows_it(readings: dict[str, Expected]) -> None:
     shown = {code for reading in readings.values() for code, _ in reading.findings}
+    for told in (CAPTURES / "sites").glob("*.check.txt"):  # what several buses say together
+        shown |= set(re.findall(r"^\S.* \[(SB\d+)\]$", told.read_text(encoding="utf-8"), re.MULTILINE))
     assert sorted(set(all_rules()) - shown) == [], "make one: a case in tests/faults, then tests.faults.make_captures"
     assert sorted(shown - set(all_rules())) == [], "expectations name rules that are no more"
 

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import random
+import struct
 from typing import Any
 
 import pytest
 
+from dissectors.frame import Chunk
+from dissectors.line import LineSettings
+from dissectors.modbus.envelope import seal_rtu
 from dissectors.profiles import Devices, packaged
 from sniff.bus.offline import outputs
 from sniff.bus.rows import Store
 from sniff.engine.engine import Output
 from sniff.engine.follow_settings import dissector_for
+from sniff.engine.session import Session
 from sniff.simulation.scenarios import scenario, simulate
 from sniff.tui.screens.points import age, trend
 
@@ -178,6 +184,35 @@ def test_what_nobody_described_is_guessed(look: Any) -> None:
         assert "guessed u16: sensor" in " ".join(see.text().split())
 
     look(store_of("modbus-rtu", 20, known=False), script, start="points")
+
+
+def test_two_registers_that_are_one_number_are_one_row_with_its_value(look: Any) -> None:
+    """A meter with floats, low word first."""
+    dice = random.Random(4)
+    line, now, items = LineSettings.parse("9600,8E1"), STARTED, []
+    for _ in range(60):
+        words = [word for mean in (230, 5) for word in struct.unpack("<2H", struct.pack("<f", dice.gauss(mean, 0.5)))]
+        for pdu in (b"\7\4\0\0\0\5", struct.pack(">BBB5H", 7, 4, 10, *words, 17)):
+            octets = seal_rtu(pdu)
+            now += 20_000_000 + len(octets) * line.char
+            items.append(Chunk(now, octets))
+        now += 400_000_000
+    session = Session("meter", line, "modbus-rtu", STARTED)
+    store = Store(session, dissector_for(session), devices=Devices({}))
+    for output in outputs(items, session):
+        if isinstance(output, Output):
+            store.add(output)
+
+    async def script(see: Any) -> None:
+        shown = {key: cells(see, key) for key in keys(see)}
+        assert list(shown) == ["7/input/30001", "7/input/30003", "7/input/30005"]
+        assert [row[0] for row in shown.values()] == ["?", "?", ""]
+        value, other, plain = (float(row[3].lstrip("*")) for row in shown.values())
+        assert 225 < value < 235
+        assert 2 < other < 8
+        assert plain == 17
+
+    look(store, script, (100, 30), "points")
 
 
 def test_without_the_plotting_library_there_are_bars(look: Any, monkeypatch: pytest.MonkeyPatch) -> None:

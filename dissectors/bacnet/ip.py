@@ -1,0 +1,258 @@
+"""BACnet/IP: the network layer of MS/TP in UDP datagrams. Each datagram with an NPDU has a twin on an MS/TP bus, whose
+stations are the last octets of the addresses; what it says is what its twin says. Pairing is by ends and invoke number.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from ipaddress import IPv4Address
+from typing import Any
+
+from dissectors.bacnet.envelope import npdu_frame
+from dissectors.bacnet.fields import fields as mstp_fields
+from dissectors.bacnet.header import peek as peek_mstp
+from dissectors.bacnet.ip_framing import ENDS, IP_NAME
+from dissectors.bacnet.message import read
+from dissectors.bacnet.readings import asks as mstp_asks
+from dissectors.bacnet.readings import readings as mstp_readings
+from dissectors.bacnet.text import meant as mstp_meant
+from dissectors.bacnet.text import text as mstp_text
+from dissectors.field_types import FieldType, FieldTypes, Kind
+from dissectors.frame import Check, Event, Frame, Header, Role
+from dissectors.line import NS_PER_S, Timing
+from dissectors.meaning import Meaning
+from dissectors.plain_tracker import closed_exchange
+from dissectors.readings import Reading
+from dissectors.tracker import NOTHING_TRACKED, Placement, Tracked, Transaction, Verdict
+
+FUNCTIONS = {
+    0x00: "result",
+    0x01: "write broadcast distribution table",
+    0x02: "read broadcast distribution table",
+    0x03: "broadcast distribution table",
+    0x04: "forwarded NPDU",
+    0x05: "register foreign device",
+    0x06: "read foreign device table",
+    0x07: "foreign device table",
+    0x08: "delete foreign device",
+    0x09: "distribute broadcast to network",
+    0x0A: "original unicast NPDU",
+    0x0B: "original broadcast NPDU",
+    0x0C: "secure BVLL",
+}
+"""Annex J.2."""
+
+_NPDU_AT = {0x04: 10, 0x09: 4, 0x0A: 4, 0x0B: 4}
+_BROADCASTS = (0x04, 0x09, 0x0B)
+EVERYBODY = 255
+PATIENCE = 60 * NS_PER_S
+"""ns that an answer may take: a router waits for the token of its bus, and devices ask again themselves."""
+MOST_OPEN = 4096
+
+Fields = dict[str, int | float | str]
+
+
+@lru_cache(maxsize=4096)
+def twin(frame: Frame) -> Frame | None:
+    """The MS/TP frame with the same NPDU; None where there is no NPDU, or not all of it came."""
+    octets = frame.octets
+    at = _NPDU_AT.get(octets[ENDS + 1]) if len(octets) > ENDS + 4 else None
+    if at is None or not frame.ok or len(octets) < ENDS + at + 2:
+        return None
+    npdu = octets[ENDS + at :]
+    source, destination = ends(frame)
+    if octets[ENDS + 1] == 0x04:
+        source = octets[ENDS + 7]  # of the device whose broadcast a router passes on
+    made = npdu_frame(destination, source, npdu, bool(npdu[1] & 4))
+    return replace(frame, protocol="mstp", octets=made, check=Check.GOOD, expected=None)
+
+
+def ends(frame: Frame) -> tuple[int, int]:
+    """Source and destination as stations."""
+    octets = frame.octets.ljust(ENDS, b"\0")
+    function = octets[ENDS + 1] if len(octets) > ENDS + 1 else None
+    return octets[3], EVERYBODY if function in _BROADCASTS else octets[9]
+
+
+def peek_ip(frame: Frame) -> Header:
+    """The header of a frame. Total."""
+    same = twin(frame)
+    if same is not None:
+        return replace(peek_mstp(same), protocol=IP_NAME)
+    source, destination = ends(frame)
+    kind = FUNCTIONS.get(frame.octets[ENDS + 1], "unknown function") if len(frame.octets) > ENDS + 1 else "nothing"
+    error = None if frame.ok else "datagram cut short"
+    return Header(
+        IP_NAME, source, destination, Role.DATA if frame.ok else Role.UNKNOWN, kind.replace(" ", "-").lower(),
+        ok=frame.ok, error=error,
+    )  # fmt: skip
+
+
+def ip_text(frame: Frame, header: Header, role: Role) -> str:
+    """One line about a frame. Total."""
+    same = twin(frame)
+    if same is not None:
+        return f"{mstp_text(same, header, role)}{_behind(frame)}"
+    error = f" [{header.error}]" if header.error else ""
+    return f"{header.source} → {header.destination} {header.kind.replace('-', ' ')}{error}{_behind(frame)}"
+
+
+def ip_meant(frame: Frame, header: Header, role: Role, meaning: Meaning) -> str:
+    """The same, what it means to its device first. Total."""
+    same = twin(frame)
+    if same is None:
+        return ip_text(frame, header, role)
+    return f"{mstp_meant(same, header, role, meaning)}{_behind(frame)}"
+
+
+def _behind(frame: Frame) -> str:
+    """Who speaks to whom in full."""
+    octets = frame.octets
+    return f"  {IPv4Address(octets[:4])} → {IPv4Address(octets[6:10])}" if len(octets) >= ENDS else ""
+
+
+def ip_fields(frame: Frame, role: Role) -> Fields:
+    """Its fields in frame order, under Wireshark's names. Total."""
+    octets, found = frame.octets, Fields()
+    if len(octets) >= ENDS:
+        found["ip.src"], found["ip.dst"] = str(IPv4Address(octets[:4])), str(IPv4Address(octets[6:10]))
+    for name, begin, end in (("type", 0, 1), ("function", 1, 2), ("length", 2, 4)):
+        if len(octets) >= ENDS + end:
+            found[f"bvlc.{name}"] = int.from_bytes(octets[ENDS + begin : ENDS + end], "big")
+    same = twin(frame)
+    told = mstp_fields(same, role) if same is not None else {}
+    return found | {name: value for name, value in told.items() if not name.startswith("mstp.")}
+
+
+def ip_types() -> FieldTypes:
+    """The types of its fields, by name."""
+    from dissectors.bacnet.field_types import types
+
+    return {
+        "ip.src": FieldType(Kind.TEXT, "address of who sends"),
+        "ip.dst": FieldType(Kind.TEXT, "address of who is spoken to"),
+        "bvlc.type": FieldType(Kind.NUMBER, "81 for IP"),
+        "bvlc.function": FieldType(Kind.NUMBER, "what it is", {name: code for code, name in FUNCTIONS.items()}),
+        "bvlc.length": FieldType(Kind.NUMBER, "octets of the datagram"),
+        **{name: kind for name, kind in types().items() if not name.startswith("mstp.")},
+    }
+
+
+def ip_readings(request: Frame | None, response: Frame | None) -> tuple[Reading, ...]:
+    """See `dissectors.readings.Readings`."""
+    first = None if request is None else twin(request)
+    second = None if response is None else twin(response)
+    if (request is not None and first is None) or (response is not None and second is None):
+        return ()
+    return mstp_readings(first, second)
+
+
+def ip_asks(frame: Frame) -> tuple[Reading, ...]:
+    """See `dissectors.readings.Asks`."""
+    same = twin(frame)
+    return () if same is None else mstp_asks(same)
+
+
+def ip_bits(frame: Frame) -> float:
+    """Evidence of a whole frame: type, function and length of a datagram."""
+    return 24.0 if frame.ok else 0.0
+
+
+def ip_packet(frame: Frame, role: Role) -> Any:
+    """The scapy packet. Never raises."""
+    from scapy.packet import Raw
+
+    from dissectors.bacnet.ip_packets import dissect
+
+    return dissect(frame) if len(frame.octets) > ENDS + 4 else Raw(frame.octets)
+
+
+# -- pairing ---------------------------------------------------------------------------------------------------
+
+_Key = tuple[bytes, bytes, int]  # who asks, who is asked, invoke number
+
+
+@dataclass(frozen=True, slots=True)
+class _Asked:
+    """See `plain_tracker.Request`."""
+
+    id: int
+    no: int
+    frame: Frame
+    header: Header
+    attempt: int = 1
+    of: int | None = None
+
+
+class IpTracker:
+    """The tracker of one network: a confirmed request is answered under its invoke number."""
+
+    def __init__(self, timing: Timing) -> None:
+        self._patience = PATIENCE + timing.latency
+        self._tx = 0
+        self._open: dict[_Key, _Asked] = {}
+
+    def track(self, no: int, event: Event, header: Header | None) -> Tracked:
+        """Take the next event."""
+        if header is None or not isinstance(event, Frame):
+            return NOTHING_TRACKED
+        before = self.advance(event.start)
+        same = twin(event)
+        message = read(same) if same is not None else None
+        apdu = message.apdu if message is not None else None
+        if apdu is not None and apdu.invoke_id is not None:
+            here, there = event.octets[:6], event.octets[6:12]
+            if apdu.is_request and not apdu.sequence:
+                return self._ask(no, event, header, (here, there, apdu.invoke_id), before)
+            if apdu.is_answer and apdu.service is not None and not apdu.sequence:
+                return self._answer(no, event, header, (there, here, apdu.invoke_id), before)
+        self._tx += 1
+        verdict = Verdict.BROADCAST if header.role is Role.BROADCAST else Verdict.DATA
+        closed = Transaction(self._tx, header.source, header.kind, no, None, verdict, event.start, event.end)
+        placed = Placement(no, self._tx, header.role, header.source, header.destination)
+        return Tracked(placed, (*before, closed))
+
+    def advance(self, now: int) -> tuple[Transaction, ...]:
+        """Say that nothing came up to `now` (ns)."""
+        late = []
+        for key, asked in self._open.items():  # the oldest first
+            if now - asked.frame.end <= self._patience:
+                break
+            late.append(key)
+        return tuple(closed_exchange(self._open.pop(key), Verdict.NO_RESPONSE) for key in late)
+
+    def close(self) -> tuple[Transaction, ...]:
+        """End of capture: answers could still have come."""
+        waiting, self._open = list(self._open.values()), {}
+        return tuple(closed_exchange(asked, Verdict.OPEN) for asked in waiting)
+
+    def _ask(self, no: int, frame: Frame, header: Header, key: _Key, before: tuple[Transaction, ...]) -> Tracked:
+        last = self._open.pop(key, None)
+        if last is not None:
+            before += (closed_exchange(last, Verdict.NO_RESPONSE),)
+        elif len(self._open) >= MOST_OPEN:
+            before += (closed_exchange(self._open.pop(next(iter(self._open))), Verdict.NO_RESPONSE),)
+        self._tx += 1
+        again = last is not None and last.frame.octets == frame.octets
+        attempt, of = (last.attempt + 1, last.of or last.id) if last is not None and again else (1, None)
+        self._open[key] = _Asked(self._tx, no, frame, header, attempt, of)
+        return Tracked(Placement(no, self._tx, Role.REQUEST, header.source, header.destination), before)
+
+    def _answer(self, no: int, frame: Frame, header: Header, key: _Key, before: tuple[Transaction, ...]) -> Tracked:
+        asked = self._open.pop(key, None)
+        if asked is None:
+            self._tx += 1
+            closed = Transaction(
+                self._tx, header.source, header.kind, None, no, Verdict.UNSOLICITED, frame.start, frame.end,
+                error=header.error,
+            )  # fmt: skip
+            return Tracked(Placement(no, self._tx, Role.RESPONSE, header.source, header.destination), (*before, closed))
+        verdict = Verdict.ANSWERED if asked.attempt == 1 else Verdict.RETRY
+        closed = closed_exchange(asked, Verdict.EXCEPTION if header.error else verdict, no, frame, header.error)
+        return Tracked(Placement(no, asked.id, Role.RESPONSE, header.source, header.destination), (*before, closed))
+
+
+def make_ip(source: bytes, destination: bytes, function: int, npdu: bytes) -> bytes:
+    """The frame of two ends (address and port, six octets each), a function and an NPDU."""
+    return source + destination + bytes((0x81, function)) + (4 + len(npdu)).to_bytes(2, "big") + npdu

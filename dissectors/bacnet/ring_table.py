@@ -1,0 +1,109 @@
+"""The MS/TP ring in words and table rows, one row a master."""
+
+from __future__ import annotations
+
+from dissectors.bacnet.ring import Ring, RingEventKind
+from dissectors.histogram import Histogram
+from dissectors.line import MS
+from dissectors.token_ring import Cell
+from dissectors.words import milliseconds
+
+HEADINGS = (
+    "MAC",
+    "next",
+    "tokens",
+    "retries",
+    "lost",
+    "loop p50 ms",
+    "loop max ms",
+    "use p50 ms",
+    "use p95 ms",
+    "use max ms",
+    "reply p50 ms",
+    "reply p95 ms",
+    "reply max ms",
+    "postponed",
+    "frames/hold",
+    "polls unanswered",
+    "polled to",
+    "damaged",
+)
+
+
+def rows(ring: Ring) -> list[tuple[Cell, ...]]:
+    """One row a master, in the order of the ring, then those outside it by address."""
+    order = ring.order
+    outside = tuple(mac for mac in ring.masters if mac not in order)
+    following = dict(zip(order, order[1:] + order[:1], strict=True))
+    return [_row(ring, mac, following.get(mac)) for mac in order + outside if mac in ring.nodes]
+
+
+def _row(ring: Ring, mac: int, following: int | None) -> tuple[Cell, ...]:
+    node = ring.nodes[mac]
+    return (
+        mac,
+        following,
+        node.tokens_sent,
+        sum(edge.retries for (source, _), edge in ring.edges.items() if source == mac),
+        ring.of(RingEventKind.LOST_TOKEN, mac).count,
+        _ms(node.loop, 0.5),
+        _ms(node.loop, 1),
+        _ms(node.use, 0.5),
+        _ms(node.use, 0.95),
+        _ms(node.use, 1),
+        _ms(node.reply, 0.5),
+        _ms(node.reply, 0.95),
+        _ms(node.reply, 1),
+        node.postponed,
+        node.most_in_a_hold,
+        node.polls_unanswered,
+        node.highest_polled if node.highest_polled >= 0 else None,
+        node.damaged,
+    )
+
+
+def sentences(ring: Ring) -> list[str]:
+    """The ring as a whole: order, loop time, waste, what cannot be judged, what happened, advice."""
+    order = ring.order
+    said = [
+        f"ring of {len(order)}: {' → '.join(map(str, (*order, order[0])))}" if order else "no closed ring seen",
+        f"{ring.frames} frames in {ring.span / 1e9:.1f} s; bus load {ring.load:.1%}",
+        f"unanswered polls for masters take {ring.poll_waste_share:.1%} of the time",
+    ]
+    said += _users(ring)
+    predicted = ring.predicted_loop
+    if predicted is not None:
+        least = "" if ring.limits["token use"] else "at least "
+        said.append(f"an idle round should take {least}{milliseconds(predicted)}")
+    bound = milliseconds(ring.timing.latency)
+    said += [
+        f"{name} against the standard's limit: not measurable, this adapter may hold octets back up to {bound}"
+        for name, possible in ring.limits.items()
+        if not possible
+    ]
+    counts: dict[RingEventKind, int] = {}
+    for (what, _), happened in ring.happened.items():
+        counts[what] = counts.get(what, 0) + happened.count
+    said += [f"{count} × {what.value}" for what, count in counts.items() if count]
+    return said + list(ring.advice())
+
+
+def _users(ring: Ring) -> list[str]:
+    """Who has the token for how much of the time, and how many broadcasts there are."""
+    held = sorted(((node.held, mac) for mac, node in ring.nodes.items() if node.held), reverse=True)
+    said = []
+    if held and ring.span:
+        shares = ", ".join(
+            f"MAC {mac} {time / ring.span:.0%} (up to {ring.nodes[mac].most_in_a_hold} frames a token)"
+            for time, mac in held[:3]
+        )
+        said.append(f"the token is longest with {shares}")
+    broadcasts = sum(node.broadcasts_sent for node in ring.nodes.values())
+    if broadcasts and ring.span:
+        said.append(f"{broadcasts} broadcasts, {broadcasts / (ring.span / 1e9):.1f} a second")
+    return said
+
+
+def _ms(durations: Histogram, share: float) -> float | None:
+    value = durations.most if share == 1 else durations.quantile(share)
+    return None if value is None else value / MS

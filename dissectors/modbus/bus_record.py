@@ -1,0 +1,120 @@
+"""The record of a Modbus line as a whole: what `observer.py` gathers and `rules_bus.py` judges."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from dissectors.findings import Tally
+from dissectors.frame import Flaw
+from dissectors.line import NS_PER_S, Timing
+from dissectors.modbus.station_record import Cycles, StationRecord
+from dissectors.strikes import Strikes
+
+_SENDERS_KEPT = 300
+_SCAN_LEAST = 4
+_CLOSE_KEPT = 4096
+_LATE_KEPT = 4096
+
+PAUSE_MARGIN = 5
+"""So many times the adapter's delay must fit into 1.5 characters before pauses inside frames are judged."""
+
+
+def _no_words(unit: int, code: int) -> str:
+    return ""
+
+
+@dataclass(slots=True)
+class BusRecord:
+    """What was seen on the bus. Times are ns.
+
+    `hasty`: requests after another that nothing had followed: (longest reading of the silence between, unit asked
+    before, time, frame before, frame). `broken_in`: the same of
+    damaged frames that begin as a request to another station. `close`, `paused`, `bare_ends`: by sender; of the first,
+    (time, frame before, frame). `bare_ends`: ASCII frames without their LF.
+    `asked_twice`: second answers to requests that were heard twice, one directly behind the other.
+    `malformed`: requests that contradict themselves, with the exceptions they got. `to_nobody`: reads of address 0, and
+    who answered. `cut_echoes`: requests given back in part. `octets`, `frames`: of each sender ("master", "station 3").
+    `late_frames`: answers that came too late. `broadcast_answers`: who answered broadcasts. `pairs`: (unit asked, unit
+    that answered); `repeated_elsewhere`: repeats of requests that such a pair is about, by unit asked.
+    `maker_words`: unit and exception code → what the maker of the device says of it, empty where not known.
+    """
+
+    timing: Timing
+    first: int | None = None
+    now: int = 0
+    requests: int = 0
+    answers: int = 0
+    echoes: int = 0
+    stations: dict[int, StationRecord] = field(default_factory=dict)
+    damaged_requests: Tally = field(default_factory=Tally)
+    strikes: Strikes = field(default_factory=Strikes)  # "master", "station 3" …
+    unasked: Tally = field(default_factory=Tally)
+    asked_twice: Tally = field(default_factory=Tally)
+    answers_to_broadcast: Tally = field(default_factory=Tally)
+    noise_after_broadcast: Tally = field(default_factory=Tally)
+    hasty: list[tuple[int, int, int, int, int]] = field(default_factory=list)
+    broken_in: list[tuple[int, int, int, int, int]] = field(default_factory=list)
+    close: dict[str, list[tuple[int, int, int]]] = field(default_factory=dict)
+    paused: dict[str, Tally] = field(default_factory=dict)
+    bare_ends: dict[str, Tally] = field(default_factory=dict)
+    pairs: dict[tuple[int, int], Tally] = field(default_factory=dict)
+    repeated_elsewhere: Counter[int] = field(default_factory=Counter)
+    malformed: Tally = field(default_factory=Tally)
+    malformed_words: Counter[str] = field(default_factory=Counter)
+    malformed_codes: Counter[int] = field(default_factory=Counter)
+    to_nobody: Tally = field(default_factory=Tally)
+    for_nobody: Counter[int] = field(default_factory=Counter)
+    cut_echoes: Tally = field(default_factory=Tally)
+    requests_damaged_by: dict[Flaw, Tally] = field(default_factory=dict)
+    octets: Counter[str] = field(default_factory=Counter)
+    frames: Counter[str] = field(default_factory=Counter)
+    late_frames: set[int] = field(default_factory=set)
+    broadcast_answers: Counter[int] = field(default_factory=Counter)
+    cycles: Cycles = field(default_factory=Cycles)
+    maker_words: Callable[[int, int], str] = _no_words
+
+    @property
+    def span(self) -> int:
+        """From the first octet to the last, ns; at least 1."""
+        return max(1, self.now - (self.first or 0))
+
+    @property
+    def judges_pauses(self) -> bool:
+        """Whether a pause inside a frame is the sender's: a busy computer goes well over what its adapter may add."""
+        return PAUSE_MARGIN * self.timing.latency <= self.timing.t15
+
+    def scanned(self) -> list[int]:
+        """Addresses that were tried once and are nobody's, where the master tried so many that it was searching."""
+        tried = [unit for unit, station in self.stations.items() if not station.answered and station.turns == 1]
+        silent = [unit for unit in tried if self.stations[unit].missing.count == self.stations[unit].asked]
+        return sorted(silent) if len(silent) >= _SCAN_LEAST else []
+
+    def is_scanned(self, unit: int) -> bool:
+        """Whether an address is one of those."""
+        return unit in self.scanned()
+
+    def too_close(self, sender: str, time: int, before: int, no: int) -> None:
+        """Note a frame that began too soon after the one before."""
+        calls = self.close.setdefault(sender, [])
+        if len(calls) < _CLOSE_KEPT:
+            calls.append((time, before, no))
+
+    def late(self, no: int | None) -> None:
+        """Note an answer that came too late."""
+        if no is not None and len(self.late_frames) < _LATE_KEPT:
+            self.late_frames.add(no)
+
+    def pair(self, pair: tuple[int, int]) -> Tally:
+        """The record of one unit that answers for another."""
+        return self.pairs.setdefault(pair, Tally()) if len(self.pairs) < _SENDERS_KEPT else self.unasked
+
+    def gap_tally(self, by_sender: dict[str, Tally], sender: str) -> Tally:
+        """The record of one sender's gaps."""
+        return by_sender.setdefault(sender, Tally())
+
+    def rare(self, count: int, of: int) -> bool:
+        """Whether so few are not worth a warning: one, or under 1 in 100 and at most two a minute."""
+        minutes = max(1, -(-self.span // (60 * NS_PER_S)))
+        return count == 1 or (count <= 2 * minutes and 100 * count < of)

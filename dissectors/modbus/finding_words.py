@@ -1,0 +1,38 @@
+"""Numbers and words of the Modbus findings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from math import sqrt
+
+from dissectors.findings import Severity
+from dissectors.modbus.station_record import Key
+
+
+def wilson(count: int, of: int) -> tuple[float, float]:
+    """95 % confidence interval of a share (Wilson 1927); (0, 1) of nothing."""
+    if of <= 0:
+        return 0.0, 1.0
+    z = 1.96
+    share = min(1.0, count / of)
+    middle = (share + z * z / (2 * of)) / (1 + z * z / of)
+    half = z * sqrt(share * (1 - share) / of + z * z / (4 * of * of)) / (1 + z * z / of)
+    return max(0.0, middle - half), min(1.0, middle + half)
+
+
+def request_words(key: Key) -> str:
+    """ "read holding registers from 0x2520"."""
+    kind, address = key
+    return kind.replace("-", " ") + (f" from 0x{address:04X}" if address is not None else "")
+
+
+def units(units: Iterable[int]) -> str:
+    """ "station 3", "stations 3, 4"; at most eight by number."""
+    numbers = sorted(units)
+    shown = ", ".join(map(str, numbers[:8])) + (" …" if len(numbers) > 8 else "")
+    return f"station{'s' if len(numbers) > 1 else ''} {shown}"
+
+
+def note_if(condition: bool) -> Severity | None:
+    """The severity of what is not worth more than a note; None, the rule's own, for all else."""
+    return Severity.NOTE if condition else None

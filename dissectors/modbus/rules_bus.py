@@ -1,0 +1,268 @@
+"""The rules of a Modbus line as a whole, in words. Pure: `BusRecord` in, findings out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from dissectors.findings import Finding, Severity, Tally, counted, found, times
+from dissectors.line import MS
+from dissectors.modbus.bus_record import BusRecord
+from dissectors.modbus.damage_shares import DamageShare, shares_of_damage, to_blame
+from dissectors.modbus.finding_words import note_if, request_words, units
+from dissectors.modbus.rules import RULES
+from dissectors.modbus.rules_station import FLAWS, is_absent, of_station
+from dissectors.words import duration, fine_milliseconds
+
+_WASTE = 0.05
+_HABIT = 10  # a sender that is too quick is so once in so many frames at least; what a computer holds up is rarer
+_HABIT_LEAST = 6
+_PAUSES_LEAST = 3
+_BARE_LEAST = 3
+_MASTERS_LEAST = 3
+_CUT_LEAST = 3
+_COMMON_LEAST = 3
+
+
+def judge(seen: BusRecord, timeout: int | None) -> tuple[Finding, ...]:
+    """All findings: the bus first, then station by station. `timeout`: the master's, ns, None while unlearnt."""
+    damage = shares_of_damage(seen)
+    made = [
+        *_of_bus(seen, "master" in damage.blamed),
+        *_of_masters(seen),
+        *_of_gaps(seen),
+        *_of_ends(seen),
+        *_common_damage(seen, damage),
+    ]
+    for unit in sorted(seen.stations):
+        made += of_station(seen, unit, seen.stations[unit], timeout, f"station {unit}" not in damage.blamed)
+    return tuple(made)
+
+
+# ---- the bus
+
+
+def _of_bus(seen: BusRecord, is_blamed: bool) -> Iterator[Finding]:
+    requests = sum(station.asked for station in seen.stations.values()) + seen.damaged_requests.count
+    damaged = seen.damaged_requests
+    if damaged.count:
+        words = f"{damaged.count} of {counted(requests, 'request')} damaged"
+        yield damaged.found(
+            RULES["MB009"], "master", words, note_if(seen.rare(damaged.count, requests) or not is_blamed)
+        )
+    yield from _of_requests(seen)
+    scanned = seen.scanned()
+    if scanned:
+        words = f"{len(scanned)} addresses asked once and silent, {scanned[0]} to {scanned[-1]}"
+        first = min(seen.stations[unit].missing.first for unit in scanned)
+        last = max(seen.stations[unit].missing.last for unit in scanned)
+        yield found(RULES["MB402"], "bus", words, first=first, last=last, count=len(scanned))
+    absent = {
+        unit: station
+        for unit, station in seen.stations.items()
+        if is_absent(station) and station.missing.count > 1 and unit not in scanned
+    }
+    waited = sum(station.waited for station in absent.values())
+    if waited:
+        share = waited / seen.span
+        words = f"{share:.0%} of the time ({duration(waited)}) went into waiting for {units(absent)}"
+        severity = Severity.WARNING if share > _WASTE else None
+        first = min(station.missing.first for station in absent.values())
+        last = max(station.missing.last for station in absent.values())
+        count = sum(station.missing.count for station in absent.values())
+        evidence = tuple(sorted(no for station in absent.values() for no in station.missing.evidence))
+        yield found(
+            RULES["MB105"], "bus", words, first=first, last=last, count=count, evidence=evidence, severity=severity
+        )
+    broadcast = seen.answers_to_broadcast
+    if broadcast.count or seen.noise_after_broadcast.count >= 3:
+        tally = broadcast if broadcast.count else seen.noise_after_broadcast
+        what = counted(tally.count, "frame") if broadcast.count else f"octets that are no frame, {times(tally.count)},"
+        words = f"{what} directly after a broadcast"
+        if seen.broadcast_answers:
+            words += f", from {units(seen.broadcast_answers)}"
+        new = [unit for unit in seen.broadcast_answers if unit not in seen.stations or not seen.stations[unit].asked]
+        if new:
+            words += f"; {units(new)} {'was' if len(new) == 1 else 'were'} never asked for anything"
+        yield tally.found(RULES["MB204"], "bus", words, note_if(tally.count == 1))
+    for (asked, answered), tally in sorted(seen.pairs.items()):
+        if tally.count >= 2:
+            words = f"{tally.count} requests to station {asked} answered by station {answered}"
+            repeated = seen.repeated_elsewhere[asked]
+            words += f"; the master asked again {times(repeated)}" if repeated else "; the master never asked again"
+            yield tally.found(RULES["MB206"], f"station {asked}", words, note_if(not repeated))
+    unasked = seen.unasked
+    if unasked.count:
+        words = f"{unasked.count} of {counted(seen.answers, 'answer')} came unasked"
+        many = unasked.count >= 3 and 100 * unasked.count >= seen.answers
+        yield unasked.found(RULES["MB207"], "bus", words, Severity.WARNING if many else None)
+    yield from _cycle(seen)
+
+
+def _of_requests(seen: BusRecord) -> Iterator[Finding]:
+    """What is wrong with what the master sends, and what its own adapter makes of it."""
+    malformed = seen.malformed
+    if malformed.count:
+        why, _ = seen.malformed_words.most_common(1)[0] if seen.malformed_words else ("", 0)
+        words = f"{counted(malformed.count, 'request')} that cannot be carried out: {why}"
+        refused = sum(seen.malformed_codes.values())
+        words += f"; refused {times(refused)}, rightly" if refused else ""
+        yield malformed.found(RULES["MB016"], "master", words)
+    nobody = seen.to_nobody
+    if nobody.count:
+        words = f"{counted(nobody.count, 'read')} of address 0, which is no station's"
+        following = RULES["MB017"].next
+        if seen.for_nobody:
+            words += f"; {units(seen.for_nobody)} answered {times(sum(seen.for_nobody.values()))}"
+        if len(seen.for_nobody) == 1:
+            following = f"set the unit number in the master to {next(iter(seen.for_nobody))}"
+        yield replace(nobody.found(RULES["MB017"], "master", words), next=following)
+    cut = seen.cut_echoes
+    if cut.count >= _CUT_LEAST and 2 * cut.count >= seen.requests:
+        words = f"{cut.count} of {counted(seen.requests, 'request')} came back at once, and not whole"
+        yield cut.found(RULES["MB013"], "bus", words)
+    echoed = {unit: s.echoed for unit, s in seen.stations.items() if s.asked >= 3}
+    copying = [unit for unit, count in echoed.items() if 10 * count >= 9 * seen.stations[unit].asked]
+    if len(copying) == 1 and len(echoed) > 1 and sum(echoed.values()) == echoed[copying[0]]:
+        station = seen.stations[copying[0]]
+        words = f"{station.echoed} of {counted(station.asked, 'request')} came back from it before its answer"
+        first, last = seen.first or 0, station.last_heard or 0
+        name = f"station {copying[0]}"
+        yield found(RULES["MB018"], name, words, first=first, last=last, count=station.echoed)
+    for flaw, tally in seen.requests_damaged_by.items():
+        if tally.count >= _CUT_LEAST and 2 * tally.count >= seen.damaged_requests.count:
+            words = f"{counted(tally.count, 'request')} good but for one thing: {flaw.value}"
+            severity = note_if(seen.rare(tally.count, seen.requests))
+            yield tally.found(RULES[FLAWS[flaw]], "master", words, severity)
+
+
+def _of_masters(seen: BusRecord) -> Iterator[Finding]:
+    """Requests into the wait of another, sooner than the station asked has ever answered.
+
+    An answer that this tap missed cannot have come before, and a master that never waits sends after the same time
+    always: both are left out.
+    """
+    alive = {unit: s for unit, s in seen.stations.items() if s.answered >= 3 and 2 * s.answered > s.asked}
+
+    def too_soon(row: tuple[int, int, int, int, int]) -> bool:
+        return row[1] in alive and 10 * row[0] < 9 * alive[row[1]].times.soonest()
+
+    hasty, broken_in = list(filter(too_soon, seen.hasty)), list(filter(too_soon, seen.broken_in))
+    gaps = sorted(row[0] for row in (*hasty, *broken_in))
+    if len(gaps) < _MASTERS_LEAST:
+        yield from _asked_twice(seen)
+        return
+    same = MS + seen.timing.latency
+    habitual = max(sum(abs(one - gap) <= same for one in gaps) for gap in gaps)
+    if not broken_in and len(gaps) >= _HABIT_LEAST and 4 * habitual > 3 * len(gaps):
+        return
+    tally = Tally()
+    for _, _, time, before, no in sorted((*hasty, *broken_in), key=lambda row: row[2]):
+        tally.add(time, before, no)
+    words = f"{len(gaps)} requests came while another one waited for a station that answers, and never so soon"
+    if gaps[len(gaps) // 2] < 10 * MS:
+        words += f"; half of them within {fine_milliseconds(gaps[len(gaps) // 2])}"
+    yield tally.found(RULES["MB203"], "bus", words)
+
+
+def _asked_twice(seen: BusRecord) -> Iterator[Finding]:
+    """Requests that came twice at once, and had two answers: no echo is answered, and no master repeats so soon.
+
+    Not where copies are usual, as behind a repeater, or where answers come twice to requests that do not.
+    """
+    twice = seen.asked_twice
+    usual = _HABIT * twice.count > seen.requests or 2 * twice.count < seen.echoes
+    if twice.count < _MASTERS_LEAST or usual or any(station.twice.count for station in seen.stations.values()):
+        return
+    words = f"{counted(twice.count, 'request')} came twice, one directly behind the other, and had two answers each"
+    yield twice.found(RULES["MB203"], "bus", words)
+
+
+def _of_gaps(seen: BusRecord) -> Iterator[Finding]:
+    timing = seen.timing
+    for sender, calls in sorted(seen.close.items()):
+        tally = Tally()
+        for time, before, no in calls:
+            if before not in seen.late_frames and no not in seen.late_frames:
+                tally.add(time, before, no)
+        if tally.count >= 3 and _HABIT * tally.count >= seen.frames[sender]:
+            words = f"{tally.count} frames began less than {fine_milliseconds(timing.t35)} after the frame before"
+            yield tally.found(RULES["MB301"], sender, words)
+    paused = seen.paused if seen.judges_pauses else {}
+    hits = {sender: tally.count for sender, tally in paused.items()}
+    blamed = to_blame(hits, {sender: max(1, seen.frames[sender]) for sender in hits}) if len(hits) > 1 else set(hits)
+    common = [paused[sender] for sender in sorted(hits) if sender not in blamed]
+    if len(common) > 1 and sum(tally.count for tally in common) >= _PAUSES_LEAST:
+        count = sum(tally.count for tally in common)
+        words = f"{count} frames of {len(common)} senders with over {fine_milliseconds(timing.t15)} of silence inside"
+        evidence = tuple(sorted(no for tally in common for no in tally.evidence))
+        yield found(
+            RULES["MB304"], "adapter", words, first=seen.first or 0, last=seen.now, count=count, evidence=evidence
+        )
+    paused = {sender: paused[sender] for sender in blamed if paused[sender].count >= _PAUSES_LEAST}
+    for sender, tally in sorted(paused.items()):
+        words = f"{tally.count} frames with over {fine_milliseconds(timing.t15)} of silence inside"
+        yield tally.found(RULES["MB302"], sender, words)
+    if not seen.judges_pauses and seen.stations:
+        words = (
+            f"the adapter may hold octets back for {fine_milliseconds(timing.latency)}; limits are "
+            f"{fine_milliseconds(timing.t15)} inside a frame and {fine_milliseconds(timing.t35)} between frames"
+        )
+        yield found(RULES["MB303"], "adapter", words, first=seen.first or 0, last=seen.now)
+
+
+def _of_ends(seen: BusRecord) -> Iterator[Finding]:
+    """Frames without LF: of those who leave it out while others send it; where all do, it is how this bus speaks."""
+    habits = {
+        sender: tally
+        for sender, tally in sorted(seen.bare_ends.items())
+        if tally.count >= _BARE_LEAST and _HABIT * tally.count >= seen.frames[sender]
+    }
+    if len(habits) > 1 and len(habits) == len(seen.frames):
+        count = sum(tally.count for tally in habits.values())
+        words = f"{counted(count, 'frame')} end with CR alone, whoever sends"
+        evidence = tuple(sorted(no for tally in habits.values() for no in tally.evidence))
+        first, last = min(one.first for one in habits.values()), max(one.last for one in habits.values())
+        severity = Severity.NOTE
+        yield found(
+            RULES["MB019"], "bus", words, first=first, last=last, count=count, evidence=evidence, severity=severity
+        )
+        return
+    for sender, tally in habits.items():
+        words = f"{tally.count} of {counted(seen.frames[sender], 'frame')} end with CR alone"
+        yield tally.found(RULES["MB019"], sender, words)
+
+
+def _common_damage(seen: BusRecord, damage: DamageShare) -> list[Finding]:
+    """What is damaged of senders none of which surely has more of it than its share."""
+    hits, struck = damage.common, [int(sender.split()[1]) for sender in damage.common if sender != "master"]
+    damaged = sum(hits.values())
+    if not struck or damaged < _COMMON_LEAST:
+        return []
+    asked = sum(seen.stations[unit].asked for unit in struck)
+    answers = damaged - hits.get("master", 0)
+    tally = Tally()
+    for unit in struck:
+        for no in seen.stations[unit].damaged.evidence:
+            tally.add(seen.stations[unit].damaged.first, no)
+    words = f"{answers} of {counted(asked, 'answer')} damaged ({answers / max(1, asked):.1%}), of {units(struck)}"
+    if "master" in hits:
+        words += f", and {counted(hits['master'], 'request')}"
+    words += (
+        ": of each about as much as it sends" if len(hits) > 1 else ": too few, and too close together, to say whose"
+    )
+    finding = tally.found(RULES["MB007"], "bus", words, note_if(seen.rare(damaged, asked)))
+    last = max(seen.stations[unit].damaged.last for unit in struck)
+    return [replace(finding, count=answers, last=last)]
+
+
+def _cycle(seen: BusRecord) -> Iterator[Finding]:
+    usual = seen.cycles.usual()
+    if usual is None or len(usual[2]) < 4:
+        return
+    unit, key, periods = usual
+    low, median, high = (periods[len(periods) * part // 100] for part in (5, 50, 95))
+    words = f"the master comes back to station {unit} ({request_words(key)}) every {duration(median)}"
+    if high - low > max(median // 50, 2 * seen.timing.latency, MS):
+        words += f"; 9 of 10 times after {duration(low)} to {duration(high)}"
+    yield found(RULES["MB401"], "bus", words, first=seen.first or 0, last=seen.now, count=len(periods))

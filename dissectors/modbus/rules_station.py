@@ -1,0 +1,294 @@
+"""The rules of one Modbus station, in words. Pure: `StationRecord` in, findings out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+from dissectors.findings import Finding, Severity, Tally, counted, found, times
+from dissectors.frame import Flaw
+from dissectors.line import MS
+from dissectors.modbus.bus_record import BusRecord
+from dissectors.modbus.finding_words import note_if, request_words, wilson
+from dissectors.modbus.functions import EXCEPTIONS as EXCEPTION_NAMES
+from dissectors.modbus.response_groups import AnsweredRequest
+from dissectors.modbus.rules import EXCEPTIONS, MAKER_EXCEPTION, RULES, USED_ALIKE, VENDOR_EXCEPTION
+from dissectors.modbus.station_record import Key, Requested, StationRecord, middle
+from dissectors.words import duration, fine_milliseconds
+
+SILENT_AT_END = 5
+"""Unanswered requests in a row to the end, from which on a station that used to answer has fallen silent."""
+
+FLAWS = {
+    Flaw.CHECK_SWAPPED: "MB011",
+    Flaw.FIRST_MISSING: "MB012",
+    Flaw.FIRST_SPOILT: "MB012",
+    Flaw.LAST_MISSING: "MB006",
+    Flaw.LAST_TWO_MISSING: "MB006",
+    Flaw.LAST_SPOILT: "MB006",
+}
+"""The rule about each kind of damage that is always the same."""
+
+_SYSTEM_LEAST = 3  # of one kind, before it is a system
+_EXCESS_SPREAD = 2  # octets
+_HEX_SHOWN = 16
+_REPEATS_COST = 0.02
+_REPEATS_LEAST = 3  # fewer are no habit, however short the capture
+
+
+def of_station(
+    seen: BusRecord, unit: int, station: StationRecord, timeout: int | None, is_common: bool
+) -> Iterator[Finding]:
+    name = f"station {unit}"
+    yield from _missing(seen, name, unit, station)
+    foreign = _foreign(seen, name, station)
+    systematic = [*_flawed(seen, name, station), *([foreign] if foreign else [])]
+    yield from systematic
+    explained = sum(finding.count for finding in systematic)
+    if 4 * explained < 3 * station.damaged.count:
+        yield from _damaged(seen, name, station, is_common)
+    for (key, code), tally in sorted(station.exceptions.items(), key=lambda item: str(item[0])):
+        yield _exception(name, station, key, code, tally, seen.maker_words(unit, code))
+    if station.unfit.count:
+        why, _ = station.unfit_words.most_common(1)[0] if station.unfit_words else ("", 0)
+        words = f"{station.unfit.count} of {counted(station.answered, 'answer')} not as asked for: {why}"
+        yield station.unfit.found(RULES["MB010"], name, words, note_if(station.unfit.count == 1))
+    yield from _times(name, station, timeout, seen, is_common)
+    if station.twice.count:
+        words = f"a second answer came to {counted(station.twice.count, 'request')}"
+        slow = station.twice.count <= station.late.count  # two tries, two answers: the first one came late
+        yield _twice(name, station, words, slow)
+    if station.undecided.count:
+        words = f"{counted(station.undecided.count, 'frame')} may be the answer or the request again"
+        yield station.undecided.found(RULES["MB403"], name, words)
+    yield from _two_times(name, station)
+    if station.reserved.count:
+        yield station.reserved.found(
+            RULES["MB205"], name, f"{counted(station.reserved.count, 'frame')} from or to this address"
+        )
+
+
+def _missing(seen: BusRecord, name: str, unit: int, station: StationRecord) -> Iterator[Finding]:
+    missing = station.missing
+    if not missing.count:
+        return
+    if is_absent(station):
+        if missing.count > 1 and not seen.is_scanned(unit):
+            words = f"no answer to any of {station.asked} requests"
+            stray = station.damaged.count
+            words += f"; octets that are no good answer followed {times(stray)}" if stray else ""
+            yield missing.found(RULES["MB001"], name, words)
+        else:
+            again = f", sent {times(missing.count)}" if missing.count > 1 else ""
+            words = f"no answer to the only request{again}"
+            if not seen.is_scanned(unit):
+                yield missing.found(RULES["MB001"], name, words, Severity.NOTE)
+        return
+    silent = station.silent
+    if silent.count >= SILENT_AT_END and station.answered and station.last_heard is not None:
+        since = seen.now - station.last_heard
+        words = f"no answer to its last {silent.count} requests; last heard {duration(since)} before the end"
+        yield silent.found(RULES["MB003"], name, words)
+    ignored = [(key, request) for key, request in sorted(station.requests.items(), key=str) if _is_ignored(request)]
+    if station.answered >= 3 and silent.count < SILENT_AT_END:
+        for key, request in ignored:
+            words = f"no answer to any of {request.tries} requests to {request_words(key)}; it answers others"
+            yield request.missing.found(RULES["MB004"], name, words)
+    else:
+        ignored = []
+    explained = sum(request.missing.count for _, request in ignored)
+    if silent.count >= SILENT_AT_END and station.answered:
+        explained += silent.count
+    left = missing.count - explained
+    if left > 0:
+        words = f"no answer to {left} of {counted(station.asked, 'request')}"
+        finding = missing.found(RULES["MB002"], name, words, note_if(seen.rare(left, station.asked)))
+        yield replace(finding, count=left)
+
+
+_RARELY = 20
+"""Of so many requests at most one may be answered by a copy that a late read made of its repeat."""
+
+
+def is_absent(station: StationRecord) -> bool:
+    """Whether no good frame ever came from it, and no more than stray damage in place of answers."""
+    # a late read puts the repeat of a write where its answer would be
+    answered = station.answered - (station.copies if _RARELY * station.copies <= station.asked else 0)
+    heard = answered or station.late.count or station.twice.count or station.undecided.count > station.asked
+    return bool(station.missing.count) and not heard and 4 * station.damaged.count <= station.asked
+
+
+def _is_ignored(request: Requested) -> bool:
+    return request.turns >= 3 and request.missing.count == request.tries
+
+
+def _damaged(seen: BusRecord, name: str, station: StationRecord, is_common: bool) -> Iterator[Finding]:
+    damaged, ends = station.damaged, station.last_octet
+    if not damaged.count or is_absent(station):
+        return
+    rare = seen.rare(damaged.count, station.asked)
+    if ends.count >= 3 and 2 * ends.count >= damaged.count:
+        words = f"{ends.count} of {counted(station.asked, 'answer')} right but for the last octet"
+        yield ends.found(RULES["MB006"], name, words, note_if(rare))
+        if 4 * ends.count >= 3 * damaged.count:
+            return
+    over = station.talked_over
+    if over.count >= 3 and 4 * over.count >= station.asked and _is_steady(station.excess):
+        words = (
+            f"{over.count} of {counted(station.asked, 'answer')} begin as they should and go on for "
+            f"{_octets(middle(station.excess))} more than they can have, damaged: two talk at once"
+        )
+        yield over.found(RULES["MB202"], name, words)
+    details = []
+    if station.cut:
+        details.append(f"{station.cut} ended early")
+    if station.garbled:
+        details.append(f"{station.garbled} no frame at all")
+    words = f"{damaged.count} of {counted(station.asked, 'answer')} damaged"
+    words += f" ({', '.join(details)})" if details else ""
+    low, high = wilson(damaged.count, station.asked)
+    if station.asked >= 20:
+        words += f"; that is {low:.1%} to {high:.1%} of all, with 95% confidence"
+    yield damaged.found(RULES["MB005"], name, words, note_if(rare or is_common))
+
+
+def _twice(name: str, station: StationRecord, words: str, slow: bool) -> Finding:
+    """Two different answers are two stations'; the same octets again may be a converter's, or one station's."""
+    twice, rule = station.twice, RULES["MB201"]
+    different = twice.count - station.same_twice
+    if different:
+        words += f", {times(different)} another than the first"
+        return twice.found(rule, name, words, note_if(twice.count == 1 or slow))
+    words += ", each time octet for octet the first one again"
+    severity = Severity.NOTE if twice.count == 1 or slow else Severity.WARNING
+    means = "two stations with this address and the same values, or one device or converter that sends twice"
+    return replace(twice.found(rule, name, words, severity), means=means)
+
+
+def _flawed(seen: BusRecord, name: str, station: StationRecord) -> Iterator[Finding]:
+    """Damage of one kind that most damaged answers of a station share."""
+    by_code: dict[str, list[tuple[Flaw, Tally]]] = {}
+    for flaw, tally in station.flaws.items():
+        by_code.setdefault(FLAWS[flaw], []).append((flaw, tally))
+    for code, parts in sorted(by_code.items()):
+        count = sum(tally.count for _, tally in parts)
+        if count < _SYSTEM_LEAST or 2 * count < station.damaged.count:
+            continue
+        flaw, tally = max(parts, key=lambda part: part[1].count)
+        words = f"{count} of {counted(station.asked, 'answer')} good but for one thing: {flaw.value}"
+        if count == station.damaged.count == station.asked:
+            words += ", every time"
+        yield replace(tally.found(RULES[code], name, words, note_if(seen.rare(count, station.asked))), count=count)
+
+
+def _foreign(seen: BusRecord, name: str, station: StationRecord) -> Finding | None:
+    """Octets in place of answers that are always the same, or those of another baud rate."""
+    garbage = station.garbage
+    same, factor = garbage.always(), garbage.slower_by()
+    if not garbage.is_system or 2 * garbage.tally.count < station.damaged.count:
+        return None
+    if same is not None and 2 * garbage.begun > garbage.tally.count:
+        words = f"{counted(garbage.tally.count, 'damaged answer')}, always the same {_octets(len(same))}: {_hex(same)}"
+        return garbage.tally.found(RULES["MB015"], name, words)
+    words = f"{times(garbage.tally.count)} something that is not this protocol came in answer"
+    if same is not None:
+        words += f", always the same {_octets(len(same))}: {_hex(same)}"
+    if factor is not None:
+        baud = seen.timing.line.baud
+        words += f"; its bits are {factor} times as long as those of this line: about {baud // factor} Bd, not {baud}"
+    return garbage.tally.found(RULES["MB014"], name, words)
+
+
+def _is_steady(values: Sequence[int]) -> bool:
+    """Whether most of them lie close together, as they do when two always begin a little apart."""
+    usual = middle(values) if values else 0
+    return 3 * sum(abs(value - usual) <= _EXCESS_SPREAD for value in values) >= 2 * len(values) > 0
+
+
+def _octets(count: int) -> str:
+    return counted(count, "octet")
+
+
+def _hex(octets: bytes) -> str:
+    return octets[:_HEX_SHOWN].hex(" ").upper() + (" …" if len(octets) > _HEX_SHOWN else "")
+
+
+def _exception(name: str, station: StationRecord, key: Key, code: int, tally: Tally, maker: str) -> Finding:
+    """`maker`: what the manual of the device says of the code; it stands before the standard."""
+    otherwise = MAKER_EXCEPTION if maker else VENDOR_EXCEPTION
+    severity, means, following = otherwise if maker and code not in USED_ALIKE else EXCEPTIONS.get(code, otherwise)
+    meaning = maker or EXCEPTION_NAMES.get(code) or f"code 0x{code:02X} of the vendor's"
+    request = station.requests.get(key)
+    of = tally.count if request is None else request.tries
+    some = "the only request" if of == 1 else f"{tally.count} of {of} requests"
+    words = f"exception {code} ({meaning}) to {some} to {request_words(key)}"
+    return replace(tally.found(RULES["MB008"], name, words, severity), means=means, next=following)
+
+
+def _times(
+    name: str, station: StationRecord, timeout: int | None, seen: BusRecord, is_common: bool
+) -> Iterator[Finding]:
+    times_, slow = station.times, station.slow
+    if slow.count >= 3 and 100 * slow.count >= station.slow_of:
+        since = "" if station.slow_of == station.answered else " since the timeout is known"
+        against = "500 ms" if timeout is None else f"70% of the master's timeout of {fine_milliseconds(timeout)}"
+        words = f"{slow.count} of {counted(station.slow_of, 'answer')}{since} took longer than {against}"
+        words += f", the longest at least {fine_milliseconds(times_.longest)}"
+        yield slow.found(RULES["MB101"], name, words, note_if(timeout is None))
+    quarters = times_.quarters()
+    if quarters:
+        first, last = quarters[0], quarters[-1]
+        rises = all(20 * b.nominal >= 19 * a.nominal for a, b in pairwise(quarters))
+        quickest_too = 2 * (last.least - first.least) > last.nominal - first.nominal  # not only more of a second kind
+        if rises and quickest_too and 2 * last.low > 3 * first.high and last.low - first.high > 5 * MS:
+            rose = f"from {fine_milliseconds(first.nominal)} to {fine_milliseconds(last.nominal)}"
+            words = f"median response time rose {rose}"
+            yield found(
+                RULES["MB102"], name, words, first=seen.first or 0, last=station.last_heard or 0, count=times_.count
+            )
+    if station.late.count:
+        words = f"{counted(station.late.count, 'answer')} came after the master had given up"
+        waits = f"; it waits {fine_milliseconds(timeout)}" if timeout is not None else ""
+        yield station.late.found(
+            RULES["MB103"], name, words + waits, note_if(seen.rare(station.late.count, station.asked))
+        )
+    if station.answered and station.repeats.count:
+        share = station.repeats_cost / seen.span
+        words = (
+            f"{counted(station.repeats.count, 'request')} sent again; each cost the time that the master had waited: "
+            f"{duration(station.repeats_cost)} in all, {share:.1%} of the time of the bus"
+        )
+        costly = share > _REPEATS_COST and station.repeats.count >= _REPEATS_LEAST and not is_common
+        yield station.repeats.found(RULES["MB104"], name, words, Severity.WARNING if costly else None)
+
+
+def _two_times(name: str, station: StationRecord) -> Iterator[Finding]:
+    """Two groups of response times to the same request, of the request that shows them best."""
+    found_ = [(key, groups) for (key, _), same in station.same.items() if (groups := same.groups()) is not None]
+    if not found_:
+        return
+    key, groups = max(found_, key=lambda pair: (pair[1].apart, pair[1].smaller))
+    quick, slow = groups.quick, groups.slow
+    words = (
+        f"answers to one request ({request_words(key)}) take either {_range(quick)} ({times(len(quick))}) or "
+        f"{_range(slow)} ({times(len(slow))}), in turns"
+    )
+    agreeing = ["the slow ones never say what the quick ones say"] if groups.apart else []
+    if station.twice.count > station.same_twice:
+        agreeing.append(f"a second answer came to {counted(station.twice.count, 'request')}")
+    mixed = station.talked_over.count
+    if mixed >= 2:
+        agreeing.append(f"{mixed} answers had other octets mixed in")
+    tally = Tally()
+    for answer in sorted((*quick[:4], *slow[:4]), key=lambda answer: answer.no):
+        tally.add(answer.time, answer.no)
+    finding = tally.found(RULES["MB208"], name, "; ".join((words, *agreeing)), Severity.WARNING if agreeing else None)
+    everything = sorted(answer.time for answer in (*quick, *slow))
+    yield replace(finding, first=everything[0], last=everything[-1], count=len(everything))
+
+
+def _range(answers: Sequence[AnsweredRequest]) -> str:
+    """Where the times of a group lie, from the shortest to the longest nominal reading."""
+    least, most = fine_milliseconds(answers[0].latency.nominal), fine_milliseconds(answers[-1].latency.nominal)
+    return least if least == most else f"{least} to {most}"

@@ -1,0 +1,27 @@
+"""A bus as others of its site are held against it."""
+
+from __future__ import annotations
+
+from dissectors.findings import Finding
+from sniff.analysis.site_ear import SiteEar
+from sniff.analysis.site_findings import SiteBus
+from sniff.bus.model import BusModel
+
+
+def site_bus(model: BusModel, ear: SiteEar, findings: tuple[Finding, ...] | None = None) -> SiteBus:
+    """What is known of a bus so far; its findings are those of its model, unless others are given."""
+    session, summary = model.session, model.summary
+    return SiteBus(
+        session.bus,
+        ear,
+        model.judging.line.stops(),
+        summary.load.first,
+        summary.load.last,
+        session.timing.latency + session.timing.char,
+        model.findings() if findings is None else findings,
+    )
+
+
+def site_name(source: str) -> str:
+    """The recording that a bus is one of, by how its captures are called: "site.mcap [boiler]"."""
+    return source.split(" [", 1)[0]

@@ -1,0 +1,89 @@
+"""One bus as the application follows it: its feed, how the user looks at it, what was said of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+
+from sniff.bus.feed import Feed, FeedStatus
+from sniff.engine.session import LineEventKind
+from sniff.tui.health_meter import HealthMeter
+from sniff.tui.viewing import Viewing
+
+
+class BusState(Enum):
+    """How a bus is, where that is worth a word; the value is what people read."""
+
+    WELL = ""
+    SEARCHING = "searching"
+    DOWN = "DOWN"
+    ENDED = "ENDED"
+    FAILS = "REC FAILS"
+
+
+@dataclass(frozen=True, slots=True)
+class BusLine:
+    """What the bar says of a bus. `health`: 0 … 100, None where nobody knows (yet). `load`: 0 … 1, of a file all of it.
+    `lost`: octets or rows that were lost on the way here."""
+
+    name: str
+    state: BusState
+    health: float | None
+    load: float
+    errors: int
+    lost: int
+    is_here: bool
+
+
+@dataclass(slots=True)
+class Seat:
+    """`visited`: the screens that `q` walks back over. `told_…`: what was said once."""
+
+    feed: Feed
+    status: FeedStatus
+    viewing: Viewing
+    visited: list[str]
+    told_end: bool = False
+    told_dropped: bool = False
+    told_trouble: str = ""
+    health: HealthMeter = field(default_factory=HealthMeter)
+
+    @classmethod
+    def of(cls, feed: Feed, start_screen: str) -> Seat:
+        """A bus that nobody has looked at yet."""
+        status = feed.status()
+        return cls(feed, status, Viewing(feed.store, follow=status.live), [start_screen])
+
+    @property
+    def name(self) -> str:
+        """What the bus is called."""
+        return self.feed.store.session.bus
+
+    @property
+    def is_still_read(self) -> bool:
+        """Whether a file is not read and judged to its end."""
+        return self.status.reading or self.status.judged < 1
+
+    @property
+    def state(self) -> BusState:
+        """How the bus is."""
+        if self.status.live and self.status.ended:
+            return BusState.ENDED
+        port = next((one for one in reversed(self.feed.store.line_events) if one.kind in _OF_PORT), None)
+        if self.status.live and port is not None and port.kind is LineEventKind.UNPLUGGED:
+            return BusState.DOWN
+        if self.status.trouble:
+            return BusState.FAILS
+        return BusState.SEARCHING if self.status.searching else BusState.WELL
+
+    def line(self, is_here: bool) -> BusLine:
+        """What the bar says of it now."""
+        store = self.feed.store
+        if not self.is_still_read:
+            self.health.look(store, final=not self.status.live)
+        health = None if self.health.bus is None else self.health.bus.score
+        load = store.load.share() if self.status.live else store.load.overall()
+        return BusLine(self.name, self.state, health, load, store.error_total, self.status.dropped, is_here)
+
+
+_OF_PORT = (LineEventKind.UNPLUGGED, LineEventKind.REPLUGGED)

@@ -1,0 +1,95 @@
+"""BACnet/IP: the framer's contract, pairing by invoke number, frames as their twins on MS/TP."""
+
+from __future__ import annotations
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dissectors.bacnet import BACNET_IP
+from dissectors.bacnet.ip import make_ip
+from dissectors.bacnet.ip_framing import IpFramer
+from dissectors.frame import Check, Chunk, Damage, Found, Frame, Header, Role
+from dissectors.line import LineSettings, Timing
+from dissectors.tracker import Verdict
+from sniff.testing.framer_contract import framer_contract
+
+TIMING = Timing(LineSettings.parse("115200"), 0)
+HERE, THERE = b"\xc0\x00\x02\x01\xba\xc0", b"\xc0\x00\x02\x09\xba\xc0"
+EVERYBODY = b"\xc0\x00\x02\xff\xba\xc0"
+
+TestIpContract = framer_contract(
+    IpFramer, st.builds(make_ip, st.just(HERE), st.just(THERE), st.integers(0, 12), st.binary(max_size=60))
+)
+
+
+def asked(invoke: int) -> bytes:
+    return make_ip(HERE, THERE, 0x0A, bytes.fromhex(f"01040005{invoke:02x}0c0c000000011955"))
+
+
+def answered(invoke: int) -> bytes:
+    return make_ip(THERE, HERE, 0x0A, bytes.fromhex(f"010030{invoke:02x}0c0c0000000119553e4441b800003f"))
+
+
+def refused(invoke: int) -> bytes:
+    return make_ip(THERE, HERE, 0x0A, bytes.fromhex(f"010050{invoke:02x}0c9101911f"))
+
+
+def frames_of(*datagrams: bytes) -> list[Frame]:
+    framer = IpFramer(TIMING)
+    events = [event for no, octets in enumerate(datagrams) for event in framer.feed(Chunk(no * 1_000_000, octets))]
+    return [event for event in events + framer.close() if isinstance(event, Frame)]
+
+
+def verdicts_of(*datagrams: bytes) -> list[tuple[int | None, int | None, Verdict]]:
+    tracker = BACNET_IP.tracker(TIMING)
+    closed = []
+    for no, frame in enumerate(frames_of(*datagrams)):
+        closed += tracker.track(no, frame, BACNET_IP.peek(frame)).closed
+    closed += tracker.close()
+    return [(one.request, one.response, one.verdict) for one in closed]
+
+
+def test_requests_are_paired_by_ends_and_number() -> None:
+    assert verdicts_of(asked(1), asked(2), refused(2), answered(1)) == [
+        (1, 2, Verdict.EXCEPTION),
+        (0, 3, Verdict.ANSWERED),
+    ]
+    assert verdicts_of(answered(1)) == [(None, 0, Verdict.UNSOLICITED)]
+    assert verdicts_of(asked(1), asked(1), answered(1)) == [(0, None, Verdict.NO_RESPONSE), (1, 2, Verdict.RETRY)]
+
+
+def test_what_a_frame_says() -> None:
+    whois = make_ip(HERE, EVERYBODY, 0x0B, bytes.fromhex("0120ffff00ff1008"))
+    registers = make_ip(HERE, THERE, 0x05, b"\x0e\x10")
+    who, ask, answer, register = frames_of(whois, asked(1), answered(1), registers)
+    assert (BACNET_IP.peek(who).source, BACNET_IP.peek(who).destination) == (1, 255)
+    text = BACNET_IP.text(answer, BACNET_IP.peek(answer), Role.RESPONSE)
+    assert "analog-input,1 present-value = 23" in text
+    assert "192.0.2.9 → 192.0.2.1" in text
+    assert BACNET_IP.peek(register).kind == "register-foreign-device"
+    assert BACNET_IP.readings is not None
+    (reading,) = BACNET_IP.readings(ask, answer)
+    assert (reading.space, reading.address) == ("analog-input", 1)
+    assert BACNET_IP.field_types is not None
+    for frame in (who, ask, answer, register):
+        assert set(BACNET_IP.fields(frame, Role.REQUEST)) <= set(BACNET_IP.field_types())
+        assert bytes(BACNET_IP.packet(frame, Role.REQUEST)) == frame.octets
+    assert BACNET_IP.packet(ask, Role.REQUEST).haslayer("NPDU")
+
+
+@given(
+    octets=st.one_of(
+        st.binary(max_size=60),
+        st.builds(make_ip, st.just(HERE), st.just(THERE), st.integers(0, 255), st.binary(max_size=40)),
+    ),
+    damaged=st.booleans(),
+    role=st.sampled_from(Role),
+)
+def test_everything_is_total(octets: bytes, damaged: bool, role: Role) -> None:
+    frame = Frame(BACNET_IP.name, octets, 0, 0, Check.ABSENT, Found.LENGTH, Damage.SHORT if damaged else None)
+    header = BACNET_IP.peek(frame)
+    assert isinstance(header, Header)
+    assert BACNET_IP.text(frame, header, role).isprintable()
+    BACNET_IP.fields(frame, role)
+    assert bytes(BACNET_IP.packet(frame, role)) == octets
+    BACNET_IP.tracker(TIMING).track(0, frame, header)

@@ -1,0 +1,77 @@
+"""Logs in many shapes and hostile variations: each octet once, times as they are told, what is broken never taken."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from dissectors.frame import Chunk
+from sniff.engine.capture import CaptureError
+from sniff.formats import read
+from tests.sniff.formats.shapes_made import SHAPES
+from tests.sniff.formats.written_anew import write_anew
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_shapes(name: str, tmp_path: Path) -> None:
+    shape = SHAPES[name]
+    path = tmp_path / (f"{name}.csv" if name.startswith("csv") else f"{name}.txt")
+    write_anew(path, shape.log)
+    if shape.octets is None:
+        with pytest.raises(CaptureError):
+            list(read(path).items())
+        return
+    log = read(path)
+    chunks = [item for item in log.items() if isinstance(item, Chunk)]
+    assert b"".join(chunk.octets for chunk in chunks) == shape.octets
+    assert log.completeness().whole == shape.whole, log.completeness().text
+    assert chunks[0].time >= 0
+    if shape.delta is not None:
+        assert chunks[1].time - chunks[0].time == pytest.approx(shape.delta, abs=2)
+    if shape.first is not None:
+        assert chunks[0].time == shape.first
+
+
+@pytest.mark.parametrize(
+    ("dates", "days"),
+    [
+        (("05/11/2024", "06/11/2024", "13/11/2024"), (0, 1, 8)),  # a number above 12
+        (("11/05/2024", "11/06/2024", "11/07/2024"), (0, 1, 2)),  # the month stays
+        (("05/11/2024", "06/11/2024", "07/11/2024"), (0, 1, 2)),
+        (("30-11-24", "01-12-24", "02-12-24"), (0, 1, 2)),
+        (("24-11-28", "24-11-29", "24-11-30"), (0, 1, 2)),  # a year of two digits
+    ],
+)
+def test_the_order_of_a_date_is_told_by_all_dates(
+    dates: tuple[str, ...], days: tuple[int, ...], tmp_path: Path
+) -> None:
+    path = tmp_path / "x.log"
+    path.write_text("".join(f"{date} 10:00:00.100 TX: 01 03 00 00 00 02 C4 0B\n" for date in dates))
+    log = read(path)
+    times = [item.time for item in log.items()]
+    assert [(time - times[0]) // (86_400 * 10**9) for time in times] == list(days)
+    assert "taken as" not in log.completeness().text
+
+
+def test_a_date_that_reads_two_ways_is_said(tmp_path: Path) -> None:
+    path = tmp_path / "x.log"
+    path.write_text("05/11/2024 10:00:00.100 TX: 01 03 00 00 00 02 C4 0B\n" * 3)
+    log = read(path)
+    assert list(log.items())
+    assert "dates taken as month/day/year" in log.completeness().text
+
+
+@pytest.mark.parametrize(
+    ("step", "unit", "said"),
+    [("137", "ms", True), ("137123", "µs", True), ("137123456", "ns", True), ("0.137", "s", False)],
+)
+def test_the_unit_of_a_bare_time_is_told_by_its_steps(step: str, unit: str, said: bool, tmp_path: Path) -> None:
+    path = tmp_path / "x.log"
+    times = [1234 + float(step) * number for number in range(6)]
+    text = [f"{time:.3f}" if "." in step else f"{time:.0f}" for time in times]
+    path.write_text("".join(f"{time} TX 01 03 00 00 00 02 C4 0B\n" for time in text))
+    log = read(path)
+    first, second, *_ = (item.time for item in log.items())
+    assert second - first == pytest.approx(float(step) * {"s": 1e9, "ms": 1e6, "µs": 1e3, "ns": 1}[unit], rel=1e-6)
+    assert (f"times taken as {unit}" in log.completeness().text) == said

@@ -1,0 +1,110 @@
+"""From a live bus to outlets: each value, or the newest of a point at its pace; the last one always."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+from dissectors.frame import Chunk
+from dissectors.line import LineSettings
+from sniff.bus.live import LiveBus
+from sniff.capture.ipc import Ended, Heard, Received, Tick
+from sniff.engine.blocks import Block, reads_of
+from sniff.engine.session import LineEvent, LineEventKind
+from sniff.outlets.teller import Teller
+from sniff.outlets.told import FindingTold, NumbersTold, StateTold, Told, ValueTold
+from tests.property.modbus_adus import rtu
+from tests.sniff.bus.given_link import GivenLink
+
+MS = 1_000_000
+
+
+class Heardall:
+    """Keeps what it is told."""
+
+    def __init__(self, every: int = 0) -> None:
+        self.every = every
+        self.got: list[Told] = []
+
+    def tell(self, things: object) -> None:
+        self.got += things  # type: ignore[operator]
+
+    def values(self) -> list[object]:
+        return [one.sample.value.value for one in self.got if isinstance(one, ValueTold)]
+
+    def of(self, kind: type) -> list:
+        return [one for one in self.got if isinstance(one, kind)]
+
+
+def read(at: int, value: int) -> list[Chunk]:
+    """A register is read, at ms."""
+    return [
+        Chunk(at * MS, rtu(bytes((1, 3, 0, 0, 0, 1)))),
+        Chunk((at + 3) * MS, rtu(bytes((1, 3, 2, value >> 8, value & 255)))),
+    ]
+
+
+def told(outlets: list[Heardall], messages: list, ended: bool = True) -> LiveBus:
+    link = GivenLink(messages)
+    link.clock = SimpleNamespace(now=lambda: 9000 * MS)  # type: ignore[attr-defined]
+    link.line = LineSettings.parse("115200,8N1")
+    live = LiveBus(link, watched=False)  # type: ignore[arg-type]
+    Teller(outlets).attach(live)
+    live.poll_tables()
+    if ended:
+        link.messages = [Ended("done")]
+        live.poll_tables()
+    return live
+
+
+def heard(chunks: list[Chunk]) -> Heard:
+    return Heard(0, Block(reads_of(chunks)))
+
+
+def test_one_gets_each_value_the_other_the_newest_at_its_pace_and_the_last() -> None:
+    each, seldom = Heardall(), Heardall(every=1_000 * MS)
+    messages = []
+    for turn in range(20):
+        messages += [heard(read(100 * turn, turn)), Tick(0, (100 * turn + 90) * MS)]
+    told([each, seldom], messages)
+    assert each.values() == list(range(20))
+    assert seldom.values()[-1] == 19
+    assert len(seldom.values()) <= 4
+
+
+def test_numbers_come_each_second_and_nobody_is_told_twice() -> None:
+    outlet = Heardall()
+    messages = []
+    for turn in range(40):
+        messages += [heard(read(100 * turn, 1)), Tick(0, (100 * turn + 90) * MS)]
+    told([outlet], messages)
+    assert len([one for one in outlet.of(NumbersTold) if one.station is None]) in (3, 4)
+    codes = [one.news.finding.code for one in outlet.of(FindingTold)]
+    assert len(codes) == len(set(codes))
+
+
+def test_a_port_that_goes_and_comes_is_told_and_the_end_too() -> None:
+    outlet = Heardall()
+    events = [
+        Received(0, LineEvent(100 * MS, LineEventKind.UNPLUGGED, "x: gone")),
+        Received(0, LineEvent(200 * MS, LineEventKind.REPLUGGED, "x: back")),
+    ]
+    told([outlet], events)
+    assert [one.listening for one in outlet.of(StateTold)] == [True, False, True, False]
+
+
+def test_what_goes_into_a_recording_is_the_same_with_a_listener() -> None:
+    def recorded(outlets: list[Heardall]) -> list[tuple]:
+        messages = []
+        for turn in range(20):
+            messages += [heard(read(100 * turn, turn)), Tick(0, (100 * turn + 90) * MS)]
+        link = GivenLink(messages, paths=["x"])
+        link.clock = SimpleNamespace(now=lambda: 9000 * MS)  # type: ignore[attr-defined]
+        live = LiveBus(link, watched=False)  # type: ignore[arg-type]
+        if outlets:
+            Teller(outlets).attach(live)
+        live.poll_tables()
+        return [one for one in link.told if one[1].startswith("/values")]
+
+    alone = recorded([])
+    assert alone
+    assert recorded([Heardall()]) == alone
