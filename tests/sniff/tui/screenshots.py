@@ -61,7 +61,7 @@ SHOTS = (
     Shot("points", "modbus-rtu", (100, 30), ("4",)),
     Shot("findings", "modbus-rtu", (100, 30), ("5",)),
     Shot("timeline", "modbus-rtu", (120, 36), ("6",)),
-    Shot("ring", "mstp", (140, 30), ("7",)),
+    Shot("ring", "mstp", (100, 30), ("7",)),
     Shot("line", "modbus-rtu", (100, 30), ("9",)),
     Shot("polls", "modbus-rtu", (100, 30), ("8",)),
     Shot("help", "modbus-rtu", (80, 24), ("question_mark",)),
