@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV   ?= .venv
 BIN     = $(VENV)/bin
 
-.PHONY: demo test lint docs bench faults clean
+.PHONY: demo test lint docs bench faults pictures clean
 
 demo: $(VENV)/.demo
 	$(BIN)/sniff485 demo $(ARGS)
@@ -30,6 +30,10 @@ bench: $(VENV)/.test
 # names of cases; --clean-minutes N; --jobs N; --seeds N; --tell.
 faults: $(VENV)/.test
 	$(BIN)/python -m tests.faults.matrix $(ARGS)
+
+# Every screen of every protocol, dark and light, small and large, to be looked at. ARGS: words of their names.
+pictures: $(VENV)/.test
+	$(BIN)/python -m tests.sniff.tui.all_screens /tmp/sniff485-pictures $(ARGS)
 
 clean:
 	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

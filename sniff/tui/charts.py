@@ -68,8 +68,8 @@ def tall_bars(values: Sequence[float | None], top: float, height: int) -> list[s
 
 
 def round_up(value: float) -> float:
-    """The next of 1, 2, 5, 10, 20 … that is not less: where an axis ends."""
+    """The next of 1, 2, 3, 5, 7.5, 10, 20 … that is not less: where an axis ends."""
     if value <= 0:
         return 1.0
     power = 10.0 ** math.floor(math.log10(value))
-    return next(step * power for step in (1, 2, 5, 10, 20) if step * power >= value * 0.999_999)
+    return next(step * power for step in (1, 2, 3, 5, 7.5, 10, 20) if step * power >= value * 0.999_999)

@@ -31,8 +31,8 @@ PERIOD = 1.0
 COLUMNS = ("how grave", "about", "what was seen", "times", "last", "code")
 _WORDS = {Severity.ERROR: "ERROR", Severity.WARNING: "warning", Severity.NOTE: "note", Severity.INFO: "fact"}
 _STYLES = {Severity.ERROR: "bold red", Severity.WARNING: "yellow", Severity.NOTE: "", Severity.INFO: "dim"}
-OTHERS = 46
-"""Cells that the other columns take at most, those between them too; what was seen has the rest."""
+OTHERS = 32
+"""Cells that the columns take whose width does not change, those between them too; what was seen has the rest."""
 LEAST_SEEN = 30
 ROOMY = 110
 """Width from which there is a column for when it was seen last."""
@@ -126,7 +126,7 @@ class FindingsScreen(ViewScreen):
 
     def _cells(self, finding: Finding, under: bool) -> list[Text]:
         """Those under a cause begin with "└"."""
-        room = max(LEAST_SEEN, self._width - OTHERS - (15 if self._width >= ROOMY else 0))
+        room = max(LEAST_SEEN, self._width - self._others())
         cells = {
             "how grave": Text(("└ " if under else "") + _WORDS[finding.severity], style=_STYLES[finding.severity]),
             "about": Text(plain(finding.subject)),
@@ -136,6 +136,11 @@ class FindingsScreen(ViewScreen):
             "code": Text(finding.code, style="dim"),
         }
         return [cells[name] for name in self._columns()]
+
+    def _others(self) -> int:
+        """Cells that the other columns take, those between them too."""
+        longest = max((len(one.subject) for one in self._found.values()), default=0)
+        return OTHERS + max(len("about"), longest) + (14 if self._width >= ROOMY else 0)
 
     def _describe(self) -> None:
         words, advice, places = (self.query_one(name, Static) for name in ("#words", "#advice", "#places"))
@@ -156,6 +161,7 @@ class FindingsScreen(ViewScreen):
         text.append(plain(finding.seen) + "\n")
         if finding.means:
             text.append("means  ", style="dim").append(plain(finding.means) + "\n")
+        text.rstrip()
         words.update(text)
         advice.update(f"next   {plain(finding.next)}" if finding.next else "")
         advice.display = bool(finding.next)

@@ -146,7 +146,19 @@ class FramesScreen(ListingScreen):
         row = self._row()
         return None if row is None else (row, self.store.transaction(row))
 
+    def _say_which(self) -> None:
+        """Above tree and octets: whose they are, and "…" while the list that follows a bus is ahead of them."""
+        shown, here = self._detail, self._row()
+        said = ""
+        if shown is not None:
+            is_late = here is not None and here.no != shown[0].no
+            said = f"row {shown[0].no} …, the list is ahead" if is_late else f"row {shown[0].no}"
+        details = self.query_one("#details")
+        if str(details.border_title or "") != said:
+            details.border_title = said
+
     def _plan_detail(self) -> None:
+        self._say_which()
         if self._state() == self._detail or self._detail_timer is not None:
             return
         delay = FOLLOWING_SECONDS if self.viewing.follow and not self.viewing.frozen else DETAIL_SECONDS
@@ -159,6 +171,7 @@ class FramesScreen(ListingScreen):
             self._detail_timer.stop()
             self._detail_timer = None
         self._detail = self._state()
+        self._say_which()
         octets, tree = self.query_one(HexPane), self.query_one(FieldTree)
         if self._detail is None:
             octets.show(None, b"", ())

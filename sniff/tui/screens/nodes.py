@@ -15,7 +15,7 @@ from textual.containers import VerticalScroll
 from textual.widgets import DataTable, Static
 
 from dissectors.findings import Finding
-from dissectors.tracker import PASSING, Verdict
+from dissectors.tracker import Verdict
 from dissectors.words import milliseconds
 from sniff.analysis.health import Health, station_of
 from sniff.analysis.nodes import Node
@@ -214,7 +214,7 @@ class NodesScreen(ViewScreen):
     def _words(self, one: Station) -> Text:
         node, profile = one.node, self.store.devices.at(one.node.address)
         text = Text()
-        text.append(f"station {node.address}", style="bold")
+        text.append(f"{self.store.dissector.noun} {node.address}", style="bold")
         if one.device and profile is not None:
             text.append(plain(f" · {profile.title}"))
         if one.identity:
@@ -237,7 +237,7 @@ class NodesScreen(ViewScreen):
             text.append("\nerrors  ", style="dim").append(plain(", ".join(named)))
         if node.passed:
             text.append("\ntokens  ", style="dim").append(
-                f"{node.passed} tokens and polls ({', '.join(sorted(PASSING))}) passed to it, {node.unused} not used"
+                f"{node.passed} tokens and polls for masters came to it, {node.unused} tokens of those it did not use"
             )
         if node.latency.count:
             text.append("\nanswers after\n", style="dim")

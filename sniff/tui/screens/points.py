@@ -63,7 +63,7 @@ def shown_value(value: Value) -> str:
 
 
 NARROW: tuple[str, ...] = ("", "stn", "point", "value", "age", "n", "every ms")
-WIDE: tuple[str, ...] = (*NARROW, "±", "low", "high", "trend")
+WIDE: tuple[str, ...] = (*NARROW, "±", "low", "high", "trend", "what it is")
 FROM = 110
 """Width from which on all columns are shown."""
 
@@ -299,6 +299,8 @@ def _seen(point: Point, guess: GuessedPoint | None) -> list[str]:
         samples += f" ±{_ms(point.jitter)}" if point.jitter is not None else ""
     words = [samples]
     low, high, rate = (point.low, point.high, point.rate) if guess is None else (guess.low, guess.high, guess.rate)
+    if point.sample.value.words:  # of states and flags the numbers between say nothing
+        low = high = rate = None
     if low is not None and high is not None and low != high:
         words.append(f"seen {low:.7g} … {high:.7g}")
     if rate:
@@ -322,7 +324,8 @@ def _key(point: Point) -> str:
 
 
 def _cells(point: Point, now: int, pinned: list[Key], guess: GuessedPoint | None) -> list[Text]:
-    sample, value = point.sample, point.sample.value
+    sample, value, entry = point.sample, point.sample.value, point.entry
+    is_number = not value.words  # of states and flags the numbers between say nothing
     shown, low, high = shown_value(value), point.low, point.high
     quality = MARKS.get(point.quality, "")
     if guess is not None and guess.value is not None and not guess.is_itself:
@@ -339,7 +342,8 @@ def _cells(point: Point, now: int, pinned: list[Key], guess: GuessedPoint | None
         Text(str(point.count), justify="right"),
         Text(_ms(point.interval), justify="right"),
         Text(_ms(point.jitter), justify="right"),
-        Text("–" if low is None else f"{low:.5g}", justify="right"),
-        Text("–" if high is None else f"{high:.5g}", justify="right"),
+        Text(f"{low:.5g}" if low is not None and is_number else "–", justify="right"),
+        Text(f"{high:.5g}" if high is not None and is_number else "–", justify="right"),
         Text(trend([number for _, number in point.history])),
+        Text(plain(entry.title if entry is not None else guess.words if guess is not None else "")),
     ]

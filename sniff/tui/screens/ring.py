@@ -45,9 +45,9 @@ SHORT: dict[str, str] = {
     "damaged": "dam.",
 }
 """Columns of a ring's table (`TokenRing.headings`) that fit into 80, with their short titles."""
-ROOMY = 170
+ROOMY = 280
 """Width from which all columns are shown, with their titles in full."""
-BESIDE = 130
+BESIDE = 160
 """Width from which the ring stands beside the table, else above it."""
 TROUBLE = {"retries", "repeats", "lost", "claims", "damaged"}
 LOOPS = ("loop p50 ms", "rotation p50 ms")

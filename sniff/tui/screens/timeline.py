@@ -153,7 +153,7 @@ class TimelineScreen(ViewScreen):
         draw_charts(text, charts, room - len(stations), paint)
         if stations:
             hidden = len(rows) - len(stations)
-            more = f", {hidden} more have fewer" if hidden else ""
+            more = f"; and {hidden} more" if hidden else ""
             text.append(f"{'stations':<14}", style="bold").append("│", style="dim")
             text.append(f" · asked, bars: went wrong{more}\n", style="dim")
             draw_rows(text, stations, paint)

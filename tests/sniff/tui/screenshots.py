@@ -27,7 +27,8 @@ from sniff.simulation.tap import TapModel
 from sniff.tui.app import SnifferApp
 
 STARTED = 1_772_359_200 * NS_PER_S  # 2026-03-01T10:00:00Z
-SECONDS = 180
+SECONDS = {"mstp": 30}
+"""Of a scenario, else three minutes; a token ring brings as many frames in less."""
 ADAPTER = TapModel("FT232R", timer=1_000_000, packet=62, usb_frame=1_000_000, reports=("parity", "framing", "break"))
 CELL = 12.2
 """Width of a character in a picture."""
@@ -51,7 +52,7 @@ SHOTS = (
         "frames-mstp",
         "mstp",
         (140, 40),
-        ("home", "d", "colon", "text:47", "enter", "enter", "end", *["up"] * 6),
+        ("home", "d", "colon", "text:17", "enter", "enter", "end", *["up"] * 6),
     ),
     Shot("frames-light", "n2", (110, 32), ("home", "down", "down", "down", "enter", "down", "down"), light=True),
     Shot("filter", "modbus-rtu", (80, 24), ("home", "slash", "text:verdict == no-response && addr == 4")),
@@ -59,8 +60,8 @@ SHOTS = (
     Shot("nodes", "modbus-rtu", (80, 24), ("3",)),
     Shot("points", "modbus-rtu", (100, 30), ("4",)),
     Shot("findings", "modbus-rtu", (100, 30), ("5",)),
-    Shot("timeline", "modbus-rtu", (100, 24), ("6",)),
-    Shot("ring", "mstp", (100, 24), ("7",)),
+    Shot("timeline", "modbus-rtu", (120, 36), ("6",)),
+    Shot("ring", "mstp", (100, 30), ("7",)),
     Shot("line", "modbus-rtu", (100, 30), ("9",)),
     Shot("polls", "modbus-rtu", (100, 30), ("8",)),
     Shot("help", "modbus-rtu", (80, 24), ("question_mark",)),
@@ -71,7 +72,7 @@ SHOTS = (
 def store_of(name: str) -> Store:
     """What a sniffer with a usual adapter hears of a scenario in some minutes."""
     plan = scenario(name, seed=7)
-    session, items = simulate(plan, SECONDS, ADAPTER, STARTED)
+    session, items = simulate(plan, SECONDS.get(name, 180), ADAPTER, STARTED)
     store = Store(
         session, dissector_for(session), devices=devices({str(at): made for at, made in plan.devices.items()})
     )
@@ -79,8 +80,8 @@ def store_of(name: str) -> Store:
     return store
 
 
-async def take(shot: Shot) -> str:
-    """The picture as SVG."""
+async def take(shot: Shot) -> tuple[str, str]:
+    """The picture as SVG, and as text."""
     from textual.events import Key
     from textual.keys import _character_to_key
 
@@ -108,7 +109,9 @@ async def take(shot: Shot) -> str:
                 await pilot.press(key)
             await pilot.pause(0.2)
         await pilot.pause(0.7)
-        return _plain_fonts(app.export_screenshot(title="sniff485"))
+        strips = app.screen._compositor.render_strips()
+        text = "\n".join("".join(segment.text for segment in strip).rstrip() for strip in strips)
+        return _plain_fonts(app.export_screenshot(title="sniff485")), text
 
 
 def _plain_fonts(picture: str) -> str:
@@ -122,8 +125,8 @@ def _shift(found: re.Match[str]) -> str:
     return f'x="{float(found[1]) + spaces:.1f}" y="{found[2]}" textLength="{float(found[3]) - spaces:.1f}"{found[4]}'
 
 
-def main(folder: str, write: Callable[[str], object] = sys.stdout.write) -> None:
-    """Take all pictures."""
+def main(folder: str, texts: str = "", write: Callable[[str], object] = sys.stdout.write) -> None:
+    """Take all pictures; as text into another folder, where one is named: what README.md shows is from there."""
     os.environ["TZ"] = "UTC"
     if hasattr(time, "tzset"):
         time.tzset()
@@ -131,11 +134,14 @@ def main(folder: str, write: Callable[[str], object] = sys.stdout.write) -> None
     target.mkdir(parents=True, exist_ok=True)
     for shot in SHOTS:
         path = target / f"{shot.name}.svg"
-        path.write_text(asyncio.run(take(shot)), "utf-8")
+        picture, text = asyncio.run(take(shot))
+        path.write_text(picture, "utf-8")
+        if texts:
+            Path(texts, f"{shot.name}.txt").write_text(text + "\n", "utf-8")
         write(f"{path}\n")
 
 
 if __name__ == "__main__":
-    if len(sys.argv) != 2:
-        sys.exit("usage: python -m tests.sniff.tui.screenshots FOLDER")
-    main(sys.argv[1])
+    if len(sys.argv) not in (2, 3):
+        sys.exit("usage: python -m tests.sniff.tui.screenshots FOLDER [FOLDER_OF_TEXTS]")
+    main(*sys.argv[1:])

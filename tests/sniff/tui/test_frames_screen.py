@@ -368,3 +368,19 @@ def test_a_live_bus_may_still_bring_frames(look: Any, make_bus: Any) -> None:
         assert "no frames yet" in see.text()
 
     look(make_bus().store, script, live=True)
+
+
+def test_what_is_shown_of_an_earlier_row_says_so_while_following(
+    look: Any, busy_bus: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def script(see: Any) -> None:
+        details = see.app.screen.query_one("#details")
+        assert details.border_title == "row 13"
+        monkeypatch.setattr("sniff.tui.screens.frames.FOLLOWING_SECONDS", 1000.0)  # the tree waits
+        busy_bus.ask(1)
+        see.app.poll()
+        assert details.border_title == "row 13 …, the list is ahead"
+        see.app.shown._show_detail()
+        assert details.border_title == "row 15"
+
+    look(busy_bus.store, script, live=True)

@@ -58,7 +58,7 @@ def test_a_view_is_saved_and_shown_by_its_name(look: Any, busy_bus: Any) -> None
 def test_a_view_is_added_to_the_configuration_that_is_there(tmp_path: Path) -> None:
     config = tmp_path / FILE
     config.write_text('[filters]\nslow = "latency_ms > 50ms"')
-    view = View({"transactions": ("tx", "kind")}, "delta", 'kind contains "\\"x"')
+    view = View({"transactions": ("tx", "kind")}, "delta", 'kind contains "write"')
     assert save_view("odd-one", view) == config
     assert load().views == {"odd-one": view}
     assert load().filters == {"slow": "latency_ms > 50ms"}
