@@ -134,6 +134,9 @@ def _command(line: str, shown: list[str], is_example: bool) -> list[str]:
         if "-w" in arguments:
             run(["convert", SAMPLE, arguments[arguments.index("-w") + 1], "--force"])
         return []
+    if arguments[0] == "report" and "-o" not in arguments:  # drawn where a page tells of it; it takes seconds
+        _parse(arguments)
+        return []
     said = run(arguments)
     if shown:
         lines = (said.out + said.err).splitlines()

@@ -25,6 +25,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+@pytest.mark.timeout(600)  # some pages hold programs of their own; a busy machine takes its time
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT / "docs" / "pages")))
 def test_blocks_of_pages(page: Path, folder: Path) -> None:
     names: dict[str, Any] = {}
@@ -33,6 +34,7 @@ def test_blocks_of_pages(page: Path, folder: Path) -> None:
         assert not wrong, f"{page.name}:{block.line}: {wrong[0]}"
 
 
+@pytest.mark.timeout(600)
 def test_blocks_of_the_readme(folder: Path) -> None:
     for name in ("night", "before", "after", "near", "far"):
         assert run(["convert", SAMPLE, f"{name}.mcap"]).code == 0

@@ -5,6 +5,10 @@ from __future__ import annotations
 import subprocess
 import sys
 
+import pytest
+
+pytestmark = pytest.mark.timeout(400)  # processes of their own, on a machine that may be busy
+
 PROGRAM = """
 import builtins, importlib, pkgutil
 

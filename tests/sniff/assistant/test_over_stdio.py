@@ -16,6 +16,7 @@ from mcp import Client, StdioServerParameters
 
 from sniff.cli import main
 
+pytestmark = pytest.mark.timeout(400)  # processes of their own, on a machine that may be busy
 CAPTURE = Path(__file__).parents[3] / "captures" / "rtu-usual-faults.cap.txt"
 
 

@@ -22,6 +22,7 @@ from sniff.formats import read
 from tests.e2e.recording_bus import Feeder
 from tests.sniff.browser import chromium
 
+pytestmark = pytest.mark.timeout(400)  # processes of their own, on a machine that may be busy
 CAPTURE = Path(__file__).parents[3] / "captures" / "rtu-usual-faults.cap.txt"
 TOKEN = "0123456789abcdef0123"
 PATIENCE = 90.0
