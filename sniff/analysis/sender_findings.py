@@ -297,7 +297,9 @@ class Senders:
         among = {code: together(self.by_name[name].stray[code] for name in names) for code, names in common.items()}
         total = sum(tally.count for tally in among.values()) + (silence.count if silence is not None else 0)
         for code, names in common.items():
-            alone = names[0] if len(names) == 1 and (self.beside or names[0] != MASTER) else BUS
+            alone = names[0] if len(names) == 1 else BUS
+            if code == "LN201" and alone == MASTER and not self.beside:
+                continue
             if alone != BUS and 2 * among[code].count > total:  # nobody else is struck
                 own += [(names[0], code)]
                 total -= among.pop(code).count

@@ -22,7 +22,7 @@ from pathlib import Path
 
 from sniff.cli import UNREADABLE, USAGE, Failure, arguments, targets
 from sniff.formats.table import suffixes
-from sniff.tui.saving import GUEST
+from sniff.tui.guest import GUEST
 
 TOKEN = "SNIFF485_TOKEN"
 PORT = 8485

@@ -19,6 +19,7 @@ from sniff.config import load as load_config
 from sniff.filter import FilterError
 from sniff.tui.analyzer import Analyzer
 from sniff.tui.busbar import BusBar
+from sniff.tui.guest import is_guest
 from sniff.tui.header import StatusHeader, why_ended
 from sniff.tui.health_meter import HealthMeter
 from sniff.tui.help import HelpScreen
@@ -353,6 +354,9 @@ class SnifferApp(Analyzer):
         row = self.store.by_no(no)
         if row is None:
             self.notify(f"row {no} is no longer in memory", timeout=3)
+            return
+        if is_guest():
+            self.notify("who looks from another machine writes no marks here", severity="warning", timeout=3)
             return
         try:
             where = self.feed.mark(row.event.start, text)

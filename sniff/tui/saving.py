@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
@@ -11,14 +10,7 @@ from sniff.bus.capture_writer import create
 from sniff.bus.rows import Store
 from sniff.engine.session import Item
 from sniff.formats import FRAMES, ITEMS, table
-
-GUEST = "SNIFF485_GUEST"
-"""Set in the environment of screens that are shown elsewhere: they write no files here."""
-
-
-def is_guest() -> bool:
-    """Whether this screen is for somebody at another machine (`serve --allow-remote` says so)."""
-    return bool(os.environ.get(GUEST))
+from sniff.tui.guest import is_guest
 
 
 def why_not(path: str) -> str:

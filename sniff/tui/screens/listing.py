@@ -14,6 +14,7 @@ from sniff.filter.completion import Completion, completions
 from sniff.filter.told import names as point_names
 from sniff.tui.analyzer import analyzer
 from sniff.tui.filter_line import FilterLine
+from sniff.tui.guest import is_guest
 from sniff.tui.index import Index, Known
 from sniff.tui.linelist import LineList
 from sniff.tui.plain import plain
@@ -184,6 +185,8 @@ class ListingScreen(ViewScreen):
             if name in self._views:
                 use(self.viewing, name, self._views[name])
                 self.query_one("#main", LineList).refresh(layout=True)
+            elif is_guest():
+                self.notify("who looks from another machine saves no views here", severity="warning", timeout=4)
             else:
                 path = save_view(name, view_of(self.viewing))
                 self.notify(f"view {name} saved in {plain(path)}", timeout=4, markup=False)

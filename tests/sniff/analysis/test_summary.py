@@ -52,16 +52,17 @@ def test_parts_add_up_to_the_whole(name: str, cuts: list[float]) -> None:
     assert expected.load.total.busy == sum(second.busy for second in expected.load.seconds.values())
 
 
-@pytest.mark.parametrize("kind", ["token", "poll-for-master"])
-def test_a_token_is_no_request(kind: str) -> None:
+@pytest.mark.parametrize(("kind", "tokens"), [("token", 2), ("poll-for-master", 0)])
+def test_a_token_is_no_request(kind: str, tokens: int) -> None:
+    """Nor is a poll for masters, and who is only polled for is nobody."""
     unused = Transaction(1, 27, kind, 1, None, Verdict.NO_RESPONSE, 0, 1)
     request = replace(unused, id=2, kind="read-property")
     table = NodeTable()
     for transaction in (unused, unused, request, replace(request, verdict=Verdict.ANSWERED)):
         table.add_transaction(transaction)
     (node,) = table.merge(NodeTable())
-    assert (node.asked, node.unanswered, node.passed, node.unused) == (2, 1, 2, 2)
+    assert (node.asked, node.unanswered, node.passed, node.unused) == (2, 1, 2, tokens)
     assert NodeTable(dict(table.nodes)).present() == [node]
     only_given = NodeTable()
     only_given.add_transaction(unused)
-    assert [node.address for node in only_given.present()] == [27]
+    assert [node.address for node in only_given.present()] == ([27] if tokens else [])

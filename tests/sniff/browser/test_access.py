@@ -65,7 +65,8 @@ def test_other_addresses_need_both(options: list[str], said: str, capsys: pytest
 
 
 def test_who_looks_from_elsewhere_saves_nothing_here(monkeypatch: pytest.MonkeyPatch) -> None:
-    from sniff.tui.saving import GUEST, why_not
+    from sniff.tui.guest import GUEST
+    from sniff.tui.saving import why_not
 
     assert why_not("/nowhere/x.mcap") == ""
     monkeypatch.setenv(GUEST, "1")

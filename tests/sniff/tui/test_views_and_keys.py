@@ -8,6 +8,8 @@ from typing import Any
 import pytest
 
 from sniff.config import FILE, ConfigError, View, load, save_view
+from sniff.engine.session import LineEventKind
+from sniff.tui.guest import GUEST
 from sniff.tui.key_names import KNOWN, name_of
 from sniff.tui.keybar import explanation, working_keys
 
@@ -111,3 +113,19 @@ def test_names_of_keys() -> None:
     assert name_of("app.follow") == "follow"
     assert name_of("move(-20)") == "move-back20"
     assert {"freeze", "help", "go_back", "switch-line"} <= KNOWN
+
+
+def test_who_looks_from_elsewhere_keeps_nothing_here(look: Any, busy_bus: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(GUEST, "1")
+
+    async def script(see: Any) -> None:
+        await see.press("V")
+        await see.type("ones")
+        await see.press("enter")
+        await see.press("m")
+        await see.type("strange")
+        await see.press("enter")
+        assert not load().views
+        assert not any(event.kind is LineEventKind.MARK for event in busy_bus.store.line_events)
+
+    look(busy_bus.store, script)
