@@ -17,7 +17,8 @@ Points are taken off 100, never below 0:
       and it is never better than half way between 100 and the worst station that an error or warning is about
 
 So half of the requests lost, or every fifth frame damaged, is a station at 0 or 40, and a bus with a dead station has
-50 at best. A station that was never asked and sent nothing has no health. README.md has the formula for users.
+50 at best. A station that was never asked and sent nothing has no health, nor has an address that never answered and
+that nothing is found about: somebody looked whether anybody is there. README.md has the formula for users.
 """
 
 from __future__ import annotations
@@ -64,9 +65,10 @@ def health_of(summary: Summary, findings: Iterable[Finding] = ()) -> HealthRepor
     stations = {
         node.address: health
         for node in summary.nodes.present()
-        if (health := station_health(node, about.get(node.address, ()))) is not None
+        if _is_there(node, about) and (health := station_health(node, about.get(node.address, ()))) is not None
     }
-    bus = _bus_health(summary, [finding for finding in grave if finding.about.is_whole_bus])
+    there = [node for node in summary.nodes if _is_there(node, about)]
+    bus = _bus_health(summary, there, [finding for finding in grave if finding.about.is_whole_bus])
     worst = min((address for address in about if address in stations), key=lambda a: stations[a].score, default=None)
     if worst is not None and (limit := (100 + stations[worst].score) // 2) < bus.score:
         first = about[worst][0].about
@@ -98,9 +100,14 @@ def station_health(node: Node, findings: Iterable[Finding] = ()) -> Health | Non
     )
 
 
-def _bus_health(summary: Summary, findings: Iterable[Finding]) -> Health:
-    asked = sum(node.asked for node in summary.nodes)
-    unanswered = sum(node.unanswered for node in summary.nodes)
+def _is_there(node: Node, about: Mapping[int, object]) -> bool:
+    """Whether an address is somebody's: it was heard, or is missed (an error or a warning is about it)."""
+    return node.sent > 0 or node.address in about
+
+
+def _bus_health(summary: Summary, nodes: Iterable[Node], findings: Iterable[Finding]) -> Health:
+    nodes = list(nodes)
+    asked, unanswered = sum(node.asked for node in nodes), sum(node.unanswered for node in nodes)
     return _sum(
         findings,
         (_share(unanswered, asked), 100, 50, "of all requests without answer"),

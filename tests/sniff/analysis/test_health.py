@@ -80,7 +80,16 @@ def test_a_bus_is_at_most_half_way_between_100_and_its_worst_station() -> None:
 
 
 def test_a_station_without_a_finding_does_not_hold_the_bus_down() -> None:
-    assert health_of(summary(node(1, 99), node(2, 0, no_response=1))).bus.score == 99
+    assert health_of(summary(node(1, 99), node(2, 1, no_response=1))).bus.score == 99
+
+
+def test_addresses_that_were_only_looked_for_cost_nothing() -> None:
+    """A scan asks everywhere; an address that is missed has a finding."""
+    scanned = [node(address, 0, no_response=1) for address in range(2, 100)]
+    health = health_of(summary(node(1, 50), *scanned))
+    assert (health.bus.score, list(health.stations)) == (100, [1])
+    missed = health_of(summary(node(1, 50), *scanned), [finding("MB001", "station 7")])
+    assert list(missed.stations) == [1, 7]
 
 
 @pytest.mark.parametrize(
