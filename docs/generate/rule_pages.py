@@ -34,9 +34,10 @@ def families() -> list[Family]:
     from sniff.analysis.judging import all_rules
     from sniff.analysis.line_rules import LINE_RULES
     from sniff.analysis.profile_findings import PROFILE_RULES
+    from sniff.analysis.site_rules import SITE_RULES
 
     titles: dict[str, list[str]] = {}
-    titled = [("The line", LINE_RULES), ("Device profiles", PROFILE_RULES)]
+    titled = [("The line", LINE_RULES), ("Device profiles", PROFILE_RULES), ("Several buses", SITE_RULES)]
     titled += [(one.title, one.rules) for one in map(registry.get, registry.BUILT_IN)]
     for title, rules in titled:
         for begin in {code[:2] for code in rules}:

@@ -25,8 +25,11 @@ from sniff.cli import COMMANDS, command_line
 ROOT = Path(__file__).parents[2]
 SAMPLE = "captures/rtu-usual-faults.cap.txt"
 
-ENDLESS = frozenset({"live", "record", "demo", "open", "serve", "mcp", "detect", "extcap", "replay"})
+ENDLESS = frozenset({"live", "record", "box", "demo", "open", "serve", "mcp", "detect", "extcap", "replay"})
 """Commands that need a port or a terminal, or go on until somebody ends them."""
+
+BUSES = frozenset({"boiler", "roof"})
+"""Buses of the configuration that the pages have, whose ports are not here."""
 
 _FENCE = re.compile(
     r'^(?P<in> *)```(?P<kind>[\w-]*) *(?:title="(?P<title>[^"]*)")? *\n(?P<text>.*?)^(?P=in)``` *$', re.M | re.S
@@ -129,7 +132,8 @@ def _command(line: str, shown: list[str], is_example: bool) -> list[str]:
         return [] if done.returncode == 0 else [f"{line}: {done.stdout}{done.stderr}"]
     assert words[0] == "sniff485", line
     arguments = words[1:]
-    if arguments[0] in ENDLESS or is_example or any(word.startswith(("/dev/", "/archive")) for word in arguments):
+    elsewhere = any(word.startswith(("/dev/", "/archive")) or word in BUSES for word in arguments)
+    if arguments[0] in ENDLESS or is_example or elsewhere:
         _parse(arguments)
         if "-w" in arguments:
             run(["convert", SAMPLE, arguments[arguments.index("-w") + 1], "--force"])
