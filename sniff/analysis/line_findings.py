@@ -349,6 +349,8 @@ class LineFindings:
             yield self._of_rests(self._rest.found(RULES["LN204"], "bus", words, severity))
         if self._echo.count:
             words = f"{self._echo.count} of {counted(self._asked, 'request')} came twice, the copy directly behind"
+            if self._echo.count > self._asked:  # several copies of one, or of some that are still open
+                words = f"{counted(self._echo.count, 'request')} came directly behind the same request"
             often = self._echo.count >= ECHOES_LEAST and 2 * self._echo.count >= self._asked
             severity = Severity.WARNING if often else None
             yield self._echo.found(RULES["LN205"], "bus", words, severity)

@@ -56,27 +56,29 @@ class Budget:
 
     def take(self, channel: str, now: int) -> bool:
         """Whether a message of a channel is to be written at `now` (ns)."""
-        self._pass(now)
-        if not self._has_turn(channel, now):
+        self._left = self._left_at(now)
+        self._at = now if self._at is None else max(self._at, now)
+        if not self._has_turn(channel, now, self._left):
             return False
         self._left -= 1
         self._last[channel] = now
         return True
 
     def would_take(self, channels: Iterable[str], now: int) -> bool:
-        """Whether a message of any of these channels would be written at `now` (ns)."""
-        self._pass(now)
-        return any(self._has_turn(channel, now) for channel in channels)
+        """Whether a message of any of these channels may be written at `now` (ns). False is sure whatever is written
+        until then, for that leaves less; so it may be asked ahead of time, and changes nothing."""
+        left = self._left_at(now)
+        return any(self._has_turn(channel, now, left) for channel in channels)
 
-    def _pass(self, now: int) -> None:
+    def _left_at(self, now: int) -> float:
+        """Messages left at `now`, if none is written until then."""
         passed = 0 if self._at is None else max(0, now - self._at)
-        self._at = now if self._at is None else max(self._at, now)
-        self._left = min(self._burst, self._left + passed / NS_PER_S * self.rate)
+        return min(self._burst, self._left + passed / NS_PER_S * self.rate)
 
-    def _has_turn(self, channel: str, now: int) -> bool:
+    def _has_turn(self, channel: str, now: int, left: float) -> bool:
         last = self._last.get(channel)
-        if last is not None and self._left < self._burst / 2:
+        if last is not None and left < self._burst / 2:
             turn = len(self._last) / self.rate * NS_PER_S
             if 0 <= now - last < turn:
                 return False
-        return self._left >= 1
+        return left >= 1

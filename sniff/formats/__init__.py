@@ -62,7 +62,9 @@ def _opened(path: Path) -> Capture:
 def _reader(path: Path, start: bytes) -> Callable[[Path], Capture]:
     """The function that opens it. Raises CaptureError, which says what was recognised and what to do."""
     found = table.told(start, path.name)
-    if found is not None and not found.last and not found.recognises(start) and _holds_frames(start):
+    is_container = start.startswith(tuple(magic for magic, _ in table.UNREADABLE))  # it holds frames by chance only
+    damaged = found is not None and not found.last and not found.recognises(start) and not is_container
+    if damaged and found is not None and _holds_frames(start):
         from sniff.formats import raw_dump
 
         return lambda place: raw_dump.RawDump(place, f"; its name says {found.name}, and it is none")

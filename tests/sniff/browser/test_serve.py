@@ -109,7 +109,7 @@ def test_viewers_do_not_disturb_the_recording(tmp_path: Path) -> None:
                 feeder.feed(request * 20)
             stays.shown = ""
             await stays.press("5")
-            await stays.until("frames:")
+            await stays.until("means")
             feeder.feed(bytes.fromhex("02030000000ac5fe") * 20)
 
     with served(feeder.path, "-s", "115200,8N1", "-p", "modbus-rtu", "-w", str(path)) as address:

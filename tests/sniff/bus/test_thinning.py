@@ -60,3 +60,16 @@ def test_a_quiet_bus_has_room_for_more_values() -> None:
     assert 1 <= room(50) < 2
     assert 8 < room(10) < 15
     assert 12 < room(0) <= Room.MOST
+
+
+def test_asking_ahead_changes_nothing() -> None:
+    """What is read of a table at once and row by row must be the same."""
+    asked, alone = Budget(2.0, 10), Budget(2.0, 10)
+    for second in range(60):
+        now = second * S
+        may = asked.would_take(("a", "b"), now)
+        asked.would_take(("a",), now + 50 * S)
+        for channel in ("a", "b"):
+            took = alone.take(channel, now)
+            assert asked.take(channel, now) == took
+            assert may or not took

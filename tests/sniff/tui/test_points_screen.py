@@ -172,7 +172,7 @@ def test_words_order_columns_and_plot(look: Any) -> None:
 
 def test_large_screens_show_all_columns_and_the_plot(look: Any) -> None:
     async def script(see: Any) -> None:
-        assert len(cells(see, keys(see)[0])) == 11
+        assert len(cells(see, keys(see)[0])) == 12
         assert "seconds before the newest" in see.text()
         assert all(len(line) <= 160 for line in see.lines())
 
