@@ -126,6 +126,7 @@ def test_killed_under_load_it_lacks_at_most_the_last_second(bus, tmp_path) -> No
 MAIN = """
 import signal, sys, time
 signal.signal(signal.SIGINT, signal.default_int_handler)  # whoever runs the tests in the background ignores it
+signal.signal(signal.SIGHUP, signal.SIG_DFL)  # and this one, under nohup
 from dissectors.line import LineSettings
 from sniff.capture.link import CaptureLink, RecordSpec, SourceSpec
 link = CaptureLink.start([SourceSpec(sys.argv[1], LineSettings.parse("115200,8N1"))], RecordSpec(sys.argv[2]))
@@ -163,6 +164,7 @@ def test_the_recording_outlives_the_main_process(bus, tmp_path, how, end) -> Non
             os.kill(pid, 0)  # still there
             wait_until_read(bus)
         finally:
+            main.kill()
             os.kill(pid, end)
             wait_until_gone(pid)
     assert recorded(file) == text(0, bus.fed) != b""
