@@ -32,6 +32,9 @@ from dissectors.tracker import Verdict
 from sniff.analysis.nodes import Node
 from sniff.analysis.summary import Summary
 
+LOOKED_FOR = 3
+"""So many requests to an address that never answers are a look whether anybody is there."""
+
 ERROR_POINTS, WARNING_POINTS, FINDINGS_MOST = 30, 10, 60
 
 
@@ -102,7 +105,7 @@ def station_health(node: Node, findings: Iterable[Finding] = ()) -> Health | Non
 
 def _is_there(node: Node, about: Mapping[int, object]) -> bool:
     """Whether an address is somebody's: it was heard, or is missed (an error or a warning is about it)."""
-    return node.sent > 0 or node.address in about
+    return node.sent > 0 or node.address in about or node.asked > LOOKED_FOR
 
 
 def _bus_health(summary: Summary, nodes: Iterable[Node], findings: Iterable[Finding]) -> Health:

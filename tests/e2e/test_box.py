@@ -56,6 +56,7 @@ def test_ports_come_and_go_and_it_says_so(box: Bench) -> None:
     assert box.bus("boiler").downs == 1
     roof.send(ANSWER)
     box.until_written()
+    wait_until(lambda: box.bus("roof").octets == len(roof.sent), "the octets are not on the status page")
 
     words = [sys.executable, "-m", "sniff", "box", "status"]
     asked = subprocess.run(words, cwd=box.folder, env=box.environment(), capture_output=True, text=True)

@@ -56,6 +56,8 @@ def test_every_number_of_the_json_is_on_the_page(made: tuple[str, Path], capsys:
             assert finding["next"] in text
             assert all(f"row {evidence['no']} at" in text for evidence in finding["evidence"])
     for station in numbers["stations"]:
+        if station["health"] is None:  # only looked for
+            continue
         row = (station["address"], station["health"]["score"], station["sent"], station["received"], station["asked"])
         assert " ".join(map(str, row)) in text
     for limit in numbers["measurement"]["limits"]:
