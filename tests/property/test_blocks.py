@@ -20,7 +20,6 @@ from sniff import formats
 from sniff.bus import capture_writer
 from sniff.engine.blocks import BLOCK_OCTETS, BLOCK_READS, Block, blocks_of, plain_reads
 from sniff.engine.capture import Capture, CaptureError
-from sniff.engine.capture_error import CaptureError
 from sniff.engine.session import Item, LineEvent, LineEventKind, Session, SettingsChange
 from sniff.formats import pcap_walk, pcapng, pcapng_walk
 from sniff.formats.linktypes import RTAC, rtac_record
@@ -186,7 +185,8 @@ def test_shared_captures(path: Path | None) -> None:
     try:
         same_file(path)
     except CaptureError as error:
-        assert "--bus NAME" in str(error)
+        if "--bus NAME" not in str(error):
+            raise
         pytest.skip("several buses: each is read by its name")
 
 
