@@ -24,15 +24,15 @@ PATIENCE = NS_PER_S
 
 
 @dataclass(frozen=True, slots=True)
-class _Asked:
+class OpenRequest:
     """A request that may still be answered, or that was not. `attempt`, `of`: as in `Transaction`."""
 
     id: int
     no: int
     frame: Frame
     header: Header
-    attempt: int
-    of: int | None
+    attempt: int = 1
+    of: int | None = None
 
 
 class Polling:
@@ -41,8 +41,8 @@ class Polling:
     def __init__(self, timing: Timing, patience: int = PATIENCE) -> None:
         self._patience = patience + timing.latency
         self._tx = 0
-        self._open: _Asked | None = None
-        self._failed: _Asked | None = None  # the last request, when it went unanswered
+        self._open: OpenRequest | None = None
+        self._failed: OpenRequest | None = None  # the last request, when it went unanswered
 
     def track(self, no: int, event: Event, header: Header | None) -> Tracked:
         """Take the next event."""
@@ -77,7 +77,7 @@ class Polling:
         repeats = last if last is not None and last.frame.octets == frame.octets else None
         self._tx += 1
         attempt, of = (1, None) if repeats is None else (repeats.attempt + 1, repeats.of or repeats.id)
-        self._open = _Asked(self._tx, no, frame, header, attempt, of)
+        self._open = OpenRequest(self._tx, no, frame, header, attempt, of)
         return Tracked(self._place(no, self._tx, header), before)
 
     def _answer(self, no: int, frame: Frame, header: Header, before: tuple[Transaction, ...]) -> Tracked:
@@ -113,12 +113,12 @@ class Polling:
         return Transaction(self._tx, station, header.kind, request, response, verdict, frame.start, frame.end, of=of)
 
     @staticmethod
-    def _place(no: int, tx: int, header: Header, asked: _Asked | None = None) -> Placement:
+    def _place(no: int, tx: int, header: Header, asked: OpenRequest | None = None) -> Placement:
         source = header.source if header.source is not None or asked is None else asked.header.destination
         return Placement(no, tx, header.role, source, header.destination)
 
 
-def _is_of(answer: Header, asked: _Asked) -> bool:
+def _is_of(answer: Header, asked: OpenRequest) -> bool:
     return answer.source is None or answer.source == asked.header.destination
 
 

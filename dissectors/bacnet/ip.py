@@ -4,7 +4,7 @@ stations are the last octets of the addresses; what it says is what its twin say
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 from ipaddress import IPv4Address
 from typing import Any
@@ -22,7 +22,7 @@ from dissectors.field_types import FieldType, FieldTypes, Kind
 from dissectors.frame import Check, Event, Frame, Header, Role
 from dissectors.line import NS_PER_S, Timing
 from dissectors.meaning import Meaning
-from dissectors.plain_tracker import closed_exchange
+from dissectors.numbered_exchanges import NumberedExchanges
 from dissectors.readings import Reading
 from dissectors.tracker import NOTHING_TRACKED, Placement, Tracked, Transaction, Verdict
 
@@ -170,28 +170,12 @@ def ip_packet(frame: Frame, role: Role) -> Any:
 
 # -- pairing ---------------------------------------------------------------------------------------------------
 
-_Key = tuple[bytes, bytes, int]  # who asks, who is asked, invoke number
-
-
-@dataclass(frozen=True, slots=True)
-class _Asked:
-    """See `plain_tracker.Request`."""
-
-    id: int
-    no: int
-    frame: Frame
-    header: Header
-    attempt: int = 1
-    of: int | None = None
-
 
 class IpTracker:
     """The tracker of one network: a confirmed request is answered under its invoke number."""
 
     def __init__(self, timing: Timing) -> None:
-        self._patience = PATIENCE + timing.latency
-        self._tx = 0
-        self._open: dict[_Key, _Asked] = {}
+        self._exchanges = NumberedExchanges(PATIENCE + timing.latency, MOST_OPEN)
 
     def track(self, no: int, event: Event, header: Header | None) -> Tracked:
         """Take the next event."""
@@ -201,56 +185,28 @@ class IpTracker:
         same = twin(event)
         message = read(same) if same is not None else None
         apdu = message.apdu if message is not None else None
-        if apdu is not None and apdu.invoke_id is not None:
+        if apdu is not None and apdu.invoke_id is not None and not apdu.sequence:
             here, there = event.octets[:6], event.octets[6:12]
-            if apdu.is_request and not apdu.sequence:
-                return self._ask(no, event, header, (here, there, apdu.invoke_id), before)
-            if apdu.is_answer and apdu.service is not None and not apdu.sequence:
-                return self._answer(no, event, header, (there, here, apdu.invoke_id), before)
-        self._tx += 1
+            if apdu.is_request:  # by who asks, who is asked, and the number
+                tx, over = self._exchanges.ask((here, there, apdu.invoke_id), no, event, header)
+                return Tracked(Placement(no, tx, Role.REQUEST, header.source, header.destination), before + over)
+            if apdu.is_answer and apdu.service is not None:
+                refused = Verdict.EXCEPTION if header.error else None
+                closed = self._exchanges.answer((there, here, apdu.invoke_id), no, event, header, refused)
+                placed = Placement(no, closed.id, Role.RESPONSE, header.source, header.destination)
+                return Tracked(placed, (*before, closed))
         verdict = Verdict.BROADCAST if header.role is Role.BROADCAST else Verdict.DATA
-        closed = Transaction(self._tx, header.source, header.kind, no, None, verdict, event.start, event.end)
-        placed = Placement(no, self._tx, header.role, header.source, header.destination)
+        closed = self._exchanges.alone(no, event, header, verdict)
+        placed = Placement(no, closed.id, header.role, header.source, header.destination)
         return Tracked(placed, (*before, closed))
 
     def advance(self, now: int) -> tuple[Transaction, ...]:
         """Say that nothing came up to `now` (ns)."""
-        late = []
-        for key, asked in self._open.items():  # the oldest first
-            if now - asked.frame.end <= self._patience:
-                break
-            late.append(key)
-        return tuple(closed_exchange(self._open.pop(key), Verdict.NO_RESPONSE) for key in late)
+        return self._exchanges.advance(now)
 
     def close(self) -> tuple[Transaction, ...]:
         """End of capture: answers could still have come."""
-        waiting, self._open = list(self._open.values()), {}
-        return tuple(closed_exchange(asked, Verdict.OPEN) for asked in waiting)
-
-    def _ask(self, no: int, frame: Frame, header: Header, key: _Key, before: tuple[Transaction, ...]) -> Tracked:
-        last = self._open.pop(key, None)
-        if last is not None:
-            before += (closed_exchange(last, Verdict.NO_RESPONSE),)
-        elif len(self._open) >= MOST_OPEN:
-            before += (closed_exchange(self._open.pop(next(iter(self._open))), Verdict.NO_RESPONSE),)
-        self._tx += 1
-        again = last is not None and last.frame.octets == frame.octets
-        attempt, of = (last.attempt + 1, last.of or last.id) if last is not None and again else (1, None)
-        self._open[key] = _Asked(self._tx, no, frame, header, attempt, of)
-        return Tracked(Placement(no, self._tx, Role.REQUEST, header.source, header.destination), before)
-
-    def _answer(self, no: int, frame: Frame, header: Header, key: _Key, before: tuple[Transaction, ...]) -> Tracked:
-        asked = self._open.pop(key, None)
-        if asked is None:
-            self._tx += 1
-            closed = Transaction(
-                self._tx, header.source, header.kind, None, no, Verdict.UNSOLICITED, frame.start, frame.end,
-                error=header.error,
-            )  # fmt: skip
-            return Tracked(Placement(no, self._tx, Role.RESPONSE, header.source, header.destination), (*before, closed))
-        verdict = Verdict.ANSWERED if asked.attempt == 1 else Verdict.RETRY
-        closed = closed_exchange(asked, Verdict.EXCEPTION if header.error else verdict, no, frame, header.error)
-        return Tracked(Placement(no, asked.id, Role.RESPONSE, header.source, header.destination), (*before, closed))
+        return self._exchanges.close()
 
 
 def make_ip(source: bytes, destination: bytes, function: int, npdu: bytes) -> bytes:
