@@ -43,9 +43,10 @@ RULES: dict[str, Rule] = {
             "damaged frames",
             "Frames whose checksum is wrong or whose form is spoilt, counted at who sent them: an answer carries no "
             "address and is counted at the station that was asked. A sender is named that has over four times the "
-            "damage that noise at the rate of all others would have done while it sends; else it is the bus's. One "
-            "alone, or fewer than 1 in 100 and at most two a minute, is only noted: Johnson Controls calls up to two "
-            "a minute tolerable.",
+            "damage that noise at the rate of all others would have done while it sends, or all of it where chance "
+            "would seldom have struck it alone; up to four in a row with no whole answer between count as one, for a "
+            "master repeats into the same disturbance. Else it is the bus's. One alone, or fewer than 1 in 100 and at "
+            "most two a minute, is only noted: Johnson Controls calls up to two a minute tolerable.",
             "noise, wrong termination or bias, or two that talk at once",
             "if one station only: its stub, its connector; if all: termination, bias, ground",
         ),

@@ -17,8 +17,9 @@ Points are taken off 100, never below 0:
       and it is never better than half way between 100 and the worst station that an error or warning is about
 
 So half of the requests lost, or every fifth frame damaged, is a station at 0 or 40, and a bus with a dead station has
-50 at best. A station that was never asked and sent nothing has no health, nor has an address that never answered and
-that nothing is found about: somebody looked whether anybody is there. README.md has the formula for users.
+50 at best. A station that was never asked and sent nothing has no health, nor has an address that was asked LOOKED_FOR
+times at most, never answered, and that no error or warning is about: somebody looked whether anybody is there.
+README.md has the formula for users.
 """
 
 from __future__ import annotations
@@ -104,7 +105,7 @@ def station_health(node: Node, findings: Iterable[Finding] = ()) -> Health | Non
 
 
 def _is_there(node: Node, about: Mapping[int, object]) -> bool:
-    """Whether an address is somebody's: it was heard, or is missed (an error or a warning is about it)."""
+    """Whether an address is somebody's: it was heard, or is missed (asked often, or something grave is about it)."""
     return node.sent > 0 or node.address in about or node.asked > LOOKED_FOR
 
 

@@ -102,10 +102,11 @@ _ALL = (
         "Octets of frames that the adapter marked, counted at the station that sent the frame (a master's frames at "
         "the master). A single one, or fewer than 1 frame in 100 and at most two a minute, is only noted. A sender is "
         "named that is struck clearly more often than the octets that it sends explain (2.5 times the rate of the "
-        "other stations, by chance less than once in a thousand); else one finding names the bus. Where one flag "
-        "covers a whole packet (the adapter says so, or in a capture that does not name it the marks: they go on in "
-        "long runs through good frames), damaged frames count, and packets with a flag: a station is named that is in "
-        "nearly all of them while the others are mostly in packets without one.",
+        "other stations, by chance less than once in a thousand; where nobody else is struck, in twenty), repeats into "
+        "one disturbance counted once; else one finding names the bus. Where one flag covers a whole packet (the "
+        "adapter says so, or in a capture that does not name it the marks: they go on in long runs through good "
+        "frames), damaged frames count, and packets with a flag: a station is named that is in nearly all of them "
+        "while the others are mostly in packets without one.",
         "noise while this station sends, weak levels from it, or two that send at once",
         "this station's connector, stub and ground; " + _WIRING,
     ),
@@ -237,7 +238,8 @@ _ALL = (
         Severity.ERROR,
         "several stations lost at one moment",
         "Two stations or more that had answered, and then left three requests in a row without answer, all from the "
-        "same moment on as far as their polls tell. A warning where they came back.",
+        "same moment on as far as their polls tell, within so small a part of the capture that chance would put so "
+        "many there less than once in ten. A warning where they came back.",
         "something they share: a supply, a fuse, a stretch of cable, a repeater",
         "what these stations have in common: supply, cabinet, the piece of cable behind the last one that answers",
         explains=("MB001", "MB002", "MB003", "MB104", "MB105", "N2005", "N2010"),

@@ -1,8 +1,8 @@
 """The terminal UI in a browser, at http://127.0.0.1:8485: several viewers of one capture, each with a view of its own.
 A port or configured bus is recorded, by one process, and viewers look at the recording as it grows, a second behind the
 bus: what they do never touches the port. Only this machine may look, unless --allow-remote and a token say otherwise;
-the token (--token, or the variable SNIFF485_TOKEN) travels as plain as the page does: beyond one's own network a proxy
-with TLS belongs before it. It needs `pip install 'sniff485[serve]'`.
+the token (in the variable SNIFF485_TOKEN, or in a file) travels as plain as the page does: beyond one's own network a
+proxy with TLS belongs before it. It needs `pip install 'sniff485[serve]'`.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from pathlib import Path
 
 from sniff.cli import UNREADABLE, USAGE, Failure, arguments, targets
 from sniff.formats.table import suffixes
+from sniff.outlet_settings import TOKEN_ENV, Secret, SettingsError
 from sniff.tui.guest import GUEST
 
-TOKEN = "SNIFF485_TOKEN"
 PORT = 8485
 LOOK = 0.2
 """Seconds between two looks for a recording that is to begin."""
@@ -43,7 +43,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--port", type=arguments.whole, default=PORT, metavar="N", help="default 8485; 0: any free one")
     parser.add_argument("--allow-remote", action="store_true", help="let others than this machine look; needs a token")
-    parser.add_argument("--token", metavar="TEXT", help="what viewers must know, at least 16 characters")
+    parser.add_argument(
+        "--token-file", metavar="FILE", help=f"what viewers must know, at least 16 characters; default: {TOKEN_ENV}"
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -70,13 +72,16 @@ def _token(args: argparse.Namespace) -> str:
     """The token, where one is said. Ends with exit code 2 where others may come without one."""
     from sniff.browser.access import LEAST_TOKEN, is_loopback
 
-    token = args.token if args.token is not None else os.environ.get(TOKEN, "")
+    try:
+        token = Secret(TOKEN_ENV, args.token_file or "").read() or ""
+    except SettingsError as error:
+        raise Failure(f"--token-file: {error}", USAGE) from None
     if token and (len(token) < LEAST_TOKEN or not re.fullmatch(r"[A-Za-z0-9_-]+", token)):
         raise Failure(f"the token: at least {LEAST_TOKEN} letters, digits, - and _; {_another()}", USAGE)
     if args.allow_remote and not token:
-        raise Failure(f"--allow-remote: needs a token, in --token or {TOKEN}; {_another()}", USAGE)
+        raise Failure(f"--allow-remote: needs a token, in {TOKEN_ENV} or a file (--token-file); {_another()}", USAGE)
     if not args.allow_remote and not is_loopback(args.host):
-        raise Failure(f"--host {args.host}: others could look; say so with --allow-remote and --token", USAGE)
+        raise Failure(f"--host {args.host}: others could look; say so with --allow-remote and a token", USAGE)
     return token
 
 

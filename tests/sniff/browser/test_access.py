@@ -6,6 +6,7 @@ import pytest
 
 from sniff.browser.access import Access, is_loopback
 from sniff.cli import main
+from sniff.outlet_settings import TOKEN_ENV
 
 TOKEN = "0123456789abcdef0123"
 HERE = {"Host": "127.0.0.1:8485", "Origin": "http://127.0.0.1:8485"}
@@ -49,17 +50,21 @@ def test_the_right_one_does() -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "token", "said"),
     [
-        (["--host", "0.0.0.0"], "--allow-remote"),
-        (["--host", "0.0.0.0", "--token", TOKEN], "--allow-remote"),
-        (["--allow-remote"], "needs a token"),
-        (["--allow-remote", "--token", "short"], "at least 16"),
-        (["--allow-remote", "--token", "with spaces and more of them"], "at least 16"),
+        (["--host", "0.0.0.0"], "", "--allow-remote"),
+        (["--host", "0.0.0.0"], TOKEN, "--allow-remote"),
+        (["--allow-remote"], "", "needs a token"),
+        (["--allow-remote"], "short", "at least 16"),
+        (["--allow-remote"], "with spaces and more of them", "at least 16"),
+        (["--allow-remote", "--token-file", "/no/token"], TOKEN, "/no/token: No such file"),
     ],
 )
-def test_other_addresses_need_both(options: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_other_addresses_need_both(
+    options: list[str], token: str, said: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     pytest.importorskip("textual_serve")
+    monkeypatch.setenv(TOKEN_ENV, token)
     assert main(["serve", "captures/rtu-clean.cap.txt", *options]) == 2
     assert said in capsys.readouterr().err
 

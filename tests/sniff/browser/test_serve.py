@@ -120,7 +120,7 @@ def test_viewers_do_not_disturb_the_recording(tmp_path: Path) -> None:
     assert heard == bytes(feeder.fed)
 
 
-def test_a_token_is_really_asked_for() -> None:
+def test_a_token_is_really_asked_for(tmp_path: Path) -> None:
     async def look(address: str) -> list[int]:
         given = []
         async with aiohttp.ClientSession(cookie_jar=aiohttp.CookieJar(unsafe=True)) as session:
@@ -137,7 +137,9 @@ def test_a_token_is_really_asked_for() -> None:
                 await viewer.until("read holding")
         return given
 
-    with served(str(CAPTURE), "--allow-remote", "--token", TOKEN) as address:
+    held = tmp_path / "token"
+    held.write_text(f"{TOKEN}\n", encoding="utf-8")
+    with served(str(CAPTURE), "--allow-remote", "--token-file", str(held)) as address:
         assert asyncio.run(look(address)) == [403, 403, 403, 403, 403, 200]
 
 
