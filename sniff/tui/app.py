@@ -175,6 +175,8 @@ class SnifferApp(Analyzer):
             keys = load_config().keys
         except ConfigError:  # said already
             return
+        if not keys:
+            return
         for entry in SCREENS:
             load(entry)  # names of keys are known with their screens
         known = tuple(sorted(KNOWN))
