@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import random
 from pathlib import Path
 
 import pytest
@@ -11,11 +10,11 @@ pytest.importorskip("termios")
 
 from tests.bench.box_week import week
 
+SEED = 1212603882  # three captures of one box are killed
+
 
 def test_an_hour_with_everything_bad_in_it(tmp_path: Path) -> None:
-    seed = random.SystemRandom().randrange(1, 1 << 31)
-    print(f"seed {seed}: python -m tests.bench.box_week --hours 1 --seed {seed}")
-    counts = week(tmp_path, seed, 1).counts
+    counts = week(tmp_path, SEED, 1).counts
     assert counts["looks"] > 30
     assert counts["power cut"] + counts["capture killed"] >= 2
     assert counts["kept"] + counts["removed for room"] > 50
