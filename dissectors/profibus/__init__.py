@@ -22,6 +22,7 @@ from dissectors.token_ring import StationTable, TokenRing
 __all__ = ["PROFIBUS", "ProfibusFramer", "ProfibusTracker", "fields", "peek", "text"]
 
 packet = on_first_use("dissectors.profibus.packets:packet")
+kernel = on_first_use("dissectors.profibus.kernel:kernel")
 
 _EVIDENCE = {1: 2.0, 3: 8.0, 6: 22.0}
 """Bits of evidence by length: short acknowledgement and token have no check, and are believed only in their place."""
@@ -63,5 +64,6 @@ PROFIBUS = Dissector(
     packet_file=PacketFile((147,), least=1),
     renamer=ProfibusRenamer,
     scenarios=on_first_use("dissectors.profibus.scenario:scenarios"),
+    kernel=kernel,
     makers={"profibus": telegram, "profibus-token": token},
 )
