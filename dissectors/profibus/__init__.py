@@ -23,6 +23,7 @@ __all__ = ["PROFIBUS", "ProfibusFramer", "ProfibusTracker", "fields", "peek", "t
 
 packet = on_first_use("dissectors.profibus.packets:packet")
 kernel = on_first_use("dissectors.profibus.kernel:kernel")
+pairing = on_first_use("dissectors.profibus.block_pairing:pairing")
 
 _EVIDENCE = {1: 2.0, 3: 8.0, 6: 22.0}
 """Bits of evidence by length: short acknowledgement and token have no check, and are believed only in their place."""
@@ -65,5 +66,6 @@ PROFIBUS = Dissector(
     renamer=ProfibusRenamer,
     scenarios=on_first_use("dissectors.profibus.scenario:scenarios"),
     kernel=kernel,
+    pairing=pairing,
     makers={"profibus": telegram, "profibus-token": token},
 )

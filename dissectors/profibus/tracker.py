@@ -16,6 +16,7 @@ may have been lost here.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from dissectors.frame import Event, Frame, Header, Noise, Role
 from dissectors.line import NS_PER_S, Timing
@@ -47,6 +48,15 @@ class _Asked:
     is_answered: bool = False
 
 
+class Past(NamedTuple):
+    """An answered request that rows in bulk ended with: its row, frame and header, and the octets of its answer."""
+
+    no: int
+    frame: Frame
+    header: Header
+    answer: bytes
+
+
 class ProfibusTracker:
     """The tracker of one bus."""
 
@@ -55,7 +65,6 @@ class ProfibusTracker:
         self._tx = 0
         self._open: _Asked | None = None
         self._past: _Asked | None = None  # the last request, once it is closed
-        self._last: dict[tuple[int | None, int | None], _Asked] = {}  # by master and station; at most 128²
         self._is_clear = True  # nothing was damaged since the last good request
 
     def track(self, no: int, event: Event, header: Header | None) -> Tracked:
@@ -85,26 +94,47 @@ class ProfibusTracker:
         asked, self._open = self._open, None
         return () if asked is None else (closed_exchange(asked, Verdict.OPEN),)
 
+    # For rows in bulk
+
+    @property
+    def is_at_rest(self) -> bool:
+        """Whether no request is open."""
+        return self._open is None
+
+    @property
+    def next_id(self) -> int:
+        """The id of the next transaction."""
+        return self._tx + 1
+
+    def may_repeat(self, octets: bytes) -> bool:
+        """Whether a request of those octets would be the last one again."""
+        return self._past is not None and self._past.frame.octets == octets
+
+    def pass_by(self, count: int, past: Past | None, asked: bool) -> None:
+        """Stand behind `count` transactions that were closed elsewhere; `asked`: some were requests to be answered."""
+        if past is None:
+            self._past = None
+        else:
+            control = parse(past.frame.octets).control
+            self._past = _Asked(self._tx + count, past.no, past.frame, past.header, control)
+            self._past.is_answered, self._past.answer = True, past.answer
+        self._tx += count
+        self._is_clear = self._is_clear or asked
+
     def _ask(self, no: int, frame: Frame, header: Header, before: tuple[Transaction, ...]) -> Tracked:
         before += self._give_up()
         control = parse(meant(frame)).control
         asked = _Asked(self._next(), no, frame, header, control)
-        pair = header.source, header.destination
-        earlier = self._last.get(pair)
-        if earlier is not None and frame.ok and self._repeats(asked, earlier):
+        earlier = self._past
+        if earlier is not None and frame.ok and earlier.frame.ok and self._repeats(asked, earlier):
             asked.attempt, asked.of = earlier.attempt + 1, earlier.of or earlier.id
-        if frame.ok:
-            self._last[pair] = asked
-            self._is_clear = True
-        else:
-            self._is_clear = False
+        self._is_clear = frame.ok
         self._open = asked
         return Tracked(_placed(no, asked.id, header), before)
 
     def _repeats(self, asked: _Asked, earlier: _Asked) -> bool:
+        """Whether a request is the one directly before once more: a master repeats at once, or not at all."""
         if asked.frame.octets != earlier.frame.octets or asked.header.role is Role.POLL:
-            return False
-        if earlier is not self._past:  # a master repeats at once, or not at all: this one asks anew
             return False
         if not earlier.is_answered:
             return True
