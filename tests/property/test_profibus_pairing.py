@@ -16,8 +16,8 @@ from tests.property.test_n2_pairing import by_rows
 from tests.seeds import seeds
 
 
-def assert_alike(seed: int, troubles: tuple[str, ...], share: float) -> None:
-    session, chunks = bus(seed, 250, troubles, share)
+def assert_alike(seed: int, troubles: tuple[str, ...], share: float, turns: int = 250) -> None:
+    session, chunks = bus(seed, turns, troubles, share)
     cuts = sorted(random.Random(seed).sample(range(1, len(chunks)), 2))
     parts = [chunks[first:beyond] for first, beyond in zip([0, *cuts], [*cuts, None], strict=True)]
     rows: list[Row] = []
@@ -32,12 +32,12 @@ def assert_alike(seed: int, troubles: tuple[str, ...], share: float) -> None:
     assert closed == settled
 
 
-@pytest.mark.parametrize("share", [0.0, 0.03, 0.4])
-@pytest.mark.parametrize("seed", seeds(4, 2))
+@pytest.mark.parametrize("share", [0.03, 0.4])
+@pytest.mark.parametrize("seed", seeds(4))
 def test_exchanges_are_paired_as_the_tracker_pairs_them(seed: int, share: float) -> None:
     assert_alike(seed, TROUBLES, share)
 
 
 @pytest.mark.parametrize("trouble", TROUBLES)
 def test_each_trouble_alone_is_paired_alike(trouble: str) -> None:
-    assert_alike(7, (trouble,), 0.1)
+    assert_alike(7, (trouble,), 0.1, 100)
