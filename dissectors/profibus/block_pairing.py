@@ -42,8 +42,8 @@ PROTOCOL: Final = "profibus"
 HORIZON: Final = 1 << 15
 """Rows looked at in one go: a run that goes on is taken up again."""
 
-_REQUEST, _POLL, _RESPONSE, _TO_ALL = (
-    np.uint8(ROLES.index(role)) for role in (Role.REQUEST, Role.POLL, Role.RESPONSE, Role.BROADCAST)
+_REQUEST, _POLL, _RESPONSE, _TO_ALL, _TOKEN = (
+    np.uint8(ROLES.index(role)) for role in (Role.REQUEST, Role.POLL, Role.RESPONSE, Role.BROADCAST, Role.TOKEN)
 )
 _ANSWERED, _EXCEPTION, _NO_RESPONSE, _DATA, _BROADCAST = (
     np.uint8(VERDICTS.index(verdict))
@@ -76,7 +76,25 @@ class ProfibusBlockPairing:
         asked = np.flatnonzero(self._frames.role[begin:end] != _RESPONSE) + begin
         run = Run(begin, end, *self._made(asked, begin, end, no))
         tracker.pass_by(len(asked), self._past(int(asked[-1]), no - begin), bool(self._asks[asked].any()))
+        self._teach(begin, end)
         return run
+
+    def _teach(self, begin: int, end: int) -> None:
+        """Who was heard, and whose turn it is behind them."""
+        frames, rows = self._frames, slice(begin, end)
+        source, to, role = frames.source[rows], frames.destination[rows], frames.role[rows]
+        token, checked = role == _TOKEN, (source != NONE) & (role != _TOKEN)
+        passed, first = np.unique(source[token][::-1], return_index=True)
+        sends = int(np.flatnonzero(role != _RESPONSE)[-1])
+        self._tracker.turn.pass_by(
+            np.unique(source[checked]).tolist(),
+            np.unique(source[checked & (role != _RESPONSE)]).tolist(),
+            np.unique(to[checked]).tolist(),
+            dict(zip(passed.tolist(), to[token][::-1][first].tolist(), strict=True)),
+            int(to[sends] if token[sends] else source[sends]),
+        )
+        goes_on = (role != _RESPONSE) & ~(token & (source == to))
+        self._tracker.turn.wait(frames.start[rows], frames.end[rows], goes_on)
 
     def _find_irregular(self) -> Masks:
         """Rows that the tracker must see: answers that are not of the row before, and what may be a repeat."""

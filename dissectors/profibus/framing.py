@@ -22,7 +22,7 @@ from dissectors.frame import Check, Event, Found, Frame, LineError, Reason
 from dissectors.line import MS, Timing
 from dissectors.plain_framers import PlainFramer
 from dissectors.profibus.control import REQUEST
-from dissectors.profibus.envelope import damaged, is_sound, length_of
+from dissectors.profibus.envelope import damaged, damaged_token, head_inside, is_sound, length_of
 from dissectors.profibus.telegram import FIXED, HIGHEST, LONGEST, SC, SD1, SD2, SD3, SD4, parse
 
 if TYPE_CHECKING:
@@ -195,7 +195,12 @@ class ProfibusFramer(PlainFramer):
     def _between(self, count: int) -> Event:
         """What lies in front of the next telegram, or of silence: all of it, or the damaged telegram at its begin."""
         octets = bytes(self._window.octets[:count])
-        told = damaged(octets) if self._is_proved else None
+        told = None
+        if self._is_proved:
+            told = damaged(octets) or damaged_token(octets, self._holder, self._masters)
+            inside = head_inside(octets) if told is None else 0
+            if inside:
+                return self._between(inside)
         if told is None:
             self._is_open &= count <= STRAY_MOST
             return self._noise(count, Reason.NO_FRAME)

@@ -15,7 +15,7 @@ may have been lost here.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from dissectors.frame import Event, Frame, Header, Noise, Role
@@ -24,6 +24,7 @@ from dissectors.plain_tracker import closed_exchange
 from dissectors.profibus.control import Control
 from dissectors.profibus.header import meant
 from dissectors.profibus.telegram import parse
+from dissectors.profibus.turn import Due, Turn
 from dissectors.tracker import NOTHING_TRACKED, Placement, Tracked, Transaction, Verdict
 
 PATIENCE = NS_PER_S
@@ -65,6 +66,7 @@ class ProfibusTracker:
         self._tx = 0
         self._open: _Asked | None = None
         self._past: _Asked | None = None  # the last request, once it is closed
+        self._turn = Turn(timing)
         self._is_clear = True  # nothing was damaged since the last good request
 
     def track(self, no: int, event: Event, header: Header | None) -> Tracked:
@@ -72,16 +74,36 @@ class ProfibusTracker:
         before = self.advance(event.start)
         if header is None or not isinstance(event, Frame):
             self._is_clear = False
+            self._turn.see_noise(event.end)
             if self._open is not None and isinstance(event, Noise):
                 self._open.disturbed = True
             return Tracked(None, before) if before else NOTHING_TRACKED
+        if not event.ok and event.repair is None:
+            return self._damaged(no, event, header, before)
+        self._turn.see(parse(meant(event)), event.start, event.end, event.ok)
+        return self._by_role(no, event, header, before)
+
+    def _by_role(self, no: int, frame: Frame, header: Header, before: tuple[Transaction, ...]) -> Tracked:
         if header.role is Role.RESPONSE:
-            return self._answer(no, event, header, before)
-        if header.role in _ASKS and (event.ok or event.repair is not None or self._open is None):
-            return self._ask(no, event, header, before)
-        if not event.ok and event.repair is None and self._open is not None:
-            return self._answer(no, event, header, before)  # damaged, in the place of the answer
-        return self._send(no, event, header, before)
+            return self._answer(no, frame, header, before)
+        if header.role in _ASKS:
+            return self._ask(no, frame, header, before)
+        return self._send(no, frame, header, before)
+
+    def _damaged(self, no: int, frame: Frame, header: Header, before: tuple[Transaction, ...]) -> Tracked:
+        """A telegram with an octet wrong, any one: the turn says whose it is."""
+        asked, due = self._open, None
+        if asked is not None:
+            is_sure = asked.frame.ok or asked.frame.repair is not None
+            station = asked.header.destination if is_sure else None
+            due = Due(station, asked.header.source, asked.header.role is Role.POLL)
+        speaker = self._turn.speaker(parse(frame.octets), len(frame.octets), frame.start, frame.end, due)
+        header = replace(header, source=speaker.source, destination=speaker.destination)
+        if speaker.answers:
+            return self._answer(no, frame, header, before)
+        if asked is not None and header.role is Role.RESPONSE:
+            return self._send(no, frame, header, before)
+        return self._by_role(no, frame, header, before)
 
     def advance(self, now: int) -> tuple[Transaction, ...]:
         """Say that nothing came up to `now` (ns)."""
@@ -109,6 +131,11 @@ class ProfibusTracker:
     def may_repeat(self, octets: bytes) -> bool:
         """Whether a request of those octets would be the last one again."""
         return self._past is not None and self._past.frame.octets == octets
+
+    @property
+    def turn(self) -> Turn:
+        """Whose turn it is."""
+        return self._turn
 
     def pass_by(self, count: int, past: Past | None, asked: bool) -> None:
         """Stand behind `count` transactions that were closed elsewhere; `asked`: some were requests to be answered."""
@@ -149,6 +176,8 @@ class ProfibusTracker:
             return self._unasked(no, frame, header, before)
         self._open, self._past = None, asked
         asked.is_answered, asked.answer = frame.ok, frame.octets
+        if not asked.frame.ok and header.source is not None:  # what it asked whom was not heard: who answers knows
+            asked.header = replace(asked.header, destination=header.source)
         if not frame.ok:
             verdict = Verdict.DAMAGED_ANSWER
         elif header.error is not None:
@@ -157,7 +186,8 @@ class ProfibusTracker:
             verdict = Verdict.ANSWERED if asked.attempt == 1 else Verdict.RETRY
         role = Role.RESPONSE
         closed = closed_exchange(asked, verdict, no, frame, header.error)
-        source, destination = asked.header.destination, asked.header.source
+        source = asked.header.destination if frame.ok else header.source
+        destination = asked.header.source
         return Tracked(Placement(no, asked.id, role, source, destination), (*before, closed))
 
     def _unasked(self, no: int, frame: Frame, header: Header, before: tuple[Transaction, ...]) -> Tracked:
@@ -214,6 +244,8 @@ def _is_of(answer: Header, asked: _Asked) -> bool:
     """Whether an answer fits a request: a short acknowledgement names nobody; others name both."""
     if answer.source is None:
         return True
+    if not asked.frame.ok and asked.frame.repair is None:
+        return answer.destination == asked.header.source
     return answer.source == asked.header.destination and answer.destination == asked.header.source
 
 
