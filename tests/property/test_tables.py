@@ -28,7 +28,7 @@ from sniff.engine.table_join import TableJoin
 from sniff.filter import compile_filter
 from sniff.filter.errors import FilterError
 from sniff.formats import read
-from tests.bench import bulk_ascii, bulk_mstp, bulk_n2, bulk_rtu
+from tests.bench import bulk_ascii, bulk_mstp, bulk_n2, bulk_profibus, bulk_rtu
 from tests.seeds import MOST_READS
 
 Bus = Callable[[float], tuple[Session, Reads]]
@@ -123,6 +123,13 @@ def _n2(damaged: float, timing: Timing = bulk_n2.TIMING) -> tuple[Session, Reads
     return _polled(damaged, "n2", bulk_n2, timing, 1500)
 
 
+def _profibus(damaged: float, latency: int = 0) -> tuple[Session, Reads]:
+    reads = bulk_profibus.reads(2000, damaged=damaged, answered=0.99)
+    if latency:
+        reads = replace(reads, times=-(-reads.times // latency) * latency)
+    return Session("x", bulk_profibus.LINE, "profibus", adapter=Adapter(latency=latency)), reads
+
+
 def _hidden(damaged: float) -> tuple[Session, Reads]:
     """An adapter that holds octets back and does not say so."""
     session, reads = _rtu(damaged, bulk_rtu.HELD_BACK)
@@ -141,6 +148,8 @@ def _hidden(damaged: float) -> tuple[Session, Reads]:
         partial(_ascii, timing=bulk_ascii.HELD_BACK),
         _n2,
         partial(_n2, timing=bulk_n2.HELD_BACK),
+        _profibus,
+        partial(_profibus, latency=16_000_000),
     ],
 )
 def test_long_buses_give_the_same_rows_as_tables(bus: Bus, damaged: float) -> None:
