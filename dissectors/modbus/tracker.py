@@ -407,8 +407,7 @@ class ModbusTracker:
         self._learn_from_next(first, first.header.role is not Role.EITHER)
         for (unit, pace), times in went.times.items():
             self.learnt.answered_often(unit, pace, times)
-        for pause, cycle in went.pauses:
-            self.learnt.paused(pause, cycle)
+        self.learnt.paused_often(went.pauses)
         self.learnt.waited(went.unanswered)
         for _ in range(min(went.sure, MOST_VOTES)):
             self._echoes.learn(False)

@@ -92,7 +92,7 @@ class Table:
             placement_columns(rows),
             transaction_columns(closed),
             np.array(closed_by if closed_by is not None else [len(rows) - 1] * len(closed), np.int64),
-            {place: row for place, row in enumerate(rows) if not _is_plain(row)},
+            {place: row for place, row in enumerate(rows) if not is_plain(row)},
         )
 
     @classmethod
@@ -329,7 +329,7 @@ def joined_columns(kind: type[Named], parts: Sequence[Named]) -> Named:
     return kind(**{name: np.concatenate(values) for name, values in held.items()}, names=same)
 
 
-def _is_plain(row: Row) -> bool:
+def is_plain(row: Row) -> bool:
     """Whether columns say all of it."""
     event = row.event
     if not isinstance(event, Frame) or row.header is None or row.searched is not None:
