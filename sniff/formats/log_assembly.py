@@ -140,7 +140,7 @@ class Assembly:
         self._samples = line.samples
         self._stamp = line.stamp
         self._way = way
-        if line.stamp is None and heading is not None and line.bare:
+        if line.stamp is None and heading is not None and (line.bare or not self._used):
             self._stamp, self._way = heading.stamp, way or heading.way
             self._used = True
 

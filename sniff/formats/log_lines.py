@@ -245,6 +245,14 @@ def _row(text: str, stamp: Stamp | None) -> Line | None:
     )  # fmt: skip
 
 
+def _are_characters(field: str, octets: bytearray) -> bool:
+    """Whether a column shows these octets as characters, with a sign for each that is none."""
+    if len(field) != len(octets):
+        return False
+    shown = sum(chr(octet) == sign for sign, octet in zip(field, octets, strict=True))
+    return shown == sum(0x20 < octet < 0x7F for octet in octets) or not _PAIRS.fullmatch(field)
+
+
 def _of_row(rest: str, marked: bool) -> bytes | None:
     """The octets behind an offset, without the characters beside them; b"" for none, None when it is no row.
 
@@ -253,7 +261,7 @@ def _of_row(rest: str, marked: bool) -> bytes | None:
     """
     found = bytearray()
     for number, field in enumerate(_COLUMN.split(rest)):
-        if number and (len(found) % 8 or not found or len(field) == len(found)):
+        if number and (len(found) % 8 or not found or _are_characters(field, found)):
             break
         if _PAIRS.fullmatch(field):
             found += bytes.fromhex(field.replace("-", " "))

@@ -41,6 +41,7 @@ class Shape:
 
 
 _H = r"[0-9A-Fa-f]{1,2}"
+_H2 = r"[0-9A-Fa-f]{2}"
 _S = r"\0"
 
 
@@ -67,6 +68,8 @@ SHAPES: tuple[Shape, ...] = (
     _shape("sigrok", r"^(?:\d+-\d+\s+[\w /.-]+?|\w+-\d+): ?(?:.*: ?)?"
                      r"(?:[Ss]tart bit|[Ss]top bit|[Pp]arity|[01]$|Frame error|Break)",
            Role.NOTHING),
+    _shape("minimalmodbus", rf"MinimalModbus debug mode\. (?:(?P<way>Writing)|Response).*"
+                            rf"['\"] \((?P<octets>{_H2}(?: {_H2})*)\)"),
     _shape("minimalmodbus", r"MinimalModbus debug mode\. (?:Will write|Writing|Response)"),
     _shape("minimalmodbus", r"MinimalModbus debug mode\. "
                             r"(?:Clearing|No sleep|Sleeping|Create|Closing|Opening|Will sleep)",
