@@ -158,7 +158,11 @@ def stamp_of(line: str, times: Times = AS_WRITTEN) -> Stamp | None:
         return Stamp(int(Decimal(text) * times.unit), tick, *bare.span("number"), times.since_1970)
     for clock in CLOCKS:
         match = clock.pattern.search(head)
-        if match is None or (times.clocks_only and not (clock.dated or clock.daily)) or (clock.first and not _ONLY_BRACKETS.fullmatch(head[: match.start()])):
+        if (
+            match is None
+            or (times.clocks_only and not (clock.dated or clock.daily))
+            or (clock.first and not _ONLY_BRACKETS.fullmatch(head[: match.start()]))
+        ):
             continue
         try:
             time = clock.value(match, times.order)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from enum import Enum
 
@@ -81,6 +81,8 @@ class Line:
     """Way and octets of what stands behind on the same line, as the answer beside its request."""
     goes_on: bool = False
     """Whether it ends as a line that another continues."""
+    whole: Callable[[bytes], bytes] | None = None
+    """What makes the octets below it those that were sent."""
 
 
 EMPTY, REMARKED = Line(Kind.EMPTY), Line(Kind.REMARK)
@@ -109,7 +111,7 @@ def line_of(text: str, base: int = PAIRS_ONLY, rows: bool = True, times: Times =
     if shape.role is Role.HEADING and (found := octets_in(text, base)) is not None and len(found.octets) > 2:
         return Line(Kind.OCTETS, stamp, way, found.octets, shape.tool, False, Role.DATA, shape.tool, found.spelling)
     if shape.role is not Role.DATA:
-        return Line(Kind.SHAPE, stamp, way, role=shape.role, tool=shape.tool)
+        return Line(Kind.SHAPE, stamp, way, role=shape.role, tool=shape.tool, whole=shape.whole)
     told = groups.get("octets")
     run = octets_in(text if told is None else told, base)
     if told is not None and run is None and _OCTET.fullmatch(told):
@@ -148,6 +150,15 @@ def numbers_of(text: str) -> tuple[str, ...]:
         return ()
     text = _without_stamps(text)[1]
     return numbers_in(text) or ((alone,) if (alone := number_in(text)) else ())
+
+
+def head_of(text: str) -> str:
+    """What a line says that stands above octets, without times and numbers: the same for all heads of one sort."""
+    text = _without_stamps(COLOURS.sub("", text)[:LONGEST])[1].replace(STAMP, "")
+    return " ".join(_NUMERAL.sub("#", text).split())[:80]
+
+
+_NUMERAL = re.compile(r"[0-9A-Fa-f]*\d[0-9A-Fa-f]*")
 
 
 def _general(text: str, stamp: Stamp | None, base: int) -> Line:
@@ -249,8 +260,12 @@ def _are_characters(field: str, octets: bytearray) -> bool:
     """Whether a column shows these octets as characters, with a sign for each that is none."""
     if len(field) != len(octets):
         return False
-    shown = sum(chr(octet) == sign for sign, octet in zip(field, octets, strict=True))
-    return shown == sum(0x20 < octet < 0x7F for octet in octets) or not _PAIRS.fullmatch(field)
+    if not _PAIRS.fullmatch(field):
+        return True
+    return all(
+        sign == chr(octet) if 0x20 < octet < 0x7F else sign not in _HEX
+        for sign, octet in zip(field, octets, strict=True)
+    )
 
 
 def _of_row(rest: str, marked: bool) -> bytes | None:

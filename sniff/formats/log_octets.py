@@ -380,7 +380,9 @@ def _words(line: str) -> Run | None:
         alone = match.end() == len(line.rstrip())
         before = line[match.start() - 1] if match.start() else ""
         quoted = before in _QUOTES and line[match.end() : match.end() + 1] == before
-        enough = 8 if quoted else 12 if not alone else 8 if before in (" ", "\t", "|", ";") else 4 if before in "#:=" else 12
+        enough = (
+            8 if quoted else 12 if not alone else 8 if before in (" ", "\t", "|", ";") else 4 if before in "#:=" else 12
+        )
         if before in ("x", "X"):  # a shorter one is an address
             enough = 10 if alone else 18
         if len(digits) >= enough and (best is None or len(digits) > 2 * len(best.octets)):

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
-from sniff.formats.log_lines import Kind, Line, line_of, numbers_of
+from sniff.formats.log_lines import Kind, Line, head_of, line_of, numbers_of
 from sniff.formats.log_margin import NO_MARGIN, Margin, margin_of
 from sniff.formats.log_octets import PAIRS_ONLY
 from sniff.formats.log_shapes import Role
@@ -46,7 +46,7 @@ class Plan:
     offsets, whose ends say nothing; None where a line is a frame, or part of one that a tool got at once. `octetwise`:
     an octet a line. `bit_samples`: samples of a bit, of a logic analyser; 0 where there are none.
     `spellings`: how octets are written. `margin`, `times`: what is no part of the lines, how their times are read.
-    `labelled`: whether lines with octets have a label; `lower`: whether their digits are small letters.
+    `heads`: those above rows that repeat others. `labelled`: whether lines with octets have a label; `lower`: whether their digits are small letters.
     """
 
     kind: str
@@ -62,6 +62,7 @@ class Plan:
     times: Times = AS_WRITTEN
     labelled: bool = False
     lower: bool = False
+    heads: frozenset[str] = frozenset()
 
     def line(self, text: str) -> Line:
         """A line taken apart as this log writes it."""
@@ -100,7 +101,7 @@ def _plan(texts: Sequence[str]) -> Plan | None:
     if offsets is not None and rows >= others:
         tools = Counter(line.tool for line in lines if line.tool)
         name = f"hexdump ({tools.most_common(1)[0][0]})" if tools else "hexdump"
-        return Plan(name, base, offsets, times=times)
+        return Plan(name, base, offsets, times=times, heads=_heads(texts, lines))
     lines = [line_of(text, base, False, times) for text in texts]
     ahead = _times_ahead(texts, lines, times)
     if ahead.unit:
@@ -110,6 +111,25 @@ def _plan(texts: Sequence[str]) -> Plan | None:
         lines = [line_of(text, base, False, times) for text in texts]
     plan = _of_labels([line for line in lines if line.kind is not Kind.EMPTY], base)
     return replace(plan, times=times) if plan is not None else None
+
+
+def _heads(texts: Sequence[str], lines: Sequence[Line]) -> frozenset[str]:
+    """The heads whose rows repeat those of one of the two blocks before, nearly always."""
+    blocks: list[tuple[str, bytearray]] = []
+    head, is_row = "", False
+    for text, line in zip(texts, lines, strict=True):
+        if line.kind is Kind.ROW and is_row and line.offset.strip("0"):
+            blocks[-1][1].extend(line.octets)
+        elif line.kind is Kind.ROW:
+            blocks.append((head, bytearray(line.octets)))
+        elif line.kind is not Kind.EMPTY:
+            head = head_of(text)
+        is_row = line.kind is Kind.ROW
+    many, repeated = Counter(name for name, _ in blocks), Counter[str]()
+    for at, (name, octets) in enumerate(blocks):
+        before = [told for other, told in blocks[max(0, at - 2) : at] if other != name]
+        repeated[name] += len(octets) >= _TELLING and any(octets in told for told in before)
+    return frozenset(name for name in many if many[name] >= 2 and repeated[name] >= _REPEATS * many[name])
 
 
 def _times_ahead(texts: Sequence[str], lines: Sequence[Line], times: Times) -> Times:
