@@ -134,8 +134,8 @@ CLOCKS: tuple[Clock, ...] = (
           daily=True, first=True),
     Clock("ms", _clock(r"[+]?(?P<number>-?\d{1,12}(?:\.\d{1,6})?) ?ms\b"), _scaled(MS), first=True),
     Clock("µs", _clock(r"[+]?(?P<number>-?\d{1,15}(?:\.\d{1,6})?) ?[uµμ]s\b"), _scaled(MS // 1000), first=True),
-    Clock("seconds", _clock(r"[+]?(?P<number>-?\d{1,10}\.\d{1,9})(?P<said> ?s(?:ec)?\b)?(?=[\s:;,\])|])"), _scaled(NS_PER_S),
-          first=True),
+    Clock("seconds", _clock(r"[+]?(?P<number>-?\d{1,10}\.\d{1,9})(?P<said> ?s(?:ec)?\b)?(?=[\s:;,\])|])"),
+          _scaled(NS_PER_S), first=True),
     Clock("a named number", re.compile(
               r"(?<![0-9A-Za-z])(?:ts|t|time|timestamp|zeit|uptime|elapsed|millis)(?:[_ ]?(?P<unit>ms|us|ns|s))?\"?"
               r"\s*[:=]\s*\"?(?P<number>-?\d{1,19}(?:\.\d{1,9})?)(?:\s?(?P<unit_behind>ms|us|µs|ns|s))?(?![0-9A-Za-z:.-])",

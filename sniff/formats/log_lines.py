@@ -167,6 +167,8 @@ def _general(text: str, stamp: Stamp | None, base: int) -> Line:
         kind = Kind.STRANGE if _looks(text) else Kind.TEXT
         return Line(kind, stamp, _way(text) if kind is Kind.TEXT else "")
     lead = text[: run.begin]
+    if run.broken:
+        lead = _LOST.sub("", lead)
     way = _way(lead)
     label = " ".join(_DIGITS.sub("#", WAYS.sub("~", lead)).replace(STAMP, "").split())
     bare = not _WORDS.search(label) and "~" not in label and "#" not in label and STAMP not in lead
@@ -178,6 +180,9 @@ def _general(text: str, stamp: Stamp | None, base: int) -> Line:
         goes_on=goes_on, more=_more(text, run, base),
     )  # fmt: skip
 
+
+_LOST = re.compile(r"(?:(?<![0-9A-Za-z])[\[<(]?(?:0x)?[0-9A-Za-z?*]{2}[\]>)]?[ ,:.-]{1,2}){1,256}$")
+"""What stands ahead of octets and was meant as some of them."""
 
 _LEFT_OUT = re.compile(r" ?(?:\.\.\.|…)\s*(?:[\[(<]?\d+ more.*)?")
 """What stands behind octets of which a tool left out the rest."""
@@ -262,10 +267,8 @@ def _are_characters(field: str, octets: bytearray) -> bool:
         return False
     if not _PAIRS.fullmatch(field):
         return True
-    return all(
-        sign == chr(octet) if 0x20 < octet < 0x7F else sign not in _HEX
-        for sign, octet in zip(field, octets, strict=True)
-    )
+    pairs = zip(field, octets, strict=True)
+    return all(sign == chr(octet) if 0x20 < octet < 0x7F else sign not in _HEX for sign, octet in pairs)
 
 
 def _of_row(rest: str, marked: bool) -> bytes | None:

@@ -379,15 +379,21 @@ def _words(line: str) -> Run | None:
             continue
         alone = match.end() == len(line.rstrip())
         before = line[match.start() - 1] if match.start() else ""
-        quoted = before in _QUOTES and line[match.end() : match.end() + 1] == before
-        enough = (
-            8 if quoted else 12 if not alone else 8 if before in (" ", "\t", "|", ";") else 4 if before in "#:=" else 12
-        )
-        if before in ("x", "X"):  # a shorter one is an address
-            enough = 10 if alone else 18
+        enough = _enough(before, line[match.end() : match.end() + 1], alone)
         if len(digits) >= enough and (best is None or len(digits) > 2 * len(best.octets)):
             best = Run(match.start(), match.end(), bytes.fromhex(digits), "digits without space")
     return best
+
+
+def _enough(before: str, behind: str, alone: bool) -> int:
+    """Digits without space that are octets and no number; fewer where they stand alone at the end, or in quotes."""
+    if before in ("x", "X"):  # a shorter one is an address
+        return 10 if alone else 18
+    if before in _QUOTES and behind == before:
+        return 8
+    if not alone:
+        return 12
+    return 8 if before in (" ", "\t", "|", ";") else 4 if before in "#:=" else 12
 
 
 _BEHIND_ONE = r"\s*(?:\(\S{1,6}\)|'.'|\".\"|[|;].*)?\s*"

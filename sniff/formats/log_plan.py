@@ -46,7 +46,8 @@ class Plan:
     offsets, whose ends say nothing; None where a line is a frame, or part of one that a tool got at once. `octetwise`:
     an octet a line. `bit_samples`: samples of a bit, of a logic analyser; 0 where there are none.
     `spellings`: how octets are written. `margin`, `times`: what is no part of the lines, how their times are read.
-    `heads`: those above rows that repeat others. `labelled`: whether lines with octets have a label; `lower`: whether their digits are small letters.
+    `heads`: those above rows that repeat others. `labelled`: whether lines with octets have a label; `lower`: whether
+    their digits are small letters.
     """
 
     kind: str
