@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from dissectors.profiles import Devices
+from sniff.analysis.site_ear import SiteEar
 from sniff.bus.feed import FeedStatus
 from sniff.bus.prepared import Prepared, prepare
 from sniff.bus.row_source import rows_that_fit
@@ -54,7 +55,8 @@ class FileFeed:
     ) -> None:
         self.path = path
         self.capture = capture
-        self._store = Store(session, dissector_for(session), rows_that_fit(buses), devices, judge_later=True)
+        rows, ear = rows_that_fit(buses), SiteEar() if buses > 1 else None
+        self._store = Store(session, dissector_for(session), rows, devices, judge_later=True, ear=ear)
         self._pieces = self._read(session)
         self._thread: threading.Thread | None = None
         self._queue: queue.Queue[Piece | BaseException | None] = queue.Queue(WAITING)

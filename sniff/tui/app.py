@@ -12,6 +12,7 @@ from textual.events import Event, InputEvent
 from textual.screen import Screen
 from textual.timer import Timer
 
+from dissectors.findings import Finding
 from sniff.bus.feed import Feed, FeedStatus
 from sniff.bus.rows import Store
 from sniff.config import ConfigError, nearest
@@ -30,6 +31,7 @@ from sniff.tui.prompt import Prompt
 from sniff.tui.screens import SCREENS, Entry, load
 from sniff.tui.screens.base import ViewScreen
 from sniff.tui.seats import BusLine, Seat
+from sniff.tui.site_meter import SiteMeter
 from sniff.tui.viewing import Viewing
 
 POLL_SECONDS = 0.1
@@ -77,6 +79,7 @@ class SnifferApp(Analyzer):
         feeds = feed if isinstance(feed, Sequence) else [feed]
         self.seats = [Seat.of(each, start_screen) for each in feeds]
         self.here = 0  # which of them is shown
+        self._site = SiteMeter()
         self._polled = 0  # which file was polled last of those that are not shown
         for entry in SCREENS:
             for number in range(len(self.seats)):
@@ -129,6 +132,14 @@ class SnifferApp(Analyzer):
         if len(self.seats) < 2:
             return ()
         return [seat.line(number == self.here) for number, seat in enumerate(self.seats)]
+
+    def site_is_due(self) -> bool:
+        """Whether the buses together would say more than they did."""
+        return not self.viewing.frozen and self._site.is_due(self.seats)
+
+    def findings(self) -> tuple[Finding, ...]:
+        """Of the bus that is shown; where there are several, with what they say together."""
+        return self._site.findings(self.seats, self.here, self.viewing.findings(), anew=not self.viewing.frozen)
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
         """There is no other bus to show where there is only one."""
