@@ -81,7 +81,9 @@ def test_the_timeline_shows_all_of_a_capture_and_zooms(look, store):
         await looking.press("6")
         assert "one column 1 s" in looking.text()
         assert "10:00:00" in looking.text()
-        assert "10:00:15" in looking.text()
+        axis = next(line for line in looking.lines() if "10:00:00" in line)
+        assert axis.split()[-1] > "10:00:10"  # little time fills the screen, too
+        assert len(axis.rstrip()) > 60
         await looking.press("minus")
         assert "one column 2 s" in looking.text()
 
