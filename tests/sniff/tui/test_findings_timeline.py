@@ -14,6 +14,7 @@ from sniff.bus.rows import Store
 from sniff.engine.observer import observe
 from sniff.engine.session import LineEvent, LineEventKind
 from sniff.simulation.scenarios import simulate
+from sniff.tui.timeline_picture import LABEL
 from sniff.tui.viewing import Viewing
 from tests.faults.buses import modbus
 
@@ -143,7 +144,8 @@ def test_the_timeline_ends_where_the_capture_ends(look, store):
     async def script(see):
         await see.press("6")
         axis = next(line for line in see.lines() if "┴" in line)
-        assert len(axis.strip("└ ")) == store.load.last // 10**9 - store.load.first // 10**9 + 1
+        seconds = store.load.last // 10**9 - store.load.first // 10**9 + 1
+        assert len(axis.strip("└ ")) == (80 - LABEL - 2) // seconds * seconds  # as wide as fits, and nothing after it
         assert "10:00:00" in see.text()
         await see.press("plus")
         assert see.notices() == ["one second is the least"]
