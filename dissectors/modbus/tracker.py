@@ -97,8 +97,8 @@ class ModbusTracker:
             self._noise(event)
             return Tracked(None, self._held.take_closed())
         seen = Seen(no, event, header, readable_adu(event))
-        if self._held.only is None or self._held.only != seen.octets:
-            self._held.only = b"" if self._last_end is not None else seen.octets
+        if header.ok and self._held.only != seen.octets:
+            self._held.only = seen.octets if self._held.only is None else b""
         if not header.ok or len(seen.octets) < 2:
             placement = self._damaged(self._as_named(seen))
         elif header.role is Role.RESPONSE:
@@ -265,9 +265,9 @@ class ModbusTracker:
 
     def _may_be_next(self, pause: int, seen: Seen) -> bool:
         """Whether a copy `pause` ns behind the frame before may be the next request of a master that writes one value
-        again and again: times are not exact, and the adapter, or a late computer, leaves room for a master's pause."""
+        for ever: nothing else was said so far, and the adapter, or a late computer, leaves room for its pause."""
         slack = max(self._timing.latency, seen.frame.slack)
-        return slack > 0 and pause + slack >= self.learnt.too_soon(self._silence)
+        return self._held.only == seen.octets and slack > 0 and pause + slack >= self.learnt.too_soon(self._silence)
 
     def _join(self, request: Exchange, seen: Seen) -> Placement:
         """Leave open what the frame is: it belongs to the request in any case."""
