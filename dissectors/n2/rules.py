@@ -21,7 +21,7 @@ RULES: dict[str, Rule] = {
             Severity.WARNING,
             "point does not exist",
             "A station refuses a read, write or override with N11: undefined object, or an attribute that is reserved "
-            "or absent (TECO F510 manual 1.2.4; Danfoss MG.11.G1).",
+            "or absent (TECO F510 manual 1.2.4; Danfoss MG.11.G1). Four points of one station or more are one finding.",
             "the master's point list does not fit this device",
             "compare the master's object numbers with the device's table; some count from 0, some from 1",
         ),

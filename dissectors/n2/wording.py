@@ -196,7 +196,21 @@ def _of_station(heard: N2Evidence, name: str, station: N2StationRecord, scanned:
         yield station.again.found(RULES["N2010"], name, f"identified again {times(station.again.count)}")
 
 
+MANY_POINTS = 4
+"""From so many absent points of one station on it is one thing that is wrong: the list that the master has of it."""
+
+
 def _points(name: str, station: N2StationRecord) -> Iterator[Finding]:
+    if len(station.points) >= MANY_POINTS:
+        tallies = list(station.points.values())
+        together = Tally(sum(one.count for one in tallies), min(one.first for one in tallies))
+        together.last = max(one.last for one in tallies)
+        together.evidence = sorted({no for one in tallies for no in one.evidence})[:MANY_POINTS]
+        names = sorted({object_name(region, point) for region, point, _ in station.points})
+        more = f" and {len(names) - MANY_POINTS} more" if len(names) > MANY_POINTS else ""
+        seen = f"{', '.join(names[:MANY_POINTS])}{more}: N11 {times(together.count)}"
+        yield together.found(RULES["N2002"], name, seen)
+        return
     for (region, point, attribute), tally in sorted(station.points.items(), key=lambda item: str(item[0])):
         what = object_name(region, point)
         if attribute is not None:

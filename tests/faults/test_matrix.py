@@ -77,7 +77,12 @@ def brief_clean() -> list[Case]:
     return cases
 
 
-LONG = ("MS/TP contactor every five seconds", "MS/TP polls up to Max_Master after each loss", "MS/TP noise anywhere")
+LONG = (
+    "MS/TP contactor every five seconds",
+    "MS/TP polls up to Max_Master after each loss",
+    "MS/TP noise anywhere",
+    "MS/TP station comes and goes",
+)
 """A ring over a long time: only in `make faults`."""
 
 FAULTY = [brief(case) for case in (*CASES, *FURTHER_CASES) if case.name not in LONG]
