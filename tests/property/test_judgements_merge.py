@@ -24,7 +24,7 @@ NAMES = sorted(path for path in CAPTURES.rglob("*.cap.txt") if path.stat().st_si
 
 COUNTED = frozenset(
     (
-        *("LN001", "LN005", "LN006", "LN007", "LN102", "LN104", "LN205", "MB009", "MB010", "MB013", "MB016", "MB017"),
+        *("LN001", "LN005", "LN006", "LN007", "LN102", "LN104", "LN205", "MB009", "MB010", "MB016", "MB017"),
         *("MB201", "MB204", "MB205", "MB206", "MB303", "MB403", "MS101", "MS102", "MS104", "MS107", "MS202", "MS301"),
         *("MS305", "MS404", "MS701", "N2001", "N2002", "N2005", "N2007", "N2008", "N2011"),
     )
