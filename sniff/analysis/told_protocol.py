@@ -94,13 +94,14 @@ def detected(session: Session) -> Session:
     return _with_line(replace(session, protocol=name, line=line, notes={**session.notes, PROTOCOL_NOTE: words}))
 
 
-def told_by(session: Session) -> Told:
-    """What the sample of a session says of its protocol."""
+def told_by(session: Session, only: str | None = None) -> Told:
+    """What the sample of a session says of its protocol; `only`: the one that it is asked for."""
     sample = session.sample
     if not sample:
         return Told(Sureness.NO)
-    readings = _readings(session, registry.usable())
-    if not any(one.frames and one.covered >= COVERED_LEAST for one in readings):  # a log of a gateway, then
+    readings = _readings(session, registry.usable() if only is None else [registry.get(only)])
+    if only is None and not any(one.frames and one.covered >= COVERED_LEAST for one in readings):
+        # a log of a gateway, then
         readings += _readings(session, registry.relatives())
     readings.sort(key=lambda one: (one.bits, one.octets * one.covered), reverse=True)
     best = next((one for one in readings if one.frames), None)

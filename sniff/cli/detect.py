@@ -1,21 +1,30 @@
 """Listens only; the port is opened once and its settings are changed in place. Stops as soon as what is heard
 suffices; a silent bus is told from a wrong setting. Exit code 0 when found, 4 when not.
+
+Of a file its octets tell the protocol; its settings are those that it says, or that the times of its octets tell. Exit
+code 0 when found, 3 when not.
 """
 
 from __future__ import annotations
 
 import argparse
+import stat
+from dataclasses import replace
+from pathlib import Path
 
+from dissectors import registry
 from sniff.analysis.autodetect import Ending, Outcome, Reading, sureness
 from sniff.analysis.plain import plain
-from sniff.cli import PORT_TROUBLE, arguments, json_output, listening, targets
+from sniff.analysis.told_protocol import Sureness, detected, told_by
+from sniff.cli import PORT_TROUBLE, UNREADABLE, arguments, json_output, listening, targets
 from sniff.cli.searching import TIMEOUT, search, sentence
 from sniff.config import AUTO
+from sniff.engine.session import Session, with_settings
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Options of `detect`."""
-    parser.add_argument("port", metavar="PORT", help="port, gateway, or a configured bus")
+    parser.add_argument("port", metavar="PORT", help="port, gateway, a configured bus, or a capture file")
     parser.add_argument(
         "-s", "--line", type=arguments.line_settings, metavar="LINE", help="these settings; search the protocol only"
     )
@@ -34,6 +43,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Search, and say what was found."""
+    if is_file(args.port):
+        return of_file(args)
     args.line, args.protocol = args.line or AUTO, args.protocol or AUTO
     target = targets.target_of(args)
     assert target.search is not None
@@ -46,22 +57,84 @@ def run(args: argparse.Namespace) -> int:
     return 0 if outcome.ending is Ending.FOUND else PORT_TROUBLE
 
 
-def write(port: str, outcome: Outcome) -> None:
+def is_file(name: str) -> bool:
+    """Whether it is a capture and no port."""
+    try:
+        return name == "-" or stat.S_ISREG(Path(name).stat().st_mode)
+    except (OSError, ValueError):
+        return False
+
+
+def of_file(args: argparse.Namespace) -> int:
+    """Say what the octets of a file are, bus by bus."""
+    found = True
+    for name, capture in arguments.open_buses(args.port):
+        outcome, told = _of_session(args, capture.session)
+        found = found and outcome.ending is Ending.FOUND
+        if args.json:
+            print(json_output.dumps(to_json(name, outcome)))
+        else:
+            write(name, outcome, told, open_with="open")
+    return 0 if found else UNREADABLE
+
+
+def _of_session(args: argparse.Namespace, session: Session) -> tuple[Outcome, str]:
+    """What is found in the octets of a capture, and what more is to be said of it."""
+    if args.line not in (None, AUTO):
+        session = with_settings(session, None, args.line)
+    told = told_by(session, args.protocol if args.protocol != AUTO else None)
+    octets = sum(len(chunk.octets) for chunk in session.sample)
+    reading = told.reading
+    if reading is None or told.sureness is Sureness.NO:
+        return Outcome(Ending.UNKNOWN if octets else Ending.SILENT, None, 1, octets), ""
+    cannot: tuple[str, ...] = ()
+    line = session.line
+    if session.line_is_assumed:
+        line = detected(replace(session, protocol=reading.protocol, line=reading.line)).line
+        cannot = (
+            (f"the format beside {line.baud} Bd, which the times of its octets tell",)
+            if line.baud != reading.line.baud
+            else (f"rate and format: the file does not say them; {line} is usual",)
+        )
+    ending = Ending.FOUND if told.sureness is Sureness.SURE else Ending.LIKELY
+    also = ""
+    if told.second is not None:
+        name, frames = told.second
+        also = f"with foreign frames that read as {registry.get(name).title} ({frames})"
+    return Outcome(ending, replace(reading, line=line), 1, octets, cannot), also
+
+
+def write(port: str, outcome: Outcome, also: str = "", open_with: str = "live") -> None:
     """Print for people."""
+    if open_with != "live" and outcome.reading is None:
+        print(f"{plain(port)}: {_of_no_protocol(outcome)}")
+        return
     print(f"{plain(port)}: {sentence(outcome)}")
     reading = outcome.reading
     if reading is None:
         return
     print(f"  {evidence(reading)}")
+    if also:
+        print(f"  {also}")
     for words in outcome.cannot_tell:
         print(f"  cannot tell {words}")
-    print(f"  next: sniff485 live {port} -s {reading.line} -p {reading.protocol}")
+    if open_with == "live":
+        print(f"  next: sniff485 live {port} -s {reading.line} -p {reading.protocol}")
+    else:
+        print(f"  next: sniff485 {open_with} {plain(port)} -p {reading.protocol}")
+
+
+def _of_no_protocol(outcome: Outcome) -> str:
+    if outcome.ending is Ending.SILENT:
+        return "no octets in it"
+    return f"no protocol makes good frames of its first {outcome.octets} octets; -p names one all the same"
 
 
 def evidence(reading: Reading) -> str:
     """Why it is believed."""
+    frames = "1 good frame holds" if reading.frames == 1 else f"{reading.frames} good frames hold"
     return (
-        f"{reading.frames} good frames hold {reading.covered:.0%} of {reading.octets} octets; {sureness(reading)}"
+        f"{frames} {reading.covered:.0%} of {reading.octets} octets; {sureness(reading)}"
         f"{f'; {reading.marked:.0%} of the octets came with line errors' if reading.marked else ''}"
     )
 

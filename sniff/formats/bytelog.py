@@ -115,6 +115,8 @@ class ByteLog:
             return Completeness(False, f"{self._strange_words()}, the first is line {counts.first} ({self.kind} log)")
         said = [f"{self.kind} log"]
         said += [f"{counts.same} lines that repeat others passed over"] if counts.same else []
+        if counts.completed:
+            said.append(f"{counts.completed} messages that the tool writes without their check completed with it")
         said += self._times_said()
         said += [f"{counts.text} lines of other text passed over"] if counts.text else []
         return Completeness(True, f"complete ({'; '.join(said)})")
@@ -173,6 +175,7 @@ class ByteLog:
             yield from assembly.take(line, text)
             counts.add(assembly.was, line.kind, number)
         yield from assembly.close()
+        counts.completed = assembly.completed
 
     def _table(self) -> Iterator[Item]:
         assert self._heading is not None
@@ -206,7 +209,7 @@ class _Counts:
     """Lines of a log, by what became of them. `first`: number of the first that was not understood."""
 
     def __init__(self) -> None:
-        self.data = self.same = self.text = self.strange = self.first = 0
+        self.data = self.same = self.text = self.strange = self.first = self.completed = 0
 
     def add(self, was: Kind, kind: Kind, number: int) -> None:
         """Count a line. `was`: what it turned out to be."""
@@ -216,7 +219,7 @@ class _Counts:
             self.pass_over(number)
         elif was is Kind.TEXT:
             self.text += 1
-        elif was is Kind.SHAPE and kind is Kind.OCTETS:
+        elif was is Kind.SHAPE and kind in (Kind.OCTETS, Kind.ROW):
             self.same += 1
 
     def pass_over(self, number: int) -> None:

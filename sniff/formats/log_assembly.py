@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 from dissectors.frame import Chunk
 from dissectors.line import MS, LineSettings
 from sniff.formats.log_clock import DAY, Stamp
-from sniff.formats.log_lines import Kind, Line
+from sniff.formats.log_lines import Kind, Line, head_of
 from sniff.formats.log_plan import WINDOW, Plan
 from sniff.formats.log_shapes import Role
 
@@ -30,7 +30,9 @@ _MOST_REPEATED = 1 << 16
 
 
 class Assembly:
-    """Lines in, reads out. `was`: what the line taken last turned out to be."""
+    """Lines in, reads out. `was`: what the line taken last turned out to be. `completed`: reads that the tool tells
+    without their check, which was put behind them.
+    """
 
     def __init__(self, plan: Plan, line: LineSettings) -> None:
         self.was = Kind.EMPTY
@@ -55,13 +57,19 @@ class Assembly:
         self._squeezed = False
         self._row = b""
         self._goes_on = False
+        self._is_repeated = False  # whether the rows below tell what others told
+        self._whole: Callable[[bytes], bytes] | None = None
+        self.completed = 0
 
     def take(self, line: Line, text: str) -> Iterator[Chunk]:
         """Take a line; `text` as it is written."""
         self.was = line.kind if line.kind is not Kind.STRANGE or self._could_be(line, text) else Kind.TEXT
         if line.kind is Kind.ROW:
             self.was = Kind.OCTETS
-            yield from self._take_row(line)
+            if self._is_repeated:
+                self.was = Kind.SHAPE
+            else:
+                yield from self._take_row(line)
         elif self._plan.offsets is not None:
             yield from self._between_rows(line, text)
         elif line.kind is Kind.OCTETS:
@@ -140,7 +148,7 @@ class Assembly:
         self._samples = line.samples
         self._stamp = line.stamp
         self._way = way
-        if line.stamp is None and heading is not None and line.bare:
+        if line.stamp is None and heading is not None and (line.bare or not self._used):
             self._stamp, self._way = heading.stamp, way or heading.way
             self._used = True
 
@@ -189,6 +197,9 @@ class Assembly:
         if line.kind is not Kind.REMARK:
             yield from self._flush()
             self._expected = 0
+        if line.kind not in (Kind.REMARK, Kind.EMPTY):
+            self._is_repeated = bool(self._plan.heads) and head_of(self._plan.margin.without(text)) in self._plan.heads
+            self._whole = line.whole
         if line.stamp is not None:
             self._head(line)
 
@@ -199,6 +210,9 @@ class Assembly:
             return
         octets = bytes(self._held)
         self._held.clear()
+        if self._whole is not None and self._whole(octets) != octets:
+            octets = self._whole(octets)
+            self.completed += 1
         length = len(octets) * self._char
         silence = 0 if self._glued or self._plan.width is not None else LINE_END
         self._glued = False

@@ -33,6 +33,8 @@ class Stamp:
     end: int
     dated: bool = False
     daily: bool = False
+    assumed: bool = False
+    """Whether nobody said what its number counts."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +75,10 @@ def _of_day(match: re.Match[str], _order: Order | None = None) -> int:
     if half:
         hour = hour % 12 + (12 if half == "pm" else 0)
     return (hour * 60 + int(minutes)) * 60 * NS_PER_S + seconds(".".join(rest))
+
+
+def _days(match: re.Match[str], _order: Order | None = None) -> int:
+    return int(match["days"]) * DAY + _of_day(match)
 
 
 def _scaled(unit: int) -> Callable[[re.Match[str], Order | None], int]:
@@ -117,7 +123,10 @@ CLOCKS: tuple[Clock, ...] = (
     Clock("month by name, day, time and year", _clock(rf"{_MONTH} +(?P<day>\d{{1,2}}),? {_TIME}"
                                                             r"(?: (?P<year>\d{4}))?"),
           _named_month, dated=True),
+    Clock("days and time of day", _clock(rf"(?P<days>\d{{1,4}}):(?=\d\d:){_TIME}"), _days, first=True),
     Clock("time of day", _clock(_TIME), _of_day, daily=True),
+    Clock("time of day behind a label", re.compile(
+              r"(?<=[G-Zg-z]:)(?P<clock>\d{1,2}:\d{2}:\d{2}[.,]\d{3,6})(?!\d)"), _of_day, daily=True),
     Clock("ms since the epoch", _clock(r"(?P<number>1\d{12})(?=[\s:;,\])|])"), _scaled(MS), dated=True, first=True),
     Clock("minutes and seconds", _clock(r"(?P<clock>(?P<m>\d{1,3}):(?P<s>\d{2}\.\d{1,6}))(?![\d:])"),
           _minutes, first=True),
@@ -125,8 +134,8 @@ CLOCKS: tuple[Clock, ...] = (
           daily=True, first=True),
     Clock("ms", _clock(r"[+]?(?P<number>-?\d{1,12}(?:\.\d{1,6})?) ?ms\b"), _scaled(MS), first=True),
     Clock("µs", _clock(r"[+]?(?P<number>-?\d{1,15}(?:\.\d{1,6})?) ?[uµμ]s\b"), _scaled(MS // 1000), first=True),
-    Clock("seconds", _clock(r"[+]?(?P<number>-?\d{1,10}\.\d{1,9})(?: ?s(?:ec)?\b)?(?=[\s:;,\])|])"), _scaled(NS_PER_S),
-          first=True),
+    Clock("seconds", _clock(r"[+]?(?P<number>-?\d{1,10}\.\d{1,9})(?P<said> ?s(?:ec)?\b)?(?=[\s:;,\])|])"),
+          _scaled(NS_PER_S), first=True),
     Clock("a named number", re.compile(
               r"(?<![0-9A-Za-z])(?:ts|t|time|timestamp|zeit|uptime|elapsed|millis)(?:[_ ]?(?P<unit>ms|us|ns|s))?\"?"
               r"\s*[:=]\s*\"?(?P<number>-?\d{1,19}(?:\.\d{1,9})?)(?:\s?(?P<unit_behind>ms|us|µs|ns|s))?(?![0-9A-Za-z:.-])",
@@ -137,7 +146,7 @@ CLOCKS: tuple[Clock, ...] = (
 
 _HEAD = 160
 """Characters at the begin of a line in which a time is looked for."""
-_ONLY_BRACKETS = re.compile(r"(?:\s*\d{1,7}\s+)?[\s\[({<#*|]*(?:\[?[A-Z]\]?[ ]?)?")
+_ONLY_BRACKETS = re.compile(r"(?:\s*\d{1,7}\s+|[A-Z][a-z]{2}\(\d+\):)?[\s\[({<#*|+]*(?:\[?[A-Z]\]?[ ]?)?")
 
 
 def stamp_of(line: str, times: Times = AS_WRITTEN) -> Stamp | None:
@@ -149,14 +158,19 @@ def stamp_of(line: str, times: Times = AS_WRITTEN) -> Stamp | None:
         return Stamp(int(Decimal(text) * times.unit), tick, *bare.span("number"), times.since_1970)
     for clock in CLOCKS:
         match = clock.pattern.search(head)
-        if match is None or (clock.first and not _ONLY_BRACKETS.fullmatch(head[: match.start()])):
+        if (
+            match is None
+            or (times.clocks_only and not (clock.dated or clock.daily))
+            or (clock.first and not _ONLY_BRACKETS.fullmatch(head[: match.start()]))
+        ):
             continue
         try:
             time = clock.value(match, times.order)
         except ValueError:
             continue
         dated = clock.dated or ("number" in match.groupdict() and time >= EPOCH[0] * NS_PER_S)
-        return Stamp(time, _tick(match), match.start(), match.end(), dated, clock.daily)
+        assumed = not dated and match.groupdict().get("said", "") is None
+        return Stamp(time, _tick(match), match.start(), match.end(), dated, clock.daily, assumed)
     return None
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from enum import Enum
 
@@ -81,6 +81,8 @@ class Line:
     """Way and octets of what stands behind on the same line, as the answer beside its request."""
     goes_on: bool = False
     """Whether it ends as a line that another continues."""
+    whole: Callable[[bytes], bytes] | None = None
+    """What makes the octets below it those that were sent."""
 
 
 EMPTY, REMARKED = Line(Kind.EMPTY), Line(Kind.REMARK)
@@ -109,7 +111,7 @@ def line_of(text: str, base: int = PAIRS_ONLY, rows: bool = True, times: Times =
     if shape.role is Role.HEADING and (found := octets_in(text, base)) is not None and len(found.octets) > 2:
         return Line(Kind.OCTETS, stamp, way, found.octets, shape.tool, False, Role.DATA, shape.tool, found.spelling)
     if shape.role is not Role.DATA:
-        return Line(Kind.SHAPE, stamp, way, role=shape.role, tool=shape.tool)
+        return Line(Kind.SHAPE, stamp, way, role=shape.role, tool=shape.tool, whole=shape.whole)
     told = groups.get("octets")
     run = octets_in(text if told is None else told, base)
     if told is not None and run is None and _OCTET.fullmatch(told):
@@ -150,12 +152,23 @@ def numbers_of(text: str) -> tuple[str, ...]:
     return numbers_in(text) or ((alone,) if (alone := number_in(text)) else ())
 
 
+def head_of(text: str) -> str:
+    """What a line says that stands above octets, without times and numbers: the same for all heads of one sort."""
+    text = _without_stamps(COLOURS.sub("", text)[:LONGEST])[1].replace(STAMP, "")
+    return " ".join(_NUMERAL.sub("#", text).split())[:80]
+
+
+_NUMERAL = re.compile(r"[0-9A-Fa-f]*\d[0-9A-Fa-f]*")
+
+
 def _general(text: str, stamp: Stamp | None, base: int) -> Line:
     run = octets_in(text, base)
     if run is None:
         kind = Kind.STRANGE if _looks(text) else Kind.TEXT
         return Line(kind, stamp, _way(text) if kind is Kind.TEXT else "")
     lead = text[: run.begin]
+    if run.broken:
+        lead = _LOST.sub("", lead)
     way = _way(lead)
     label = " ".join(_DIGITS.sub("#", WAYS.sub("~", lead)).replace(STAMP, "").split())
     bare = not _WORDS.search(label) and "~" not in label and "#" not in label and STAMP not in lead
@@ -167,6 +180,9 @@ def _general(text: str, stamp: Stamp | None, base: int) -> Line:
         goes_on=goes_on, more=_more(text, run, base),
     )  # fmt: skip
 
+
+_LOST = re.compile(r"(?:(?<![0-9A-Za-z])[\[<(]?(?:0x)?[0-9A-Za-z?*]{2}[\]>)]?[ ,:.-]{1,2}){1,256}$")
+"""What stands ahead of octets and was meant as some of them."""
 
 _LEFT_OUT = re.compile(r" ?(?:\.\.\.|…)\s*(?:[\[(<]?\d+ more.*)?")
 """What stands behind octets of which a tool left out the rest."""
@@ -245,6 +261,16 @@ def _row(text: str, stamp: Stamp | None) -> Line | None:
     )  # fmt: skip
 
 
+def _are_characters(field: str, octets: bytearray) -> bool:
+    """Whether a column shows these octets as characters, with a sign for each that is none."""
+    if len(field) != len(octets):
+        return False
+    if not _PAIRS.fullmatch(field):
+        return True
+    pairs = zip(field, octets, strict=True)
+    return all(sign == chr(octet) if 0x20 < octet < 0x7F else sign not in _HEX for sign, octet in pairs)
+
+
 def _of_row(rest: str, marked: bool) -> bytes | None:
     """The octets behind an offset, without the characters beside them; b"" for none, None when it is no row.
 
@@ -253,7 +279,7 @@ def _of_row(rest: str, marked: bool) -> bytes | None:
     """
     found = bytearray()
     for number, field in enumerate(_COLUMN.split(rest)):
-        if number and (len(found) % 8 or not found or len(field) == len(found)):
+        if number and (len(found) % 8 or not found or _are_characters(field, found)):
             break
         if _PAIRS.fullmatch(field):
             found += bytes.fromhex(field.replace("-", " "))

@@ -16,9 +16,11 @@ from sniff.formats.log_times import LEAST, is_count
 _MOST = 0.8
 _SPACES = str.maketrans(
     {"\u00a0": " ", "\u2007": " ", "\u202f": " ", "\u2009": " ", "\u3000": " ", "\u200b": None, "\ufeff": None,
-     "：": ":", "，": ",", "；": ";", "（": "(", "）": ")", "【": "[", "】": "]", "`": " ", "\u200e": None, "\0": " "}
+     "：": ":", "，": ",", "；": ";", "（": "(", "）": ")", "【": "[", "】": "]", "\u200e": None, "\0": " "}
 )  # fmt: skip
 """Signs that look like others, as web pages and word processors put them."""
+_CODE = re.compile(r"(?:(?<=[\s|])|^)(?:`{3,}|(?P<marks>`{1,2})(?P<code>[^`]+)(?P=marks)(?=[\s|,.;:)]|$))")
+"""Code in a text: marks stand around it, and none of the octets is a mark."""
 _ENTITIES = {"&gt;": ">", "&lt;": "<", "&amp;": "&", "&nbsp;": " ", "&quot;": '"', "&#39;": "'"}
 _QUOTE = re.compile(r"(?:> ?){1,8}(?=\S|$)")
 _NUMBER = re.compile(r"\s*[\[(#|]?\s*(?P<number>\d{1,9})(?P<behind>\s*[\])}:.|,;]+\s*|\t|\s+)(?=\S)")
@@ -87,8 +89,10 @@ NO_MARGIN = Margin()
 
 def plain_signs(text: str) -> str:
     """A line with the plain signs for those that only look like them."""
-    if not text.isascii() or "`" in text or "\0" in text:
+    if not text.isascii() or "\0" in text:
         text = text.translate(_SPACES)
+    if "`" in text:
+        text = _CODE.sub(_blank_marks, text)
     if "&" in text:
         for entity, sign in _ENTITIES.items():
             text = text.replace(entity, sign)
@@ -121,6 +125,14 @@ _NARROWEST = 30
 _HALF_END = re.compile(r"[0-9A-Fa-f]{2}[ :,-][0-9A-Fa-f]$")
 _HALF_BEGIN = re.compile(r"[0-9A-Fa-f](?:[ :,-]|$)")
 _GOES_ON = re.compile(r"[ :,-]?[0-9A-Fa-f]{1,2}(?:[ :,-]|$)")
+
+
+def _blank_marks(match: re.Match[str]) -> str:
+    """The code without its marks."""
+    if match["code"] is None:
+        return " " * len(match[0])
+    marks = " " * len(match["marks"])
+    return f"{marks}{match['code']}{marks}"
 
 
 def _blank(match: re.Match[str]) -> str:

@@ -103,6 +103,7 @@ def _escaped(text: str) -> bytes:
     """A string with escapes, as Python, C and strace write it; only characters of one octet."""
     inner = text[text.index(text[-1]) + 1 : -1] if text[-1] in "'\"" else text
     inner = re.sub(r"\\(.)", lambda found: "\\x1b" if found[1] == "e" else found[0], inner)
+    inner = re.sub(r"[\x80-\xff]", lambda found: f"\\x{ord(found[0]):02x}", inner)  # of a text, not of octets
     quote = '"' if "'" in inner else "'"
     if quote in inner.replace("\\" + quote, ""):
         raise ValueError("a quote within")
@@ -193,6 +194,9 @@ SPELLINGS: tuple[Spelling, ...] = (
     Spelling("binary", r"0b[01]{8}(?: ?\(0[xX][0-9A-Fa-f]{1,2}\))?", _SEPARATOR, _by(r"0b([01]{8})", 2), 1),
     Spelling("0x and digits", r"0[xX][0-9A-Fa-f]{1,2}(?![0-9A-Za-z])", r"['\"]?[ ]?[,;:/|]?[ \t]{0,2}['\"]?",
              _by(r"0[xX]([0-9A-Fa-f]{1,2})", 16), 2),
+    Spelling("pairs joined by _", _H2, "_", _HEX, 3),
+    Spelling("decimals in brackets", r"[^\s()\[\]]{0,4}\(\d{3}\)", r"[ \t]{0,2}", _by(r"\((\d{3})\)", 10), 2,
+             before=r"(?:(?<=\s)|^)", after=""),
     Spelling("digits and h", rf"{_H2}[hH]", _SEPARATOR, _by(rf"({_H2})[hH]", 16), 2),
     Spelling("character codes", r"#\d{1,3}", "", _codes, SURELY, before=r"(?<![0-9A-Za-z_])"),
     Spelling("digits after a sign", rf"[$%&#]{_H2}", r"[ ,;]{0,2}", _HEX, 2, before=r"(?<![0-9A-Za-z_])"),
@@ -361,6 +365,7 @@ def _between(inside: str) -> str:
     return match[1].strip() if match is not None else ""
 
 
+_QUOTES = ("'", '"')
 _DATE = re.compile(r"[0-3]\d [01]\d (?:19|20)\d\d")
 
 
@@ -374,12 +379,21 @@ def _words(line: str) -> Run | None:
             continue
         alone = match.end() == len(line.rstrip())
         before = line[match.start() - 1] if match.start() else ""
-        enough = 12 if not alone else 8 if before in (" ", "\t", "|", ";") else 4 if before in "#:=" else 12
-        if before in ("x", "X"):  # a shorter one is an address
-            enough = 10 if alone else 18
+        enough = _enough(before, line[match.end() : match.end() + 1], alone)
         if len(digits) >= enough and (best is None or len(digits) > 2 * len(best.octets)):
             best = Run(match.start(), match.end(), bytes.fromhex(digits), "digits without space")
     return best
+
+
+def _enough(before: str, behind: str, alone: bool) -> int:
+    """Digits without space that are octets and no number; fewer where they stand alone at the end, or in quotes."""
+    if before in ("x", "X"):  # a shorter one is an address
+        return 10 if alone else 18
+    if before in _QUOTES and behind == before:
+        return 8
+    if not alone:
+        return 12
+    return 8 if before in (" ", "\t", "|", ";") else 4 if before in "#:=" else 12
 
 
 _BEHIND_ONE = r"\s*(?:\(\S{1,6}\)|'.'|\".\"|[|;].*)?\s*"

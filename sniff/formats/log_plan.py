@@ -13,11 +13,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
-from sniff.formats.log_lines import Kind, Line, line_of, numbers_of
+from sniff.formats.log_lines import Kind, Line, head_of, line_of, numbers_of
 from sniff.formats.log_margin import NO_MARGIN, Margin, margin_of
 from sniff.formats.log_octets import PAIRS_ONLY
 from sniff.formats.log_shapes import Role
-from sniff.formats.log_times import AS_WRITTEN, Times, counted, number_ahead, order_of
+from sniff.formats.log_times import AS_WRITTEN, FASTEST, Times, counted, number_ahead, order_of
 
 LOOKED_AT = 2000
 """Lines of a log that are looked at."""
@@ -46,7 +46,8 @@ class Plan:
     offsets, whose ends say nothing; None where a line is a frame, or part of one that a tool got at once. `octetwise`:
     an octet a line. `bit_samples`: samples of a bit, of a logic analyser; 0 where there are none.
     `spellings`: how octets are written. `margin`, `times`: what is no part of the lines, how their times are read.
-    `labelled`: whether lines with octets have a label; `lower`: whether their digits are small letters.
+    `heads`: those above rows that repeat others. `labelled`: whether lines with octets have a label; `lower`: whether
+    their digits are small letters.
     """
 
     kind: str
@@ -62,6 +63,7 @@ class Plan:
     times: Times = AS_WRITTEN
     labelled: bool = False
     lower: bool = False
+    heads: frozenset[str] = frozenset()
 
     def line(self, text: str) -> Line:
         """A line taken apart as this log writes it."""
@@ -100,20 +102,41 @@ def _plan(texts: Sequence[str]) -> Plan | None:
     if offsets is not None and rows >= others:
         tools = Counter(line.tool for line in lines if line.tool)
         name = f"hexdump ({tools.most_common(1)[0][0]})" if tools else "hexdump"
-        return Plan(name, base, offsets, times=times)
+        return Plan(name, base, offsets, times=times, heads=_heads(texts, lines))
     lines = [line_of(text, base, False, times) for text in texts]
     ahead = _times_ahead(texts, lines, times)
     if ahead.unit:
         times, lines = ahead, [line_of(text, base, False, ahead) for text in texts]
     times = _steps(lines, times)
+    if times.clocks_only:
+        lines = [line_of(text, base, False, times) for text in texts]
     plan = _of_labels([line for line in lines if line.kind is not Kind.EMPTY], base)
     return replace(plan, times=times) if plan is not None else None
+
+
+def _heads(texts: Sequence[str], lines: Sequence[Line]) -> frozenset[str]:
+    """The heads whose rows repeat those of one of the two blocks before, nearly always."""
+    blocks: list[tuple[str, bytearray]] = []
+    head, is_row = "", False
+    for text, line in zip(texts, lines, strict=True):
+        if line.kind is Kind.ROW and is_row and line.offset.strip("0"):
+            blocks[-1][1].extend(line.octets)
+        elif line.kind is Kind.ROW:
+            blocks.append((head, bytearray(line.octets)))
+        elif line.kind is not Kind.EMPTY:
+            head = head_of(text)
+        is_row = line.kind is Kind.ROW
+    many, repeated = Counter(name for name, _ in blocks), Counter[str]()
+    for at, (name, octets) in enumerate(blocks):
+        before = [told for other, told in blocks[max(0, at - 2) : at] if other != name]
+        repeated[name] += len(octets) >= _TELLING and any(octets in told for told in before)
+    return frozenset(name for name in many if many[name] >= 2 and repeated[name] >= _REPEATS * many[name])
 
 
 def _times_ahead(texts: Sequence[str], lines: Sequence[Line], times: Times) -> Times:
     """The times with those that numbers ahead of the lines tell, where hardly a line has another."""
     told = [(text, line) for text, line in zip(texts, lines, strict=True) if line.kind is Kind.OCTETS]
-    bare = [(text, line) for text, line in told if line.stamp is None]
+    bare = [(text, line) for text, line in told if line.stamp is None or line.stamp.assumed]
     numbers = [(number, line) for text, line in bare if (number := number_ahead(text)) is not None]
     if 2 * len(bare) < len(told) or _NUMBERED * len(bare) > len(numbers):
         return times
@@ -121,12 +144,20 @@ def _times_ahead(texts: Sequence[str], lines: Sequence[Line], times: Times) -> T
 
 
 def _steps(lines: Sequence[Line], times: Times) -> Times:
-    """Whether times that go back again and again are those since the line before."""
-    stamps = [line.stamp for line in lines if line.stamp is not None and line.kind is Kind.OCTETS]
-    if len(stamps) < _FIXED_LEAST or any(stamp.dated or stamp.daily for stamp in stamps):
+    """Whether times that go back again and again are those since the line before, or durations and no times."""
+    told = [line for line in lines if line.kind is Kind.OCTETS]
+    stamps = [line.stamp for line in told if line.stamp is not None]
+    if not stamps or any(stamp.dated or stamp.daily for stamp in stamps):
         return times
-    back = sum(later.time < earlier.time for earlier, later in pairwise(stamps))
-    return replace(times, steps=True) if back > _BACK * len(stamps) else times
+    if len(stamps) < _NUMBERED * len(told):
+        return replace(times, clocks_only=True)  # how long an answer took, beside answers
+    if len(stamps) < _FIXED_LEAST:
+        return times
+    back = sum(later.time < earlier.time for earlier, later in pairwise(stamps)) > _BACK * len(stamps)
+    passed = sum(stamp.time for stamp in stamps) if back else stamps[-1].time - stamps[0].time
+    if 4 * passed < FASTEST * sum(len(line.octets) for line in told[1:]):
+        return replace(times, clocks_only=True)  # how long a call took: octets take their time on the line
+    return replace(times, steps=True) if back else times
 
 
 def _of_labels(lines: Sequence[Line], base: int) -> Plan | None:
@@ -161,8 +192,8 @@ def _of_labels(lines: Sequence[Line], base: int) -> Plan | None:
     told = sum(len(line.octets) for line in data)
     if not data or (told < 3 and not known and written > len(data)):
         return None
-    if main == "" and main not in directed and 3 * len(data) < written:  # a word here and there
-        return None
+    if main == "" and main not in directed and 3 * len(data) < written and not _are_headed(lines):
+        return None  # a word here and there
     octetwise = 2 * sum(len(line.octets) == 1 for line in data) > len(data)
     return Plan(
         _name(data, lines), base, None, roles, main in directed, _width(data), octetwise,
@@ -170,6 +201,21 @@ def _of_labels(lines: Sequence[Line], base: int) -> Plan | None:
         frozenset(line.spelling for line in data),
         labelled=main != "", lower=2 * sum(line.lower for line in data) > len(data),
     )  # fmt: skip
+
+
+def _are_headed(lines: Sequence[Line]) -> bool:
+    """Whether above nearly all lines of octets stands one that says their time or direction."""
+    blocks = headed = 0
+    head = in_block = False
+    for line in lines:
+        if line.kind is Kind.OCTETS and line.bare:
+            blocks += not in_block
+            headed += head and not in_block
+            in_block, head = True, False
+        elif line.kind in (Kind.TEXT, Kind.SHAPE):
+            head = (head and not in_block) or line.stamp is not None or bool(line.way)
+            in_block = False
+    return blocks >= _FIXED_LEAST and headed >= _MOSTLY * blocks
 
 
 def _roles(lines: Sequence[Line], main: str, directed: set[str]) -> dict[str, Role | None]:

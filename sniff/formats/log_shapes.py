@@ -7,8 +7,11 @@ Most tools need no line here: a time, a direction and octets are found wherever 
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
+
+from dissectors.checksums import crc16_modbus
 
 STAMP = "\0"
 """Stands in a line where a time was."""
@@ -38,14 +41,22 @@ class Shape:
     tool: str
     pattern: re.Pattern[str]
     role: Role = Role.DATA
+    whole: Callable[[bytes], bytes] | None = None
+    """Octets that the tool tells without their check → as they were sent."""
 
 
 _H = r"[0-9A-Fa-f]{1,2}"
+_H2 = r"[0-9A-Fa-f]{2}"
 _S = r"\0"
 
 
-def _shape(tool: str, pattern: str, role: Role = Role.DATA) -> Shape:
-    return Shape(tool, re.compile(pattern), role)
+def _shape(tool: str, pattern: str, role: Role = Role.DATA, whole: Callable[[bytes], bytes] | None = None) -> Shape:
+    return Shape(tool, re.compile(pattern), role, whole)
+
+
+def _with_crc(octets: bytes) -> bytes:
+    """A message with its CRC behind it, unless it has one."""
+    return octets if not crc16_modbus(octets) else octets + crc16_modbus(octets).to_bytes(2, "little")
 
 
 SHAPES: tuple[Shape, ...] = (
@@ -67,6 +78,8 @@ SHAPES: tuple[Shape, ...] = (
     _shape("sigrok", r"^(?:\d+-\d+\s+[\w /.-]+?|\w+-\d+): ?(?:.*: ?)?"
                      r"(?:[Ss]tart bit|[Ss]top bit|[Pp]arity|[01]$|Frame error|Break)",
            Role.NOTHING),
+    _shape("minimalmodbus", rf"MinimalModbus debug mode\. (?:(?P<way>Writing)|Response).*"
+                            rf"['\"] \((?P<octets>{_H2}(?: {_H2})*)\)"),
     _shape("minimalmodbus", r"MinimalModbus debug mode\. (?:Will write|Writing|Response)"),
     _shape("minimalmodbus", r"MinimalModbus debug mode\. "
                             r"(?:Clearing|No sleep|Sleeping|Create|Closing|Opening|Will sleep)",
@@ -87,6 +100,10 @@ SHAPES: tuple[Shape, ...] = (
     _shape("jpnevulator", rf"^\s*{_S}: \S+$", Role.HEADING),
     _shape("Docklight", r"\[(?P<way>TX|RX|C1|C2)\]"),
     _shape("Docklight", r"^\s*Docklight", Role.NOTHING),
+    _shape("eModbus", r"\b(?P<way>Sent|Received|Request|Response) packet: @[0-9A-Fa-f]{6,16}/\d", Role.HEADING,
+           _with_crc),
+    _shape("eModbus", r"\bData: @[0-9A-Fa-f]{6,16}/\d", Role.HEADING, _with_crc),
+    _shape("eModbus", r"\bRaw buffer (?P<way>received): @[0-9A-Fa-f]{6,16}/\d", Role.HEADING),
     _shape("eModbus", r"\|\s*\w+\.(?:cpp|h)\s*\[.*\]"),
     _shape("Serial Port Monitor", r"(?P<way>Read|Written|Write) data \(COM\d+\)", Role.HEADING),
     _shape("Serial Port Monitor", r"(?:Open|Close|Opened|Closed)\b.*port|IOCTL_|IRP_MJ_(?:CREATE|CLOSE|DEVICE)",

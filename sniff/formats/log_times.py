@@ -26,6 +26,9 @@ FASTEST = 130_000
 SLOWEST = 60 * NS_PER_S
 """ns from one line to the next, in the middle of a log, from which on a finer unit is meant."""
 
+SLOWEST_OCTET = NS_PER_S // 5
+"""The same where each line is an octet: most follow one another in a frame."""
+
 EPOCH = (1_100_000_000, 2_600_000_000)
 """s since 1970 that a log may have been written at: 2004 to 2052."""
 
@@ -54,13 +57,14 @@ class Order(Enum):
 class Times:
     """How times of one log are read. `order`: of a date; None: as its signs suggest. `unit`: ns that the number ahead
     of a line counts; 0: such a number is no time. `since_1970`: it counts from there. `steps`: times are those since
-    the line before. `said`: what was assumed, in words.
+    the line before. `clocks_only`: only a date or a time of day is a time. `said`: what was assumed, in words.
     """
 
     order: Order | None = None
     unit: int = 0
     since_1970: bool = False
     steps: bool = False
+    clocks_only: bool = False
     said: tuple[str, ...] = ()
 
 
@@ -151,7 +155,8 @@ def unit_of(numbers: Sequence[Decimal], lengths: Sequence[int]) -> tuple[int, bo
     span = numbers[-1] - numbers[0] if numbers else Decimal(0)
     has_parts = any(number != int(number) for number in numbers)
     units = (NS_PER_S, MS, _US) if has_parts else (MS, _US, _NS)
+    slowest = SLOWEST if sum(lengths) > 2 * len(lengths) else SLOWEST_OCTET
     if not has_parts and span * MS < needed:
         return NS_PER_S, False, False
-    unit = next((one for one in units if middle * one <= SLOWEST), units[-1])
+    unit = next((one for one in units if middle * one <= slowest), units[-1])
     return unit, False, has_parts and unit == NS_PER_S

@@ -37,6 +37,9 @@ OCTET = (
     "hex data",
     "raw",
     "message",
+    "decoded protocol result",
+    "decoded result",
+    "telegram",
 )
 ANALYSER = re.compile(r".*\b(?:uart|rs-?485|rs-?232|async serial|serial)\b.*")
 """A column that is named for its decoder, when no other holds octets."""
@@ -61,6 +64,7 @@ _UNIT = re.compile(
     r"(?P<last>s|secs?|seconds|ms|millis(?:econds)?|us|µs|μs|micros(?:econds)?|ns|nanos)"
 )
 _LONG = {"sec": "s", "millis": "ms", "micros": "us", "nanos": "ns"}
+_WITH_UNIT = re.compile(r"(?P<number>[+-]?\d{1,18}(?:[.,]\d{1,12})?) ?(?P<unit>s|ms|us|µs|μs|ns)")
 _DELIMITERS = (",", ";", "\t", "|")
 
 MOST_CELL = 1 << 16
@@ -95,6 +99,8 @@ class Table:
     """Column → the error it tells; None: it names the error itself."""
     times: Times = AS_WRITTEN
     """How dates are read, and what was assumed."""
+    tail: bool = False
+    """Whether each cell from `octet` on holds one octet."""
 
     @property
     def exact(self) -> bool:
@@ -112,7 +118,10 @@ class Table:
 
         Raises ValueError for a row that says less than it should.
         """
-        octets = self.read(_cell(row, self.octet))
+        if self.tail:
+            octets = b"".join(self.read(cell) for cell in row[self.octet :] if cell.strip())
+        else:
+            octets = self.read(_cell(row, self.octet))
         if not octets:
             raise ValueError("no octets")
         return Chunk(self._end(row, len(octets) * char), octets, self._marks(row))
@@ -121,7 +130,12 @@ class Table:
         if self.end is not None:
             return time_of(_cell(row, self.end), self.unit, self.times)
         begin = time_of(_cell(row, self.begin), self.unit, self.times)
-        return begin + (time_of(_cell(row, self.duration), self.unit) if self.duration is not None else length)
+        if self.duration is None:
+            return begin + length
+        try:
+            return begin + time_of(_cell(row, self.duration), self.unit)
+        except ValueError:
+            return begin + length  # in words, or left out
 
     def _marks(self, row: Sequence[str]) -> tuple[Mark, ...]:
         found = LineError(0)
@@ -182,11 +196,27 @@ def heading_of(heading: str, delimiter: str, rows: Sequence[str]) -> Table | Non
         if max(octet, when) < len(cell)
         and (kind is None or kind >= len(cell) or cell[kind].lower() in TYPES_WITH_OCTETS)
     ]
-    read = spelling_of([cell[octet] for cell in data])
-    unit, times = _times_of([cell[when] for cell in data], [cell[octet] for cell in data], read, units[when])
+    tail = octet > when and _go_on(names, octet, data)
+    told = [[one for one in cell[octet:] if one] if tail else [cell[octet]] for cell in data]
+    read = spelling_of([one for cell in told for one in cell])
+    unit, times = _times_of([cell[when] for cell in data], [_length(cell, read) for cell in told], units[when])
     return Table(
-        octet, read, delimiter, begin, end, place(DURATION), unit, kind, (*errors, *named), times
+        octet, read, delimiter, begin, end, place(DURATION), unit, kind, (*errors, *named), times, tail
     )  # fmt: skip
+
+
+_NUMBERED_NAME = re.compile(r"(?:[a-z]{1,6}[ _#]?)?\[?[0-9a-f]{1,3}\]?|")
+_ONE_OCTET = re.compile(r"(?:0x)?[0-9a-f]{1,2}h?|[0-9]{1,3}|", re.IGNORECASE)
+
+
+def _go_on(names: Sequence[str], octet: int, rows: Sequence[Sequence[str]]) -> bool:
+    """Whether the octets of a row stand in a cell each: behind the column that is named for them come more that have a
+    number for a name, or none.
+    """
+    if not all(_NUMBERED_NAME.fullmatch(name) for name in names[octet + 1 :]):
+        return False
+    more = [row for row in rows if any(row[octet + 1 :])]
+    return 2 * len(more) > len(rows) and all(_ONE_OCTET.fullmatch(cell) for row in more for cell in row[octet:])
 
 
 def _named(name: str) -> tuple[str, str]:
@@ -250,26 +280,31 @@ def _are_times(column: Sequence[str]) -> bool:
     return many > 1 and rising >= 0.9 * (len(found) - 1) and not is_count([Decimal(time) for time in found])
 
 
-def _times_of(
-    cells: Sequence[str], octets: Sequence[str], read: Callable[[str], bytes], named: str
-) -> tuple[int, Times]:
-    """ns that a number of the column of times counts, and how its dates are read."""
+def _length(cells: Sequence[str], read: Callable[[str], bytes]) -> int:
+    """Octets that cells tell; 0 where one tells none."""
+    try:
+        return sum(len(read(cell)) for cell in cells)
+    except ValueError:
+        return 0
+
+
+def _times_of(cells: Sequence[str], lengths: Sequence[int], named: str) -> tuple[int, Times]:
+    """ns that a number of the column of times counts, and how its dates are read. `lengths`: octets of each row."""
     if named:
         return UNITS[named], AS_WRITTEN
     numbers: list[Decimal] = []
-    lengths: list[int] = []
-    for cell, told in zip(cells, octets, strict=True):
+    of_them: list[int] = []
+    for cell, length in zip(cells, lengths, strict=True):
         try:
             number = Decimal(cell.replace(",", "."))
-            lengths.append(len(read(told)))
-        except (InvalidOperation, ValueError):
+        except InvalidOperation:
             continue
-        if not number.is_finite():
-            continue
-        numbers.append(number)
+        if number.is_finite() and length:
+            numbers.append(number)
+            of_them.append(length)
     if 2 * len(numbers) < len(cells) or len(numbers) < 2:
         return UNITS["s"], order_of(cells)
-    unit, _, is_sure = unit_of(numbers, lengths[: len(numbers)])
+    unit, _, is_sure = unit_of(numbers, of_them)
     return unit, AS_WRITTEN if is_sure else Times(said=(f"times taken as {UNIT_NAMES[unit]}",))
 
 
@@ -349,8 +384,9 @@ def time_of(text: str, unit: int, times: Times = AS_WRITTEN) -> int:
     """A cell with a time → ns: a number of `unit`s (ns), or a date and time. Raises ValueError."""
     from sniff.formats.log_clock import stamp_of
 
+    counted = _WITH_UNIT.fullmatch(text.strip())
     try:
-        return scaled(text, unit)
+        return scaled(text, unit) if counted is None else scaled(counted["number"], UNITS[counted["unit"]])
     except ValueError:
         stamp = stamp_of(text.strip(), times)
         if stamp is None or stamp.begin:
