@@ -13,7 +13,7 @@ from dissectors.profibus.renamer import ProfibusRenamer
 from dissectors.profibus.ring import ring_window
 from dissectors.profibus.rules import RULES
 from dissectors.profibus.telegram import telegram, token
-from dissectors.profibus.text import text
+from dissectors.profibus.text import line_meant, text
 from dissectors.profibus.tracker import ProfibusTracker
 from dissectors.token_ring import StationTable, TokenRing
 
@@ -51,6 +51,7 @@ PROFIBUS = Dissector(
     peek=peek,
     tracker=ProfibusTracker,
     text=text,
+    meant=line_meant,
     fields=fields,
     packet=packet,
     default_line="1500000,8E1",

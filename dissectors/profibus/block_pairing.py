@@ -59,7 +59,7 @@ class ProfibusBlockPairing:
     ) -> None:
         self._tracker = tracker
         self._frames, self._octets, self._slack = frames, octets, slack
-        self._asks: Masks = (frames.role == _REQUEST) | (frames.role == _POLL)
+        self._asks: Masks = ((frames.role == _REQUEST) | (frames.role == _POLL)) & frames.ok
         self._answered = _answered(frames, self._asks, PATIENCE + timing.latency)
         self._irregular = np.append(np.flatnonzero(self._find_irregular()), len(frames))
 
@@ -97,9 +97,10 @@ class ProfibusBlockPairing:
         self._tracker.turn.wait(frames.start[rows], frames.end[rows], goes_on)
 
     def _find_irregular(self) -> Masks:
-        """Rows that the tracker must see: answers that are not of the row before, and what may be a repeat."""
+        """Rows that the tracker must see: what the kernel did not give, requests before it, answers that are not of the
+        row before, and what may be a repeat."""
         frames = self._frames
-        response = frames.role == _RESPONSE
+        response = (frames.role == _RESPONSE) | ~frames.ok
         irregular: Masks = response.copy()
         irregular[1:] &= ~self._answered[:-1]
         irregular[:-1] |= self._asks[:-1] & response[1:] & ~self._answered[:-1]
@@ -180,7 +181,7 @@ def _answered(frames: FrameColumns, asks: Masks, patience: int) -> Masks:
         return answered
     source, destination = frames.source, frames.destination
     named = (source[1:] == destination[:-1]) & (destination[1:] == source[:-1])
-    fits = asks[:-1] & (frames.role[1:] == _RESPONSE) & (named | (source[1:] == NONE))
+    fits = asks[:-1] & (frames.role[1:] == _RESPONSE) & frames.ok[1:] & (named | (source[1:] == NONE))
     answered[:-1] = fits & (frames.start[1:] - frames.end[:-1] <= patience)
     return answered
 

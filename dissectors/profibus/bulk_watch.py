@@ -9,6 +9,7 @@ import numpy as np
 
 from dissectors.histogram import Histogram, add_grouped
 from dissectors.profibus.regular_columns import Units
+from dissectors.profibus.slave_watch import SlaveView
 from dissectors.profibus.watch import BusWatch
 from dissectors.stretches import FEW, LEAST
 
@@ -110,22 +111,41 @@ class BulkBusWatch(BusWatch):
     def _exchange(self, rows: RowColumns, units: Units, which: slice) -> None:
         """Data exchange of each slave."""
         at = np.flatnonzero(units.exchange[which])
-        begun, urgent = rows.frames.start[units.request[which][at]], units.urgent[which][at]
-        source = units.source[which][at]
-        cycles: list[tuple[int, Times]] = []
-        for address, mine in grouped(units.destination[which][at]):
-            slave, times = self.slaves[address], begun[mine]
-            cycles.append((address, np.diff(times) if slave.begun is None else np.diff(times, prepend=slave.begun)))
-            slave.begun = int(times[-1])
-            served = times if slave.owner is None else times[source[mine] == slave.owner]
-            if len(served):
-                pauses = np.diff(served, prepend=served[0] if slave.asked is None else slave.asked)
-                slave.silence, slave.asked = max(slave.silence, int(pauses.max())), int(served[-1])
+        if not len(at):
+            return
+        order = at[np.argsort(units.destination[which][at], kind="stable")]
+        slave_of, source = units.destination[which][order], units.source[which][order]
+        times, urgent = rows.frames.start[units.request[which][order]], units.urgent[which][order]
+        begins = np.flatnonzero(np.append(True, slave_of[1:] != slave_of[:-1]))
+        cycles = np.append(np.int64(0), times[1:] - times[:-1])
+        pauses, is_cycle, any_urgent = cycles.copy(), np.ones(len(cycles), bool), bool(urgent.any())
+        slaves = [self.slaves[address] for address in slave_of[begins].tolist()]
+        bounds = list(zip(begins.tolist(), [*begins[1:].tolist(), len(order)], strict=True))
+        for slave, (begin, end) in zip(slaves, bounds, strict=True):
+            first = int(times[begin])
+            is_cycle[begin] = slave.begun is not None
+            cycles[begin] = 0 if slave.begun is None else first - slave.begun
+            pauses[begin] = 0 if slave.asked is None else first - slave.asked
+            slave.begun = int(times[end - 1])
+        longest = np.maximum.reduceat(pauses, begins).tolist()
+        for slave, (begin, end), pause in zip(slaves, bounds, longest, strict=True):
+            if slave.owner is None or (source[begin:end] == slave.owner).all():
+                slave.silence, slave.asked = max(slave.silence, pause), int(times[end - 1])
+            else:
+                _serve(slave, times[begin:end][source[begin:end] == slave.owner])
             slave.heard(True)
-            slave.exchanges += len(mine)
-            slave.urgent = _trailing(urgent[mine], slave.urgent)
+            slave.exchanges += end - begin
+            slave.urgent = _trailing(urgent[begin:end], slave.urgent) if any_urgent else 0
             slave.unanswered = slave.run = 0
-        _add(cycles, {address: self.slaves[address].cycle for address, _ in cycles})
+        histograms = {address: self.slaves[address].cycle for address in slave_of[begins].tolist()}
+        add_grouped(histograms.__getitem__, slave_of[is_cycle], cycles[is_cycle])
+
+
+def _serve(slave: SlaveView, times: Times) -> None:
+    """Requests of its master among those of others."""
+    for time in times.tolist():
+        slave.silence = max(slave.silence, 0 if slave.asked is None else time - slave.asked)
+        slave.asked = time
 
 
 def _stretches(units: Units) -> Iterator[tuple[int, int]]:

@@ -157,7 +157,7 @@ def _begun(octets: bytes) -> tuple[Flaw, int, bytes] | None:
 
 
 def _long_begun(octets: bytes) -> tuple[Flaw, int, bytes] | None:
-    """The same of one with a length: of its four first octets three are right, or all but the first are there."""
+    """The same of one with a length: of its four first octets three are right, or all but one are there."""
     if len(octets) < 8:
         return None
     for length in dict.fromkeys(octets[1:3]):
@@ -165,5 +165,9 @@ def _long_begun(octets: bytes) -> tuple[Flaw, int, bytes] | None:
         whole = head + octets[4 : length + 6]
         if sum(a == b for a, b in zip(head, octets[:4], strict=True)) == 3 and is_sound(whole):
             return Flaw.ONE_SPOILT if octets[0] == SD2 else Flaw.FIRST_SPOILT, length + 6, whole
+        if octets[0] == SD2 and (octets[2] == SD2 or octets[1] == octets[2]):  # a length, or the second start
+            whole = head + octets[3 : length + 5]
+            if is_sound(whole):
+                return Flaw.ONE_MISSING, length + 5, whole
     whole = bytes((SD2,)) + octets[: octets[0] + 5]
     return (Flaw.FIRST_MISSING, len(whole) - 1, whole) if is_sound(whole) else None

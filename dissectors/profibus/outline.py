@@ -20,8 +20,16 @@ _STARTS = {0x10: "SD1: no data", SD2: "SD2: variable length", SD3: "SD3: eight o
 
 
 def outline(octets: bytes) -> Nodes | None:
-    """The tree of a telegram with a frame control octet, `begin` and `end` in its octets; None of anything else."""
+    """The tree of a telegram, `begin` and `end` in its octets; None of anything else."""
     telegram = parse(octets)
+    if telegram.is_short:
+        return (Node("start", "SC: short acknowledgement, by who was asked", 0, 1),)
+    if telegram.is_token and telegram.source is not None:
+        return (
+            Node("start", "SD4: token", 0, 1),
+            Node("destination", f"{telegram.destination}, which may send now", 1, 2),
+            Node("source", f"{telegram.source}", 2, 3),
+        )
     if telegram.control is None:
         return None
     body = body_of(octets)

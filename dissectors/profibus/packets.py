@@ -129,12 +129,20 @@ class PBToken(Packet):
     name = "PROFIBUS token"
     fields_desc = (XByteField("sd", SD4), ByteField("da", 2), ByteField("sa", 2))
 
+    def tree(self) -> tuple[Node, ...] | None:
+        """The telegram octet by octet."""
+        return outline(bytes(self))
+
 
 class PBShort(Packet):
     """A short acknowledgement."""
 
     name = "PROFIBUS short acknowledgement"
     fields_desc = (XByteField("sd", SC),)
+
+    def tree(self) -> tuple[Node, ...] | None:
+        """The telegram octet by octet."""
+        return outline(bytes(self))
 
 
 def packet(frame: Frame, role: Role) -> Packet:

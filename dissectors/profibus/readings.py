@@ -29,7 +29,7 @@ def readings(request: Frame | None, response: Frame | None) -> tuple[Reading, ..
     if service is Service.DATA_EXCHANGE:
         return (*_words("dp-output", asked.data, How.WRITE), *_words("dp-input", told.data, How.READ))
     if service is Service.DIAGNOSIS and (said := parse_diagnosis(told.data)) is not None:
-        return (Reading("dp-ident", 0, said.ident, said.ident, How.READ),)
+        return (Reading("dp-ident", 0, said.ident, said.ident, How.READ, words=f"{said.ident:04X}h"),)
     if service is Service.READ_INPUTS:
         return _words("dp-input", told.data, How.READ)
     return _words("dp-output", told.data, How.READ) if service is Service.READ_OUTPUTS else ()

@@ -50,7 +50,7 @@ class Record:
             return
         self.requests += 1
         self.exchanged += closed.kind == _EXCHANGE
-        self.answers += verdict in _LISTENED
+        self.answers += verdict in _LISTENED and closed.response is not None  # rubbish alone shows nobody
         if closed.attempt > 1:
             self.repeats += 1
             self.worst = max(self.worst, closed.attempt - 1)

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 from dissectors.checksums import sum8
 from dissectors.frame import Check, Frame, Header, Role
+from dissectors.meaning import Meaning
 from dissectors.profibus.configuration import parse_configuration
 from dissectors.profibus.control import FDL_STATUS, Control
 from dissectors.profibus.diagnosis import NO_MASTER, parse_diagnosis
@@ -22,10 +23,24 @@ def text(frame: Frame, header: Header, role: Role) -> str:
     return _line(telegram) + _damage(frame)
 
 
+def line_meant(frame: Frame, header: Header, role: Role, meaning: Meaning) -> str:
+    """The same, what it means to its device behind the way it goes: `1 → 5 run, forward — Data_Exchange: out 00 01`."""
+    line, said = text(frame, header, role), meaning.about
+    telegram = parse(meant(frame))
+    if not said or telegram.is_short or telegram.control is None:
+        return line
+    way = _way(telegram)
+    return f"{way} {said} — {line.removeprefix(way).lstrip()}"
+
+
+def _way(telegram: Telegram) -> str:
+    return f"{_station(telegram.source)} → {_station(telegram.destination)}"
+
+
 def _line(telegram: Telegram) -> str:
     if telegram.is_short:
         return "SC"
-    way = f"{_station(telegram.source)} → {_station(telegram.destination)}"
+    way = _way(telegram)
     if telegram.is_token:
         return f"{way} token"
     if telegram.control is None:

@@ -76,8 +76,9 @@ def decode(profile: Profile | None, readings: Sequence[Reading]) -> tuple[Value,
     values: list[Value] = []
     for reading in readings:
         entry = None if reading.part else profile.at(reading.space, reading.address)
-        if entry is not None and entry.reserved and reading.how is How.READ:
-            continue  # read along with its neighbours
+        is_kept = reading.how is How.READ or not profile.forbids(reading.space, reading.address, reading.raw)
+        if entry is not None and entry.reserved and is_kept:
+            continue  # read or written along with its neighbours
         if entry is None or entry.reserved:
             values.append(_attribute(profile, reading) if reading.part else _plain(reading))
             continue
@@ -109,7 +110,14 @@ def phrase(value: Value) -> str:
         return value.text
     if value.words == f"no {entry.title}":
         return value.words  # which says what of
-    return f"{brief_title(entry)} {value.text}" + (" (?)" if entry.doubt or not value.reading.sure else "")
+    return f"{brief_title(entry)} {value.text}" + (" (?)" if _is_doubtful(value, entry) else "")
+
+
+def _is_doubtful(value: Value, entry: Entry) -> bool:
+    """Whether a value is to be marked as doubtful: its words may mark what is doubtful of it themselves."""
+    if value.text.endswith("(?)"):
+        return False
+    return not value.reading.sure or (bool(entry.doubt) and "(?)" not in value.text)
 
 
 def brief_title(entry: Entry) -> str:

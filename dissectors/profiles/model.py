@@ -59,6 +59,10 @@ class Role(Enum):
     ALARM = "alarm"  # the device warns
 
 
+_OUTPUTS = "dp-output"
+"""The table of cyclic outputs: a master gives all of them to a station at once, over and over."""
+
+
 @dataclass(frozen=True, slots=True)
 class Bit:
     """One bit of a register. `on`, `off`: what 1 and 0 say in words; empty: nothing worth saying. `role`: of a 1."""
@@ -245,6 +249,11 @@ class Profile:
         if entry is not None:
             return entry.reserved
         return space in ("holding", "input") and any(first <= address <= last for first, last in self.reserved)
+
+    def forbids(self, space: str, address: int, raw: int | None) -> bool:
+        """Whether the maker forbids to write `raw`: to a reserved place; but cyclic outputs are always sent whole, and
+        their reserved words as 0."""
+        return self.is_reserved(space, address) and not (space == _OUTPUTS and raw == 0)
 
     def in_space(self, *spaces: str) -> Iterator[Entry]:
         """The entries of some tables, in the order of the profile."""

@@ -255,7 +255,8 @@ class ProfileFindings:
             entry = None if reading.part else profile.at(reading.space, reading.address)
             if profile.is_reserved(reading.space, reading.address):
                 place = entry.number if entry is not None else plain_name(reading.space, reading.address)
-                self._add("PR002", who, place, f"{reading.value} written to reserved {place}", frame.end, no)
+                if profile.forbids(reading.space, reading.address, reading.raw):
+                    self._add("PR002", who, place, f"{reading.value} written to reserved {place}", frame.end, no)
             elif f"{reading.space}:{reading.part}" in profile.limits_on(self._family).read_only:
                 place = f"{reading.space} {reading.address} {reading.part}"
                 self._add("PR003", who, place, f"{place} written, it is read only", frame.end, no)

@@ -57,6 +57,15 @@ def exchanges(count: int, outputs: bytes = b"\0", wait: int = 1) -> list[tuple[i
     return [one for at in range(count) for one in exchange(at % 2, outputs, wait)]
 
 
+def test_rubbish_in_the_place_of_an_answer_shows_no_station() -> None:
+    asked = [(2, telegram(9, 1, 0x5D | at % 2 << 5, dsap=60, ssap=62)) for at in range(6)]
+    judge = judged([*exchanges(2), *asked[:3], (1, b"\xfe\x00\xf8"), *asked[3:], *exchanges(2)])
+    silent = found(judge, "PB001")
+    assert silent is not None
+    assert silent.severity is Severity.ERROR
+    assert found(judge, "PB002") is None
+
+
 def test_counts_as_bus_monitors_have_them() -> None:
     lost = [(1, telegram(5, 1, 0x5D, b"\0"))] * 2 + [(1, telegram(5, 1, 0x6D, dsap=60, ssap=62))]
     spoilt = bytearray(telegram(1, 5, 0x08, b"\7"))

@@ -66,6 +66,8 @@ def damaged(rows: list[Row]) -> list[tuple[int | None, int | None]]:
         ([EXCHANGE, INPUTS, spoilt(token(3, 2), (0, 0x08)), *ROUND[3:]], (2, 3)),
         ([EXCHANGE, INPUTS, token(3, 2)[:2], *ROUND[3:]], (2, 3)),
         ([EXCHANGE, INPUTS, token(3, 2)[1:], *ROUND[3:]], (2, 3)),
+        ([EXCHANGE, INPUTS[:1] + INPUTS[2:], *ROUND[2:]], (5, 2)),  # a length is lost
+        ([EXCHANGE, INPUTS[:3] + INPUTS[4:], *ROUND[2:]], (5, 2)),  # the second start
         ([POLL, spoilt(EXCHANGE, (7, 0x10)), INPUTS, *ROUND[2:]], (2, 5)),  # nobody need answer a poll
     ],
 )

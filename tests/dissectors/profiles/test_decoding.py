@@ -84,6 +84,23 @@ def test_values_out_of_range_are_bad_and_doubtful_ones_uncertain() -> None:
     assert decode(packaged("teco-f510"), (nan,))[0].quality == Quality.BAD
 
 
+def test_a_doubt_is_marked_once() -> None:
+    drive = packaged("teco-f510")
+    for word, said in (
+        (0x2001, "status running, forward, preparing, frequency reference from Profibus (?)"),
+        (0x0001, "status running, forward, preparing (?)"),
+    ):
+        assert say(drive, (Reading("dp-input", 0, word, word, How.READ),)) == said
+
+
+def test_cyclic_outputs_are_sent_whole_and_what_is_reserved_in_them_as_0() -> None:
+    drive = packaged("teco-f510")
+    zeros = tuple(Reading("dp-output", at, 0, 0, How.WRITE) for at in range(16))
+    assert not any(value.entry is None for value in decode(drive, zeros))
+    assert [drive.forbids("dp-output", 2, raw) for raw in (0, 1)] == [False, True]
+    assert not drive.forbids("dp-output", 1, 1)
+
+
 def test_bits_are_points_of_their_own() -> None:
     values = {value.name: value for value in decode(E510, holding(0x2520, 0b1001))}
     assert values["status"].text.startswith("running, forward, not ready, fault")
