@@ -3,6 +3,9 @@ PYTHON ?= python3
 VENV   ?= .venv
 BIN     = $(VENV)/bin
 
+# Many processes of ours begin in the tests: what one of them compiled, the next need not.
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: demo test lint docs bench faults pictures clean
 
 demo: $(VENV)/.demo

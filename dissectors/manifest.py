@@ -146,7 +146,9 @@ class Dissector:
         if self.meant is not None:
             return self.meant(frame, header, role, meaning)
         said, text = meaning.about, self.text(frame, header, role)
-        return f"{said} — {text}" if said else text
+        way = "" if header.source is None else f"{header.source} → {header.destination} "
+        rest = text.removeprefix(way)
+        return f"{way if rest != text else ''}{said} — {rest}" if said else text
 
     @property
     def prefixes(self) -> tuple[str, ...]:

@@ -12,6 +12,10 @@ T = TypeVar("T")
 IS_SEARCH = os.environ.get("HYPOTHESIS_PROFILE") == "thorough"
 
 
+MOST_READS = 6000 if IS_SEARCH else 1000
+"""Of a capture that is read in two ways to be compared: all but one have fewer than 6000."""
+
+
 def seeds(many: int, usual: int = 1) -> range:
     """The seeds 0 … of a run: `many` in a search, `usual` in the suite."""
     return range(many if IS_SEARCH else usual)

@@ -105,6 +105,14 @@ def _under_causes(made: list[Remark]) -> Iterable[Finding]:
     return (explained.get(id(one), one.finding) for one in made)
 
 
+def _comes_back(ring: Ring, mac: int, left: int) -> bool:
+    """Whether a station that was away before has not been away clearly longer yet, at the end of what was heard."""
+    leaves = [event.time for event in ring.of(RingEventKind.LEFT, mac).events]
+    returns = [event.time for event in ring.of(RingEventKind.REJOINED, mac).events]
+    away = [back - max(before) for back in returns if (before := [time for time in leaves if time < back])]
+    return bool(away) and (ring.last or left) - left <= 2 * max(away)
+
+
 def _tokens(ring: Ring) -> Iterable[Remark]:
     for (what, mac), happened in ring.happened.items():
         if what is RingEventKind.LOST_TOKEN:
@@ -124,7 +132,7 @@ def _tokens(ring: Ring) -> Iterable[Remark]:
             and ring.of(RingEventKind.REJOINED, mac).last <= happened.last
         ):
             node = ring.nodes.get(mac)
-            if node is not None and node.last <= happened.last:
+            if node is not None and node.last <= happened.last and not _comes_back(ring, mac, happened.last):
                 seen = "did not use its token, was passed over, and has been silent since"
                 yield of("MS106", mac, seen, happened)
     strays = [happened for (what, _), happened in ring.happened.items() if what is RingEventKind.TWO_TOKENS]

@@ -65,7 +65,8 @@ _ALL = (
         "MS106",
         Severity.ERROR,
         "station left the ring",
-        "A station did not use its token, was passed over, and has not come back.",
+        "A station did not use its token, was passed over, and has not come back; of one that was away before and came "
+        "back, not for twice as long as then.",
         "it is off, disconnected or has crashed",
         "the station's supply and wiring",
         explains=("MS102", "MS301"),

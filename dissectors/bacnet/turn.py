@@ -101,14 +101,15 @@ class Turn:
 
     def speaker(self, frame: Frame) -> Speaker | None:
         """Who most likely sent a frame whose header is damaged; None where nothing is known of the bus."""
-        guesses = self._guesses(frame)
         octets = frame.octets[: HEADER + 2]
+        guesses = [(guess, _expected(guess)) for guess in self._guesses(frame)]
         best: _Guess | None = None
-        least = _FAR
-        for guess in guesses:
+        # what it costs where nothing is lost or too many, so that others need not be reckoned to their end
+        least = min((guess.cost + _substituted(octets, header) for guess, header in guesses), default=_FAR) + 1
+        for guess, header in guesses:
             if guess.cost >= least:
                 continue
-            cost = guess.cost + _distance(octets, _expected(guess), least - guess.cost)
+            cost = guess.cost + _distance(octets, header, least - guess.cost)
             if cost < least:
                 least, best = cost, guess
         if best is None:
@@ -183,6 +184,21 @@ def _expected(guess: _Guess) -> tuple[int, ...]:
     return (*PREAMBLE, guess.frame_type, guess.destination, guess.source, _ANY, _ANY, _ANY)
 
 
+def _substituted(octets: bytes, header: tuple[int, ...]) -> int:
+    """What it costs at most to take the begin of `octets` for that header: octet for octet, and the end lost."""
+    cost = max(0, len(header) - len(octets)) * _LOST
+    for wanted, octet in zip(header, octets, strict=False):
+        if wanted != octet:
+            cost += _of_octet(wanted, octet)
+    return cost
+
+
+def _of_octet(wanted: int, octet: int) -> int:
+    if wanted == _ANY:
+        return _ANY_COST
+    return _A_BIT if (wanted ^ octet).bit_count() == 1 else _SPOILT
+
+
 def _distance(octets: bytes, header: tuple[int, ...], limit: int) -> int:
     """What it costs to take the begin of `octets` for that header; octets after it cost nothing.
 
@@ -198,10 +214,8 @@ def _distance(octets: bytes, header: tuple[int, ...], limit: int) -> int:
             above = before[at]
             if wanted == octet:
                 cost = diagonal
-            elif wanted == _ANY:
-                cost = diagonal + _ANY_COST
             else:
-                cost = diagonal + (_A_BIT if (wanted ^ octet).bit_count() == 1 else _SPOILT)
+                cost = diagonal + _of_octet(wanted, octet)
             if above + _LOST < cost:
                 cost = above + _LOST
             if left + _TOO_MANY < cost:

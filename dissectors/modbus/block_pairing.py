@@ -6,9 +6,11 @@ RTU, which is more than ASCII asks: then the tracker looks at more by itself.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from dissectors.columns import FrameColumns, Octets, Run, Times
+from dissectors.columns import NONE, FrameColumns, Octets, PlacementColumns, Run, Times, TransactionColumns
 from dissectors.line import Timing
 from dissectors.modbus.ascii_kernel import rtu_twins
 from dissectors.modbus.envelope import ASCII_NAME, RTU_NAME, readable_adu
@@ -36,7 +38,9 @@ class ModbusBlockPairing:
         self._tracker = tracker
         self._frames, self._octets, self._timing, self._slack = frames, octets, timing, slack
         self._found = exchanges(*(twins or (frames, octets)), timing, slack)
-        self._numbers: Times | None = None
+        self._last = self._found.last
+        self._rows: Times = np.zeros(0, np.int64)  # of all exchanges before each, once they are placed
+        self._whole: tuple[Times, PlacementColumns, TransactionColumns] | None = None
 
     def run(self, begin: int, no: int) -> Run | None:
         """See `dissectors.columns.BlockPairing`."""
@@ -50,15 +54,38 @@ class ModbusBlockPairing:
         end = holding(found, frames, place, known, self._timing)
         if end == place:
             return None
-        if self._numbers is None:
-            self._numbers = np.arange(len(frames)) + (no - begin)
-        which, last = slice(place, end), int(found.last[end - 1])
-        tx = self._tracker.next_tx
-        placements, transactions = placed(found, frames, which, self._numbers, tx, self._timing, self._slack)
+        which, last = slice(place, end), int(self._last[end - 1])
+        placements, transactions = self._placed(which, no - begin)
         self._let_pass(place, end, no - begin)
-        closed_by = found.last[which].copy()
+        closed_by = self._last[which].copy()
         closed_by[:-1] = np.where(found.unanswered[which][:-1], found.request[which][1:], closed_by[:-1])
         return Run(begin, last + 1, placements, transactions, closed_by)
+
+    def _placed(self, which: slice, to_number: int) -> tuple[PlacementColumns, TransactionColumns]:
+        """What `placed` gives for some exchanges: a part of what it gives for all, where that is the same."""
+        found, tx = self._found, self._tracker.next_tx
+        if self._whole is None:
+            numbers = np.arange(len(self._frames)) + to_number  # the rows follow one another: the same in every run
+            everything = slice(0, len(found))
+            self._rows = np.append(0, np.cumsum(1 + found.answered))
+            self._whole = (
+                numbers,
+                *placed(found, self._frames, everything, numbers, 0, self._timing, self._slack),
+            )
+        numbers, placements, transactions = self._whole
+        if found.repeat[which.start]:  # its attempts count from here
+            return placed(found, self._frames, which, numbers, tx, self._timing, self._slack)
+        further, rows = tx - which.start, slice(int(self._rows[which.start]), int(self._rows[which.stop]))
+        closed = transactions.take(which)
+        return (
+            PlacementColumns(
+                placements.tx[rows] + further,
+                placements.role[rows],
+                placements.source[rows],
+                placements.destination[rows],
+            ),
+            replace(closed, id=closed.id + further, of=np.where(closed.of == NONE, NONE, closed.of + further)),
+        )
 
     def _let_pass(self, place: int, end: int, to_number: int) -> None:
         """Put the tracker behind exchanges [place, end)."""
@@ -76,7 +103,7 @@ class ModbusBlockPairing:
             newest=[one for at, one in made.items() if at in went.answered or at == end - 1],
             given_up=[made[at] for at in went.given_up],
             count=end - place,
-            end=int(self._frames.end[found.last[end - 1]]),
+            end=int(self._frames.end[self._last[end - 1]]),
             units=set(np.flatnonzero(np.bincount(found.unit[place:end])).tolist()) - {0},
         )
         self._tracker.pass_by(went, by)

@@ -73,6 +73,11 @@ class LearnedTiming:
         self._pauses.append(gap)
         self._cycles.append(cycle)
 
+    def paused_often(self, pauses: Sequence[tuple[int, int]]) -> None:
+        """The same for one pause after the other, each with its cycle."""
+        self._pauses.extend([pause for pause, _ in pauses])
+        self._cycles.extend([cycle for _, cycle in pauses])
+
     def pauses_after_answers(self, gap: int, pause: int, cycle: int) -> bool:
         """Whether a master leaves `pause` after an answer, and would leave more if it had waited `gap` in vain.
 

@@ -75,8 +75,8 @@ class Past:
 
     @property
     def only_gathers(self) -> bool:
-        """Whether noting what was noted before changes nothing: nothing is forgotten or counted down."""
-        return not self._strays and not self._flaws and len(self._requests) < _MOST_REQUESTS
+        """Whether noting an answer that was noted before changes nothing: nothing is forgotten or counted down."""
+        return not self._strays and not self._flaws
 
     def note(self, octets: bytes, request: bool) -> None:
         """A good frame, and what it was taken for."""
@@ -111,11 +111,12 @@ class Past:
         for octets in asked:
             if self._strays:
                 self._strays -= self._strays >> 6
+            if octets in requests:
+                continue
             calls.add(octets[0] << 8 | octets[1])
-            if octets not in requests:
-                requests[octets] = None
-                if len(requests) > _MOST_REQUESTS:
-                    del requests[next(iter(requests))]
+            requests[octets] = None
+            if len(requests) > _MOST_REQUESTS:
+                del requests[next(iter(requests))]
 
     def note_stray_zero(self) -> None:
         """A zero behind a frame that cannot be its last octet."""

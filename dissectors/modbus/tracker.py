@@ -97,8 +97,8 @@ class ModbusTracker:
             self._noise(event)
             return Tracked(None, self._held.take_closed())
         seen = Seen(no, event, header, readable_adu(event))
-        if self._held.only is None or self._held.only != seen.octets:
-            self._held.only = b"" if self._last_end is not None else seen.octets
+        if header.ok and self._held.only != seen.octets:
+            self._held.only = seen.octets if self._held.only is None else b""
         if not header.ok or len(seen.octets) < 2:
             placement = self._damaged(self._as_named(seen))
         elif header.role is Role.RESPONSE:
@@ -251,7 +251,7 @@ class ModbusTracker:
             return self._request(seen, sure=False)
         pause = max(0, seen.frame.start - request.last_end)
         gap = request.gap(request.copies[0].frame.start)
-        if pause < self._echoes.limit:  # whichever it was, this repeats it at once
+        if pause < self._echoes.limit and not self._may_be_next(pause, seen):  # whichever it was, this repeats it
             if self._echoes.usual:
                 return self._echo(seen)
             return self._answer_apart(seen, Verdict.ANSWERED_TWICE, request)
@@ -263,6 +263,12 @@ class ModbusTracker:
             return self._join(request, seen)
         return self._request(seen, sure=False)
 
+    def _may_be_next(self, pause: int, seen: Seen) -> bool:
+        """Whether a copy `pause` ns behind the frame before may be the next request of a master that writes one value
+        for ever: nothing else was said so far, and the adapter, or a late computer, leaves room for its pause."""
+        slack = max(self._timing.latency, seen.frame.slack)
+        return self._held.only == seen.octets and slack > 0 and pause + slack >= self.learnt.too_soon(self._silence)
+
     def _join(self, request: Exchange, seen: Seen) -> Placement:
         """Leave open what the frame is: it belongs to the request in any case."""
         request.copies.append(seen)
@@ -272,7 +278,8 @@ class ModbusTracker:
         """No request is open: a new one, unless it comes too soon for that."""
         last = self._held.last
         gap = 0 if self._last_end is None else max(0, seen.frame.start - self._last_end)
-        if last is not None and last.octets == seen.octets and gap < self.learnt.too_soon(self._silence):
+        too_soon = gap < self.learnt.too_soon(self._silence) and not self._may_be_next(gap, seen)
+        if last is not None and last.octets == seen.octets and too_soon:
             if last.answered:
                 return self._answer_apart(seen, Verdict.ANSWERED_TWICE, last)
             return self._echo(seen)
@@ -407,8 +414,7 @@ class ModbusTracker:
         self._learn_from_next(first, first.header.role is not Role.EITHER)
         for (unit, pace), times in went.times.items():
             self.learnt.answered_often(unit, pace, times)
-        for pause, cycle in went.pauses:
-            self.learnt.paused(pause, cycle)
+        self.learnt.paused_often(went.pauses)
         self.learnt.waited(went.unanswered)
         for _ in range(min(went.sure, MOST_VOTES)):
             self._echoes.learn(False)

@@ -123,7 +123,8 @@ RULES: dict[str, Rule] = {
             "At least three damaged frames of one sender, and 4 in 5 of all its damaged ones, are right but for one "
             "and the same thing: the first or the last octet missing or spoilt, or the two checksum digits swapped. "
             "What they were follows from the checksum and from what was asked, and is shown, marked as repaired. Where "
-            "all stations have it, one finding names the bus. A warning where fewer than half of its frames have it.",
+            "all stations have it, or the only one that is heard lacks its first or last octet, one finding names "
+            "the bus. A warning where fewer than half of its frames have it.",
             "first octet: a driver or converter that is switched on too late; last octet: one that lets go too soon; "
             "checksum: the program of the device",
             "the direction control of that station and of the converter in between; the same with another adapter",

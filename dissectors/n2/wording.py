@@ -92,18 +92,28 @@ def _damaged(heard: N2Evidence) -> Iterator[Finding]:
         yield heard.noted_if(heard.is_rare(tally, of), tally.found(RULES["N2004"], subject, seen))
 
 
+_OF_DRIVERS = frozenset(Flaw) - {Flaw.CHECK_SWAPPED, Flaw.ONE_SPOILT, Flaw.ONE_MISSING}
+"""What a driver makes that is switched on too late or off too soon: the station's own, or a converter's before it."""
+
+
 def _alike(heard: N2Evidence) -> Iterator[Finding]:
     """Senders whose frames are damaged in one and the same way."""
     senders = {name: sent for name, sent in _senders(heard).items() if sent.frames}
     found = {name: flaw for name, sent in senders.items() if (flaw := _flaw(sent)) is not None}
     stations = [name for name, sent in senders.items() if name != "master" and (sent.frames >= ALIKE or sent.bad.count)]
     flaws = {found.get(name) or _only_flaw(senders[name]) for name in stations}
-    if found.keys() - {"master"} and len(stations) > 1 and len(flaws) == 1 and (flaw := flaws.pop()) is not None:
+    if (
+        found.keys() - {"master"}
+        and len(flaws) == 1
+        and (flaw := flaws.pop()) is not None
+        and (len(stations) > 1 or flaw in _OF_DRIVERS)
+    ):
         tallies = [senders[name].flaws[flaw] for name in stations]
         tally = Tally(sum(one.count for one in tallies), min(one.first for one in tallies))
         tally.last = max(one.last for one in tallies)
         tally.evidence = sorted(frame for one in tallies for frame in one.evidence)
-        seen = f"{_flaw_words(flaw)} in {counted(tally.count, 'answer')} of all stations"
+        whose = "all stations" if len(stations) > 1 else f"{stations[0]}, the only one heard: its own or a converter's"
+        seen = f"{_flaw_words(flaw)} in {counted(tally.count, 'answer')} of {whose}"
         yield tally.found(RULES["N2012"], "bus", seen)
         found = {name: flaw for name, flaw in found.items() if name not in stations}
     for name, flaw in found.items():

@@ -6,7 +6,6 @@ from dissectors.frame import Frame
 from dissectors.manifest import Dissector, PacketFile, on_first_use
 from dissectors.profibus import ring_words
 from dissectors.profibus.fields import fields
-from dissectors.profibus.findings import ProfibusFindings
 from dissectors.profibus.framing import ProfibusFramer
 from dissectors.profibus.header import peek
 from dissectors.profibus.readings import readings
@@ -16,12 +15,15 @@ from dissectors.profibus.rules import RULES
 from dissectors.profibus.telegram import telegram, token
 from dissectors.profibus.text import text
 from dissectors.profibus.tracker import ProfibusTracker
-from dissectors.profibus.watch import BusWatch
 from dissectors.token_ring import StationTable, TokenRing
 
 __all__ = ["PROFIBUS", "ProfibusFramer", "ProfibusTracker", "fields", "peek", "text"]
 
 packet = on_first_use("dissectors.profibus.packets:packet")
+kernel = on_first_use("dissectors.profibus.kernel:kernel")
+judge = on_first_use("dissectors.profibus.judging_columns:BulkProfibusFindings")
+watch = on_first_use("dissectors.profibus.bulk_watch:BulkBusWatch")
+pairing = on_first_use("dissectors.profibus.block_pairing:pairing")
 
 _EVIDENCE = {1: 2.0, 3: 8.0, 6: 22.0}
 """Bits of evidence by length: short acknowledgement and token have no check, and are believed only in their place."""
@@ -33,7 +35,7 @@ def bits(frame: Frame) -> float:
 
 
 RING = TokenRing(
-    observer=BusWatch,
+    observer=watch,
     window=ring_window,
     order=lambda ring: ring.order,
     headings=ring_words.HEADINGS,
@@ -56,12 +58,14 @@ PROFIBUS = Dissector(
     field_prefixes=("pb.",),
     field_types=on_first_use("dissectors.profibus.field_types:types"),
     bits=bits,
-    judge=ProfibusFindings,
+    judge=judge,
     rules=RULES,
     ring=RING,
     readings=readings,
     packet_file=PacketFile((147,), least=1),
     renamer=ProfibusRenamer,
     scenarios=on_first_use("dissectors.profibus.scenario:scenarios"),
+    kernel=kernel,
+    pairing=pairing,
     makers={"profibus": telegram, "profibus-token": token},
 )

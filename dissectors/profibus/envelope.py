@@ -6,6 +6,7 @@ that the standard knows: other buses use the same envelope (M-Bus, IEC 60870-5-1
 
 from __future__ import annotations
 
+from collections.abc import Container
 from dataclasses import dataclass
 
 from dissectors.checksums import sum8
@@ -75,10 +76,42 @@ def damaged(octets: bytes) -> Damaged | None:
     if whole is not None:
         flaw, count, repaired = whole
         return Damaged(count, Check.BAD, Damage.FORM, len(repaired), Repair(flaw, repaired))
+    count = _spoilt_head(octets)
+    if count:
+        return Damaged(count, Check.BAD, Damage.FORM, count)
     if expected and len(octets) >= 4:
         repair = _ended(octets, expected)
         if repair is not None:
             return Damaged(len(octets), Check.ABSENT, Damage.SHORT, expected, repair)
+    return None
+
+
+def head_inside(octets: bytes) -> int:
+    """Where a telegram with a length begins behind other octets, by its whole head; 0: nowhere."""
+    at = octets.find(SD2, 1)
+    while 0 < at <= len(octets) - 4:
+        if length_of(octets, at):
+            return at
+        at = octets.find(SD2, at + 1)
+    return 0
+
+
+def damaged_token(octets: bytes, holder: int | None, masters: Container[int]) -> Damaged | None:
+    """The token of `holder` to another master, one octet of it spoilt or missing; None where it may be anything."""
+    if not 2 <= len(octets) <= FIXED[SD4]:
+        return None
+    is_whole = len(octets) == FIXED[SD4]
+    if octets[-1] == holder and octets[-2] in masters and (not is_whole or (octets[0] ^ SD4).bit_count() == 1):
+        repaired = bytes((SD4,)) + octets[-2:]
+        return Damaged(
+            len(octets),
+            Check.ABSENT,
+            Damage.FORM,
+            FIXED[SD4],
+            Repair(Flaw.FIRST_SPOILT if is_whole else Flaw.FIRST_MISSING, repaired),
+        )
+    if octets[0] == SD4 and (octets[1] in masters or octets[-1] == holder):
+        return Damaged(len(octets), Check.ABSENT, Damage.FORM if is_whole else Damage.SHORT, FIXED[SD4])
     return None
 
 
@@ -92,6 +125,18 @@ def _of_right_length(octets: bytes) -> Damaged | None:
         return None
     damage = Damage.CHECK if right_end and not right_sum else Damage.FORM
     return Damaged(len(octets), Check.GOOD if right_sum else Check.BAD, damage, len(octets))
+
+
+def _spoilt_head(octets: bytes) -> int:
+    """Octets of a telegram with a length of which one octet of the head is spoilt, and another one elsewhere; 0 where
+    it may be anything."""
+    for length in dict.fromkeys(octets[1:3]):
+        head = bytes((SD2, length, length, SD2))
+        is_long = LEAST_LE <= length <= MOST_LE and len(octets) >= length + 6
+        has_head = sum(a == b for a, b in zip(head, octets, strict=False)) == 3
+        if is_long and has_head and octets[length + 5] == ED and Control(octets[6]).is_known:
+            return length + 6
+    return 0
 
 
 def _ended(octets: bytes, expected: int) -> Repair | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 
 from dissectors.findings import Finding, Severity, Tally, counted, times
 from dissectors.frame import Event, Frame, Header, Role
@@ -35,12 +35,14 @@ _TOLERANCE = 5
 class ProfibusFindings:
     """The judge of one bus."""
 
+    watches: type[BusWatch] = BusWatch
+
     def __init__(self, timing: Timing) -> None:
-        self._watch = BusWatch(timing, self._noticed)
+        self.watch = self.watches(timing, self._noticed)
         self._usual, self._tolerance = timing.line.bits(usual_tsdr(timing.line.baud)), timing.line.bits(_TOLERANCE)
         self._most: Callable[[int], int | None] | None = None
         self._limits: dict[int, int] = {}
-        self._records: dict[int, Record] = defaultdict(Record)
+        self.records: dict[int, Record] = defaultdict(Record)
         self._noted: dict[tuple[Notice, int], Tally] = defaultdict(Tally)
         self._diagnosed: dict[int, dict[str, Tally]] = defaultdict(lambda: defaultdict(Tally))
         self._damaged = Tally()
@@ -56,7 +58,15 @@ class ProfibusFindings:
                 self._damaged.add(event.start, no)
             elif header is not None:
                 self._count(header)
-        self._watch.see(no, event, header)
+        self.watch.see(no, event, header)
+
+    def count_rows(self, frames: int, passed: Mapping[int, int], told: Mapping[int, int]) -> None:
+        """Count good telegrams; `passed`, `told`: tokens to, tokens and requests from each master."""
+        self._frames += frames
+        for address, count in passed.items():
+            self._passed[address] += count
+        for address, count in told.items():
+            self._told[address] += count
 
     def _count(self, header: Header) -> None:
         is_token = header.role is Role.TOKEN
@@ -68,13 +78,13 @@ class ProfibusFindings:
     def settle(self, transaction: Transaction) -> None:
         """Take a transaction that closed."""
         if transaction.station is not None and not transaction.is_passing:
-            self._records[transaction.station].settle(transaction, self._slow_of(transaction.station))
+            self.records[transaction.station].settle(transaction, self.slow_of(transaction.station))
 
     def know_response_times(self, most: Callable[[int], int | None]) -> None:
         """Let a device's GSD say how long it may take, where there is one."""
         self._most = most
 
-    def _slow_of(self, address: int) -> int:
+    def slow_of(self, address: int) -> int:
         """ns above which an answer of a station is slow."""
         limit = self._limits.get(address)
         if limit is None:
@@ -84,7 +94,7 @@ class ProfibusFindings:
 
     def ring(self) -> Ring:
         """The ring so far."""
-        return self._watch.ring()
+        return self.watch.ring()
 
     def findings(self) -> tuple[Finding, ...]:
         """All findings so far."""
@@ -92,7 +102,7 @@ class ProfibusFindings:
 
     def _noticed(self, what: Notice, address: int, no: int, time: int) -> None:
         if what is Notice.DIAGNOSIS:
-            for code in self._codes_of(self._watch.slaves[address]):
+            for code in self._codes_of(self.watch.slaves[address]):
                 self._diagnosed[address][code].add(time, no)
         elif what is Notice.LOCKED:
             self._diagnosed[address]["PB011"].add(time, no)
@@ -115,11 +125,11 @@ class ProfibusFindings:
             yield "PB009"
 
     def _all(self) -> Iterator[Finding]:
-        for address in sorted(self._records):
-            yield from self._of_exchanges(station(address), self._records[address])
+        for address in sorted(self.records):
+            yield from self._of_exchanges(station(address), self.records[address])
         yield from self._of_repeats()
-        for address in sorted(self._watch.slaves):
-            yield from self._of_diagnosis(address, self._watch.slaves[address])
+        for address in sorted(self.watch.slaves):
+            yield from self._of_diagnosis(address, self.watch.slaves[address])
         yield from self._of_damage()
         yield from self._of_masters()
 
@@ -148,7 +158,7 @@ class ProfibusFindings:
 
     def _of_repeats(self) -> Iterator[Finding]:
         """Repeats of what was answered well here: of one station's requests, or of the bus where most stations' are."""
-        known = {address: one for address, one in self._records.items() if one.answers >= _LEAST}
+        known = {address: one for address, one in self.records.items() if one.answers >= _LEAST}
         told = {address: one for address, one in known.items() if one.repeated.count}
         grave = [one for one in told.values() if _grave(one.repeated.count, one.requests) >= Severity.WARNING]
         if len(grave) > 1 and len(grave) >= _COMMON * len(known):
@@ -221,10 +231,10 @@ class ProfibusFindings:
         damaged = self._damaged
         if not damaged.count:
             return
-        answers = {address: one.damaged for address, one in self._records.items() if one.damaged.count}
+        answers = {address: one.damaged for address, one in self.records.items() if one.damaged.count}
         total = sum(tally.count for tally in answers.values())
         worst = max(answers, key=lambda address: answers[address].count, default=None)
-        others = any(one.answers >= _LEAST for address, one in self._records.items() if address != worst)
+        others = any(one.answers >= _LEAST for address, one in self.records.items() if address != worst)
         checked = self._frames - sum(self._passed.values())
         is_one = (
             worst is not None
@@ -233,7 +243,7 @@ class ProfibusFindings:
             and answers[worst].count >= _ONE_STATION * damaged.count
         )
         if is_one and worst is not None:
-            asked = self._records[worst].requests
+            asked = self.records[worst].requests
             seen = f"{answers[worst].count} of {asked} answers damaged, {damaged.count} telegrams in all"
             yield answers[worst].found(RULES["PB008"], station(worst), seen, _grave(answers[worst].count, asked))
         else:
@@ -257,7 +267,7 @@ class ProfibusFindings:
             elif what is Notice.CLEAR_PERHAPS and (Notice.CLEAR, address) not in self._noted:
                 seen = f"{self._clear_seen(address)}; octets were damaged since, its end may not have been heard"
                 yield tally.found(RULES["PB012"], station(address), seen, Severity.NOTE)
-        ring = self._watch.ring()
+        ring = self.watch.ring()
         for address, view in sorted(ring.masters.items()):
             if view.polls > view.answered:
                 tally = Tally(view.polls - view.answered, ring.first, ring.last)
@@ -272,7 +282,7 @@ class ProfibusFindings:
         return f"; silent with the token until then, and going on as if it still had it: {', '.join(map(str, woken))}"
 
     def _clear_seen(self, address: int) -> str:
-        return f"outputs are cleared for {self._watch.longest_clear(address) / NS_PER_S:.0f} s of data exchange"
+        return f"outputs are cleared for {self.watch.longest_clear(address) / NS_PER_S:.0f} s of data exchange"
 
 
 def _grave(count: int, total: int) -> Severity:

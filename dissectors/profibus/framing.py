@@ -16,13 +16,18 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from dissectors.frame import Check, Event, Found, Frame, LineError, Reason
 from dissectors.line import MS, Timing
 from dissectors.plain_framers import PlainFramer
 from dissectors.profibus.control import REQUEST
-from dissectors.profibus.envelope import damaged, is_sound, length_of
-from dissectors.profibus.telegram import HIGHEST, LONGEST, SC, SD1, SD2, SD3, SD4, parse
+from dissectors.profibus.envelope import damaged, damaged_token, head_inside, is_sound, length_of
+from dissectors.profibus.telegram import FIXED, HIGHEST, LONGEST, SC, SD1, SD2, SD3, SD4, parse
+
+if TYPE_CHECKING:
+    from dissectors.columns import FrameColumns, Octets
+    from dissectors.framer import Framer
 
 SILENCE = 100 * MS
 """ns of silence that end what has begun: a busy sender may pause inside a telegram, but not so long."""
@@ -33,7 +38,7 @@ MOST_HELD = LONGEST + 45
 _CHAIN = 3
 """Tokens in a row, each from whom the last one went to, that prove a ring."""
 
-_STRAY_MOST = 3
+STRAY_MOST = 3
 """Stray octets between a request and its short acknowledgement."""
 
 _STARTS = re.compile(rb"[\x10\x68\xa2\xdc\xe5]")
@@ -51,6 +56,17 @@ class ProfibusFramer(PlainFramer):
         self._holder: int | None = None  # of the token
         self._is_proved = False  # a checked telegram was seen
         self._at = 0  # where the search goes on: nothing begins before it
+
+    def remember(self, earlier: Framer, frames: FrameColumns, octets: Octets) -> None:
+        """See `dissectors.columns.Remembering`."""
+        from dissectors.profibus.header_columns import masters_shown
+
+        assert isinstance(earlier, ProfibusFramer)
+        self._masters = earlier._masters | masters_shown(frames)
+        self._is_proved = earlier._is_proved or bool((frames.length > FIXED[SD4]).any())
+        self._is_open, self._asked, self._holder = earlier._is_open, earlier._asked, earlier._holder
+        for begin, length in zip(frames.offset[-2:].tolist(), frames.length[-2:].tolist(), strict=True):
+            self._learn(octets[begin : begin + length].tobytes())
 
     def _scan(self, last: bool) -> list[Event]:
         events: list[Event] = []
@@ -109,7 +125,7 @@ class ProfibusFramer(PlainFramer):
         """1 where a short acknowledgement stands; with the answer that is due right behind it is a stray octet."""
         if not (self._is_open and self._may_acknowledge(at)):
             return 0
-        answers = [self._answers(at + 1 + skip) for skip in range(_STRAY_MOST + 1)]
+        answers = [self._answers(at + 1 + skip) for skip in range(STRAY_MOST + 1)]
         if True in answers:
             return 0
         return None if None in answers and not last else 1
@@ -128,7 +144,7 @@ class ProfibusFramer(PlainFramer):
         return (source & 0x7F, to & 0x7F) == self._asked and not control & REQUEST
 
     def _may_acknowledge(self, at: int) -> bool:
-        return not at or (at <= _STRAY_MOST and not _STARTS.search(self._window.octets, 0, at))
+        return not at or (at <= STRAY_MOST and not _STARTS.search(self._window.octets, 0, at))
 
     def _token(self, at: int) -> int | None:
         octets = self._window.octets
@@ -179,9 +195,14 @@ class ProfibusFramer(PlainFramer):
     def _between(self, count: int) -> Event:
         """What lies in front of the next telegram, or of silence: all of it, or the damaged telegram at its begin."""
         octets = bytes(self._window.octets[:count])
-        told = damaged(octets) if self._is_proved else None
+        told = None
+        if self._is_proved:
+            told = damaged(octets) or damaged_token(octets, self._holder, self._masters)
+            inside = head_inside(octets) if told is None else 0
+            if inside:
+                return self._between(inside)
         if told is None:
-            self._is_open &= count <= _STRAY_MOST
+            self._is_open &= count <= STRAY_MOST
             return self._noise(count, Reason.NO_FRAME)
         meant = octets[: told.count] if told.repair is None else told.repair.octets
         control = parse(meant).control

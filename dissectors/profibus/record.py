@@ -67,8 +67,12 @@ class Record:
             self.put_off += closed.kind == _EXCHANGE
             self.refusals.add(f"{closed.kind}: {closed.error}")
         if closed.latency is not None and closed.latency.low > slow and verdict is not Verdict.DAMAGED_ANSWER:
-            self.slow.add(closed.start, closed.request, closed.response)
-            self.slowest = max(self.slowest, closed.latency.low)
+            self.is_slow(closed.latency.low, closed.start, closed.request, closed.response)
+
+    def is_slow(self, least: int, time: int, *rows: int | None) -> None:
+        """Take an answer that came too late, after `least` ns."""
+        self.slow.add(time, *rows)
+        self.slowest = max(self.slowest, least)
 
 
 def joined(tallies: Sequence[Tally]) -> Tally:

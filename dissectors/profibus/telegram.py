@@ -60,12 +60,23 @@ class Telegram:
 
 def body_of(octets: bytes) -> bytes:
     """What is checked: from the destination to the last octet of data; without the check of a whole telegram."""
-    begin = 4 if octets[:1] == bytes((SD2,)) else 1
-    if octets[:1] == bytes((SD2,)) and len(octets) > 4:
-        end = begin + octets[1]
+    length = _spoilt_length(octets)
+    begin = 4 if length or octets[:1] == bytes((SD2,)) else 1
+    if begin == 4 and len(octets) > 4:
+        end = begin + (length or octets[1])
         return octets[begin : min(end, len(octets))]
     size = FIXED.get(octets[0], len(octets)) if octets else 0
     return octets[begin : size - 2] if len(octets) >= size else octets[begin:]
+
+
+def _spoilt_length(octets: bytes) -> int:
+    """The length of a telegram of which one octet of the head is spoilt, and nothing missing; else 0."""
+    for length in dict.fromkeys(octets[1:3]):
+        if len(octets) == length + 6 and length >= LEAST_LE:
+            head = bytes((SD2, length, length, SD2))
+            if sum(a == b for a, b in zip(head, octets, strict=False)) == 3:
+                return length
+    return 0
 
 
 def parse(octets: bytes) -> Telegram:

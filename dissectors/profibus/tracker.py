@@ -15,7 +15,8 @@ may have been lost here.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from dissectors.frame import Event, Frame, Header, Noise, Role
 from dissectors.line import NS_PER_S, Timing
@@ -23,6 +24,7 @@ from dissectors.plain_tracker import closed_exchange
 from dissectors.profibus.control import Control
 from dissectors.profibus.header import meant
 from dissectors.profibus.telegram import parse
+from dissectors.profibus.turn import Due, Turn
 from dissectors.tracker import NOTHING_TRACKED, Placement, Tracked, Transaction, Verdict
 
 PATIENCE = NS_PER_S
@@ -47,6 +49,15 @@ class _Asked:
     is_answered: bool = False
 
 
+class Past(NamedTuple):
+    """An answered request that rows in bulk ended with: its row, frame and header, and the octets of its answer."""
+
+    no: int
+    frame: Frame
+    header: Header
+    answer: bytes
+
+
 class ProfibusTracker:
     """The tracker of one bus."""
 
@@ -55,7 +66,7 @@ class ProfibusTracker:
         self._tx = 0
         self._open: _Asked | None = None
         self._past: _Asked | None = None  # the last request, once it is closed
-        self._last: dict[tuple[int | None, int | None], _Asked] = {}  # by master and station; at most 128²
+        self._turn = Turn(timing)
         self._is_clear = True  # nothing was damaged since the last good request
 
     def track(self, no: int, event: Event, header: Header | None) -> Tracked:
@@ -63,16 +74,36 @@ class ProfibusTracker:
         before = self.advance(event.start)
         if header is None or not isinstance(event, Frame):
             self._is_clear = False
+            self._turn.see_noise(event.end)
             if self._open is not None and isinstance(event, Noise):
                 self._open.disturbed = True
             return Tracked(None, before) if before else NOTHING_TRACKED
+        if not event.ok and event.repair is None:
+            return self._damaged(no, event, header, before)
+        self._turn.see(parse(meant(event)), event.start, event.end, event.ok)
+        return self._by_role(no, event, header, before)
+
+    def _by_role(self, no: int, frame: Frame, header: Header, before: tuple[Transaction, ...]) -> Tracked:
         if header.role is Role.RESPONSE:
-            return self._answer(no, event, header, before)
-        if header.role in _ASKS and (event.ok or event.repair is not None or self._open is None):
-            return self._ask(no, event, header, before)
-        if not event.ok and event.repair is None and self._open is not None:
-            return self._answer(no, event, header, before)  # damaged, in the place of the answer
-        return self._send(no, event, header, before)
+            return self._answer(no, frame, header, before)
+        if header.role in _ASKS:
+            return self._ask(no, frame, header, before)
+        return self._send(no, frame, header, before)
+
+    def _damaged(self, no: int, frame: Frame, header: Header, before: tuple[Transaction, ...]) -> Tracked:
+        """A telegram with an octet wrong, any one: the turn says whose it is."""
+        asked, due = self._open, None
+        if asked is not None:
+            is_sure = asked.frame.ok or asked.frame.repair is not None
+            station = asked.header.destination if is_sure else None
+            due = Due(station, asked.header.source, asked.header.role is Role.POLL)
+        speaker = self._turn.speaker(parse(frame.octets), len(frame.octets), frame.start, frame.end, due)
+        header = replace(header, source=speaker.source, destination=speaker.destination)
+        if speaker.answers:
+            return self._answer(no, frame, header, before)
+        if asked is not None and header.role is Role.RESPONSE:
+            return self._send(no, frame, header, before)
+        return self._by_role(no, frame, header, before)
 
     def advance(self, now: int) -> tuple[Transaction, ...]:
         """Say that nothing came up to `now` (ns)."""
@@ -85,26 +116,52 @@ class ProfibusTracker:
         asked, self._open = self._open, None
         return () if asked is None else (closed_exchange(asked, Verdict.OPEN),)
 
+    # For rows in bulk
+
+    @property
+    def is_at_rest(self) -> bool:
+        """Whether no request is open."""
+        return self._open is None
+
+    @property
+    def next_id(self) -> int:
+        """The id of the next transaction."""
+        return self._tx + 1
+
+    def may_repeat(self, octets: bytes) -> bool:
+        """Whether a request of those octets would be the last one again."""
+        return self._past is not None and self._past.frame.octets == octets
+
+    @property
+    def turn(self) -> Turn:
+        """Whose turn it is."""
+        return self._turn
+
+    def pass_by(self, count: int, past: Past | None, asked: bool) -> None:
+        """Stand behind `count` transactions that were closed elsewhere; `asked`: some were requests to be answered."""
+        if past is None:
+            self._past = None
+        else:
+            control = parse(past.frame.octets).control
+            self._past = _Asked(self._tx + count, past.no, past.frame, past.header, control)
+            self._past.is_answered, self._past.answer = True, past.answer
+        self._tx += count
+        self._is_clear = self._is_clear or asked
+
     def _ask(self, no: int, frame: Frame, header: Header, before: tuple[Transaction, ...]) -> Tracked:
         before += self._give_up()
         control = parse(meant(frame)).control
         asked = _Asked(self._next(), no, frame, header, control)
-        pair = header.source, header.destination
-        earlier = self._last.get(pair)
-        if earlier is not None and frame.ok and self._repeats(asked, earlier):
+        earlier = self._past
+        if earlier is not None and frame.ok and earlier.frame.ok and self._repeats(asked, earlier):
             asked.attempt, asked.of = earlier.attempt + 1, earlier.of or earlier.id
-        if frame.ok:
-            self._last[pair] = asked
-            self._is_clear = True
-        else:
-            self._is_clear = False
+        self._is_clear = frame.ok
         self._open = asked
         return Tracked(_placed(no, asked.id, header), before)
 
     def _repeats(self, asked: _Asked, earlier: _Asked) -> bool:
+        """Whether a request is the one directly before once more: a master repeats at once, or not at all."""
         if asked.frame.octets != earlier.frame.octets or asked.header.role is Role.POLL:
-            return False
-        if earlier is not self._past:  # a master repeats at once, or not at all: this one asks anew
             return False
         if not earlier.is_answered:
             return True
@@ -119,6 +176,8 @@ class ProfibusTracker:
             return self._unasked(no, frame, header, before)
         self._open, self._past = None, asked
         asked.is_answered, asked.answer = frame.ok, frame.octets
+        if not asked.frame.ok and header.source is not None:  # what it asked whom was not heard: who answers knows
+            asked.header = replace(asked.header, destination=header.source)
         if not frame.ok:
             verdict = Verdict.DAMAGED_ANSWER
         elif header.error is not None:
@@ -127,7 +186,8 @@ class ProfibusTracker:
             verdict = Verdict.ANSWERED if asked.attempt == 1 else Verdict.RETRY
         role = Role.RESPONSE
         closed = closed_exchange(asked, verdict, no, frame, header.error)
-        source, destination = asked.header.destination, asked.header.source
+        source = asked.header.destination if frame.ok else header.source
+        destination = asked.header.source
         return Tracked(Placement(no, asked.id, role, source, destination), (*before, closed))
 
     def _unasked(self, no: int, frame: Frame, header: Header, before: tuple[Transaction, ...]) -> Tracked:
@@ -184,6 +244,8 @@ def _is_of(answer: Header, asked: _Asked) -> bool:
     """Whether an answer fits a request: a short acknowledgement names nobody; others name both."""
     if answer.source is None:
         return True
+    if not asked.frame.ok and asked.frame.repair is None:
+        return answer.destination == asked.header.source
     return answer.source == asked.header.destination and answer.destination == asked.header.source
 
 

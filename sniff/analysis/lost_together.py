@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from dissectors.findings import Finding, Severity, Tally, counted
@@ -83,9 +84,18 @@ class LostTogether:
             if station is not None and number not in one_by_one:
                 station.answered += count
                 station.last_answer = int(closed.end[places[len(places) - 1 - last]])
-        doubtful = asked & np.isin(closed.station, sorted(one_by_one))
-        for place in np.flatnonzero(doubtful).tolist():
-            self.settle(closed.transaction(place))
+        told = missed | answered
+        places = np.flatnonzero(told & np.isin(closed.station, sorted(one_by_one)))
+        places = places[np.argsort(closed.station[places], kind="stable")]
+        again = ~missed[places]  # answers directly behind another answer of their station: only counted
+        again[1:] &= ~missed[places[:-1]] & (closed.station[places[1:]] == closed.station[places[:-1]])
+        again[:1] = False
+        for head, end in pairwise([*np.flatnonzero(~again).tolist(), len(places)]):
+            self.settle(closed.transaction(int(places[head])))
+            station = self._stations.get(int(closed.station[places[head]]))
+            if station is not None and end - head > 1:
+                station.answered += end - head - 1
+                station.last_answer = int(closed.end[places[end - 1]])
 
     def _back(self, station: _Station, time: int) -> None:
         if station.missed >= LOST_IN_A_ROW and station.answered >= ANSWERED_BEFORE:

@@ -30,17 +30,21 @@ _FEW = 3  # requests of which coming and going are told
 _UNEVEN = 0.15  # part of the usual number by which one stretch may differ from the next
 
 
-def asked(poll: Poll, devices: Devices) -> str:
-    """ "output-frequency, output-current (holding/49505 ×2)"; empty where it names nothing."""
+def asked(poll: Poll, devices: Devices, room: int = 0) -> str:
+    """ "output-frequency, output-current (holding/49505 ×2)"; empty where it names nothing. `room`: cells; where that
+    is too long for them, names stand without their place."""
     question, profile = poll.key.question, devices.at(poll.key.station)
-    said = [_said(span, None if question.behind else profile) for span in question.spans[:MOST_PARTS]]
+    spans = question.spans[:MOST_PARTS]
+    said = [_said(span, None if question.behind else profile) for span in spans]
+    if room and len("; ".join(said)) > room:
+        said = [_said(span, None if question.behind else profile, with_place=False) for span in spans]
     left = len(question.spans) - MOST_PARTS
     said += [f"and {left} more"] if left > 0 else []
     words = "; ".join(said)
     return f"{question.behind}: {words}".removesuffix(": ") if question.behind else words
 
 
-def _said(span: Span, profile: Profile | None) -> str:
+def _said(span: Span, profile: Profile | None, with_place: bool = True) -> str:
     place = plain_name(span.space, span.address) + (f" ×{span.count}" if span.count > 1 else "")
     part = f"/{span.part}" if span.part else ""
     place = f"write {place}{part}" if span.writes else f"{place}{part}"
@@ -48,7 +52,10 @@ def _said(span: Span, profile: Profile | None) -> str:
     if not names:
         return place
     more = "…" if len(names) > MOST_NAMES else ""
-    return f"{', '.join(names[:MOST_NAMES])}{more}{part} ({place})"
+    named = f"{', '.join(names[:MOST_NAMES])}{more}{part}"
+    if not with_place:
+        return f"write {named}" if span.writes else named
+    return f"{named} ({place})"
 
 
 def _names(span: Span, profile: Profile) -> list[str]:

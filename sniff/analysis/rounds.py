@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from dissectors.line import MS
+
 if TYPE_CHECKING:
     import numpy as np
     import numpy.typing as npt
@@ -13,15 +15,34 @@ if TYPE_CHECKING:
     from sniff.engine.table import Table
 
 MOST_ROUNDS = 300
+STEADY = 0.5
+NEAR = 0.05
 
 
 @dataclass(slots=True)
 class _Round:
-    """One frame that comes again and again: when first and last, and how often after the first time."""
+    """One frame that comes again and again: when first and last, and how often after the first time.
+
+    `squares`: sum of the squares of the intervals between, in whole ms.
+    """
 
     first: int
     last: int
     count: int = 0
+    squares: int = 0
+
+    def again(self, start: int) -> None:
+        """It came once more."""
+        self.count += 1
+        self.squares += ((start - self.last) // MS) ** 2
+        self.last = start
+
+    @property
+    def is_steady(self) -> bool:
+        """Whether it keeps a rhythm: intervals scatter by less than half, as those of a poll do that is missed now and
+        then; what comes at random scatters by the whole."""
+        every = (self.last - self.first) / MS / self.count
+        return self.squares / self.count < (1 + STEADY * STEADY) * every * every
 
 
 class Rounds:
@@ -35,8 +56,7 @@ class Rounds:
         """Take a frame. `start`: ns."""
         known = self._rounds.get(octets)
         if known is not None:
-            known.count += 1
-            known.last = start
+            known.again(start)
         elif len(self._rounds) < MOST_ROUNDS:
             self._rounds[octets] = _Round(start, start)
 
@@ -75,7 +95,9 @@ class Rounds:
             self.see(octets, int(frames.start[first]))
             one = self._rounds.get(octets)
             if times > 1 and one is not None:
+                starts = frames.start[order[int(begins[group]) : int(ends[group])]]
                 one.count += times - 1
+                one.squares += int((((starts[1:] - starts[:-1]) // MS) ** 2).sum())
                 one.last = int(frames.start[lasts[group]])
 
     def _mark(self) -> None:
@@ -95,9 +117,9 @@ class Rounds:
     def is_own(self, interval: int) -> bool:
         """Whether something on this bus comes at that interval (ns) anyhow, or at a half or a third of it."""
         for one in self._rounds.values():
-            if one.count >= 4:
+            if one.count >= 4 and one.is_steady:
                 every = (one.last - one.first) / one.count
-                if any(abs(interval - times * every) <= 0.1 * interval for times in (1, 2, 3)):
+                if any(abs(interval - times * every) <= NEAR * interval for times in (1, 2, 3)):
                     return True
         return False
 

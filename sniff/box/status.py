@@ -80,12 +80,25 @@ class Recovered:
 
 
 @dataclass(frozen=True, slots=True)
+class OutletLine:
+    """Who is told what is heard. `where`: whom, in words without secrets. `connected`: whether that gets through now,
+    `trouble`: why not. `sent`, `dropped`: how much was delivered and never will be; None where others come and ask."""
+
+    name: str
+    where: str
+    connected: bool = True
+    trouble: str = ""
+    sent: int | None = None
+    dropped: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class BoxStatus:
     """The box. `recording`: whether a capture runs now; `trouble`: what is wrong with it or with the disk, in words, ""
     while all is well. `restarts`: how often the capture had to be started anew, and `last_restart`: why. `current`: the
     part being written; `parts`, `parts_size`: how many there are, and their octets. `free`, `keep_free`: octets of the
     disk. `behind`: s by which the disk is late. `clock_offset`: ns by which the clock was set since this capture began.
-    `site`: what its buses say together.
+    `site`: what its buses say together. `outlets`: who else is told.
     """
 
     name: str
@@ -112,6 +125,7 @@ class BoxStatus:
     alerts_dropped: int = 0
     recovered: tuple[Recovered, ...] = ()
     site: tuple[FindingLine, ...] = ()
+    outlets: tuple[OutletLine, ...] = ()
     buses: tuple[BusStatus, ...] = field(default_factory=tuple)
 
     @property
@@ -143,7 +157,9 @@ class BoxStatus:
         )
         site = tuple(FindingLine(**_known(FindingLine, one)) for one in value.get("site", ()))
         recovered = tuple(Recovered(**_known(Recovered, one)) for one in value["recovered"])
-        return cls(**{**_known(cls, value), "buses": buses, "recovered": recovered, "site": site})
+        outlets = tuple(OutletLine(**_known(OutletLine, one)) for one in value.get("outlets", ()))
+        told = {"buses": buses, "recovered": recovered, "site": site, "outlets": outlets}
+        return cls(**{**_known(cls, value), **told})
 
 
 def _known(kind: type, value: Mapping[str, Any]) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 
 from dissectors.line import NS_PER_S
 from sniff.analysis.plain import plain
-from sniff.box.status import BoxStatus, BusStatus, FindingLine, State
+from sniff.box.status import BoxStatus, BusStatus, FindingLine, OutletLine, State
 
 _WORDS = {State.HEARD: "heard", State.SILENT: "SILENT", State.DOWN: "DOWN", State.OVER: "NOT HEARD"}
 _HEADINGS = ("bus", "state", "since", "octets", "lost", "frames", "damaged", "load", "health")
@@ -57,9 +57,19 @@ def _head(box: BoxStatus) -> Iterator[str]:
         )
     if box.alerts_failed or box.alerts_dropped:
         yield f"  alerts     {box.alerts_failed} failed, {box.alerts_dropped} dropped"
+    for outlet in box.outlets:
+        yield plain(f"  outlet     {outlet.name} {outlet.where}{_fares(outlet)}")
     for one in box.recovered:
         what = "closed" if one.closed else f"left as it is: {one.why_not}"
         yield plain(f"  cut part   {one.name}: {one.text}; {what}")
+
+
+def _fares(outlet: OutletLine) -> str:
+    why = f" ({outlet.trouble})" if outlet.trouble else ""
+    said = [] if outlet.connected else [f"NOT CONNECTED{why}"]
+    said += [] if outlet.sent is None else [f"{outlet.sent} sent"]
+    said += [f"{outlet.dropped} DROPPED"] if outlet.dropped else []
+    return f": {', '.join(said)}" if said else ""
 
 
 def _table(box: BoxStatus) -> Iterator[str]:

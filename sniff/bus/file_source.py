@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from dissectors.profiles import Devices
+from sniff.analysis.site_ear import SiteEar
 from sniff.bus.feed import FeedStatus
 from sniff.bus.prepared import Prepared, prepare
 from sniff.bus.row_source import rows_that_fit
@@ -27,7 +28,7 @@ from sniff.engine.capture import Capture, CaptureError
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import LineEvent, LineEventKind, Session
 from sniff.formats.files import watched
-from sniff.formats.mark_file import add_mark, mark_file
+from sniff.formats.mark_file import add_mark, mark_file, place_of
 
 FIRST_READS, READS = 512, 16_384
 """Reads that are taken together, at first and later."""
@@ -54,7 +55,8 @@ class FileFeed:
     ) -> None:
         self.path = path
         self.capture = capture
-        self._store = Store(session, dissector_for(session), rows_that_fit(buses), devices, judge_later=True)
+        rows, ear = rows_that_fit(buses), SiteEar() if buses > 1 else None
+        self._store = Store(session, dissector_for(session), rows, devices, judge_later=True, ear=ear)
         self._pieces = self._read(session)
         self._thread: threading.Thread | None = None
         self._queue: queue.Queue[Piece | BaseException | None] = queue.Queue(WAITING)
@@ -173,10 +175,11 @@ class FileFeed:
         """Write it beside the file, which stays as it is."""
         kind = LineEventKind.UNMARK if text is None else LineEventKind.MARK
         self._store.add_mark(LineEvent(time, kind, text or ""))
-        if not Path(self.path).is_file():
+        place = place_of(self.path, self.capture)
+        if place is None:
             return "until this view ends: no single file is shown"
-        add_mark(self.path, time, text)
-        return f"in {mark_file(self.path)}"
+        add_mark(place.file, time, text, place.bus)
+        return f"in {mark_file(place.file)}"
 
     def close(self) -> None:
         """Have the thread end."""

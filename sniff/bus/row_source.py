@@ -36,7 +36,8 @@ class LiveFeed:
     def __init__(self, live: LiveBus, tell: Callable[[Status], None] = lambda status: None, buses: int = 1) -> None:
         self.live = live
         self._tell = tell
-        self._store = Store(live.session, live.dissector, min(KEPT_ROWS, rows_that_fit(buses)), model=live.model)
+        rows = min(KEPT_ROWS, rows_that_fit(buses))
+        self._store = Store(live.session, live.dissector, rows, model=live.model, ear=live.ear)
         self._session = live.session
 
     @property

@@ -27,6 +27,7 @@ from sniff.analysis.load import Load
 from sniff.analysis.nodes import NodeTable
 from sniff.analysis.points import TELLING, PointTable, meaning_of
 from sniff.analysis.polls import Polls
+from sniff.analysis.site_ear import SiteEar
 from sniff.analysis.summary import Summary
 from sniff.analysis.wording import describe
 from sniff.bus.ascending import Ascending
@@ -76,7 +77,7 @@ class Store:
     `kept`: the rows and transactions. `errors`: numbers of rows that are damaged frames or noise, or that have a bad
     verdict; `error_total`: with those that were dropped; `failed`: how many of them began in each second. `marks`:
     octets by the line errors reported on them. `gaps`: silence between one row and the next, ns. `version` changes
-    whenever anything changed, `heard` whenever more was heard.
+    whenever anything changed, `heard` whenever more was heard. `ear`: what is kept to hold the bus against others.
     """
 
     def __init__(
@@ -87,10 +88,12 @@ class Store:
         devices: Devices | None = None,
         model: BusModel | None = None,
         judge_later: bool = False,
+        ear: SiteEar | None = None,
     ) -> None:
-        """`model`: of this bus, which somebody else feeds; without one it has its own. `judge_later`: which takes
-        rows only when `judge` is called; counts and load are up to date all the same."""
+        """`model`: of this bus, which somebody else feeds, and the `ear` with it; without one it has its own.
+        `judge_later`: which takes rows only when `judge` is called; counts and load are up to date all the same."""
         self.keep = keep
+        self.ear = ear
         self._feeds_model = model is None
         self.model = BusModel(session, dissector, devices) if model is None else model
         self.kept = KeptTables()
@@ -126,6 +129,8 @@ class Store:
         if self._feeds_model and self._later is None:
             for output in given:
                 self.model.add(output)
+                if self.ear is not None:
+                    self.ear.add(output)
         if given:
             self._take(Table.of_outputs(self.dissector.name, self.last_no + 1, given))
 
@@ -134,13 +139,13 @@ class Store:
         if not table:
             return
         if self._feeds_model and self._later is None:
-            self.model.add_table(table)
+            self._judge(table)
         self._take(table)
 
     def add_prepared(self, prepared: Prepared) -> None:
         """Take a table that was looked at elsewhere."""
         if self._feeds_model and self._later is None:
-            self.model.add_table(prepared.table)
+            self._judge(prepared.table)
         self._take(prepared.table, prepared)
 
     def add_line_event(self, event: LineEvent) -> None:
@@ -148,7 +153,7 @@ class Store:
         if self._later is not None:
             self._later.events.append((self.last_no, self.last_closed, event))
         elif self._feeds_model:
-            self.model.add_line_event(event)
+            self._judge_event(event)
         if self._summary is not None:
             self._summary.add_line_event(event)
         self.version += 1
@@ -245,10 +250,20 @@ class Store:
         if not later.events or (later.row, later.closed) < later.events[0][:2]:
             table = later.next(self.kept, rows)
         if table:
-            self.model.add_table(table)
+            self._judge(table)
         elif later.events:
-            self.model.add_line_event(later.events.popleft()[2])
+            self._judge_event(later.events.popleft()[2])
         return not self.all_judged
+
+    def _judge(self, table: Table) -> None:
+        self.model.add_table(table)
+        if self.ear is not None:
+            self.ear.add_table(table)
+
+    def _judge_event(self, event: LineEvent) -> None:
+        self.model.add_line_event(event)
+        if self.ear is not None:
+            self.ear.add_line_event(event)
 
     def findings(self) -> tuple[Finding, ...]:
         """What was found so far; nothing as long as there was nothing to judge."""

@@ -221,7 +221,7 @@ class Box:
         self._progress = Progress(time.monotonic_ns())
         for watch in self._watches:
             watch.begin(self._begun)
-        self._say(f"recording {len(lives)} buses to {link.paths[0]}")
+        self._say(f"recording {len(lives)} bus{'es' if len(lives) > 1 else ''} to {link.paths[0]}")
         self._next_page = 0.0
         self._tell()
 
@@ -356,6 +356,7 @@ class Box:
             alerts_failed=sum(one.failed for one in told),
             alerts_dropped=sum(one.dropped for one in told),
             recovered=tuple(self._recovered),
+            outlets=() if self._telling is None else self._telling.lines(),
             site=tuple(_line(one, drift) for one in site.findings) if site is not None else (),
             buses=tuple(
                 self._bus(number, now, drift, None if site is None else site.buses[number])

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import asdict
+from collections.abc import Iterator
+from dataclasses import asdict, fields
+from typing import Any
 
 from sniff.cli import USAGE, Failure, json_output
-from sniff.config import FILE, ConfigError, load
+from sniff.config import FILE, Config, ConfigError, load
+from sniff.outlet_settings import FileSettings, ListenSettings, MqttSettings, Secret
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -38,18 +41,54 @@ def run(args: argparse.Namespace) -> int:
         for key, value in values.items():
             if value is not None:
                 print(f"  {key} = {value!r}  # {bus.origin.get(key, config.path)}")
-    box = {key: value for key, value in asdict(config.box).items() if value is not None}
-    if box and args.json:
-        print(json_output.dumps({"box": box, "from": str(config.path)}))
-    elif box:
-        print("[box]")
-        for key, value in box.items():
+    for section, values in _sections(config):
+        if not values:
+            continue
+        if args.json:
+            print(json_output.dumps({section: values, "from": str(config.path)}))
+            continue
+        print(f"[{section}]")
+        for key, value in values.items():
             print(f"  {key} = {value!r}  # {config.path}")
-    for section, filters in (("filters", config.filters), ("colours", config.colours)):
-        if filters and args.json:
-            print(json_output.dumps({section: dict(filters), "from": str(config.path)}))
-        elif filters:
-            print(f"[{section}]")
-            for name, text in filters.items():
-                print(f"  {name} = {text!r}  # {config.path}")
     return 0
+
+
+def _sections(config: Config) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Everything besides the buses: values as they are in force, also those that the file leaves to us."""
+    if config.alert is not None:
+        alert = config.alert
+        told = {"command": list(alert.command) or None, "webhook": alert.webhook or None}
+        yield "alert", _said({**told, "at": alert.least.label, "every": alert.every})
+    yield "box", _said(asdict(config.box))
+    for one in fields(config.outlets):
+        settings = getattr(config.outlets, one.name)
+        if settings is not None:
+            yield one.name, _outlet(settings)
+    yield "filters", dict(config.filters)
+    yield "colours", dict(config.colours)
+    for name, view in config.views.items():
+        lists = {which: list(columns) for which, columns in view.columns.items()}
+        yield f"view.{name}", _said({**lists, "time": view.time or None, "filter": view.filter or None})
+    yield "keys", dict(config.keys)
+
+
+def _outlet(settings: MqttSettings | FileSettings | ListenSettings) -> dict[str, Any]:
+    """Where secrets are, never the secrets."""
+    if isinstance(settings, FileSettings):
+        return asdict(settings)
+    if isinstance(settings, ListenSettings):
+        return {"listen": settings.address, "allow_remote": settings.allow_remote, **_secret("token", settings.token)}
+    told: dict[str, Any] = {key: value for key, value in asdict(settings).items() if value != ""}
+    told["discovery"] = settings.discovery
+    for key in ("host", "port", "tls", "password"):
+        del told[key]
+    broker = f"mqtt{'s' if settings.tls else ''}://{settings.host}:{settings.port}"
+    return {"broker": broker, **told, **_secret("password", settings.password)}
+
+
+def _secret(name: str, secret: Secret) -> dict[str, str]:
+    return {f"{name}_file": secret.file} if secret.file else {f"{name}_env": secret.env}
+
+
+def _said(values: dict[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in values.items() if value is not None}

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from sniff.analysis.plain import plain
+from sniff.box.status import OutletLine
 from sniff.bus.live import LiveBus
 from sniff.cli import USAGE, Failure, targets
 from sniff.outlet_settings import (
@@ -130,13 +131,14 @@ class Printed:
 @dataclass(slots=True)
 class Telling:
     """Outlets at work. `said`: what they have to say to people; whoever owns the terminal prints it. `where`: what
-    listens, as addresses."""
+    listens, as addresses; `metrics`: that of /metrics."""
 
     teller: Teller
     outlets: tuple[Outlet, ...]
     said: deque[str]
     server: MetricsServer | None = None
     where: list[str] = field(default_factory=list)
+    metrics: str = ""
 
     def attach(self, live: LiveBus) -> None:
         """Tell of a bus, too; another capture of the same takes the place of the first."""
@@ -145,6 +147,13 @@ class Telling:
     def take_said(self) -> list[str]:
         """What they had to say since the last call."""
         return [self.said.popleft() for _ in range(len(self.said))]
+
+    def lines(self) -> tuple[OutletLine, ...]:
+        """How each of them fares, and what listens for others to ask."""
+        told = [
+            OutletLine(one.name, one.where, one.connected, one.trouble, one.sent, one.dropped) for one in self.outlets
+        ]
+        return (*told, *([OutletLine("metrics", self.metrics)] if self.metrics else []))
 
     @property
     def counted(self) -> str:
@@ -213,17 +222,24 @@ def _made(settings: OutletSettings, also: Sequence[Hearer]) -> Telling:
             server.page = exposition(now, outlets)
 
     teller = Teller([*outlets, *also], None if server is None else publish)
-    return Telling(teller, outlets, said, server, list(_addresses(settings, outlets, server)))
+    metrics = _address(settings.metrics, server)
+    return Telling(teller, outlets, said, server, list(_addresses(metrics, outlets)), metrics)
 
 
-def _addresses(settings: OutletSettings, outlets: Sequence[Outlet], server: MetricsServer | None) -> Iterator[str]:
+def _addresses(metrics: str, outlets: Sequence[Outlet]) -> Iterator[str]:
     """What listens, and where."""
-    if server is not None and settings.metrics is not None:
-        yield f"http://{replace(settings.metrics, port=server.port).address}/metrics"
+    if metrics:
+        yield metrics
     for outlet in outlets:
-        port = getattr(outlet, "port", None)
-        if port is not None and settings.foxglove is not None:
-            yield f"Foxglove: ws://{replace(settings.foxglove, port=port).address}"
+        if getattr(outlet, "port", None) is not None:
+            yield f"Foxglove: {outlet.where}"
+
+
+def _address(settings: ListenSettings | None, server: MetricsServer | None) -> str:
+    """Where the page of /metrics is; "" where there is none."""
+    if server is None or settings is None:
+        return ""
+    return f"http://{replace(settings, port=server.port).address}/metrics"
 
 
 def _metrics(there: ListenSettings) -> MetricsServer:

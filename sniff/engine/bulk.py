@@ -21,7 +21,8 @@ from sniff.engine.blocks import Block
 from sniff.engine.capture import CaptureError
 from sniff.engine.engine import Engine, Output, Row
 from sniff.engine.follow_settings import SessionEngine
-from sniff.engine.framing import BulkFraming, Clean
+from sniff.engine.framing import BulkFraming, Clean, Stretch
+from sniff.engine.gathering import gathered
 from sniff.engine.late_columns import LateColumns
 from sniff.engine.placing import Placing
 from sniff.engine.session import LineEvent, Session, settings_change
@@ -190,14 +191,15 @@ class _Leg:
         if not any(isinstance(one, Clean) for one in stretches):
             events = [event for one in stretches if not isinstance(one, Clean) for event in one]
             return self._outputs(events) if len(events) < MANY else [self._events(events)]
-        made = [self._clean(one) if isinstance(one, Clean) else self._events(one) for one in stretches]
-        return [joined(self.dissector.name, self.next, made)]
+        return [self._placed_at_once(stretches)]
 
     def take(self, block: Block) -> Table:
         """Take reads."""
         self._late.see(block.reads)
-        made = [self._clean(one) if isinstance(one, Clean) else self._events(one) for one in self._framing.take(block)]
-        return joined(self.dissector.name, self.next, made)
+        stretches = self._framing.take(block)
+        if any(isinstance(one, Clean) for one in stretches):
+            return self._placed_at_once(stretches)
+        return self._events([event for one in stretches if not isinstance(one, Clean) for event in one])
 
     def advance(self, now: int) -> list[Output | Table]:
         """Say that no read returned up to `now`."""
@@ -217,19 +219,19 @@ class _Leg:
         closed = self._numbered(self._tracker.close())
         return joined(self.dissector.name, self.next, [*made, Table.of(self.dissector.name, self.next, [], closed)])
 
-    def _clean(self, stretch: Clean) -> Table:
-        """Rows of a kernel: paired by columns as far as that is certain, by the tracker where it is not."""
-        table = stretch.table(self.dissector.name, self.next, self._late.slack(stretch.columns.end))
-        make = self.dissector.pairing
+    def _placed_at_once(self, stretches: list[Stretch]) -> Table:
+        """Rows of a kernel and between them: paired by columns as far as that is certain, by the tracker elsewhere."""
+        whole = gathered(self.dissector, self.next, stretches, self._late)
+        table, given, make = whole.table, whole.given, self.dissector.pairing
         if make is None:
             return self._placed(list(table.rows()))
-        pairing = make(self._tracker, table.frames, table.octets, self.timing, table.slack)
+        pairing = make(self._tracker, whole.by_kernel, table.octets, self.timing, table.slack)
         placing, place = Placing(table), 0
         while place < len(table):
-            run = pairing.run(place, table.first + place)
+            row = given.get(place)
+            run = pairing.run(place, table.first + place) if row is None else None
             if run is None:
-                row, closed = self._track(table.row(place))
-                placing.add(place, row, closed)
+                placing.add(place, *self._track(row or table.row(place)))
                 place += 1
             else:
                 placing.add_run(run, self._before_tx)

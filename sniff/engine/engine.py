@@ -5,8 +5,8 @@ Pure: no I/O, no clock. One engine is one bus. What it gives is numbered from 1 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
 
 from dissectors.frame import Chunk, Event, Frame, Header
 from dissectors.line import LineSettings, Timing
@@ -33,16 +33,34 @@ class Row:
 
 @dataclass(frozen=True, slots=True)
 class Output:
-    """What one step of the engine gave: new rows, then the transactions that closed."""
+    """What one step of the engine gave: new rows, then the transactions that closed.
+
+    `closed_by`: the place among `rows` of the row that closed each of the first transactions; the others closed after
+    the last row.
+    """
 
     rows: tuple[Row, ...] = ()
     transactions: tuple[Transaction, ...] = ()
+    closed_by: tuple[int, ...] = field(default=(), compare=False)
 
     def __bool__(self) -> bool:
         return bool(self.rows or self.transactions)
 
 
 NOTHING = Output()
+
+
+def together(outputs: Iterable[Output]) -> Output:
+    """Outputs that follow one another, as one; `closed_by` may be -1 for what closed before any row."""
+    rows: list[Row] = []
+    closed: list[Transaction] = []
+    closed_by: list[int] = []
+    for output in outputs:
+        closed_by += [len(rows) + place for place in output.closed_by]
+        rows += output.rows
+        closed += output.transactions
+        closed_by += [len(rows) - 1] * (len(closed) - len(closed_by))
+    return Output(tuple(rows), tuple(closed), tuple(closed_by))
 
 
 class Engine:
@@ -78,12 +96,12 @@ class Engine:
         if self.framer.deadline() is not None:
             return output  # octets still held may be the answer that the tracker waits for
         closed = self._renumbered(self.tracker.advance(now))
-        return Output(output.rows, output.transactions + closed) if closed else output
+        return replace(output, transactions=output.transactions + closed) if closed else output
 
     def close(self) -> Output:
         """End of capture."""
         output = self._track(self.framer.close())
-        return Output(output.rows, output.transactions + self._renumbered(self.tracker.close()))
+        return replace(output, transactions=output.transactions + self._renumbered(self.tracker.close()))
 
     def deadline(self) -> int | None:
         """When to call `advance` next (ns), or None."""
@@ -94,6 +112,7 @@ class Engine:
             return NOTHING
         rows: list[Row] = []
         closed: list[Transaction] = []
+        closed_by: list[int] = []
         peek, track, late = self.dissector.peek, self.tracker.track, self.late
         for event in events:
             self.held -= len(event.octets)
@@ -114,7 +133,8 @@ class Engine:
             rows.append(Row(no, event, header, placement))
             if tracked.closed:
                 closed += self._renumbered(tracked.closed)
-        return Output(tuple(rows), tuple(closed))
+                closed_by += [len(rows) - 1] * len(tracked.closed)
+        return Output(tuple(rows), tuple(closed), tuple(closed_by))
 
     def _renumbered(self, closed: tuple[Transaction, ...]) -> tuple[Transaction, ...]:
         """Transactions with their numbers on the whole bus, where another engine has numbered before this one."""

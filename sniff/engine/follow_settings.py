@@ -23,7 +23,7 @@ from dissectors import registry
 from dissectors.frame import Chunk, Noise, Place, Reason
 from dissectors.line import LineSettings, Timing
 from dissectors.manifest import Dissector
-from sniff.engine.engine import NOTHING, Engine, Output, Row
+from sniff.engine.engine import NOTHING, Engine, Output, Row, together
 from sniff.engine.session import Item, Session, SettingsChange, settings_change
 
 MOST_HELD_OCTETS = 4 << 20
@@ -79,7 +79,7 @@ class SessionEngine:
 
     def close(self) -> Output:
         """End of capture."""
-        return _together(self.engine.close(), self._only_heard(self._let_go(), self._in_force))
+        return together((self.engine.close(), self._only_heard(self._let_go(), self._in_force)))
 
     def deadline(self) -> int | None:
         """When to call `advance` next (ns), or None."""
@@ -100,7 +100,7 @@ class SessionEngine:
         if self.searching or change.searching:
             if self.searching and (line == self._in_force or self.session.adapter.lineless):
                 return NOTHING
-            output = _together(self._restart(self.session.timing), self._only_heard(self._let_go(), self._in_force))
+            output = together((self._restart(self.session.timing), self._only_heard(self._let_go(), self._in_force)))
             self._since = now if self.searching else None
             self.searching, self._before, self._in_force = True, self._in_force, line
             return output
@@ -125,7 +125,7 @@ class SessionEngine:
             outputs.append(self._only_heard(held[:late], self._before))
             held = held[late:]
         outputs += [self.engine.feed(chunk) for chunk in held]
-        return _together(*outputs)
+        return together(outputs)
 
     def _restart(self, timing: Timing, protocol: str | None = None) -> Output:
         """Close the engine and go on with another, whose numbers follow."""
@@ -148,11 +148,6 @@ class SessionEngine:
             rows.append(Row(self.engine.next, noise, searched=line))
             self.engine.next += 1
         return Output(tuple(rows))
-
-
-def _together(*outputs: Output) -> Output:
-    rows = tuple(row for output in outputs for row in output.rows)
-    return Output(rows, tuple(one for output in outputs for one in output.transactions))
 
 
 def dissector_for(session: Session) -> Dissector:

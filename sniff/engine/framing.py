@@ -12,13 +12,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dissectors.columns import NONE, ROLES, FrameColumns, Octets, PlacementColumns, Reads, Remembering, Times
+from dissectors.columns import ROLES, FrameColumns, Octets, Reads, Remembering, Times
 from dissectors.frame import Chunk, Event, Frame, Role
 from dissectors.framer import Framer
 from dissectors.line import Timing
 from dissectors.manifest import Dissector
 from sniff.engine.blocks import Block
-from sniff.engine.table import Table, transaction_columns
 
 MARGIN = 520
 """Octets before the end of a block from which on nothing is taken from a kernel: what follows may decide them. Two of
@@ -36,21 +35,12 @@ PRIMED = (6, 100)
 
 @dataclass(frozen=True, slots=True)
 class Clean:
-    """Rows of a kernel; `octets`: theirs, so that `columns.offset` counts from their first."""
+    """Rows [begin, end) of a kernel's columns. `octets`: of the block, where `columns.offset` counts."""
 
     columns: FrameColumns
     octets: Octets
-
-    def table(self, protocol: str, first: int, slack: Times) -> Table:
-        """The rows as a table that nobody has placed yet."""
-        count = len(self.columns)
-        nowhere = np.full(count, NONE, np.int16)
-        placed = PlacementColumns(np.zeros(count, np.int64), np.zeros(count, np.uint8), nowhere, nowhere)
-        nothing = transaction_columns(())
-        mask = np.ones(count, bool)
-        return Table(
-            protocol, first, self.octets, self.columns, slack, mask, placed, nothing, np.zeros(0, np.int64), {}
-        )
+    begin: int
+    end: int
 
 
 Stretch = Clean | list[Event]
@@ -203,7 +193,7 @@ class _Work:
             if self._prime(slice(row + 1, max(row + 1, first)), slice(first, end)):
                 self._end_events()
                 self._taken = row, end, len(self._stretches)
-                self._stretches.append(self._clean(row + 1, end))
+                self._stretches.append(Clean(columns, self._reads.octets, row + 1, end))
                 stop = int(columns.offset[end - 1]) + int(columns.length[end - 1])
                 self._framing._given = self._framing._base + stop
                 return stop
@@ -218,12 +208,6 @@ class _Work:
             return first
         asked = np.flatnonzero(columns.role[row : first + 1] == _REQUEST)
         return row + int(asked[-1]) if len(asked) else row
-
-    def _clean(self, first: int, end: int) -> Clean:
-        assert self._columns is not None
-        columns = self._columns.take(slice(first, end))
-        begin, stop = int(columns.offset[0]), int(columns.offset[-1]) + int(columns.length[-1])
-        return Clean(replace(columns, offset=columns.offset - begin), self._reads.octets[begin:stop])
 
     def _give_back(self) -> int:
         """Let the reference read the newest chain after all; where it goes on in the block."""

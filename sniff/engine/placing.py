@@ -1,4 +1,4 @@
-"""Placing the rows of a clean stretch: runs by columns, single rows by the tracker, in any order of both."""
+"""Placing the rows of a block: runs by columns, single rows by the tracker, in any order of both."""
 
 from __future__ import annotations
 
@@ -7,12 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from dissectors.columns import NONE, ROLES, PlacementColumns, Run, TransactionColumns
+from dissectors.columns import NONE, PlacementColumns, Run, TransactionColumns
 from dissectors.tracker import Transaction
 from sniff.engine.engine import Row
-from sniff.engine.table import Table, joined_columns, transaction_columns
-
-_ROLES = {one: at for at, one in enumerate(ROLES)}
+from sniff.engine.table import Table, joined_columns, placement_columns, transaction_columns
 
 
 class Placing:
@@ -23,7 +21,8 @@ class Placing:
         self._table = table
         self._tx, self._role = np.zeros(count, np.int64), np.zeros(count, np.uint8)
         self._source, self._destination = np.full(count, NONE, np.int16), np.full(count, NONE, np.int16)
-        self._odd: dict[int, Row] = {}
+        self._single: list[int] = []
+        self._rows: list[Row] = []
         self._closed: list[Transaction] = []
         self._closed_by: list[int] = []
         self._runs: list[TransactionColumns] = []
@@ -31,13 +30,8 @@ class Placing:
 
     def add(self, place: int, row: Row, closed: Sequence[Transaction]) -> None:
         """A row that the tracker took, and what it closed."""
-        placement = row.placement
-        if placement is not None:
-            self._tx[place], self._role[place] = placement.tx, _ROLES[placement.role]
-            self._source[place] = NONE if placement.source is None else placement.source
-            self._destination[place] = NONE if placement.destination is None else placement.destination
-        if getattr(row.event, "assembly", None) is not None:
-            self._odd[place] = row
+        self._single.append(place)
+        self._rows.append(row)
         self._closed += closed
         self._closed_by += [place] * len(closed)
 
@@ -59,5 +53,12 @@ class Placing:
             closed_by = np.concatenate([*self._runs_closed_by, closed_by])
             order = np.argsort(closed_by, kind="stable")  # a row is in a run or not: none closes some of both
             closed, closed_by = closed.take(order), closed_by[order]
+        single, alone = self._single, placement_columns(self._rows)
+        self._tx[single], self._role[single] = alone.tx, alone.role
+        self._source[single], self._destination[single] = alone.source, alone.destination
         placed = PlacementColumns(self._tx, self._role, self._source, self._destination)
-        return replace(self._table, placed=placed, transactions=closed, closed_by=closed_by, odd=self._odd)
+        odd = {place: row for place, row in zip(single, self._rows, strict=True) if self._is_odd(place, row)}
+        return replace(self._table, placed=placed, transactions=closed, closed_by=closed_by, odd=odd)
+
+    def _is_odd(self, place: int, row: Row) -> bool:
+        return place in self._table.odd or getattr(row.event, "assembly", None) is not None

@@ -32,7 +32,12 @@ FULL_PACKETS = (62, 64)
 """Octets of a USB packet that is full and does not wait for the timer."""
 
 LEAST_INTERVALS = 12
+FEW_INTERVALS, LONG_PERIOD = 5, 10
+"""So many intervals are enough when all lie on a grid of so many ms or more, which chance alone hardly does."""
+
 LEAST_SPLITS = 3.0
+HURRIED_LEAST = 100_000  # ns
+HURRIED_SHARE = 20
 ON_GRID = 0.85
 USB_FRAME = MS
 LONGEST_INTERVAL = 1000 * MS  # two clocks drift apart over longer ones
@@ -97,8 +102,10 @@ def held_back(reads: ReadTimes, line: LineSettings, bound: int = 0) -> HeldBack:
     """What the reads say on a line with these settings. `bound`: ns that are known to be held back anyhow."""
     worst = _backlogs(reads, line.char, bound + line.char + reads.unit)
     proved = max(worst, default=0)
+    hurried = 0 if bound else _hurried(reads, line.char)
+    proved = max(proved, hurried)
     period, scatter = _grid(reads, line.char)
-    if not period and not worst:
+    if not period and not proved:
         return EXACT
     rounded = reads.unit if reads.unit >= MS // 10 else 0
     latency = period + USB_FRAME + 2 * scatter + rounded if period else 0
@@ -116,6 +123,20 @@ def _backlogs(reads: ReadTimes, char: int, allowed: int) -> list[int]:
             del found[backlog.stretches - 1 :]
             found.append(int(backlog.now))
     return found
+
+
+def _hurried(reads: ReadTimes, char: int) -> int:
+    """ns by which reads came sooner after the one before than their octets take on the line; 0 where few did.
+
+    Where one in twenty comes clearly sooner, the ones before them were late: by a timer of 1 ms on a slow bus, or by a
+    computer that wakes now sooner, now later. A backlog of less than a character shows in nothing else.
+    """
+    pairs = [pair for pair in zip(reads.intervals, reads.octets, strict=True) if pair[0] >= 0]
+    sooner = [int(FAST * count * char) - interval for interval, count in pairs]
+    sooner = sorted(over for over in sooner if over > HURRIED_LEAST + reads.unit)
+    if len(sooner) < LEAST_INTERVALS or HURRIED_SHARE * len(sooner) < len(pairs):
+        return 0
+    return sooner[int(0.95 * (len(sooner) - 1))]
 
 
 class Backlog:
@@ -162,11 +183,11 @@ def _grid(reads: ReadTimes, char: int) -> tuple[int, int]:
         for interval, count in zip(reads.intervals, reads.octets, strict=True)
         if 0 < interval <= LONGEST_INTERVAL and count not in FULL_PACKETS
     ]
-    if len(pairs) < LEAST_INTERVALS:
+    if len(pairs) < FEW_INTERVALS:
         return 0, 0
     in_whole_ms = reads.unit == MS  # as people write: multiples of 5 and 10 ms prove nothing
     for ms in PERIODS:
-        if in_whole_ms and ms % 5 == 0:
+        if (in_whole_ms and ms % 5 == 0) or (len(pairs) < LEAST_INTERVALS and ms < LONG_PERIOD):
             continue
         scatter = _fits(pairs, ms * MS, char)
         if scatter is not None:
@@ -182,9 +203,9 @@ def _fits(pairs: Sequence[tuple[int, int]], period: int, char: int) -> int | Non
         return None
     errors = [_off(interval, period) for interval, _ in pairs]
     on_grid = sorted(error for error in errors if error <= tolerance)
-    if len(on_grid) < ON_GRID * len(pairs):
+    if len(on_grid) < (ON_GRID if len(pairs) >= LEAST_INTERVALS else 1) * len(pairs):
         return None
-    longest = period + tolerance + USB_FRAME
+    longest = period + tolerance + USB_FRAME + char // 2  # an octet that ends in the period began before it
     if sum(FAST * count * char > longest for _, count in pairs) > 0.03 * len(pairs):
         return None  # whole frames: a timer would have cut them
     # Where a period ends inside a frame, two reads stand one period apart.
@@ -192,15 +213,28 @@ def _fits(pairs: Sequence[tuple[int, int]], period: int, char: int) -> int | Non
     apart = [(interval, count) for interval, count in pairs if abs(interval - period) <= tolerance]
     if expected < LEAST_SPLITS or len(apart) < 0.4 * expected:
         return None
-    # It ends anywhere in a frame, so that these reads hold now this many octets, now that.
+    return on_grid[int(0.95 * (len(on_grid) - 1))] if _ends_anywhere(apart, period, tolerance, char) else None
+
+
+def _ends_anywhere(apart: Sequence[tuple[int, int]], period: int, tolerance: int, char: int) -> bool:
+    """Whether reads one period apart end anywhere in a frame, so that they hold now this many octets, now that.
+
+    On a slow bus what comes in a whole period is as good as always as many octets: there those tell that hold less,
+    the ends of frames. Octets read one by one as they come stand apart by what they take on the line, not by a timer.
+    """
+    slow = period < 6 * char
+    short = period - tolerance - (char // 4 if slow else char)
+    ends = Counter(count for _, count in apart if count * char < short)
+    if 10 * ends.total() >= len(apart):
+        if slow and 10 * ends.total() <= 9 * len(apart):
+            return True
+        if len(ends) >= 3 and max(ends.values()) <= 0.7 * ends.total():
+            return True
     counts = Counter(count for _, count in apart)
     if len(counts) < (3 if period > 3 * char else 2) or max(counts.values()) > 0.6 * len(apart):
-        return None
-    # Octets read one by one as they come stand apart by what they take on the line, not by a timer.
+        return False
     as_sent = sum(abs(interval - count * char) <= max(tolerance, char // 4) for interval, count in apart)
-    if 2 * as_sent > len(apart):
-        return None
-    return on_grid[int(0.95 * (len(on_grid) - 1))]
+    return 2 * as_sent <= len(apart)
 
 
 def _off(interval: int, period: int) -> int:

@@ -31,7 +31,7 @@ from dissectors.columns import (
 )
 from dissectors.frame import Check, Frame, Header
 from dissectors.tracker import Placement, Transaction
-from sniff.engine.engine import Output, Row
+from sniff.engine.engine import Output, Row, together
 
 _CHECKS = {one: at for at, one in enumerate(CHECKS)}
 _DAMAGES = {one: at for at, one in enumerate(DAMAGES)}
@@ -92,22 +92,16 @@ class Table:
             placement_columns(rows),
             transaction_columns(closed),
             np.array(closed_by if closed_by is not None else [len(rows) - 1] * len(closed), np.int64),
-            {place: row for place, row in enumerate(rows) if not _is_plain(row)},
+            {place: row for place, row in enumerate(rows) if not is_plain(row)},
         )
 
     @classmethod
     def of_outputs(cls, protocol: str, first: int, outputs: Iterable[Output]) -> Table:
-        """What an engine gave, output by output: transactions close with the last row of theirs."""
-        rows: list[Row] = []
-        closed: list[Transaction] = []
-        closed_by: list[int] = []
-        for output in outputs:
-            rows += output.rows
-            closed += output.transactions
-            closed_by += [len(rows) - 1] * len(output.transactions)
-        if rows:  # what closed before any row came goes with the first
-            closed_by = [max(place, 0) for place in closed_by]
-        return cls.of(protocol, first, rows, closed, closed_by)
+        """What an engine gave, output by output."""
+        whole = together(outputs)
+        least = 0 if whole.rows else -1  # what closed before any row came goes with the first
+        closed_by = [max(place, least) for place in whole.closed_by]
+        return cls.of(protocol, first, whole.rows, whole.transactions, closed_by)
 
     @property
     def heard(self) -> Masks:
@@ -335,7 +329,7 @@ def joined_columns(kind: type[Named], parts: Sequence[Named]) -> Named:
     return kind(**{name: np.concatenate(values) for name, values in held.items()}, names=same)
 
 
-def _is_plain(row: Row) -> bool:
+def is_plain(row: Row) -> bool:
     """Whether columns say all of it."""
     event = row.event
     if not isinstance(event, Frame) or row.header is None or row.searched is not None:

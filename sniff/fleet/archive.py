@@ -15,6 +15,7 @@ from pathlib import Path
 
 from sniff.engine.capture import Capture, CaptureError
 from sniff.formats import read
+from sniff.formats.mark_file import unmarked
 from sniff.formats.several_buses import buses_in
 from sniff.formats.table import suffixes
 from sniff.recording import scan
@@ -153,7 +154,7 @@ def look(file: FileState) -> tuple[Begin, ...] | str:
         capture = read(file.path)
     except CaptureError as error:
         return _why(error, file)
-    buses = buses_in(capture)
+    buses = [unmarked(bus)[0] for bus in buses_in(capture)]
     return tuple(
         Begin(bus.session.bus if len(buses) > 1 else None, bus.session.protocol, _part(bus), _recording(bus, file))
         for bus in buses
@@ -194,7 +195,7 @@ def opened(task: Task) -> list[Capture]:
 
 def _bus_of(task: Task, capture: Capture) -> Capture:
     """The bus that a task is about."""
-    return next(bus for bus in buses_in(capture) if task.bus in (None, bus.session.bus))
+    return next(unmarked(bus)[0] for bus in buses_in(capture) if task.bus in (None, bus.session.bus))
 
 
 def _why(error: CaptureError, file: FileState) -> str:

@@ -21,7 +21,7 @@ from sniff.formats.cut_capture import cut_short
 from sniff.formats.files import explain, open_capture
 from sniff.formats.mark_file import with_marks
 from sniff.formats.records import FrameFile
-from sniff.formats.several_buses import buses_in
+from sniff.formats.several_buses import SeveralBuses, buses_in
 
 SAMPLE = 6000
 """Octets at the begin of a capture that are kept with its session, to tell its protocol."""
@@ -39,7 +39,10 @@ def read(path: str | Path) -> Capture:
     if Path(path).is_dir():
         raise CaptureError(f"{path}: a directory, not a capture; name a file in it")
     opened = _with_reads(_opened(Path(path)))
-    return opened if len(buses_in(opened)) > 1 else with_marks(opened, path)
+    if isinstance(opened, SeveralBuses):
+        opened.buses = tuple(with_marks(one, path) for one in opened.buses)
+        return opened
+    return with_marks(opened, path)
 
 
 def _opened(path: Path) -> Capture:

@@ -1,13 +1,15 @@
 """Marks and comments about a capture that cannot hold them itself: a small file beside it, `NAME.marks.jsonl`.
 
 A line is a JSON object: "time", ns since the Unix epoch, the moment that is marked; "text", what was written; "gone":
-true where the mark of that moment was taken away again. Later lines win. Lines are only ever added.
+true where the mark of that moment was taken away again; "bus", which it is about where the file holds several. Later
+lines win. Lines are only ever added.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -29,15 +31,37 @@ def mark_file(path: str | Path) -> Path:
     return Path(f"{path}{SUFFIX}")
 
 
-def add_mark(path: str | Path, time: int, text: str | None) -> None:
+@dataclass(frozen=True, slots=True)
+class MarkPlace:
+    """Where the marks of a capture are kept: beside which file, and of which bus in it; "": it holds one."""
+
+    file: Path
+    bus: str = ""
+
+
+def place_of(name: str, capture: Capture) -> MarkPlace | None:
+    """Where the marks of an open capture go that people know by a name: beside its file, the first of several parts.
+    None where there is no such file, as of standard input."""
+    if Path(name).is_file():
+        return MarkPlace(Path(name))
+    first = getattr(capture, "parts", (capture,))[0]
+    path = getattr(first, "path", None)
+    if path is None or not name.startswith(str(path)) or not Path(path).is_file():
+        return None
+    return MarkPlace(Path(path), capture.session.bus)
+
+
+def add_mark(path: str | Path, time: int, text: str | None, bus: str = "") -> None:
     """Write a mark beside a capture, or that the one of that moment (ns) is taken away (None). Raises OSError."""
     record: dict[str, Any] = {"time": time, "gone": True} if text is None else {"time": time, "text": text[:LONGEST]}
+    if bus:
+        record["bus"] = bus
     with mark_file(path).open("a", encoding="utf-8") as stream:
         stream.write(json.dumps(record, ensure_ascii=False) + "\n")
 
 
-def marks_beside(path: str | Path) -> list[LineEvent]:
-    """Marks in the file beside a capture, in order of time; what is no mark is passed over."""
+def marks_beside(path: str | Path, bus: str = "") -> list[LineEvent]:
+    """Marks of a bus in the file beside a capture, in order of time; what is no mark is passed over."""
     try:
         with mark_file(path).open("rb") as stream:
             lines = stream.read(LARGEST).decode("utf-8", "replace").splitlines()
@@ -52,6 +76,8 @@ def marks_beside(path: str | Path) -> list[LineEvent]:
         time = record.get("time") if isinstance(record, dict) else None
         if not isinstance(time, int) or isinstance(time, bool) or abs(time) >= 1 << 62:
             continue
+        if record.get("bus", bus) != bus:
+            continue
         if record.get("gone"):
             found.pop(time, None)
         elif isinstance(record.get("text"), str):
@@ -62,9 +88,9 @@ def marks_beside(path: str | Path) -> list[LineEvent]:
 class MarkedCapture:
     """A capture with the marks beside it among its events. Everything else is the capture's own."""
 
-    def __init__(self, capture: Capture, marks: list[LineEvent]) -> None:
+    def __init__(self, capture: Capture, marks: Sequence[LineEvent]) -> None:
         self._capture = capture
-        self._marks = marks
+        self._marks = tuple(marks)
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._capture, name)
@@ -104,5 +130,14 @@ class MarkedCapture:
 
 def with_marks(capture: Capture, path: str | Path) -> Capture:
     """The capture with the marks beside it, the capture itself where there are none."""
-    marks = marks_beside(path)
+    return marked(capture, marks_beside(path, capture.session.bus))
+
+
+def marked(capture: Capture, marks: Sequence[LineEvent]) -> Capture:
+    """The capture with these marks, itself where there are none."""
     return MarkedCapture(capture, marks) if marks else capture
+
+
+def unmarked(capture: Capture) -> tuple[Capture, tuple[LineEvent, ...]]:
+    """The capture as its format reads it, and the marks that stand beside it."""
+    return (capture._capture, capture._marks) if isinstance(capture, MarkedCapture) else (capture, ())

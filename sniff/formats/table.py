@@ -137,12 +137,14 @@ def told(start: bytes, name: str) -> Format | None:
 
     A raw dump does not take a file away from the format that its name says: it is such a file, and damaged.
     """
-    recognised = [one for one in formats() if one.reader and one.recognises(start)]
     named = [one for one in formats() if one.reader and one.named(name)]
+    certain = next((one for one in named if not one.last and one.recognises(start)), None)
+    if certain is not None:  # nobody else is asked, who would have to be imported first
+        return certain
+    recognised = [one for one in formats() if one.reader and one.recognises(start)]
     best = next((one for one in recognised if not one.last), None)
     if best is not None:
-        both = [one for one in recognised if one in named and not one.last]
-        return both[0] if both else best
+        return best
     damaged = next((one for one in named if not one.last), None)
     if damaged is not None and not any(one.name == "byte log" for one in recognised):
         return damaged

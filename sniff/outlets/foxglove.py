@@ -11,6 +11,7 @@ import json
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 from sniff.bus.derived_topics import DerivedMessage
 from sniff.bus.value_topics import ValueChannels, ValueMessage
@@ -45,6 +46,7 @@ class FoxgloveOutlet(Outlet):
         self._channels: dict[str, int] = {}
         self._values: dict[str, ValueChannels] = {}
         self.port = self._begin(settings, token)
+        self.where = f"ws://{replace(settings, port=self.port).address}"
 
     def _begin(self, settings: ListenSettings, token: str | None) -> int:
         """Tell the process where to listen: by its input, so that the token is in no list of processes."""

@@ -66,7 +66,7 @@ def exposition(buses: Sequence[BusNow], outlets: Sequence[Outlet] = ()) -> str:
             samples[family].append(line)
     for outlet in outlets:
         label = _labels({"outlet": outlet.name})
-        samples["sniff485_outlet_up"].append(f"sniff485_outlet_up{label} {int(not outlet.trouble)}")
+        samples["sniff485_outlet_up"].append(f"sniff485_outlet_up{label} {int(outlet.connected)}")
         samples["sniff485_outlet_sent"].append(f"sniff485_outlet_sent_total{label} {outlet.sent}")
         samples["sniff485_outlet_dropped"].append(f"sniff485_outlet_dropped_total{label} {outlet.dropped}")
     lines = []

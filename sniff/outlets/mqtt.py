@@ -57,6 +57,8 @@ class MqttOutlet(Outlet):
         self._kept: dict[str, bytes] = {}  # what is retained, the newest of each topic
         self._unsent: dict[str, bool] = {}  # topics whose newest the broker lacks; True: nobody ever got it
         self._events: deque[Publication] = deque()
+        self.connected = False
+        self.where = f"mqtt{'s' if settings.tls else ''}://{settings.host}:{settings.port}"
         self._loop: asyncio.AbstractEventLoop | None = None
         self._news = asyncio.Event()
         self._behind = False  # whether what newer things replace is lost to whoever listens at the broker

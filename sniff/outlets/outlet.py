@@ -24,15 +24,17 @@ AT_THE_END = 2.0
 class Outlet(ABC):
     """One listener. `name`: as people know it. `every`: ns between two values of one point, 0 for each of them.
     `sent`, `dropped`: how many were delivered, and how many never will be. `trouble`: why nothing gets through at the
-    moment, in words without secrets; empty when all is well. `complain`: called once when trouble begins, and once
-    when it is over.
+    moment, in words without secrets; empty when all is well. `connected`: whether what it is told gets through; not yet
+    either, where that needs somebody at the other end. `where`: whom it tells, in words without secrets. `complain`:
+    called once when trouble begins, and once when it is over.
     """
 
     def __init__(self, name: str, complain: Callable[[str], None], every: int = 0, most: int = MOST_WAITING) -> None:
         self.name = name
         self.every = every
         self.sent = self.dropped = 0
-        self.trouble = ""
+        self.trouble = self.where = ""
+        self.connected = True
         self._complain = complain
         self._told: deque[Told] = deque()
         self._most = most
@@ -92,6 +94,7 @@ class Outlet(ABC):
         if bool(trouble) is not bool(self.trouble):
             self._complain(f"{self.name}: {trouble}" if trouble else f"{self.name}: goes on")
         self.trouble = trouble
+        self.connected = not trouble
 
     def _live(self) -> None:
         try:

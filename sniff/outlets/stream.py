@@ -35,6 +35,7 @@ class StreamOutlet(Outlet):
         super().__init__(name, complain, int(settings.every * 1e9))
         self._line_of = line_of
         self._path = settings.file
+        self.where = "standard output" if settings.file == STANDARD_OUTPUT else settings.file
         self._most_size = most_size
         self._size = 0
         self._descriptor = self._open() if self._path != STANDARD_OUTPUT else 1

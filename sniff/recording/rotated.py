@@ -13,6 +13,7 @@ from typing import Any
 from sniff.engine.blocks import Block
 from sniff.engine.capture import Capture
 from sniff.engine.session import Completeness, Item, LineEvent, Session
+from sniff.formats.mark_file import marked, unmarked
 from sniff.recording.reader import McapCapture
 
 
@@ -50,19 +51,22 @@ def joined(opened: Sequence[tuple[str, Capture]]) -> list[tuple[str, Capture]]:
         groups.setdefault(_recording(capture) or place, []).append((name, capture))
     found: list[tuple[str, Capture]] = []
     for group in groups.values():
-        parts = {capture.part: capture for _, capture in group if isinstance(capture, McapCapture)}
+        plain = [unmarked(capture) for _, capture in group]
+        parts = {capture.part: capture for capture, _ in plain if isinstance(capture, McapCapture)}
         if len(group) < 2 or len(parts) < len(group):  # pieces that were cut out, and copies, are all part 1
             found += group
             continue
         more = len(parts) - 1
         rotated = RotatedCapture(list(parts.values()))
-        first = next(name for name, capture in group if capture is rotated.parts[0])
-        found.append((f"{first} and {more} more part{'s' if more > 1 else ''}", rotated))
+        first = next(name for name, capture in group if unmarked(capture)[0] is rotated.parts[0])
+        marks = sorted((mark for _, beside in plain for mark in beside), key=lambda mark: mark.time)
+        found.append((f"{first} and {more} more part{'s' if more > 1 else ''}", marked(rotated, marks)))
     return found
 
 
 def _recording(capture: Capture) -> tuple[str, int] | None:
     """What all parts of a recording have in common; None for what no rotation made."""
+    capture, _ = unmarked(capture)
     if not isinstance(capture, McapCapture) or not capture.session.started:
         return None
     return capture.session.port, capture.session.started

@@ -15,7 +15,9 @@ def run(feed: Feed | Sequence[Feed], start_screen: str = "frames") -> None:
 
     feeds = feed if isinstance(feed, Sequence) else [feed]
     try:
-        SnifferApp(feeds, start_screen).run()
+        app = SnifferApp(feeds, start_screen)
+        app.is_alone = True
+        app.run()
         ended = [(status.port, status.ended) for status in (each.status() for each in feeds) if status.ended]
     finally:
         for each in feeds:

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from textual.app import App
 from textual.message_pump import MessagePump
 
+from dissectors.findings import Finding
 from sniff.bus.feed import FeedStatus
 from sniff.bus.rows import Store
 from sniff.tui.health_meter import HealthMeter
@@ -39,6 +40,14 @@ class Analyzer(App[None]):
     @abstractmethod
     def buses(self) -> Sequence[BusLine]:
         """What the bar says of each bus; none where there is only one."""
+
+    @abstractmethod
+    def site_is_due(self) -> bool:
+        """Whether `findings` would say more of what several buses say together than it did last."""
+
+    @abstractmethod
+    def findings(self) -> tuple[Finding, ...]:
+        """Of the bus that is shown, and what several buses say together."""
 
     @property
     @abstractmethod

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import gc
 import time
 from collections.abc import Sequence
 from functools import partial
+from pathlib import PurePath
 from typing import ClassVar
 
 from textual.binding import Binding, BindingType
@@ -12,6 +14,7 @@ from textual.events import Event, InputEvent
 from textual.screen import Screen
 from textual.timer import Timer
 
+from dissectors.findings import Finding
 from sniff.bus.feed import Feed, FeedStatus
 from sniff.bus.rows import Store
 from sniff.config import ConfigError, nearest
@@ -27,14 +30,17 @@ from sniff.tui.key_names import KNOWN, named
 from sniff.tui.palette import ActionCommands
 from sniff.tui.plain import plain
 from sniff.tui.prompt import Prompt
-from sniff.tui.screens import SCREENS, Entry, load
+from sniff.tui.screens import SCREENS, STYLED, Entry, load
 from sniff.tui.screens.base import ViewScreen
 from sniff.tui.seats import BusLine, Seat
+from sniff.tui.site_meter import SiteMeter
 from sniff.tui.viewing import Viewing
 
 POLL_SECONDS = 0.1
 WORK_SECONDS = 0.02
 """Pause between two pieces of pending work, so that keys are answered in between."""
+LOADING_SECONDS = 0.1
+"""Pause between two screens that are imported before they are asked for."""
 CALM_SECONDS = 0.2
 """How long what is not on the screen waits after a key: who holds one down must not feel it."""
 SURE_SECONDS = 4.0
@@ -48,7 +54,10 @@ class SnifferApp(Analyzer):
     """Shows what a feed brings. Nothing that the user does here touches the capture."""
 
     TITLE = "sniff485"
-    CSS_PATH = "app.tcss"
+    CSS_PATH: ClassVar[list[str | PurePath]] = [  # all at once: a sheet that comes later has all of them read anew
+        "app.tcss",
+        *(f"screens/{name}.tcss" for name in STYLED),
+    ]
     COMMANDS = Analyzer.COMMANDS | {ActionCommands}
     ENABLE_COMMAND_PALETTE = True
     BINDINGS: ClassVar[list[BindingType]] = named(
@@ -77,14 +86,22 @@ class SnifferApp(Analyzer):
         feeds = feed if isinstance(feed, Sequence) else [feed]
         self.seats = [Seat.of(each, start_screen) for each in feeds]
         self.here = 0  # which of them is shown
+        self._site = SiteMeter()
         self._polled = 0  # which file was polled last of those that are not shown
         for entry in SCREENS:
             for number in range(len(self.seats)):
-                self.add_mode(_mode(entry.name, number), partial(_make, entry))
+                self.add_mode(_mode(entry.name, number), partial(self._make, entry))
         self.tabs = tuple((entry.key, entry.title) for entry in SCREENS)
         self._worker: Timer | None = None
+        self._not_loaded = list(SCREENS)
+        self.is_alone = False  # whether this process is for nothing else
         self._asked_to_quit = 0.0
         self._pressed = 0.0  # when the last key was
+
+    def _make(self, entry: Entry) -> Screen[None]:
+        made: Screen[None] = load(entry)()
+        made._css_update_count = self._css_update_count  # its widgets get their style as they are put in: Textual
+        return made  # would read all sheets twice more, which is most of what a screen costs the first time
 
     # -- the bus that is shown ---------------------------------------------------------------------------------
 
@@ -130,6 +147,14 @@ class SnifferApp(Analyzer):
             return ()
         return [seat.line(number == self.here) for number, seat in enumerate(self.seats)]
 
+    def site_is_due(self) -> bool:
+        """Whether the buses together would say more than they did."""
+        return not self.viewing.frozen and self._site.is_due(self.seats)
+
+    def findings(self) -> tuple[Finding, ...]:
+        """Of the bus that is shown; where there are several, with what they say together."""
+        return self._site.findings(self.seats, self.here, self.viewing.findings(), anew=not self.viewing.frozen)
+
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
         """There is no other bus to show where there is only one."""
         return len(self.seats) > 1 if action == "bus" else super().check_action(action, parameters)
@@ -167,7 +192,17 @@ class SnifferApp(Analyzer):
         self._take_keys()
         self._worker = self.set_interval(WORK_SECONDS, self._work, pause=True)
         self.set_interval(POLL_SECONDS, self.poll)
+        self.set_timer(LOADING_SECONDS, self._load_more)
         self.poll()
+
+    def _load_more(self) -> None:
+        """Import another screen while nobody presses a key, so that showing it first takes no longer than again."""
+        if time.monotonic() - self._pressed >= CALM_SECONDS and not self.status.reading:
+            load(self._not_loaded.pop(0))
+        if self._not_loaded:
+            self.set_timer(LOADING_SECONDS, self._load_more)
+        elif self.is_alone:
+            gc.freeze()  # what is there by now stays: looking through all of it takes 100 ms each time
 
     def _take_keys(self) -> None:
         """Other keys, as the configuration says."""
@@ -393,11 +428,6 @@ def with_step(path: list[str], name: str) -> list[str]:
 def _mode(name: str, bus: int) -> str:
     """What a screen of a bus is called: each bus has its own, with its own cursor."""
     return f"{name} of {bus}" if bus else name
-
-
-def _make(entry: Entry) -> Screen[None]:
-    made: Screen[None] = load(entry)()
-    return made
 
 
 def _is_whole(screen: ViewScreen) -> bool:

@@ -17,6 +17,7 @@ from sniff.bus.rows import BAD_VERDICTS, Store
 Values = npt.NDArray[Any]
 
 _BAD = np.array([verdict in BAD_VERDICTS for verdict in VERDICTS], bool)
+_TO_ALL = VERDICTS.index(Verdict.BROADCAST)
 _STEPS = 16
 """Classes of times in each doubling: a percentile is right to 5 %."""
 _CLASSES = 512
@@ -25,7 +26,10 @@ _US = 1000.0
 
 
 class Exchanges:
-    """What is asked and answered; tokens and polls for masters are none. Take what closed with `bring_up`."""
+    """What is asked and answered; tokens, polls for masters and what is said to all are none of it.
+
+    Take what closed with `bring_up`.
+    """
 
     def __init__(self) -> None:
         self._seen = 0  # closings
@@ -49,9 +53,10 @@ class Exchanges:
         kind = part.closed_column("kind")[which]
         names = part.whole.closed_names if hasattr(part.whole, "closed_names") else part.whole.transactions.names
         passing = np.array([name in PASSING for name in names] or [False], bool)
-        wanted = (station != NONE) & ~passing[kind]
+        verdict = part.closed_column("verdict")[which]
+        wanted = (station != NONE) & ~passing[kind] & (verdict != _TO_ALL)
+        verdict = verdict[wanted]
         latency = part.closed_column("latency")[which][wanted]
-        verdict = part.closed_column("verdict")[which][wanted]
         timed = (latency != NONE) & (verdict != VERDICTS.index(Verdict.DATA))
         classes = np.clip(np.log2(np.maximum(latency, 0) / _US + 1) * _STEPS, 0, _CLASSES - 1).astype(np.int16)
         self._pieces.append(

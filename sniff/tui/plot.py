@@ -14,6 +14,8 @@ from dissectors.line import NS_PER_S
 from sniff.tui.plain import plain
 
 HAS_PLOT = find_spec("textual_plot") is not None
+if HAS_PLOT:
+    from textual_plot import HiResMode, PlotWidget
 
 LEAST = 3
 """Values that make a plot."""
@@ -40,8 +42,6 @@ class HistoryPlot(Vertical):
     def _canvas(self) -> Widget:
         if not HAS_PLOT:
             return Sparkline([], id="plot-canvas")
-        from textual_plot import PlotWidget
-
         made: Widget = PlotWidget(id="plot-canvas", allow_pan_and_zoom=False)
         made.can_focus = False  # the arrows are the table's
         return made
@@ -58,8 +58,6 @@ class HistoryPlot(Vertical):
         if isinstance(canvas, Sparkline):
             canvas.data = [] if few else [value for _, value in history]
             return
-        from textual_plot import HiResMode, PlotWidget
-
         assert isinstance(canvas, PlotWidget)
         canvas.margin_top, canvas.margin_bottom = 1, 2  # no titles on the axes
         canvas.clear()

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import groupby
 
 from rich.text import Text
 
@@ -65,8 +66,8 @@ def heights(charts: Sequence[Chart], room: int) -> list[int]:
     return made
 
 
-def draw_charts(text: Text, charts: Sequence[Chart], room: int, paint: Paint) -> None:
-    """Add the charts: name and full height at the upper end of the axis, 0 at the lower one."""
+def draw_charts(text: Text, charts: Sequence[Chart], room: int, paint: Paint, cells: int = 1) -> None:
+    """Add the charts: name and full height at the upper end of the axis, 0 at the lower one. `cells`: of a column."""
     for chart, height in zip(charts, heights(charts, room), strict=True):
         for line, bars in enumerate(tall_bars(chart.values, chart.top, height)):
             if height == 1:
@@ -77,33 +78,43 @@ def draw_charts(text: Text, charts: Sequence[Chart], room: int, paint: Paint) ->
                 label, corner = ends.get(line, ""), "┤" if line in (0, height - 1) else "│"
             text.append(f"{label:<14}"[:14], style="bold" if line == 0 else "")
             text.append(corner, style="dim")
-            for place, bar in enumerate(bars):
-                text.append(bar, style=paint(place, chart.style))
-            text.append("\n")
+            _append(text, bars, [paint(place, chart.style) for place in range(len(bars))], cells)
 
 
-def draw_rows(text: Text, rows: Sequence[Row], paint: Paint) -> None:
+def _append(text: Text, bars: str, styles: Sequence[str], cells: int) -> None:
+    """Add a line of columns, those of one style together: each piece costs as much as a hundred cells."""
+    begin = 0
+    for style, same in groupby(styles):
+        end = begin + sum(1 for _ in same)
+        text.append("".join(bar * cells for bar in bars[begin:end]), style=style)
+        begin = end
+    text.append("\n")
+
+
+def draw_rows(text: Text, rows: Sequence[Row], paint: Paint, cells: int = 1) -> None:
     """Add a line for each station; the highest bar is the most that went wrong in a column of any of them."""
     most = max((max(row.failed, default=0) for row in rows), default=0)
     for row in rows:
         text.append(f"{row.name:<14}"[:14]).append("│", style="dim")
-        for place, (asked, failed) in enumerate(zip(row.asked, row.failed, strict=True)):
-            bar = BARS[max(1, round(failed / most * 8))] if failed else "·" if asked else " "
-            text.append(bar, style=paint(place, "bold red" if failed else "dim"))
-        text.append("\n")
+        bars = "".join(
+            BARS[max(1, round(failed / most * 8))] if failed else "·" if asked else " "
+            for asked, failed in zip(row.asked, row.failed, strict=True)
+        )
+        _append(text, bars, [paint(at, "bold red" if failed else "dim") for at, failed in enumerate(row.failed)], cells)
 
 
-def axis(begin: int, count: int, zoom: int, cursor: int) -> tuple[str, str]:
+def axis(begin: int, count: int, zoom: int, cursor: int, cells: int = 1) -> tuple[str, str]:
     """The line below the charts, with ticks and the cursor's place, and the times below that line."""
-    step = next((one for one in TICKS if one >= APART * zoom and one % zoom == 0), TICKS[-1])
-    line, times = ["─"] * count, [" "] * (count + APART)
+    step = next((one for one in TICKS if one * cells >= APART * zoom and one % zoom == 0), TICKS[-1])
+    width = count * cells
+    line, times = ["─"] * width, [" "] * (width + APART)
     for place in range(count):
-        second = begin + place * zoom
+        second, at = begin + place * zoom, place * cells
         if second // step != (second - zoom) // step or place == 0:
-            line[place] = "┴"
+            line[at] = "┴"
             said = clock(second * NS_PER_S)[:8]
-            if place + len(said) <= count + 4 and not "".join(times[max(0, place - 2) : place + 9]).strip():
-                times[place : place + len(said)] = said
+            if at + len(said) <= width + 4 and not "".join(times[max(0, at - 2) : at + 9]).strip():
+                times[at : at + len(said)] = said
     if 0 <= cursor < count:
-        line[cursor] = "▲"
+        line[cursor * cells + cells // 2] = "▲"
     return " " * (LABEL - 1) + "└" + "".join(line), " " * LABEL + "".join(times).rstrip()

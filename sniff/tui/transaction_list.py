@@ -13,7 +13,7 @@ from sniff.tui.verdicts import latency_cell, verdict_cell
 COLUMNS = (
     Column("tx", "tx", 6, right=True),
     Column("time", "time", 12, right=True),
-    Column("station", "stn", 3, right=True),
+    Column("station", "stn", 3, right=True, needs=100),  # what stands in `kind` begins with it
     Column("kind", "what"),
     Column("verdict", "verdict", 12),
     Column("latency", "latency ms", 8, right=True),
@@ -21,6 +21,10 @@ COLUMNS = (
     Column("request", "request", 8, right=True, needs=128),
     Column("response", "response", 8, right=True, needs=128),
 )
+
+
+LINE = 80
+"""Cells from which on question and answer may both be read."""
 
 
 class TransactionList(StoreList):
@@ -65,6 +69,9 @@ class TransactionList(StoreList):
     def _what(self, transaction: Transaction) -> str:
         """What its frames say; its kind where they are no longer in memory."""
         rows = [self.store.by_no(no) for no in (transaction.request, transaction.response) if no is not None]
+        response = transaction.response
+        if self.width_of("kind") < LINE and response is not None and self.store.told(response):
+            rows.reverse()  # values first: both do not fit
         parts = [plain(self.store.text(row)) for row in rows if row is not None] or [plain(transaction.kind)]
         error = plain(transaction.error or "")
         if error and not any(error in part for part in parts):

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 from dissectors import registry
 from docs.generate import rule_pages
 from docs.generate.command_pages import command_pages
@@ -9,7 +12,14 @@ from docs.generate.field_pages import field_pages
 from docs.generate.wire_picture import wire_picture
 from sniff.analysis.judging import all_rules
 from sniff.cli import COMMANDS
+from sniff.config import ALERT_KEYS, BOX_KEYS, BUS_KEYS, TOP_KEYS, VIEW_KEYS
 from sniff.filter.fields import types_of
+from sniff.outlet_settings import FILE_KEYS, LISTEN_KEYS, MQTT_KEYS
+from sniff.tui.app import SnifferApp
+from sniff.tui.key_names import KNOWN
+from sniff.tui.screens import SCREENS, load
+
+PAGES = Path(__file__).parents[2] / "docs" / "pages"
 
 
 def test_every_command_has_a_page() -> None:
@@ -17,6 +27,28 @@ def test_every_command_has_a_page() -> None:
     assert {f"reference/commands/{name}.md" for name in COMMANDS} <= set(pages)
     assert "<code>--fail-on SEVERITY</code>" in pages["reference/commands/check.md"]
     assert "sniff485 profile draft" in pages["reference/commands/profile.md"]
+
+
+def test_every_table_and_key_of_the_configuration_is_explained() -> None:
+    text = (PAGES / "configuration.md").read_text("utf-8")
+    tables: dict[str, set[str]] = {name: set() for name in TOP_KEYS} | {
+        "bus": {*BUS_KEYS}, "box": {*BOX_KEYS}, "alert": {*ALERT_KEYS}, "view": {*VIEW_KEYS}, "mqtt": {*MQTT_KEYS},
+        "influx": {*FILE_KEYS}, "metrics": {*LISTEN_KEYS},
+    }  # fmt: skip
+    for table, keys in tables.items():
+        assert re.search(rf"\[{table}[].]", text), table
+        for key in keys:
+            assert f"`{key}`" in text or re.search(rf"^{key} = |`{key} = ", text, re.M), f"{table}: {key}"
+
+
+def test_keys_that_are_named_are_there() -> None:
+    text = (PAGES / "screens.md").read_text("utf-8").partition("| name | does |")[2]
+    for entry in SCREENS:
+        load(entry)
+    named = {name for line in text.splitlines() if "|" in line for name in re.findall(r"`([\w-]+)`", line)}
+    assert SnifferApp.BINDINGS
+    assert len(named) > 30
+    assert named <= KNOWN
 
 
 def test_every_field_is_on_a_page() -> None:

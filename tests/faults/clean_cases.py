@@ -99,6 +99,21 @@ def _brisk(is_ascii: bool) -> Modbus:
     return Modbus(asked, stations, is_ascii=is_ascii, line=line, pause=2_200_000, timeout=80 * MS)
 
 
+def _one_write() -> Modbus:
+    """A master that tells one drive the same value for ever: confirmations and requests are all alike."""
+    line = LineSettings.parse("38400,8E1")
+    return Modbus((write_register(32, 40, 395),), {32: partial(server, 32, delay=4 * MS)}, line=line, pause=3_500_000)
+
+
+def _slow_bus(settings: str) -> Modbus:
+    """Stations that answer as soon as they may, on a line where that takes longer than an adapter's timer."""
+    line = LineSettings.parse(settings)
+    soon = Timing(line).t35
+    stations = {unit: partial(server, unit, delay=soon) for unit in _FOUR}
+    asked = tuple(read_holding(unit, 3, quantity) for quantity in (2, 5, 9) for unit in _FOUR)
+    return Modbus(asked, stations, line=line, pause=2 * soon, timeout=S)
+
+
 def _makers_own(unit: int, times: dict[int, int]) -> Station:
     return OwnFunctions(server(unit), unit, times)
 
@@ -235,6 +250,10 @@ CLEAN: tuple[Clean, ...] = (
         is_ring=True,
     ),
     # badly heard
+    Clean("RTU clean, one write again and again", _one_write()),
+    Clean("RTU clean, one write again and again, hidden latency", _one_write(), LATE, hidden_latency),
+    Clean("RTU clean, slow bus, hidden latency", _slow_bus("4800,8E1"), LATE, hidden_latency),
+    Clean("RTU clean, very slow bus, hidden latency", _slow_bus("1200,8N1"), LATE, hidden_latency),
     Clean("RTU clean, busy host", modbus, hear=busy_host),
     Clean("ASCII clean, busy host", _ascii, hear=busy_host),
     Clean("N2 clean, busy host", n2, hear=busy_host),

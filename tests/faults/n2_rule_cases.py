@@ -18,6 +18,7 @@ from sniff.simulation.wire import Party
 from tests.faults.buses import MS, N2_LINE, n2
 from tests.faults.case import Case, Heard
 from tests.faults.stations import Wrapped
+from tests.faults.workbench import N2, by_turns, follower
 
 S = 1_000 * MS
 
@@ -115,6 +116,13 @@ N2_RULE_CASES: tuple[Case, ...] = (
         n2,
         (("N2012", "bus"),),
         hear=partial(_edited, _without_first, ("drive 1", "drive 2")),
+        never=_INNOCENT,
+    ),
+    Case(
+        "N2 first octet of the only one missing",
+        N2(partial(by_turns, 5, count=4), {"drive 5": partial(follower, 5)}),
+        (("N2012", "bus"),),
+        hear=partial(_edited, _without_first, ("drive 5",)),
         never=_INNOCENT,
     ),
     Case(

@@ -12,7 +12,7 @@ from dissectors.frame import Place
 from dissectors.simulated_faults import BitFlips, EarlyRelease, NoiseInGaps
 from tests.faults.buses import MSTP_LINE, mstp
 from tests.faults.case import Case
-from tests.faults.ring_nodes import AlsoSends, FailsFor, SlowToBeFound
+from tests.faults.ring_nodes import AlsoSends, ComesAndGoes, FailsFor, SlowToBeFound
 from tests.faults.stations import OfLong
 
 MS = 1_000_000
@@ -51,6 +51,14 @@ RING_CASES: tuple[Case, ...] = (
         partial(mstp, polls_every=20, change={9: partial(FailsFor, at=_AWAY, until=4 * S, faults=Faults(off=True))}),
         (("MS105", "5 → 9"),),
         struck=("MAC 9", "1 → 9", "2 → 9"),
+    ),
+    Case(
+        "MS/TP station comes and goes",
+        partial(mstp, polls_every=20, change={9: partial(ComesAndGoes, every=10 * S, away=3 * S)}),
+        (("MS105", "5 → 9"),),
+        seconds=58,
+        struck=("MAC 9", "1 → 9", "2 → 9"),
+        never=("MS106",),
     ),
     Case(
         "MS/TP second token",

@@ -45,6 +45,25 @@ class FailsFor(Wrapped):
         self.node.faults = self.faults if failing else Faults()
 
 
+class ComesAndGoes(Wrapped):
+    """A node that is off for the last `away` ns of every `every`: a loose contact, a supply that gives in."""
+
+    def __init__(self, inner: SimulatedNode, every: int, away: int) -> None:
+        super().__init__(inner)
+        self.node, self.every, self.away = inner, every, away
+
+    def hear(self, now: int, octets: bytes, quiet: bool) -> tuple[Send, ...]:
+        self._set(now)
+        return self.inner.hear(now, octets, quiet)
+
+    def wake(self, now: int) -> tuple[Send, ...]:
+        self._set(now)
+        return self.inner.wake(now)
+
+    def _set(self, now: int) -> None:
+        self.node.faults = Faults(off=now % self.every >= self.every - self.away)
+
+
 class SlowToBeFound(Wrapped):
     """Answers a Poll For Master `by` ns later than it wants."""
 

@@ -28,8 +28,12 @@ from sniff.recording.rotated import RotatedCapture
 from sniff.recording.rotation import Rotation
 from sniff.recording.writer import Recorder
 from tests.captures_shared import CAPTURES as SHARED
+from tests.seeds import IS_SEARCH
 
 OWN = Path(__file__).parents[2] / "captures"
+LARGE = 1 << 20
+"""Octets of a file that is only read where one searches."""
+
 BASE = 1_772_359_200_000_000_000
 MS = 1_000_000
 LINE = LineSettings(38400, 8, "N", 1)
@@ -178,7 +182,11 @@ def test_own_captures(path: Path) -> None:
     same_file(path)
 
 
-@pytest.mark.parametrize("path", _captures(SHARED) or [None], ids=lambda path: path.name if path else "none")
+def _shared() -> list[Path]:
+    return [path for path in _captures(SHARED) if IS_SEARCH or path.stat().st_size < LARGE]
+
+
+@pytest.mark.parametrize("path", _shared() or [None], ids=lambda path: path.name if path else "none")
 def test_shared_captures(path: Path | None) -> None:
     if path is None:
         pytest.skip("shared captures are not here")

@@ -1,9 +1,11 @@
 """sniff485.toml: buses by name, and errors that say where."""
 
+import json
 from pathlib import Path
 
 import pytest
 
+from sniff.cli import main
 from sniff.config import BoxSettings, ConfigError, load, parse
 
 
@@ -108,3 +110,45 @@ def test_what_a_box_cannot_be_told(tmp_path: Path, line: str, said: str) -> None
     with pytest.raises(ConfigError, match=r"sniff485\.toml:2: ") as caught:
         parse(path)
     assert said in str(caught.value)
+
+
+def test_config_show_shows_every_table(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write(
+        tmp_path,
+        """
+        [alert]
+        webhook = "https://a.example/hook"
+        [box]
+        keep = 3
+        [mqtt]
+        broker = "mqtts://me@b.example"
+        password_file = "/no/such"
+        [json]
+        file = "-"
+        [metrics]
+        listen = 9485
+        [filters]
+        slow = "latency_ms > 50ms"
+        [colours]
+        red = "dst == 3"
+        [view.few]
+        frames = ["no"]
+        [keys]
+        mark = "ctrl+b"
+        """,
+    )
+    assert main(["config", "show"]) == 0
+    said = capsys.readouterr().out
+    for line in (
+        "webhook = 'https://a.example/hook'", "at = 'warning'", "keep = 3", "broker = 'mqtts://b.example:8883'",
+        "user = 'me'", "password_file = '/no/such'", "file = '-'", "listen = '127.0.0.1:9485'", "allow_remote = False",
+        "slow = 'latency_ms > 50ms'", "red = 'dst == 3'", "frames = ['no']", "mark = 'ctrl+b'",
+    ):  # fmt: skip
+        assert f"  {line}  # " in said
+    assert main(["config", "show", "--json"]) == 0
+    told = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    tables = ["alert", "box", "mqtt", "json", "metrics", "filters", "colours", "view.few", "keys"]
+    assert [next(iter(one)) for one in told] == tables

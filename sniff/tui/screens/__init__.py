@@ -38,6 +38,9 @@ SCREENS: tuple[Entry, ...] = (
     Entry("9", "Line", "sniff.tui.screens.line:LineScreen"),
 )
 
+STYLED: tuple[str, ...] = ("frames", "nodes", "points", "findings", "timeline", "ring", "polls", "line")
+"""Screens that have a style sheet beside them."""
+
 
 def load(entry: Entry) -> type[Screen[None]]:
     """The class of a screen."""

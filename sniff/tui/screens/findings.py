@@ -15,6 +15,7 @@ from textual.widgets import DataTable, Static
 
 from dissectors.findings import Finding, Severity, under_causes
 from sniff.analysis.judging import rules_over
+from sniff.analysis.site_rules import SITE_RULES
 from sniff.tui.analyzer import analyzer
 from sniff.tui.columns import fit
 from sniff.tui.plain import plain
@@ -76,6 +77,8 @@ class FindingsScreen(ViewScreen):
         table = self.query_one(StationTable)
         table.cell_padding = 1
         self._lay_out(self.app.size.width)
+        if analyzer(self).buses:
+            self.set_interval(PERIOD, self._look_beyond)
 
     def on_resize(self, event: events.Resize) -> None:
         """Other width, more or less of what was seen."""
@@ -104,11 +107,17 @@ class FindingsScreen(ViewScreen):
             self._open_end = open_end
             self._look()
 
+    def _look_beyond(self) -> None:
+        """The other buses may have been read to their end meanwhile."""
+        if self.is_current and analyzer(self).site_is_due():
+            self._look()
+
     def _look(self) -> None:
         self._looked = time.monotonic()
-        self._titles = {code: rule.title for code, rule in rules_over(self.store.dissector).items()}
+        rules = {**rules_over(self.store.dissector), **SITE_RULES}
+        self._titles = {code: rule.title for code, rule in rules.items()}
         found = [
-            f for f in self.viewing.findings() if self._all or f.severity >= Severity.WARNING or f.cause is not None
+            f for f in analyzer(self).findings() if self._all or f.severity >= Severity.WARNING or f.cause is not None
         ]
         if self._by_subject:
             found.sort(key=lambda f: (f.subject, -f.severity, f.code))

@@ -32,7 +32,10 @@ FRESH = 2 * NS_PER_S
 TREND = 12
 """Values of the small chart."""
 
-WORDS = 26
+WORDS, LEAST_WORDS = 26, 16
+"""Cells of a value, where there is room and where there is little."""
+OTHERS = 39
+"""Cells of all columns but names and values where the screen is narrow, those between them and the bar too."""
 MARKS = {Quality.UNCERTAIN: "?", Quality.BAD: "!"}
 
 
@@ -56,10 +59,10 @@ def age(nanoseconds: int) -> str:
     return f"{seconds // 60} min" if seconds < 7200 else f"{seconds // 3600} h"
 
 
-def shown_value(value: Value) -> str:
-    """The value with unit, or what it says in words."""
+def shown_value(value: Value, room: int = WORDS) -> str:
+    """The value with unit, or what it says in words, in so many cells."""
     text = value.words or number(value.value, value.entry, value.unit)
-    return plain(text if len(text) <= WORDS else text[: WORDS - 1] + "…")
+    return plain(text if len(text) <= room else text[: room - 1] + "…")
 
 
 NARROW: tuple[str, ...] = ("", "stn", "point", "value", "age", "n", "every ms")
@@ -165,8 +168,10 @@ class PointsScreen(TableScreen):
         guesses = self._guesses.of(self.store.points, self.store.model.series)
         told = [(point, guesses.get(_place(point)) if point.entry is None else None) for point in self._chosen()]
         points = [(point, guess) for point, guess in told if guess is None or not guess.is_covered]
+        longest = max((len(point.sample.name) for point, _ in points[:SHOWN]), default=0)
+        room = WORDS if self._columns == WIDE else min(WORDS, max(LEAST_WORDS, self.app.size.width - OTHERS - longest))
         self.query_one(StationTable).fill(
-            (_key(point), _cells(point, now, self._pinned, guess)[: len(self._columns)])
+            (_key(point), _cells(point, now, self._pinned, guess, room)[: len(self._columns)])
             for point, guess in points[:SHOWN]
         )
         self._hidden = max(0, len(points) - SHOWN)
@@ -323,10 +328,10 @@ def _key(point: Point) -> str:
     return "/".join(_place(point))
 
 
-def _cells(point: Point, now: int, pinned: list[Key], guess: GuessedPoint | None) -> list[Text]:
+def _cells(point: Point, now: int, pinned: list[Key], guess: GuessedPoint | None, room: int) -> list[Text]:
     sample, value, entry = point.sample, point.sample.value, point.entry
     is_number = not value.words  # of states and flags the numbers between say nothing
-    shown, low, high = shown_value(value), point.low, point.high
+    shown, low, high = shown_value(value, room), point.low, point.high
     quality = MARKS.get(point.quality, "")
     if guess is not None and guess.value is not None and not guess.is_itself:
         shown, low, high, quality = f"{guess.value:.7g}", guess.low, guess.high, MARKS[Quality.UNCERTAIN]

@@ -139,13 +139,13 @@ class PollsScreen(TableScreen):
         self.query_one(StationTable).fill((key, self._cells(poll)) for key, poll in self._shown.items())
         self._describe()
 
-    def _asks(self, poll: Poll) -> str:
-        said = asked(poll, self.store.model.devices)
+    def _asks(self, poll: Poll, room: int = 0) -> str:
+        said = asked(poll, self.store.model.devices, room)
         return said or poll.key.kind
 
     def _cells(self, poll: Poll) -> list[Text]:
         room = max(20, self.app.size.width - (44 if self._columns == NARROW else 78))
-        said = plain(self._asks(poll))
+        said = plain(self._asks(poll, room))
         said = said if len(said) <= room else said[: room - 1] + "…"
         return [Text(_who(poll), justify="right"), Text(said), *(_cell(title, of(poll)) for title, of in self._columns)]
 

@@ -107,11 +107,12 @@ class RingScreen(ViewScreen):
         words = self.query_one("#words", Static)
         shown = self.store.dissector.ring
         self.query_one("#ring").display = shown is not None
+        self.query_one("#sentences").set_class(shown is None, "-alone")
         if shown is None:
             session = self.store.session
             unknown = "protocol" in session.unknown
             why = "the protocol is not known" if unknown else f"{session.protocol} passes no token"
-            words.update(f"{why}: there is no ring to show")
+            words.update(f"{why}: there is no ring to show\n\nWho asks whom, and how often, is on Polls (8).")
             return
         ring = self.store.model.ring()
         rows = shown.rows(ring)

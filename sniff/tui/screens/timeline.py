@@ -28,6 +28,10 @@ LOADS = (0.02, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5, 0.75, 1.0)
 OTHER_LINES = 7
 """Header, keys, axis, times and what is said of the cursor."""
 LEAST_STATIONS = 3
+LEAST_TOLD = 0.01
+"""ms; no adapter tells shorter times apart."""
+WIDEST = 16
+"""Cells of a column at most, where little time has to fill the screen."""
 
 
 class Column(NamedTuple):
@@ -96,6 +100,7 @@ class TimelineScreen(ViewScreen):
         self._cursor: int | None = None  # s since the epoch; None follows the newest
         self._anchor: int | None = None  # where the selection began
         self._begin = 0
+        self._cells = 1  # of a column
         self._drawn: tuple[object, ...] = ()
         self._exchanges = Exchanges()
 
@@ -122,7 +127,8 @@ class TimelineScreen(ViewScreen):
         zoom = ZOOMS[self._zoom]
         cursor = last if self._cursor is None else min(max(self._cursor, first), last)
         self._begin = self._scrolled(first, last, cursor, width, zoom)
-        width = min(width, (last - self._begin) // zoom + 1)  # none after the end
+        room, width = width, min(width, (last - self._begin) // zoom + 1)  # none after the end
+        self._cells = min(WIDEST, room // width)
         self._exchanges.bring_up(self.store, self.viewing.last_closed)
         chart.update(self._text(columns(self.store, self._begin, width, zoom), cursor, zoom))
 
@@ -150,14 +156,14 @@ class TimelineScreen(ViewScreen):
         charts = self._charts(made, zoom)
         room = self.size.height - OTHER_LINES - (1 if rows else 0)
         stations = rows[: max(LEAST_STATIONS, (room - 2 * len(charts)) // 3)] if room > 2 * len(charts) else []
-        draw_charts(text, charts, room - len(stations), paint)
+        draw_charts(text, charts, room - len(stations), paint, self._cells)
         if stations:
             hidden = len(rows) - len(stations)
             more = f"; and {hidden} more" if hidden else ""
             text.append(f"{'stations':<14}", style="bold").append("│", style="dim")
             text.append(f" · asked, bars: went wrong{more}\n", style="dim")
-            draw_rows(text, stations, paint)
-        for line in axis(self._begin, len(made), zoom, at):
+            draw_rows(text, stations, paint, self._cells)
+        for line in axis(self._begin, len(made), zoom, at, self._cells):
             text.append(line + "\n")
         text.append(self._words(made[at] if 0 <= at < len(made) else None, zoom, chosen))
         return text
@@ -207,7 +213,7 @@ class TimelineScreen(ViewScreen):
         median, most = self._exchanges.latencies(column.begin, 1, zoom, (0.5, 0.95))
         if median[0] is None or most[0] is None:
             return ", nothing answered"
-        return f", answers after {median[0]:.2g} ms (p50), {most[0]:.2g} ms (p95)"
+        return f", answers after {_answered(median[0])} (p50), {_answered(most[0])} (p95)"
 
     # -- time --------------------------------------------------------------------------------------------------
 
@@ -314,6 +320,10 @@ def _counted(name: str, values: list[int], weight: int, style: str = "") -> Char
 
 class _Chart(Static, can_focus=True):
     """The charts take the keys."""
+
+
+def _answered(ms: float) -> str:
+    return f"{ms:.2g} ms" if ms >= LEAST_TOLD else f"under {LEAST_TOLD:g} ms"
 
 
 def _duration(seconds: int) -> str:

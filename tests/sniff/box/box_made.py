@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sniff.box.status import BoxStatus, BusStatus, FindingLine, Recovered, State
+from sniff.box.status import BoxStatus, BusStatus, FindingLine, OutletLine, Recovered, State
 
 S = 1_000_000_000
 NOW = 1_772_359_200 * S
@@ -28,6 +28,10 @@ STATUS = BoxStatus(
     keep_free=10**9,
     clock_offset=86_400 * S,
     recovered=(Recovered("site-0002.mcap", "cut at octet 9", True),),
+    outlets=(
+        OutletLine("mqtt", "mqtts://broker:8883", False, "connection refused", 120, 9),
+        OutletLine("metrics", "http://127.0.0.1:9485/metrics"),
+    ),
     buses=(
         BusStatus("boiler", "/dev/ttyUSB0", "19200,8E1", "modbus-rtu", State.HEARD, NOW - 4 * S, "", NOW, 552, 7),
         BusStatus(

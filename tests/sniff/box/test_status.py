@@ -22,6 +22,8 @@ def test_everything_bad_is_in_the_words() -> None:
     said = words.text(STATUS)
     for bad in ("7", "DOWN", "started anew 1 time", "SIGKILL", "set by +86400 s", "site-0002.mcap", "LN006", "3 more"):
         assert bad in said
+    assert "outlet     mqtt mqtts://broker:8883: NOT CONNECTED (connection refused), 120 sent, 9 DROPPED" in said
+    assert "outlet     metrics http://127.0.0.1:9485/metrics\n" in said
     assert "gone 2 times, 1 min 35 s altogether" in said
     assert all(line.isprintable() for line in said.splitlines())
     assert HOSTILE not in said

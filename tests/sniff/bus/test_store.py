@@ -228,8 +228,12 @@ def test_a_table_of_outputs_says_which_row_closed_what(name: str) -> None:
     made = reference_of(name)[2]
     last, expected = 0, []
     for output in made:
-        last = output.rows[-1].no if output.rows else last
-        expected += [(last, one) for one in output.transactions]
+        numbers = [row.no for row in output.rows]
+        after = numbers[-1] if numbers else last
+        by_rows = [numbers[place] for place in output.closed_by]
+        by = by_rows + [after] * (len(output.transactions) - len(by_rows))
+        expected += zip(by, output.transactions, strict=True)
+        last = after
     said = [(one.rows[0].no, tx) for one in Table.of_outputs(name, 1, made).outputs() for tx in one.transactions]
     assert said == expected
 

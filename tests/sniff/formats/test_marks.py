@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
+import random
 import shutil
 import struct
 from pathlib import Path
 
 import pytest
 
+from dissectors.frame import Chunk
+from sniff.bus.file_source import FileFeed
 from sniff.bus.marked_rows import MarkedRows
 from sniff.bus.offline import survey
-from sniff.cli import main
+from sniff.cli import arguments, main
 from sniff.engine.blocks import blocks_of
 from sniff.engine.session import LineEvent, LineEventKind
 from sniff.formats import create_of_items, read
 from sniff.formats.mark_file import add_mark, mark_file, marks_beside
 from sniff.formats.pcapng import ENHANCED, OPT_COMMENT, OPT_END, SECTION, _option
+from sniff.formats.several_buses import chosen
+from sniff.recording.rotation import Rotation
+from sniff.recording.writer import Recorder
+from tests.sniff.analysis.sites_made import power_lost, sessions, write
 
 CLEAN = Path("captures/rtu-clean.cap.txt")
 
@@ -52,6 +59,38 @@ def test_what_is_no_mark_is_passed_over(capture: Path, text: str) -> None:
     mark_file(capture).write_text(text)
     assert marks_beside(capture) == []
     assert rows_of(capture) == {}
+
+
+def test_marks_of_one_bus_of_several_are_that_bus_s(tmp_path: Path) -> None:
+    path = tmp_path / "site.mcap"
+    write(path, power_lost(random.Random(1)))
+    for name, capture in arguments.open_buses(str(path)):
+        feed = FileFeed(name, capture, capture.session, buses=3)
+        assert feed.mark(next(iter(capture.items())).time, f"seen on {capture.session.bus}") == f"in {path}.marks.jsonl"
+    for _, capture in arguments.open_buses(str(path)):
+        marked = MarkedRows()
+        survey(capture, capture.session, marked)
+        assert marked.by_row() == {1: f"seen on {capture.session.bus}"}
+    with chosen("roof"):
+        assert [one.text for one in read(path).items() if isinstance(one, LineEvent)] == ["seen on roof"]
+
+
+def test_parts_of_a_recording_with_marks_beside_them_are_one_still(tmp_path: Path) -> None:
+    site = power_lost(random.Random(2))
+    session, items = sessions(site)[0], site["boiler"]
+    recorder = Recorder(tmp_path / "night.mcap", session, Rotation(count=100))
+    for item in items:
+        recorder.tick(item.time)
+        if isinstance(item, Chunk):
+            recorder.chunk(item)
+    recorder.close()
+    parts = [str(path) for path in recorder.paths]
+    add_mark(parts[1], items[150].time, "in the second part")
+    ((name, whole),) = arguments.open_captures(parts)
+    assert name.endswith(f"{len(parts) - 1} more parts")
+    FileFeed(name, whole, whole.session).mark(items[0].time, "in the first")
+    ((_, again),) = arguments.open_captures(parts)
+    assert [one.text for one in again.items() if isinstance(one, LineEvent)] == ["in the first", "in the second part"]
 
 
 def test_a_recording_holds_marks_that_came_later(capture: Path, tmp_path: Path) -> None:

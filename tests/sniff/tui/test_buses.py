@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 from rich.cells import cell_len
 
+from sniff.analysis.site_ear import SiteEar
 from sniff.bus.feed import FeedStatus, StoreFeed
 from sniff.bus.offline import outputs
 from sniff.bus.rows import Store
@@ -20,7 +21,7 @@ from sniff.engine.session import LineEvent, LineEventKind, gone
 from sniff.tui.app import SnifferApp
 from sniff.tui.busbar import labels
 from sniff.tui.seats import BusLine, BusState
-from tests.sniff.analysis.sites_made import Exchange, asked, heard, sessions
+from tests.sniff.analysis.sites_made import Exchange, asked, heard, power_lost, sessions
 from tests.sniff.tui.conftest import Looking
 
 HOSTILE = "[b]\x1b[2J"
@@ -113,6 +114,28 @@ def test_a_bus_that_fails_is_marked_and_the_others_go_on(feeds: list[StoreFeed])
         assert cellar.store.last_no > before
 
     look(feeds, script)
+
+
+def test_what_the_buses_say_together_stands_with_the_findings_of_each() -> None:
+    site = power_lost(random.Random(3))
+    made = []
+    for session in sessions(site):
+        kept = Store(session, dissector_for(session), ear=SiteEar())
+        observe(outputs(site[session.bus], session), kept)
+        made.append(StoreFeed(kept, FeedStatus("site.mcap", "19200,8E1", "modbus-rtu")))
+
+    async def script(see: Looking) -> None:
+        await see.press("5")
+        for name in site:
+            assert bar(see).find(f"[{name}") >= 0
+            lines = see.lines()
+            site_line = next(number for number, line in enumerate(lines) if "SB001" in line)
+            assert "site" in lines[site_line]
+            assert "3 buses stopped at one moment" in see.text()
+            assert "└" in lines[site_line + 1]  # the bus's own silence comes from it
+            await see.press("b", "5")
+
+    look(made, script, (120, 40))
 
 
 def test_a_click_shows_a_bus(feeds: list[StoreFeed]) -> None:

@@ -1,0 +1,102 @@
+"""The stretches of a block as one table that nobody has placed yet, so that what follows is done once a block."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from dissectors.columns import NONE, FrameColumns, Masks, PlacementColumns
+from dissectors.frame import Event, Frame
+from dissectors.manifest import Dissector
+from sniff.engine.engine import Row
+from sniff.engine.framing import Clean, Stretch
+from sniff.engine.late_columns import LateColumns
+from sniff.engine.table import Table, frame_columns, is_plain, joined_columns, transaction_columns
+
+
+@dataclass(frozen=True, slots=True)
+class Gathered:
+    """Rows of a block in their order. `given`: by place, those that the reference framer gave, as they are."""
+
+    table: Table
+    given: dict[int, Row]
+
+    @property
+    def by_kernel(self) -> FrameColumns:
+        """The columns, where nothing but the frames of the kernel is said to be good: what pairing may look at."""
+        frames = self.table.frames
+        if not self.given:
+            return frames
+        return replace(frames, ok=frames.ok & ~_mask(len(frames), self.given))
+
+
+def gathered(dissector: Dissector, first: int, stretches: Sequence[Stretch], late: LateColumns) -> Gathered:
+    """The rows of stretches, of which one at least is a kernel's, as a table that begins with number `first`."""
+    clean = [one for one in stretches if isinstance(one, Clean)]
+    of_kernel = clean[0].columns.take(np.concatenate([np.arange(one.begin, one.end) for one in clean]))
+    places, events, count = _heard(stretches)
+    heard = _mask(count, places)
+    ends, is_frame, slack = np.empty(count, np.int64), np.ones(count, bool), np.zeros(count, np.int64)
+    ends[~heard], ends[heard] = of_kernel.end, [event.end for event in events]
+    is_frame[heard] = [isinstance(event, Frame) for event in events]
+    slack[is_frame] = late.slack(ends[is_frame])
+    given = []
+    for place, event in zip(places, events, strict=True):
+        if not isinstance(event, Frame):
+            given.append(Row(first + place, event))
+            continue
+        if slack[place] > event.slack:
+            event = replace(event, slack=int(slack[place]))
+        slack[place] = event.slack
+        given.append(Row(first + place, event, dissector.peek(event)))
+    frames = of_kernel
+    if given:
+        order = np.empty(count, np.int64)
+        order[~heard], order[heard] = np.arange(len(of_kernel)), np.arange(len(of_kernel), count)
+        frames = joined_columns(FrameColumns, [of_kernel, frame_columns(given)]).take(order)
+    lengths = frames.length.astype(np.int64)
+    frames = replace(frames, offset=np.cumsum(lengths) - lengths)
+    nowhere = np.full(count, NONE, np.int16)
+    table = Table(
+        dissector.name,
+        first,
+        np.concatenate([_octets(one) for one in stretches]),
+        frames,
+        slack,
+        is_frame,
+        PlacementColumns(np.zeros(count, np.int64), np.zeros(count, np.uint8), nowhere, nowhere),
+        transaction_columns(()),
+        np.zeros(0, np.int64),
+        {place: row for place, row in zip(places, given, strict=True) if not is_plain(row)},
+    )
+    return Gathered(table, dict(zip(places, given, strict=True)))
+
+
+def _heard(stretches: Sequence[Stretch]) -> tuple[list[int], list[Event], int]:
+    """The events of the reference framer and their places among all rows; how many those are."""
+    places: list[int] = []
+    events: list[Event] = []
+    count = 0
+    for one in stretches:
+        if isinstance(one, Clean):
+            count += one.end - one.begin
+            continue
+        places += range(count, count + len(one))
+        events += one
+        count += len(one)
+    return places, events, count
+
+
+def _octets(stretch: Stretch) -> np.ndarray[tuple[int], np.dtype[np.uint8]]:
+    if not isinstance(stretch, Clean):
+        return np.frombuffer(b"".join([event.octets for event in stretch]), np.uint8)
+    columns, last = stretch.columns, stretch.end - 1
+    return stretch.octets[int(columns.offset[stretch.begin]) : int(columns.offset[last]) + int(columns.length[last])]
+
+
+def _mask(count: int, places: Sequence[int] | dict[int, Row]) -> Masks:
+    mask: Masks = np.zeros(count, bool)
+    mask[list(places)] = True
+    return mask
