@@ -25,7 +25,7 @@ from sniff.engine.capture import Capture, CaptureError
 from sniff.engine.engine import Row
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.observer import Observer
-from sniff.engine.session import Session
+from sniff.engine.session import SECOND_NOTE, Session
 from sniff.engine.verdict_join import Wanted
 from sniff.filter import Filter, FilterError, Scope, compile_filter
 from sniff.filter.compiling import field_of
@@ -61,6 +61,8 @@ def filter_of(args: argparse.Namespace, capture: Source, session: Session, devic
     try:
         return _compiled(args.filter, capture, session, scope)
     except OfOthers as error:
+        if of_second(args, session, session.notes.get(SECOND_NOTE, "")) is not None:
+            return compile_filter(args.filter, dissector, scope, others=True)
         refused = args.of_others = getattr(args, "of_others", frozenset()) | {id(capture)}
         if len(refused) >= arguments.captures_open():
             raise Failure(f"filter {args.filter!r}: {error}", USAGE) from None
@@ -68,6 +70,16 @@ def filter_of(args: argparse.Namespace, capture: Source, session: Session, devic
         return compile_filter(args.filter, dissector, scope, others=True)
     except FilterError as error:
         raise Failure(f"filter {args.filter!r}: {error}", USAGE) from None
+
+
+def of_second(args: argparse.Namespace, session: Session, name: str) -> Filter | None:
+    """What -Y says of frames of a second protocol on the bus; None where it asks for what they cannot have."""
+    if name not in registry.names():
+        return None
+    try:
+        return compile_filter(args.filter, registry.get(name), Scope(session.started, Devices()))
+    except FilterError:
+        return None
 
 
 def _compiled(text: str, capture: Source, session: Session, scope: Scope) -> Filter:

@@ -139,8 +139,9 @@ def values_of(item: JudgedRow, dissector: Dissector) -> list[dict[str, Any]]:
     ]
 
 
-def text_line(item: JudgedRow, dissector: Dissector, session: Session, colour: bool = False) -> str:
-    """One line for people: number, seconds since the start, what it is, verdict and response time, doubts."""
+def text_line(item: JudgedRow, dissector: Dissector, session: Session, colour: bool = False, title: str = "") -> str:
+    """One line for people: number, seconds since the start, what it is, verdict and response time, doubts. `title`: of
+    its protocol, where that is not the bus's."""
     row, transaction = item.row, item.transaction
     seconds = since_start(row.event.start, session) / NS_PER_S
     notes: list[str] = []
@@ -153,7 +154,7 @@ def text_line(item: JudgedRow, dissector: Dissector, session: Session, colour: b
             bad = True
         if transaction.latency is not None:
             notes.append(duration(transaction.latency))
-    text = describe(dissector, row, item.meaning)
+    text = f"{title}: " * bool(title) + describe(dissector, row, item.meaning)
     if not isinstance(row.event, Frame):
         shown = row.event.octets[:16].hex(" ").upper()
         text = f"{text}: {shown}{' …' if len(row.event.octets) > 16 else ''}"
