@@ -198,7 +198,7 @@ class FieldCells:
 
 def is_of_filters(name: str) -> bool:
     """Whether rows of `--json` and fields of dissectors do not have that name, and filters have it."""
-    from sniff.cli.rows import JSON_KEYS
+    from sniff.bus.row_words import JSON_KEYS
 
     if name in ("frame.number", "frame.len"):
         return False
@@ -212,7 +212,7 @@ _OF_ROWS = frozenset(
 
 
 def _cell(value: object, type: FieldType) -> str:
-    from sniff.cli.rows import iso
+    from sniff.bus.row_words import iso
 
     if isinstance(value, bytes):
         return value.hex()
@@ -225,7 +225,7 @@ def _cell(value: object, type: FieldType) -> str:
 
 def check_names(names: Iterable[str]) -> None:
     """Whether there are such fields; ends with exit code 2 where there is none."""
-    from sniff.cli.rows import JSON_KEYS
+    from sniff.bus.row_words import JSON_KEYS
 
     for name in names:
         if name in JSON_KEYS or name in COLUMN_TYPES or name in ALIASES:

@@ -15,9 +15,10 @@ from dissectors.manifest import Dissector
 from dissectors.profiles import Devices
 from sniff.analysis.packet_tree import Field
 from sniff.analysis.row_tree import tree_of
+from sniff.bus import row_words as rows
 from sniff.bus.offline import settled, settled_columns, settled_in_bulk
 from sniff.bus.second_protocol import of_both
-from sniff.cli import USAGE, Failure, arguments, filtering, rows, standard_streams, writing
+from sniff.cli import USAGE, Failure, arguments, filtering, standard_streams, writing
 from sniff.cli.progress import Watched
 from sniff.cli.tables import Cell, plain_cell
 from sniff.engine.capture import Capture

@@ -298,7 +298,7 @@ class FramesScreen(ListingScreen):
 
     def action_save(self) -> None:
         """Ask where to save what is shown."""
-        self.query_one(Prompt).ask("save", "", "shown.mcap   shown.pcapng   shown.cap.txt", why_not)
+        self.query_one(Prompt).ask("save", "", "x.mcap  x.pcapng  x.cap.txt  x.csv  x.json  x.txt", why_not)
 
     def _save(self, path: str) -> None:
         index = self.lines.index

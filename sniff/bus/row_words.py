@@ -7,10 +7,10 @@ from typing import Any
 from dissectors.frame import Frame, Role
 from dissectors.line import MS, NS_PER_S
 from dissectors.manifest import Dissector
+from sniff.analysis.json_text import dumps
 from sniff.analysis.json_text import iso as iso
 from sniff.analysis.plain import ascii_of
 from sniff.analysis.wording import describe, duration, is_error
-from sniff.cli import json_output
 from sniff.engine.session import Session
 from sniff.engine.verdict_join import JudgedRow
 from sniff.formats.parquet import Kind
@@ -78,7 +78,7 @@ def since_start(time: int, session: Session) -> int:
 
 def json_line(item: JudgedRow, dissector: Dissector, session: Session, with_fields: bool = False) -> str:
     """The object on one line."""
-    return json_output.dumps(to_json(item, dissector, session, with_fields))
+    return dumps(to_json(item, dissector, session, with_fields))
 
 
 def typed(item: JudgedRow, dissector: Dissector, session: Session) -> list[Any]:
