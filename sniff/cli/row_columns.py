@@ -1,7 +1,7 @@
 """Rows as the command line shows them, many at a time: the same texts as `row_words.py` makes, from columns.
 
 What a row says, apart from its number, its times and its transaction, depends on its octets, what was made of them and
-whom its exchange says it is between. Rows that are equal in that share one specimen, which `row_words.py` is asked about.
+whom its exchange says it is between. Rows that are equal in that share one specimen, which `row_words.py` is asked of.
 """
 
 from __future__ import annotations
