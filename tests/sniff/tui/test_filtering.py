@@ -252,6 +252,28 @@ def test_find_next_and_before(look: Any, busy_bus: Any) -> None:
     look(busy_bus.store, script)
 
 
+def test_the_same_keys_find_in_transactions_and_in_tables(look: Any, make_bus: Any) -> None:
+    bus = make_bus()
+    for station in (1, 2, 3, 2, 1):
+        bus.ask(station)
+
+    async def script(see: Any) -> None:
+        await see.press("2")
+        await see.press("home")
+        await see.press("n")
+        await see.type("3 ←")
+        await see.press("enter")
+        assert see.app.store.closed_by_no(see.main.cursor).station == 3
+        await see.press("3")
+        table = see.app.screen.query_one("#main")
+        see.app.viewing.search = "3"
+        await see.press("home")
+        await see.press("n")
+        assert "3" in table.get_row_at(table.cursor_row)[0].plain
+
+    look(bus.store, script)
+
+
 def test_what_is_shown_is_saved(look: Any, busy_bus: Any, tmp_path: Any) -> None:
     names = "shown.cap.txt", "shown.csv", "shown.json", "shown.txt"
 
