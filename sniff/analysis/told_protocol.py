@@ -30,7 +30,7 @@ from sniff.analysis.autodetect import (
     sureness,
 )
 from sniff.engine.engine import Engine
-from sniff.engine.session import ASSUMED, LINE_NOTE, PROTOCOL_NOTE, Session
+from sniff.engine.session import ASSUMED, LINE_NOTE, PROTOCOL_NOTE, SECOND_NOTE, Session
 
 SECOND_FRAMES = 2
 SECOND_BITS = 40.0
@@ -77,7 +77,9 @@ class Told:
             said += ", too few to be sure"
         if self.second is not None:
             title = registry.get(self.second[0]).title
-            said += f"; with foreign frames that read as {title} ({self.second[1]}; -p {self.second[0]} shows them)"
+            said += (
+                f"; with foreign frames that read as {title} ({self.second[1]}; -p {self.second[0]} shows them alone)"
+            )
         return said
 
 
@@ -91,7 +93,8 @@ def detected(session: Session) -> Session:
         return replace(session, notes={**session.notes, PROTOCOL_NOTE: f"assumed: {words}"})
     name = told.reading.protocol
     line = LineSettings.parse(registry.get(name).default_line) if session.line_is_assumed else session.line
-    return _with_line(replace(session, protocol=name, line=line, notes={**session.notes, PROTOCOL_NOTE: words}))
+    notes = {**session.notes, PROTOCOL_NOTE: words} | ({SECOND_NOTE: told.second[0]} if told.second is not None else {})
+    return _with_line(replace(session, protocol=name, line=line, notes=notes))
 
 
 def told_by(session: Session, only: str | None = None) -> Told:

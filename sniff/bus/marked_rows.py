@@ -32,8 +32,8 @@ class MarkedRows:
         self._ends.append(table.frames.end.astype(np.int64))
 
     def add_line_event(self, event: LineEvent) -> None:
-        """Note the marks."""
-        if event.is_mark:
+        """Note marks, and comments of a text."""
+        if event.is_mark or event.kind is LineEventKind.COMMENT:
             self._events.append(event)
 
     def by_row(self) -> dict[int, str]:
@@ -42,6 +42,7 @@ class MarkedRows:
             return {}
         starts, ends = np.concatenate(self._starts), np.concatenate(self._ends)
         marks: dict[int, str] = {}
+        said: dict[int, list[str]] = {}
         for event in self._events:
             moment = event.moment
             at = int(np.searchsorted(starts, moment))
@@ -49,6 +50,10 @@ class MarkedRows:
                 at -= 1
             if event.kind is LineEventKind.UNMARK:
                 marks.pop(at + 1, None)
+            elif event.kind is LineEventKind.COMMENT:
+                said.setdefault(min(at, len(starts) - 1) + 1, []).append(event.text)
             elif at < len(starts):
                 marks[at + 1] = event.text
-        return marks
+        for no, text in marks.items():
+            said.setdefault(no, []).insert(0, text)
+        return {no: "; ".join(texts) for no, texts in sorted(said.items())}

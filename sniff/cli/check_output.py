@@ -20,7 +20,7 @@ from sniff.analysis.plain import plain
 from sniff.analysis.site_findings import SiteBus, judged
 from sniff.analysis.site_rules import SITE, SITE_RULES
 from sniff.analysis.wording import station_word
-from sniff.cli.rows import iso
+from sniff.bus.row_words import iso
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import Session
 

@@ -74,7 +74,7 @@ def _evidence(
 ) -> tuple[dict[int, str], dict[int, str]]:
     """The findings in words, and what people wrote, by the rows that they are about."""
     judging, marked = Judging(session, dissector_for(session), devices), MarkedRows()
-    survey(Watched(capture), session, judging, marked, reference=reference)
+    survey(Watched(writing.with_comments(capture)), session, judging, marked, reference=reference)
     notes: dict[int, str] = {}
     for finding in judging.findings():
         said = f"{finding.code} {finding.subject}: {finding.seen}"

@@ -25,7 +25,7 @@ from sniff.engine.capture import Capture, CaptureError
 from sniff.engine.engine import Row
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.observer import Observer
-from sniff.engine.session import Session
+from sniff.engine.session import SECOND_NOTE, Session
 from sniff.engine.verdict_join import Wanted
 from sniff.filter import Filter, FilterError, Scope, compile_filter
 from sniff.filter.compiling import field_of
@@ -61,6 +61,8 @@ def filter_of(args: argparse.Namespace, capture: Source, session: Session, devic
     try:
         return _compiled(args.filter, capture, session, scope)
     except OfOthers as error:
+        if of_second(args, session, session.notes.get(SECOND_NOTE, "")) is not None:
+            return compile_filter(args.filter, dissector, scope, others=True)
         refused = args.of_others = getattr(args, "of_others", frozenset()) | {id(capture)}
         if len(refused) >= arguments.captures_open():
             raise Failure(f"filter {args.filter!r}: {error}", USAGE) from None
@@ -68,6 +70,16 @@ def filter_of(args: argparse.Namespace, capture: Source, session: Session, devic
         return compile_filter(args.filter, dissector, scope, others=True)
     except FilterError as error:
         raise Failure(f"filter {args.filter!r}: {error}", USAGE) from None
+
+
+def of_second(args: argparse.Namespace, session: Session, name: str) -> Filter | None:
+    """What -Y says of frames of a second protocol on the bus; None where it asks for what they cannot have."""
+    if name not in registry.names():
+        return None
+    try:
+        return compile_filter(args.filter, registry.get(name), Scope(session.started, Devices()))
+    except FilterError:
+        return None
 
 
 def _compiled(text: str, capture: Source, session: Session, scope: Scope) -> Filter:
@@ -186,7 +198,7 @@ class FieldCells:
 
 def is_of_filters(name: str) -> bool:
     """Whether rows of `--json` and fields of dissectors do not have that name, and filters have it."""
-    from sniff.cli.rows import JSON_KEYS
+    from sniff.bus.row_words import JSON_KEYS
 
     if name in ("frame.number", "frame.len"):
         return False
@@ -200,7 +212,7 @@ _OF_ROWS = frozenset(
 
 
 def _cell(value: object, type: FieldType) -> str:
-    from sniff.cli.rows import iso
+    from sniff.bus.row_words import iso
 
     if isinstance(value, bytes):
         return value.hex()
@@ -213,7 +225,7 @@ def _cell(value: object, type: FieldType) -> str:
 
 def check_names(names: Iterable[str]) -> None:
     """Whether there are such fields; ends with exit code 2 where there is none."""
-    from sniff.cli.rows import JSON_KEYS
+    from sniff.bus.row_words import JSON_KEYS
 
     for name in names:
         if name in JSON_KEYS or name in COLUMN_TYPES or name in ALIASES:

@@ -13,8 +13,8 @@ from dissectors.words import milliseconds
 from sniff.analysis.nodes import Node
 from sniff.analysis.plain import plain
 from sniff.analysis.summary import Summary, ranked
+from sniff.bus.row_words import iso
 from sniff.cli import arguments, filtering, json_output
-from sniff.cli.rows import iso
 from sniff.engine.capture import Capture
 from sniff.engine.engine import Output
 from sniff.engine.follow_settings import dissector_for

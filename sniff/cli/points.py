@@ -19,10 +19,10 @@ from dissectors.profiles import Devices
 from dissectors.profiles.decoding import Quality, number
 from sniff.analysis.points import Point, PointReader, PointTable, Sample
 from sniff.bus.offline import outputs
+from sniff.bus.row_words import iso
 from sniff.bus.sample_row import COLUMNS, sample_row, shown_value
 from sniff.cli import USAGE, Failure, arguments, filtering, tables, watching, writing
 from sniff.cli.progress import Watched
-from sniff.cli.rows import iso
 from sniff.cli.tables import Cell
 from sniff.engine.capture import Capture
 from sniff.engine.engine import Output

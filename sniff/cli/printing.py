@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 
 from sniff.analysis.plain import plain
 from sniff.analysis.summary import Summary
+from sniff.bus import row_words as rows
 from sniff.bus.live import LiveBus, LiveItem, LiveTables
 from sniff.bus.triggers import Fired, Triggers
 from sniff.capture.ipc import Ended, Status
-from sniff.cli import rows
 from sniff.engine.engine import Output
 from sniff.engine.session import LineEvent, LineEventKind
 from sniff.engine.table import Table

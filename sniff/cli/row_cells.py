@@ -14,7 +14,8 @@ from dissectors.columns import FOUNDS, NONE, ROLES, VERDICTS, Masks, Times
 from dissectors.line import NS_PER_S
 from dissectors.manifest import Dissector
 from dissectors.stencil import Stencil
-from sniff.cli import json_output, rows
+from sniff.bus import row_words as rows
+from sniff.cli import json_output
 from sniff.cli.byte_columns import (
     Chosen,
     Codes,

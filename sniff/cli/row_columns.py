@@ -1,7 +1,7 @@
-"""Rows as the command line shows them, many at a time: the same texts as `rows.py` makes, from columns.
+"""Rows as the command line shows them, many at a time: the same texts as `row_words.py` makes, from columns.
 
 What a row says, apart from its number, its times and its transaction, depends on its octets, what was made of them and
-whom its exchange says it is between. Rows that are equal in that share one specimen, which `rows.py` is asked about.
+whom its exchange says it is between. Rows that are equal in that share one specimen, which `row_words.py` is asked of.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from dissectors.columns import FOUNDS, NONE, ROLES, VERDICTS, Times
 from dissectors.line import MS
 from dissectors.manifest import Dissector
-from sniff.cli import rows
+from sniff.bus import row_words as rows
 from sniff.engine.column_join import SettledRows
 from sniff.engine.engine import Row
 from sniff.engine.session import Session

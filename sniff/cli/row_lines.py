@@ -11,7 +11,7 @@ from dissectors.manifest import Dissector
 from dissectors.tracker import Interval
 from dissectors.words import milliseconds
 from sniff.analysis.wording import duration
-from sniff.cli import rows
+from sniff.bus import row_words as rows
 from sniff.cli.byte_columns import Chosen, Codes, Column, digits, encoded, fixed_digits, pieced
 from sniff.cli.distinct import distinct_codes
 from sniff.cli.said_texts import SaidTexts

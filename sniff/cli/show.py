@@ -10,17 +10,20 @@ import sys
 from collections.abc import Callable, Iterable, Iterator
 from typing import TYPE_CHECKING
 
+from dissectors import registry
 from dissectors.manifest import Dissector
 from dissectors.profiles import Devices
 from sniff.analysis.packet_tree import Field
 from sniff.analysis.row_tree import tree_of
+from sniff.bus import row_words as rows
 from sniff.bus.offline import settled, settled_columns, settled_in_bulk
-from sniff.cli import USAGE, Failure, arguments, filtering, rows, standard_streams, writing
+from sniff.bus.second_protocol import of_both
+from sniff.cli import USAGE, Failure, arguments, filtering, standard_streams, writing
 from sniff.cli.progress import Watched
 from sniff.cli.tables import Cell, plain_cell
 from sniff.engine.capture import Capture
 from sniff.engine.follow_settings import dissector_for
-from sniff.engine.session import Session
+from sniff.engine.session import SECOND_NOTE, Session
 from sniff.engine.verdict_join import JudgedRow, Wanted
 from sniff.filter import Filter
 from sniff.filter.fields import types_of
@@ -83,10 +86,15 @@ def _show_all(args: argparse.Namespace, table: ParquetWriter | None) -> int:
         )  # then every register is named, with a profile or without
         spoken = devices if named or (devices and (not args.table or "text" in args.names)) else None
         ours = filtering.FieldCells(args.names, session, devices)
-        if args.reference or spoken or named or ours or args.hex:
-            left = _show(
-                args, _settled(args, capture, session, spoken, ours.noting(wanted)), session, ours, left, table
-            )
+        second = session.notes.get(SECOND_NOTE, "")
+        if second in registry.names():
+            accepted = ours.noting(wanted), filtering.of_second(args, session, second)
+            rows_of_both = of_both(_settled(args, capture, session, spoken, None), session, second, *accepted)
+            left = _show(args, rows_of_both, session, ours, left, table)
+        elif args.reference or spoken or named or ours or args.hex:
+            items = _settled(args, capture, session, spoken, ours.noting(wanted))
+            dissector = dissector_for(session)
+            left = _show(args, ((item, dissector) for item in items), session, ours, left, table)
         else:
             left = _show_in_bulk(args, capture, session, wanted, left, table)
         writing.say_incomplete(path, capture)
@@ -102,7 +110,7 @@ def _by_request(names: list[str], session: Session) -> bool:
 
 
 def _settled(
-    args: argparse.Namespace, capture: Capture, session: Session, devices: Devices | None, wanted: Wanted
+    args: argparse.Namespace, capture: Capture, session: Session, devices: Devices | None, wanted: Wanted | None
 ) -> Iterator[JudgedRow]:
     watched = Watched(capture, prints=True)
     if args.reference:
@@ -112,16 +120,16 @@ def _settled(
 
 def _show(
     args: argparse.Namespace,
-    items: Iterable[JudgedRow],
+    items: Iterable[tuple[JudgedRow, Dissector]],
     session: Session,
     ours: FieldCells,
     left: int | None,
     table: ParquetWriter | None,
 ) -> int | None:
     colour = arguments.colour()
-    dissector = dissector_for(session)
+    usual = dissector_for(session)
     writer = csv.writer(sys.stdout, delimiter="," if args.csv else "\t", lineterminator="\n", quoting=csv.QUOTE_MINIMAL)
-    for item in items if left != 0 else ():
+    for item, dissector in items if left != 0 else ():
         left = None if left is None else left - 1
         if table is not None:
             table.add(rows.typed(item, dissector, session))
@@ -132,7 +140,8 @@ def _show(
         elif args.json:
             print(rows.json_line(item, dissector, session, args.fields))
         else:
-            print(rows.text_line(item, dissector, session, colour))
+            title = dissector.title if dissector is not usual else ""
+            print(rows.text_line(item, dissector, session, colour, title))
             if args.tree:
                 print(_tree(item, dissector))
             if args.hex:

@@ -25,9 +25,9 @@ from sniff.analysis.summary import Summary
 from sniff.analysis.wording import station_word
 from sniff.bus.model import BusModel
 from sniff.bus.offline import survey
+from sniff.bus.row_words import iso
 from sniff.cli import USAGE, Failure, arguments, filtering, tables, watching
 from sniff.cli.progress import Watched
-from sniff.cli.rows import iso
 from sniff.cli.tables import Cell
 from sniff.editing.merging import Merged, merged_session
 from sniff.engine.engine import Output

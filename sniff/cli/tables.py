@@ -8,6 +8,7 @@ from collections.abc import Iterable, Sequence
 from typing import cast
 
 from sniff.analysis.plain import plain
+from sniff.bus.row_files import safe_text
 from sniff.cli import json_output
 
 Cell = str | int | float | None
@@ -44,7 +45,7 @@ class Growing:
 
 def safe_cell(cell: Cell) -> Cell:
     """A cell that no spreadsheet takes for a formula (it would run what begins with = + - @)."""
-    return "'" + cell if isinstance(cell, str) and cell[:1] in ("=", "+", "-", "@", "\t", "\r") else cell
+    return safe_text(cell) if isinstance(cell, str) else cell
 
 
 def plain_cell(value: object) -> Cell:

@@ -54,6 +54,9 @@ ASSUMED = "assumed: the file does not say"
 PROTOCOL_NOTE = "protocol"
 """Note of a session whose file does not say its protocol: ASSUMED, or how it was told from the octets."""
 
+SECOND_NOTE = "second protocol"
+"""Note of a session whose octets told its protocol: the name of another that makes good frames of what is left."""
+
 INFERRED = "inferred from the reads"
 """Where a latency is from that nobody said."""
 
@@ -351,7 +354,8 @@ def with_settings(session: Session, protocol: str | None = None, line: LineSetti
     elif protocol is not None and session.line_is_assumed:
         session = replace(session, line=LineSettings.parse(registry.get(protocol).default_line))
     if protocol is not None:
-        session = replace(session, notes={name: said for name, said in session.notes.items() if name != PROTOCOL_NOTE})
+        told = (PROTOCOL_NOTE, SECOND_NOTE)
+        session = replace(session, notes={name: said for name, said in session.notes.items() if name not in told})
     said = [name for name, value in (("line", line), ("protocol", protocol)) if value is not None]
     unknown = tuple(name for name in session.unknown if name not in said)
     return replace(

@@ -222,6 +222,8 @@ def _go_on(names: Sequence[str], octet: int, rows: Sequence[Sequence[str]]) -> b
 def _named(name: str) -> tuple[str, str]:
     """The name of a column without its unit, and the unit, "" where it has none."""
     match = _UNIT.fullmatch(name)
+    if name in ("ms", "us", "µs", "μs", "ns"):
+        return "time", name
     if match is None:
         return name, ""
     if match["unit"] is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable, Iterable
 
 from sniff.filter.completion import written
 from sniff.tui.index import Index
@@ -20,8 +21,11 @@ def search_filter(text: str) -> str:
     return f'text contains "{escaped}"' + (f" || hex contains {digits}" if is_hex else "")
 
 
-def find(viewing: Viewing, shown: Index, text: str, position: int, step: int) -> tuple[int | None, bool]:
-    """Number of the next shown row that holds it, from a place in `shown`, which is left out; None: there is none.
+def find(
+    viewing: Viewing, shown: Index, text: str, position: int, step: int, rows_of: Callable[[int], Iterable[int]]
+) -> tuple[int | None, bool]:
+    """The next number shown of whose rows (`rows_of`) one holds it, from a place in `shown`, which is left out; None:
+    there is none.
 
     And whether it was found: a search that takes long ends early, at the row that it came to.
     """
@@ -30,8 +34,8 @@ def find(viewing: Viewing, shown: Index, text: str, position: int, step: int) ->
     position += step
     while 0 <= position < len(shown):
         no = shown[position]
-        row = viewing.store.by_no(no)
-        if row is not None and wanted(row, viewing.store.transaction(row)):
+        rows = [row for one in rows_of(no) if (row := viewing.store.by_no(one)) is not None]
+        if any(wanted(row, viewing.store.transaction(row)) for row in rows):
             return no, True
         if time.perf_counter() > until:
             return no, False

@@ -19,7 +19,7 @@ from sniff.analysis.site_rules import SITE_RULES
 from sniff.tui.analyzer import analyzer
 from sniff.tui.columns import fit
 from sniff.tui.plain import plain
-from sniff.tui.screens.base import ViewScreen
+from sniff.tui.screens.searching import SearchScreen
 from sniff.tui.still_judging import still_judging
 from sniff.tui.tables import StationTable
 from sniff.tui.times import clock
@@ -39,7 +39,7 @@ ROOMY = 110
 """Width from which there is a column for when it was seen last."""
 
 
-class FindingsScreen(ViewScreen):
+class FindingsScreen(SearchScreen):
     """A line a finding; below it what it means, what to do next, and where to see it."""
 
     TITLE = "Findings"

@@ -20,7 +20,7 @@ from sniff.tui import places
 from sniff.tui.analyzer import analyzer
 from sniff.tui.field_tree import FieldTree
 from sniff.tui.filter_line import FilterLine
-from sniff.tui.finding_rows import filter_of_octets, filter_of_row, find
+from sniff.tui.finding_rows import filter_of_octets, filter_of_row
 from sniff.tui.frame_list import FrameList
 from sniff.tui.hex_pane import HexPane
 from sniff.tui.index import Known
@@ -61,12 +61,7 @@ class FramesScreen(ListingScreen):
         Binding("colon", "go_to", "go to", tooltip="go to a row number or a time"),
         Binding("tab", "app.focus_next", "pane", tooltip="next pane: list, fields, octets", show=False),
         Binding("shift+tab", "app.focus_previous", "pane", tooltip="pane before", show=False),
-        Binding(
-            "n", "find_on(1)", "find", tooltip="next row with the text or octets looked for; asks at first", show=False
-        ),
-        Binding("N", "find_on(-1)", "find", tooltip="the row before with the text or octets looked for", show=False),
-        Binding("ctrl+f", "find", "look for", tooltip="ask for text or octets to look for", show=False),
-        Binding("w", "save", "save", tooltip="save the rows that are shown as a capture of any format", show=False),
+        Binding("w", "save", "save", tooltip="save the rows that are shown: capture, table, JSON, text", show=False),
         Binding("equals_sign", "alike", "alike", tooltip="filter: what is like the thing under the cursor", show=False),
         Binding("z", "zoom", "zoom", tooltip="the pane as large as the screen, and back", show=False),
         Binding("y", "copy", "copy", tooltip="copy the octets that are shown as hex to the clipboard", show=False),
@@ -95,6 +90,10 @@ class FramesScreen(ListingScreen):
         """What columns say of rows."""
         masks = self.viewing.masks
         return None if masks is None else masks.rows
+
+    def rows_of(self, number: int) -> tuple[int, ...]:
+        """The row itself."""
+        return (number,)
 
     def bounds(self) -> tuple[int, int]:
         """Rows in memory, up to the freeze."""
@@ -265,10 +264,6 @@ class FramesScreen(ListingScreen):
             found = places.find(self.store, message.text, self.viewing.last_row)
             if found is not None:
                 self.lines.go_to(found)
-        elif message.purpose == "look for" and message.text.strip():
-            message.stop()
-            self.viewing.search = message.text.strip()
-            self.action_find_on(1)
         elif message.purpose == "mark":
             message.stop()
             analyzer(self).mark_row(self._marked, message.text.strip())
@@ -276,29 +271,9 @@ class FramesScreen(ListingScreen):
             message.stop()
             self._save(message.text.strip())
 
-    def action_find(self) -> None:
-        """Ask what to look for."""
-        self.query_one(Prompt).ask("look for", self.viewing.search, "holding   03:10", lambda text: "")
-
-    def action_find_on(self, step: int) -> None:
-        """The next or previous row that is shown and holds it."""
-        if not self.viewing.search:
-            self.action_find()
-            return
-        lines, wanted = self.lines, self.viewing.search
-        no, found = find(self.viewing, lines.index, wanted, lines.index.position(lines.cursor), step)
-        if no is None:
-            self.notify(
-                f"{wanted!r} is in no row {'after' if step > 0 else 'before'} this one", timeout=2, markup=False
-            )
-            return
-        lines.go_to(no)
-        if not found:
-            self.notify(f"{wanted!r} not found up to row {no}; the same key goes on", timeout=3, markup=False)
-
     def action_save(self) -> None:
         """Ask where to save what is shown."""
-        self.query_one(Prompt).ask("save", "", "shown.mcap   shown.pcapng   shown.cap.txt", why_not)
+        self.query_one(Prompt).ask("save", "", "x.mcap  x.pcapng  x.cap.txt  x.csv  x.json  x.txt", why_not)
 
     def _save(self, path: str) -> None:
         index = self.lines.index

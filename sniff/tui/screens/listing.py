@@ -14,12 +14,13 @@ from sniff.filter.completion import Completion, completions
 from sniff.filter.told import names as point_names
 from sniff.tui.analyzer import analyzer
 from sniff.tui.filter_line import FilterLine
+from sniff.tui.finding_rows import find
 from sniff.tui.guest import is_guest
 from sniff.tui.index import Index, Known
 from sniff.tui.linelist import LineList
 from sniff.tui.plain import plain
 from sniff.tui.prompt import Prompt
-from sniff.tui.screens.base import ViewScreen
+from sniff.tui.screens.searching import SearchScreen
 from sniff.tui.store_list import StoreList
 from sniff.tui.views import use, view_of, wrong_columns
 
@@ -33,10 +34,11 @@ DATA_ONLY = "!(role in {token, poll})"
 """On an idle token ring more than nine rows of ten are tokens."""
 
 
-class ListingScreen(ViewScreen):
+class ListingScreen(SearchScreen):
     """A screen around one `LineList` with the id "main"; `THINGS` is what it lists."""
 
     THINGS: ClassVar[str] = "rows"
+    LOOKED_FOR: ClassVar[str] = "holding   03:10"
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("slash", "filter", "filter", tooltip="filter: show only what an expression accepts"),
         Binding("F", "saved", "saved", tooltip="a filter of the configuration by its name", show=False),
@@ -77,6 +79,10 @@ class ListingScreen(ViewScreen):
 
     def place(self) -> int | None:
         """The number for the row under the shared cursor; None when this list has none for it."""
+        raise NotImplementedError
+
+    def rows_of(self, number: int) -> tuple[int, ...]:
+        """The rows of the store that a line is about."""
         raise NotImplementedError
 
     # -- keeping up --------------------------------------------------------------------------------------------
@@ -210,6 +216,17 @@ class ListingScreen(ViewScreen):
             message.stop()
             if message.text.strip():
                 analyzer(self).filter(self._saved[message.text.strip()])
+
+    def find_on(self, wanted: str, step: int) -> None:
+        """Go to the next or previous line whose frames hold a text or octets."""
+        lines = self.lines
+        number, found = find(self.viewing, lines.index, wanted, lines.index.position(lines.cursor), step, self.rows_of)
+        if number is None:
+            self.say_not_found(wanted, step)
+            return
+        lines.go_to(number)
+        if not found:
+            self.notify(f"{wanted!r} not found up to number {number}; the same key goes on", timeout=3, markup=False)
 
     def action_data(self) -> None:
         """Hide what only keeps a token-passing bus going, or show it again."""

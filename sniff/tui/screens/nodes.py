@@ -22,7 +22,7 @@ from sniff.analysis.nodes import Node
 from sniff.tui.analyzer import analyzer
 from sniff.tui.charts import spread
 from sniff.tui.plain import plain
-from sniff.tui.screens.base import ViewScreen
+from sniff.tui.screens.searching import SearchScreen
 from sniff.tui.still_judging import still_judging
 from sniff.tui.tables import StationTable
 
@@ -113,7 +113,7 @@ ORDERS: tuple[tuple[str, Order], ...] = (
 )
 
 
-class NodesScreen(ViewScreen):
+class NodesScreen(SearchScreen):
     """One line a station, and the one under the cursor in full; enter shows its frames."""
 
     TITLE = "Nodes"

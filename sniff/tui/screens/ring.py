@@ -15,7 +15,7 @@ from textual.widgets import DataTable, Static
 from dissectors.token_ring import Cell, TokenRing
 from sniff.tui.analyzer import analyzer
 from sniff.tui.ring_picture import ring_picture, share_bars
-from sniff.tui.screens.base import ViewScreen
+from sniff.tui.screens.searching import SearchScreen
 from sniff.tui.still_judging import still_judging
 from sniff.tui.tables import StationTable
 
@@ -53,7 +53,7 @@ TROUBLE = {"retries", "repeats", "lost", "claims", "damaged"}
 LOOPS = ("loop p50 ms", "rotation p50 ms")
 
 
-class RingScreen(ViewScreen):
+class RingScreen(SearchScreen):
     """One line a master, then the ring in sentences; enter shows the frames of a master."""
 
     TITLE = "Ring"

@@ -8,12 +8,12 @@ from textual.binding import Binding, BindingType
 
 from sniff.tui.plain import plain
 from sniff.tui.prompt import Prompt
-from sniff.tui.screens.base import ViewScreen
+from sniff.tui.screens.searching import SearchScreen
 
 FIND = "words"
 
 
-class TableScreen(ViewScreen):
+class TableScreen(SearchScreen):
     """A screen around one table. `ORDERS`: by what its rows can be sorted, in words; `HINT`: an example to look for."""
 
     ORDERS: ClassVar[tuple[str, ...]] = ()

@@ -36,6 +36,12 @@ class TransactionsScreen(ListingScreen):
         masks = self.viewing.masks
         return None if masks is None else masks.closings
 
+    def rows_of(self, number: int) -> tuple[int, ...]:
+        """Request and response."""
+        transaction = self.store.closed_by_no(number)
+        both = () if transaction is None else (transaction.request, transaction.response)
+        return tuple(no for no in both if no is not None)
+
     def bounds(self) -> tuple[int, int]:
         """Closed transactions in memory, up to the freeze."""
         return self.store.dropped_transactions + 1, self.viewing.last_closed

@@ -18,8 +18,8 @@ from dissectors.frame import Role
 from dissectors.manifest import Dissector
 from dissectors.modbus.stencils import rtu_stencil
 from dissectors.stencil import Form
+from sniff.bus import row_words as rows
 from sniff.bus.offline import settled_columns
-from sniff.cli import rows
 from sniff.cli.byte_columns import digits, fixed_digits, hex_octets, joined
 from sniff.cli.row_lines import RowLines
 from sniff.engine.column_join import SettledRows

@@ -193,8 +193,8 @@ def test_csv_has_one_heading_and_takes_filters(poll: Path, sniff485: Callable) -
 
 
 def test_no_cell_of_csv_is_a_formula(poll: Path, sniff485: Callable, monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in ("rows", "said_texts"):
-        monkeypatch.setattr(f"sniff.cli.{module}.describe", lambda dissector, row, meaning=None: "=1+1,\n2")
+    for module in ("bus.row_words", "cli.said_texts"):
+        monkeypatch.setattr(f"sniff.{module}.describe", lambda dissector, row, meaning=None: "=1+1,\n2")
     rows = list(csv.DictReader(io.StringIO(sniff485("show", "--csv", poll, "-c", "1").out)))
     assert [row["text"] for row in rows] == ["'=1+1,\n2"]
 

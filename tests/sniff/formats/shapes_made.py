@@ -846,3 +846,122 @@ add("slave-id3", lines(lambda i, f: f"{way(i)} 02 03: {hx(f)}"))
 add("baud-header", "9600,8,N,1\n" + lines(lambda i, f: f"{way(i)} {hx(f)}"))
 add("ms-step-paren", lines(lambda i, f: f"(+{100 + i} ms) {way(i)} {hx(f)}"))
 add("delta-steps", lines(lambda i, f: f"{0.1 + (i * 7 % 5) * 0.013:.3f} {way(i)} {hx(f)}"))
+
+
+# -- each of these was lost once --------------------------------------------------------------------------------
+
+add("underscores", lines(lambda i, f: f"10:00:{i:02d}.100 {way(i)} {hx(f, '_')}"), delta=10**9)
+add(
+    "csv-octet-a-cell",
+    "Timestamp;Direction;Data\n" + lines(lambda i, f: f"10:00:{i:02d}.100;{way(i)};{hx(f, ';', '0x{:02X}')}"),
+    delta=10**9,
+)
+add(
+    "csv-octet-a-cell-numbered",
+    "ms,dir,data,1,2,3\n" + lines(lambda i, f: f"{i * 137 + 5},{way(i)},{hx(f, ',', '{}')}"),
+    delta=137_000_000,
+)
+add(
+    "csv-saleae1-two-analysers",
+    "Time [s],Analyzer Name,Decoded Protocol Result\n"
+    + "".join(f"{k * 0.00115:.9f},Async Serial,0x{b:02X}\n" for k, b in enumerate(ALL)),
+    delta=1_150_000,
+)
+add(
+    "csv-unit-in-the-cell",
+    "Id,Time,0:UART\n" + "".join(f"{k},{k * 1150000:.2f}ns,{b:02X}\n" for k, b in enumerate(ALL)),
+    delta=1_150_000,
+)
+add(
+    "gateway-page",
+    lines(lambda i, f: f"Pkt({i}): 001:14:03:{i:02d}.100 {way(i)[0]}x:{hx(f, ' ', '{:02x}h')}"),
+    delta=10**9,
+)
+add("label-and-clock", lines(lambda i, f: f"{i:06d}-Tx:14:03:{i:02d}.100-{hx(f)}"), delta=10**9)
+add(
+    "decimals-in-brackets",
+    lines(lambda i, f: f"{'Host   -->' if i % 2 == 0 else 'Device -->'} {hx(f, ' ', '({:03d})')}"),
+)
+add(
+    "plus-clock",
+    lines(lambda i, f: f"+00:{i:02d}.137 {'<' if i % 2 == 0 else '>'} {hx(f, ' ', '{:02x}')}"),
+    delta=10**9,
+)
+add(
+    "accent-within-characters",
+    r"""TX: b'\x02\x04`\x01`\xff`'""" + "\n" + r"""RX: b'`\x04#\x20 `'""" + "\n",
+    exp=b"\x02\x04`\x01`\xff``\x04#  `",
+)
+add(
+    "calls-that-took-long",
+    lines(
+        lambda i, f: (
+            f"{i}\t0.0000{i + 11}\tscan.exe\tIRP_MJ_{'WRITE' if i % 2 == 0 else 'READ'}\tSerial0\tSUCCESS\tLength {len(f)}: {hx(f)}"
+        )
+    ),
+)
+add(
+    "answers-with-their-time",
+    lines(lambda i, f: f"{way(i)} {hx(f)}" + (f" roundtrip time: {i % 5}.3 ms" if i % 2 else "")),
+)
+add(
+    "octet-a-line-ms",
+    "".join(f"{k * 1.146:.3f} {b:02X}\n" for k, b in enumerate(ALL)),
+    delta=1_146_000,
+)
+add(
+    "json-short",
+    "".join(
+        f'{{"ts": "2024-05-02T14:03:{i:02d}.100Z", "data": "{f.hex()}"}}\n'
+        for i, f in enumerate([*FR, b"\x11\x83\x02\xc1\x34"])
+    ),
+    exp=ALL + b"\x11\x83\x02\xc1\x34",
+    delta=10**9,
+)
+add(
+    "broken-behind-three",
+    lines(lambda i, f: f"10:00:{i:02d}.100 {way(i)} {hx(f)}")
+    + "10:00:59.100 TX "
+    + hx(FR[0][:3])
+    + " 0G "
+    + hx(FR[0][4:])
+    + "\n",
+    whole=False,
+    delta=10**9,
+)
+add(
+    "object-over-lines",
+    "".join(
+        f"2024-05-02T14:03:{i:02d}.100Z serial {{\n  action: 'send',\n  data: <Buffer {hx(f, ' ', '{:02x}')}>,\n  unitid: 1\n}}\n"
+        for i, f in enumerate(FR)
+    ),
+    delta=10**9,
+)
+add(
+    "headed-by-four-lines",
+    "".join(
+        f"[23/10/2008 10:00:{i:02d}]\n{i} IRP_MJ_{'WRITE' if i % 2 == 0 else 'READ'} - transfers data (COM5)\n   STATUS_SUCCESS\n         {hx(f[:16])}   ........\n{'         ' + hx(f[16:]) + chr(10) if len(f) > 16 else ''}{'-' * 60}\n"
+        for i, f in enumerate(FR)
+    ),
+    delta=10**9,
+)
+
+
+def _rows(frame: bytes) -> str:
+    return "".join(
+        f"  | {at:04X}: {hx(frame[at : at + 8])}  {hx(frame[at + 8 : at + 16]):<24} |{'.' * len(frame[at : at + 16])}|\n"
+        for at in range(0, len(frame), 16)
+    )
+
+
+add(
+    "dumps-that-repeat",
+    "".join(
+        f"[D] {1000 + 137 * i}| x.cpp [ 12] go\n[D] Sent packet: @3FFD32E0/{len(f) - 2}:\n{_rows(f[:-2])}"
+        if i % 2 == 0
+        else f"[V] {1000 + 137 * i}| x.cpp [ 89] in\n[D] Raw buffer received: @3FFD2454/{len(f)}:\n{_rows(f)}"
+        f"[D] Received packet: @3FFBC880/{len(f) - 2}:\n{_rows(f[:-2])}[V] Data: @3FFBC880/7:\n{_rows(f[:-2])}"
+        for i, f in enumerate(FR)
+    ),
+    delta=137_000_000,
+)

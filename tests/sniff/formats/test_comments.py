@@ -39,6 +39,19 @@ def test_comments_are_kept(tmp_path: Path) -> None:
     assert places[2].read_text() == places[3].read_text()
 
 
+def test_comments_are_kept_beside_packets(tmp_path: Path) -> None:
+    from sniff.cli import main
+
+    places = [tmp_path / name for name in ("a.cap.txt", "b.pcapng", "c.mcap", "d.cap.txt")]
+    places[0].write_text(TEXT)
+    for before, after in pairwise(places):
+        assert main(["convert", str(before), str(after)]) == 0
+    octets, text = places[1].read_bytes(), places[3].read_text()
+    for said in SAID:
+        assert said.encode() in octets
+        assert said in text
+
+
 def test_a_comment_is_never_read_as_a_header(tmp_path: Path) -> None:
     path = tmp_path / "a.cap.txt"
     path.write_text(TEXT)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
 import pytest
@@ -251,17 +252,45 @@ def test_find_next_and_before(look: Any, busy_bus: Any) -> None:
     look(busy_bus.store, script)
 
 
+def test_the_same_keys_find_in_transactions_and_in_tables(look: Any, make_bus: Any) -> None:
+    bus = make_bus()
+    for station in (1, 2, 3, 2, 1):
+        bus.ask(station)
+
+    async def script(see: Any) -> None:
+        await see.press("2")
+        await see.press("home")
+        await see.press("n")
+        await see.type("3 ←")
+        await see.press("enter")
+        assert see.app.store.closed_by_no(see.main.cursor).station == 3
+        await see.press("3")
+        table = see.app.screen.query_one("#main")
+        see.app.viewing.search = "3"
+        await see.press("home")
+        await see.press("n")
+        assert "3" in table.get_row_at(table.cursor_row)[0].plain
+
+    look(bus.store, script)
+
+
 def test_what_is_shown_is_saved(look: Any, busy_bus: Any, tmp_path: Any) -> None:
-    target = tmp_path / "shown.cap.txt"
+    names = "shown.cap.txt", "shown.csv", "shown.json", "shown.txt"
 
     async def script(see: Any) -> None:
         await filter_by(see, "dst == 1")
-        await see.press("w")
-        await see.type(str(target))
-        await see.press("enter")
+        for name in names:
+            await see.press("w")
+            await see.type(str(tmp_path / name))
+            await see.press("enter")
 
     look(busy_bus.store, script)
-    assert sum(line[:1].isdigit() or line[:1] == "+" for line in target.read_text().splitlines()) >= 3
+    capture, table, objects, lines = ((tmp_path / name).read_text().splitlines() for name in names)
+    assert sum(line[:1].isdigit() or line[:1] == "+" for line in capture) >= 3
+    assert table[0].startswith("no,t,start_ns,")
+    assert len(table) - 1 == len(objects) == len(lines) >= 3
+    assert {json.loads(line)["dst"] for line in objects} == {1}
+    assert all(" read" in line for line in lines)
 
 
 def test_what_is_alike_is_shown_with_one_key(look: Any, busy_bus: Any) -> None:

@@ -7,10 +7,10 @@ from typing import Any
 from dissectors.frame import Frame, Role
 from dissectors.line import MS, NS_PER_S
 from dissectors.manifest import Dissector
+from sniff.analysis.json_text import dumps
 from sniff.analysis.json_text import iso as iso
 from sniff.analysis.plain import ascii_of
 from sniff.analysis.wording import describe, duration, is_error
-from sniff.cli import json_output
 from sniff.engine.session import Session
 from sniff.engine.verdict_join import JudgedRow
 from sniff.formats.parquet import Kind
@@ -78,7 +78,7 @@ def since_start(time: int, session: Session) -> int:
 
 def json_line(item: JudgedRow, dissector: Dissector, session: Session, with_fields: bool = False) -> str:
     """The object on one line."""
-    return json_output.dumps(to_json(item, dissector, session, with_fields))
+    return dumps(to_json(item, dissector, session, with_fields))
 
 
 def typed(item: JudgedRow, dissector: Dissector, session: Session) -> list[Any]:
@@ -139,8 +139,9 @@ def values_of(item: JudgedRow, dissector: Dissector) -> list[dict[str, Any]]:
     ]
 
 
-def text_line(item: JudgedRow, dissector: Dissector, session: Session, colour: bool = False) -> str:
-    """One line for people: number, seconds since the start, what it is, verdict and response time, doubts."""
+def text_line(item: JudgedRow, dissector: Dissector, session: Session, colour: bool = False, title: str = "") -> str:
+    """One line for people: number, seconds since the start, what it is, verdict and response time, doubts. `title`: of
+    its protocol, where that is not the bus's."""
     row, transaction = item.row, item.transaction
     seconds = since_start(row.event.start, session) / NS_PER_S
     notes: list[str] = []
@@ -153,7 +154,7 @@ def text_line(item: JudgedRow, dissector: Dissector, session: Session, colour: b
             bad = True
         if transaction.latency is not None:
             notes.append(duration(transaction.latency))
-    text = describe(dissector, row, item.meaning)
+    text = f"{title}: " * bool(title) + describe(dissector, row, item.meaning)
     if not isinstance(row.event, Frame):
         shown = row.event.octets[:16].hex(" ").upper()
         text = f"{text}: {shown}{' …' if len(row.event.octets) > 16 else ''}"
