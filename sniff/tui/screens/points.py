@@ -205,7 +205,7 @@ class PointsScreen(TableScreen):
         guess = self._guess(point)
         if guess is not None and guess.history:
             history, how = guess.history, f", {guess.words}"
-        plot.show(f"{_key(point)}{unit}{how}; seconds before the newest", history)
+        plot.show(f"{_key(point)}{unit}{how}", history)
 
     def _guess(self, point: Point) -> GuessedPoint | None:
         """What it may be, worked out once for each sample."""
