@@ -79,6 +79,8 @@ def capture(status: FeedStatus) -> str:
     parts = [f"recorded to {plain(status.recording)}, {size(status.file_size)}" if status.recording else "not recorded"]
     if not status.live:
         parts = [f"from {plain(status.port)}, {size(status.file_size)}"]
+    if status.follows:
+        parts = [f"from {plain(status.follows)}, {size(status.file_size)}, which another process goes on to write"]
     if status.priority:
         parts.append(f"priority {plain(status.priority)}")
     parts.append(f"{status.dropped} lost" if status.dropped else "nothing lost")
