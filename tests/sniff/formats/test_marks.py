@@ -160,9 +160,8 @@ def test_marks_on_what_another_process_records_stand_beside_it(tmp_path: Path) -
     path.write_bytes(b"12345")
     (session,) = sessions({"boiler": []})
     model = BusModel(session, dissector_for(session))
-    feed = LiveFeed(
-        SimpleNamespace(session=session, dissector=model.dissector, model=model, ear=None), follows=str(path)
-    )  # type: ignore[arg-type]
+    live: Any = SimpleNamespace(session=session, dissector=model.dissector, model=model, ear=None)
+    feed = LiveFeed(live, follows=str(path))
     assert feed.mark(17, "the gate") == f"in {path}.marks.jsonl"
     assert [(one.time, one.text) for one in (*marks_beside(path), *feed.store.line_events)] == 2 * [(17, "the gate")]
     assert path.read_bytes() == b"12345"
