@@ -143,6 +143,7 @@ class PointsScreen(TableScreen):
     def on_resize(self, event: events.Resize) -> None:
         """Columns that fit, and a plot where there is room."""
         self._lay_out(event.size.width, event.size.height)
+        self._drawn = None
 
     def _lay_out(self, width: int, height: int) -> None:
         self.query_one(HistoryPlot).display = height >= TALL if self._plotted is None else self._plotted
