@@ -22,6 +22,7 @@ class FeedStatus:
     `behind`: seconds by which the disk is late with the recording, 0 while it keeps up.
     `reading`: whether the file is still being read, `read`: how much of it has been, 0 … 1. `judged`: how many of its
     rows the rules have seen, 0 … 1.
+    `follows`: the recording that rows are read from while another process writes it; "": they are from a port.
     `searching`: with which settings a search listens at the moment, empty when there is none.
     """
 
@@ -40,11 +41,12 @@ class FeedStatus:
     reading: bool = False
     read: float = 1.0
     judged: float = 1.0
+    follows: str = ""
 
     @property
     def in_file(self) -> bool:
         """Whether what leaves memory can be found in a file: read from one, or recorded."""
-        return not self.live or (self.recording is not None and not self.trouble)
+        return not self.live or bool(self.follows) or (self.recording is not None and not self.trouble)
 
 
 class Feed(Protocol):

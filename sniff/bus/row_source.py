@@ -11,8 +11,9 @@ from sniff.bus.live import LiveBus
 from sniff.bus.rows import KEPT_ROWS, Store
 from sniff.capture.ipc import Status
 from sniff.engine.engine import Output
-from sniff.engine.session import LineEvent
+from sniff.engine.session import LineEvent, LineEventKind
 from sniff.engine.table import Table
+from sniff.formats.mark_file import add_mark, mark_file
 
 LEAST_ROWS = 100_000
 ROW_OCTETS = 120
@@ -31,10 +32,17 @@ def rows_that_fit(buses: int = 1) -> int:
 
 class LiveFeed:
     """A running capture. `tell` is called once where closing it waits for a slow disk. `buses`: how many share the
-    memory."""
+    memory. `follows`: the recording of another process that this is."""
 
-    def __init__(self, live: LiveBus, tell: Callable[[Status], None] = lambda status: None, buses: int = 1) -> None:
+    def __init__(
+        self,
+        live: LiveBus,
+        tell: Callable[[Status], None] = lambda status: None,
+        buses: int = 1,
+        follows: str = "",
+    ) -> None:
         self.live = live
+        self._follows = follows
         self._tell = tell
         rows = min(KEPT_ROWS, rows_that_fit(buses))
         self._store = Store(live.session, live.dissector, rows, model=live.model, ear=live.ear)
@@ -80,7 +88,7 @@ class LiveFeed:
             line=self.live.session.line_words,
             protocol=self.live.session.protocol_words,
             recording=None if ended is not None and self.live.file_is_gone else status.path or None,
-            file_size=status.size,
+            file_size=_size(self._follows) if self._follows else status.size,
             dropped=self.live.unseen + status.lost,
             live=True,
             ended=ended.reason if ended is not None else "",
@@ -88,10 +96,17 @@ class LiveFeed:
             behind=status.behind,
             priority=status.priority,
             searching="" if searching is None else f"{searching.line}",
+            follows=self._follows,
         )
 
     def mark(self, time: int, text: str | None) -> str:
-        """Have it written into the recording."""
+        """Have it written into the recording; beside it, where that is another's."""
+        if self._follows:
+            self._store.add_mark(
+                LineEvent(time, LineEventKind.UNMARK if text is None else LineEventKind.MARK, text or "")
+            )
+            add_mark(self._follows, time, text)
+            return f"in {mark_file(self._follows)}"
         self.live.link.mark(self.live.bus, time, text)
         return f"in {self.live.status.path}" if self.live.status.path else "until this view ends: nothing is recorded"
 
@@ -109,3 +124,11 @@ class LiveFeed:
         while self.live.ended is None:
             with contextlib.suppress(KeyboardInterrupt):  # then it is told to stop once more
                 self.live.stop(tell)
+
+
+def _size(path: str) -> int:
+    """Octets of a file; 0 where it is gone."""
+    try:
+        return os.stat(path).st_size
+    except OSError:
+        return 0

@@ -64,5 +64,5 @@ def _follow(args: argparse.Namespace) -> int:
     devices = arguments.noted_devices(args, session)
     bus = session.bus or "bus"
     live = listening.start(SourceSpec(f"follow:{path}", session.line, session.protocol, bus), None, devices=devices)
-    run_tui(LiveFeed(live))
+    run_tui(LiveFeed(live, follows=path))
     return 0

@@ -259,7 +259,7 @@ def _load(summary: Summary, every: int) -> list[tuple[Cell, ...]]:
     return [
         (
             iso(number * every),
-            100 * summary.load.share_of(part, number * every, (number + 1) * every),
+            round(100 * summary.load.share_of(part, number * every, (number + 1) * every), 4),
             part.frames,
             part.damaged,
             part.noise,

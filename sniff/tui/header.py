@@ -58,7 +58,7 @@ def record_state(status: FeedStatus) -> RecordState:
     """Whether what comes in is recorded, and how well."""
     if status.ended:
         return RecordState.ENDED
-    if not status.live:
+    if not status.live or status.follows:
         return RecordState.FILE
     if status.trouble:
         return RecordState.FAILS
@@ -109,7 +109,11 @@ def status_line(
         (f"err {store.error_total}", "bad" if store.error_total else ""),
         (shown_state, STATE_STYLES.get(state, "")),
         *([(progress, "")] if (progress := progress_of(status)) else []),
-        *([(size(status.file_size), "")] if status.recording or not (status.live or progress) else []),
+        *(
+            [(size(status.file_size), "")]
+            if status.recording or status.follows or not (status.live or progress)
+            else []
+        ),
     ]
     if status.dropped:
         pieces.append((f"LOST {status.dropped}", "bad"))

@@ -17,12 +17,16 @@ HAS_PLOT = find_spec("textual_plot") is not None
 if HAS_PLOT:
     from textual_plot import HiResMode, PlotWidget
 
+UNITS = ((3600 * NS_PER_S, "hours"), (60 * NS_PER_S, "minutes"), (NS_PER_S, "seconds"))
+LONG = 5
+"""So many of a unit are counted in it."""
+
 LEAST = 3
 """Values that make a plot."""
 
 
 class HistoryPlot(Vertical):
-    """Times, ns, and values. The newest is at the right, the axis counts seconds before it."""
+    """Times, ns, and values. The newest is at the right, the axis counts seconds before it, or minutes, or hours."""
 
     DEFAULT_CSS = """
     HistoryPlot { height: 11; width: 100%; }
@@ -46,8 +50,12 @@ class HistoryPlot(Vertical):
         made.can_focus = False  # the arrows are the table's
         return made
 
-    def show(self, title: str, history: Sequence[tuple[int, float]]) -> None:
-        """Draw these values, unless they are drawn already."""
+    def show(self, title: str, history: Sequence[tuple[int, float]], least: float | None = None) -> None:
+        """Draw these values, unless they are drawn already. `least`: where the axis begins, where that is not theirs to
+        say."""
+        span = history[-1][0] - history[0][0] if history else 0
+        unit, name = next((one for one in UNITS if span >= LONG * one[0]), UNITS[-1])
+        title = f"{title}; {name} before the newest" if title else ""
         state = title, tuple(history)
         if state == self._drawn:
             return
@@ -64,10 +72,10 @@ class HistoryPlot(Vertical):
         if few:
             return
         newest = history[-1][0]
-        seconds = [(time - newest) / NS_PER_S for time, _ in history]
+        before = [(time - newest) / unit for time, _ in history]
         values = [value for _, value in history]
         low, high = min(values), max(values)
         spare = (high - low) * 0.05 or max(1.0, abs(high) * 0.05)
-        canvas.set_xlimits(min(seconds[0], -1e-3), 0.0)
-        canvas.set_ylimits(low - spare, high + spare)
-        canvas.plot(seconds, values, line_style="cyan", hires_mode=HiResMode.BRAILLE)
+        canvas.set_xlimits(min(before[0], -1e-3), 0.0)
+        canvas.set_ylimits(low - spare if least is None else least, high + spare)
+        canvas.plot(before, values, line_style="cyan", hires_mode=HiResMode.BRAILLE)

@@ -71,6 +71,10 @@ class ViewScreen(Screen[None]):
         """The rows."""
         return analyzer(self).store
 
+    def on_resize(self) -> None:
+        """What was laid out for another width is drawn anew, also where nothing comes any more."""
+        self.call_after_refresh(analyzer(self).draw_screen)
+
     def on_screen_resume(self) -> None:
         """Shown (again): catch up."""
         analyzer(self).draw_screen()

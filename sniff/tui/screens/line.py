@@ -8,7 +8,7 @@ from rich.table import Table
 from rich.text import Text
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
-from textual.containers import VerticalScroll
+from textual.containers import Container, VerticalScroll
 from textual.widgets import Static
 
 from dissectors.frame import LineError
@@ -18,13 +18,18 @@ from sniff.bus.feed import FeedStatus
 from sniff.bus.rows import Store
 from sniff.engine.session import LineEvent
 from sniff.tui.analyzer import analyzer
-from sniff.tui.charts import sparkline, spread
+from sniff.tui.charts import spread
 from sniff.tui.key_names import named
 from sniff.tui.plain import plain
+from sniff.tui.plot import LEAST, HistoryPlot
 from sniff.tui.screens.base import ViewScreen
 from sniff.tui.times import clock, date_and_clock, size
 
 EVENTS_SHOWN = 200
+STEPS = 240
+"""Values of a curve at most."""
+BESIDE = 120
+"""Width from which on two curves stand beside each other."""
 LABEL = 7
 REPORTABLE = (
     ("parity", LineError.PARITY),
@@ -74,6 +79,8 @@ def capture(status: FeedStatus) -> str:
     parts = [f"recorded to {plain(status.recording)}, {size(status.file_size)}" if status.recording else "not recorded"]
     if not status.live:
         parts = [f"from {plain(status.port)}, {size(status.file_size)}"]
+    if status.follows:
+        parts = [f"from {plain(status.follows)}, {size(status.file_size)}, which another process goes on to write"]
     if status.priority:
         parts.append(f"priority {plain(status.priority)}")
     parts.append(f"{status.dropped} lost" if status.dropped else "nothing lost")
@@ -114,20 +121,32 @@ def _count(store: Store, name: str, flag: LineError) -> str:
     return f"{name} {count}"
 
 
-def load(store: Store, width: int) -> list[Part]:
-    """Bus load second by second; the newest at the right."""
+Curve = list[tuple[int, float]]
+"""Times, ns, and values."""
+
+
+def load(store: Store) -> list[Part]:
+    """How busy the bus is."""
     known = store.load
-    text = Text(f"{known.share():.0%} now, {known.overall():.0%} overall")
-    if known.last is None:
-        return [("load", text)]
-    newest = known.last // NS_PER_S
-    shares = [
-        min(1.0, second.busy / NS_PER_S) if (second := known.seconds.get(number)) is not None else 0.0
-        for number in range(newest - width + 1, newest + 1)
-    ]
-    top = max(0.01, max(shares))
-    text.append(f" · the last {width} s, full height is {top:.0%}\n").append(sparkline(shares, top))
-    return [("load", text)]
+    return [("load", Text(f"{known.share():.0%} now, {known.overall():.0%} overall"))]
+
+
+def curves(store: Store, most: int) -> tuple[Curve, Curve]:
+    """The load, %, and errors a second, of all seconds that are known, in `most` steps at most; the last step is left
+    out where it is not over."""
+    seconds = store.load.seconds
+    if not seconds:
+        return [], []
+    first, last = min(seconds), max(seconds)
+    step = -(-(last - first + 1) // most)
+    shares, errors = [], []
+    for begin in range(first, max(first + 1, last + 1 - step), step):
+        part = range(begin, begin + step)
+        busy = sum(seconds[at].busy for at in part if at in seconds)
+        failed = sum(store.failed[at] for at in part if at in store.failed)
+        shares.append((begin * NS_PER_S, min(100.0, 100 * busy / (step * NS_PER_S))))
+        errors.append((begin * NS_PER_S, failed / step))
+    return shares, errors
 
 
 def gaps(store: Store, width: int) -> list[Part]:
@@ -189,8 +208,12 @@ class LineScreen(ViewScreen):
     def compose_view(self) -> ComposeResult:
         """The sections."""
         with Page(id="main"):
-            for name in ("settings", "errors", "load", "gaps", "events"):
+            for name in ("settings", "errors", "load", "gaps"):
                 yield Static(id=name)
+            with Container(id="curves"):
+                yield HistoryPlot(id="load-curve")
+                yield HistoryPlot(id="error-curve")
+            yield Static(id="events")
 
     def draw(self) -> None:
         """Bring the page up to date, unless frozen."""
@@ -204,13 +227,25 @@ class LineScreen(ViewScreen):
         sections = {
             "settings": settings(store, analyzer(self).status),
             "errors": errors(store),
-            "load": load(store, width),
+            "load": load(store),
             "gaps": gaps(store, width),
             "events": events(store.line_events),
         }
         for name, parts in sections.items():
             self.query_one(f"#{name}", Static).update(_table(parts))
+        shares, failed = curves(store, STEPS)
+        self._plot("load-curve", "load, %", shares, len(shares) >= LEAST)
+        went_wrong = any(value for _, value in failed) and len(failed) >= LEAST
+        self._plot("error-curve", "errors a second (damaged, noise, went wrong)", failed, went_wrong)
+
+    def _plot(self, name: str, title: str, curve: Curve, shown: bool) -> None:
+        """A curve, where it says something."""
+        plot = self.query_one(f"#{name}", HistoryPlot)
+        plot.display = shown
+        if shown:
+            plot.show(title, curve, least=0)
 
     def on_resize(self) -> None:
-        """Charts take the new width."""
+        """Charts take the new width, and stand beside each other where there is room."""
+        self.set_class(self.app.size.width >= BESIDE, "-beside")
         self.call_after_refresh(self.draw)

@@ -143,6 +143,7 @@ class PointsScreen(TableScreen):
     def on_resize(self, event: events.Resize) -> None:
         """Columns that fit, and a plot where there is room."""
         self._lay_out(event.size.width, event.size.height)
+        self._drawn = None
 
     def _lay_out(self, width: int, height: int) -> None:
         self.query_one(HistoryPlot).display = height >= TALL if self._plotted is None else self._plotted
@@ -205,7 +206,7 @@ class PointsScreen(TableScreen):
         guess = self._guess(point)
         if guess is not None and guess.history:
             history, how = guess.history, f", {guess.words}"
-        plot.show(f"{_key(point)}{unit}{how}; seconds before the newest", history)
+        plot.show(f"{_key(point)}{unit}{how}", history)
 
     def _guess(self, point: Point) -> GuessedPoint | None:
         """What it may be, worked out once for each sample."""

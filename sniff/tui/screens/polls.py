@@ -110,6 +110,7 @@ class PollsScreen(TableScreen):
     def on_resize(self, event: events.Resize) -> None:
         """Columns that fit."""
         self._lay_out(event.size.width)
+        self._drawn = None
 
     def _lay_out(self, width: int) -> None:
         columns = (*NARROW, *MORE) if width >= WIDE else NARROW

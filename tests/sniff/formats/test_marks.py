@@ -6,15 +6,20 @@ import random
 import shutil
 import struct
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
 from dissectors.frame import Chunk
 from sniff.bus.file_source import FileFeed
 from sniff.bus.marked_rows import MarkedRows
+from sniff.bus.model import BusModel
 from sniff.bus.offline import survey
+from sniff.bus.row_source import LiveFeed
 from sniff.cli import arguments, main
 from sniff.engine.blocks import blocks_of
+from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import LineEvent, LineEventKind
 from sniff.formats import create_of_items, read
 from sniff.formats.mark_file import add_mark, mark_file, marks_beside
@@ -148,3 +153,15 @@ def test_a_report_tells_marks(capture: Path, tmp_path: Path) -> None:
     target = tmp_path / "report.html"
     assert main(["report", str(capture), "-o", str(target)]) == 0
     assert "gate opens" in target.read_text("utf-8")
+
+
+def test_marks_on_what_another_process_records_stand_beside_it(tmp_path: Path) -> None:
+    path = tmp_path / "night.mcap"
+    path.write_bytes(b"12345")
+    (session,) = sessions({"boiler": []})
+    model = BusModel(session, dissector_for(session))
+    live: Any = SimpleNamespace(session=session, dissector=model.dissector, model=model, ear=None)
+    feed = LiveFeed(live, follows=str(path))
+    assert feed.mark(17, "the gate") == f"in {path}.marks.jsonl"
+    assert [(one.time, one.text) for one in (*marks_beside(path), *feed.store.line_events)] == 2 * [(17, "the gate")]
+    assert path.read_bytes() == b"12345"

@@ -261,6 +261,7 @@ def look(monkeypatch: pytest.MonkeyPatch) -> Callable[..., SnifferApp]:
     """`look(store, script, size=…, start=…, **status)` runs the app over a store and the script with it."""
     monkeypatch.setattr("sniff.tui.screens.frames.DETAIL_SECONDS", 0.001)  # nobody holds a key down here
     monkeypatch.setattr("sniff.tui.screens.frames.FOLLOWING_SECONDS", 0.001)
+    monkeypatch.setattr("textual.notifications.Notification.has_expired", False)  # however slow the machine is
 
     def run(
         store: Store, script: Script, size: tuple[int, int] = (80, 24), start: str = "frames", **status: Any

@@ -46,6 +46,7 @@ def test_frozen_says_how_many_rows_came(busy_bus: Any) -> None:
     [
         (LIVE, "REC"),
         (FeedStatus("p", "l", "n2", live=True), "NOT REC"),
+        (FeedStatus("follow:x.mcap", "l", "n2", live=True, follows="x.mcap"), "FILE"),
         (FeedStatus("p", "l", "n2", "/x", live=True, trouble="/x: no space left"), "REC FAILS"),
         (FeedStatus("p", "l", "n2", "/x", live=True, behind=12.4), "REC 12 s BEHIND"),
         (FeedStatus("p", "l", "n2", live=True, behind=12.4), "NOT REC"),

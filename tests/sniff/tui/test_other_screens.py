@@ -10,6 +10,7 @@ from textual.widgets import DataTable
 from dissectors.frame import LineError, Mark
 from dissectors.tracker import Verdict
 from sniff.engine.session import LineEvent, LineEventKind
+from sniff.tui.screens.line import curves
 
 MS = 1_000_000
 
@@ -145,7 +146,7 @@ def test_nodes_keep_up_and_freeze(look: Any, busy_bus: Any) -> None:
 
 def test_one_failure_in_many_is_not_rounded_away(look: Any, make_bus: Any) -> None:
     bus = make_bus()
-    for _ in range(5000):
+    for _ in range(2001):
         bus.ask(1)
     bus.ask(1, Verdict.NO_RESPONSE)
 
@@ -244,3 +245,19 @@ def test_line_events_the_newest_first(look: Any, busy_bus: Any) -> None:
         assert "\x1b" not in text
 
     look(store, script, (100, 40), "line")
+
+
+def test_the_curves_of_the_line_hold_all_that_was_heard(make_bus: Any) -> None:
+    bus = make_bus()
+    for number in range(200):
+        bus.ask(1, Verdict.NO_RESPONSE if number % 3 == 2 else Verdict.ANSWERED, latency=20)
+    store = bus.store
+    shares, errors = curves(store, 10_000)
+    seconds = store.load.seconds
+    assert [time // 10**9 for time, _ in shares] == list(range(min(seconds), max(seconds)))
+    assert all(value == pytest.approx(100 * seconds[time // 10**9].busy / 1e9) for time, value in shares)
+    assert sum(value for _, value in errors) == sum(
+        count for second, count in store.failed.items() if second < max(seconds)
+    )
+    few, _ = curves(store, 3)
+    assert 1 <= len(few) <= 3

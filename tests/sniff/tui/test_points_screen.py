@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 import struct
+from functools import cache
 from typing import Any
 
 import pytest
@@ -24,7 +25,9 @@ STARTED = 1_772_359_200 * 1_000_000_000
 SIZES = {"80x24": (80, 24), "160x50": (160, 50)}
 
 
+@cache
 def store_of(name: str, seconds: float, known: bool = True) -> Store:
+    """To be looked at only: each is made once."""
     plan = scenario(name, faults=False)
     session, items = simulate(plan, seconds, started=STARTED)
     devices = Devices({address: packaged(profile) for address, profile in plan.devices.items()} if known else {})
@@ -43,19 +46,21 @@ def cells(see: Any, key: str) -> list[str]:
     return [cell.plain for cell in see.main.get_row(key)]
 
 
-@pytest.mark.parametrize("size", SIZES)
-def test_values_by_device_and_name(look: Any, size: str) -> None:
+def test_values_by_device_and_name(look: Any) -> None:
     async def script(see: Any) -> None:
-        text = see.text()
-        assert "None" not in text
-        assert all(len(line) <= SIZES[size][0] for line in see.lines())
-        assert cells(see, "1/output-frequency")[3].endswith(" Hz")
-        assert cells(see, "1/status")[3].lstrip("*").startswith(("running", "stopped"))
-        assert cells(see, "1/command")[0].startswith("→")
-        assert keys(see)[0].startswith("1/")
-        assert "1/status.running" not in keys(see)
+        for width, height in SIZES.values():
+            await see.pilot.resize_terminal(width, height)
+            await see.settle()
+            text = see.text()
+            assert "None" not in text
+            assert all(len(line) <= width for line in see.lines())
+            assert cells(see, "1/output-frequency")[3].endswith(" Hz")
+            assert cells(see, "1/status")[3].lstrip("*").startswith(("running", "stopped"))
+            assert cells(see, "1/command")[0].startswith("→")
+            assert keys(see)[0].startswith("1/")
+            assert "1/status.running" not in keys(see)
 
-    look(store_of("modbus-rtu", 20), script, SIZES[size], "points")
+    look(store_of("modbus-rtu", 20), script, start="points")
 
 
 def test_pin_bits_and_commands(look: Any) -> None:
@@ -130,7 +135,7 @@ def test_names_and_values_from_the_wire_are_harmless(look: Any) -> None:
     from dissectors.readings import How, Reading
     from sniff.analysis.points import Sample
 
-    store = store_of("mstp", 3)
+    store = store_of.__wrapped__("mstp", 3)
     evil = Reading("device", 5, None, "[red]x[/red]\x1b[2J\u202e", How.READ, "object-name\x1b")
     store.points.add([Sample(STARTED, 5, value, 1) for value in decode(None, [evil])])
 
