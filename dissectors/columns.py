@@ -335,7 +335,11 @@ class Pairing(Protocol):
     def __call__(
         self, tracker: Tracker, frames: FrameColumns, octets: Octets, timing: Timing, slack: Times
     ) -> BlockPairing:
-        """`tracker`: will be moved. `octets`: where `frames.offset` counts. `slack`: ns, of each frame."""
+        """`tracker`: will be moved. `octets`: where `frames.offset` counts. `slack`: ns, of each frame.
+
+        Among frames of the kernel there may be rows that the reference framer gave, noise too: they are not `ok`, their
+        other columns may say anything, and the tracker must take them.
+        """
         ...
 
 

@@ -7,6 +7,7 @@ is compared with what each of those could have sent; octets may be wrong, missin
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from functools import cache
 from typing import NamedTuple
 
 from dissectors.bacnet.frame_types import EXPECTING, HEADER, PREAMBLE, FrameType
@@ -186,44 +187,48 @@ def _expected(guess: _Guess) -> tuple[int, ...]:
 
 def _substituted(octets: bytes, header: tuple[int, ...]) -> int:
     """What it costs at most to take the begin of `octets` for that header: octet for octet, and the end lost."""
-    cost = max(0, len(header) - len(octets)) * _LOST
-    for wanted, octet in zip(header, octets, strict=False):
-        if wanted != octet:
-            cost += _of_octet(wanted, octet)
-    return cost
-
-
-def _of_octet(wanted: int, octet: int) -> int:
-    if wanted == _ANY:
-        return _ANY_COST
-    return _A_BIT if (wanted ^ octet).bit_count() == 1 else _SPOILT
+    lost = max(0, len(header) - len(octets)) * _LOST
+    return lost + sum([_costs(wanted)[octet] for wanted, octet in zip(header, octets, strict=False)])
 
 
 def _distance(octets: bytes, header: tuple[int, ...], limit: int) -> int:
     """What it costs to take the begin of `octets` for that header; octets after it cost nothing.
 
-    `limit` where it is that or more: a row never costs less than the one before it, so the rest need not be known.
+    `limit`, 1 or more, where it is that or more: a row never costs less than the one before it, so the rest need not be
+    known, nor what is further from the diagonal than octets may be lost or too many for less.
     """
-    least = 0
-    row = [at * _TOO_MANY for at in range(len(octets) + 1)]
-    for wanted in header:
-        before, diagonal = row, row[0]
-        left = least = diagonal + _LOST
-        row = [left]
-        for at, octet in enumerate(octets, 1):
-            above = before[at]
-            if wanted == octet:
-                cost = diagonal
-            else:
-                cost = diagonal + _of_octet(wanted, octet)
+    least, count, reach = 0, len(octets), (limit - 1) // _LOST
+    row = [at * _TOO_MANY for at in range(count + 1)]
+    for number, wanted in enumerate(header, 1):
+        costs, before = _costs(wanted), row
+        first = max(1, number - reach)
+        if first > count + 1:
+            return limit
+        row = [_FAR] * (count + 1)
+        if number <= reach:
+            row[0] = number * _LOST
+        left = least = row[first - 1]
+        diagonal = before[first - 1]
+        for at in range(first, min(count, number + reach) + 1):
+            cost, above = diagonal + costs[octets[at - 1]], before[at]
             if above + _LOST < cost:
                 cost = above + _LOST
             if left + _TOO_MANY < cost:
                 cost = left + _TOO_MANY
-            row.append(cost)
+            row[at] = cost
             diagonal, left = above, cost
             if cost < least:
                 least = cost
         if least >= limit:
             return limit
     return least
+
+
+@cache
+def _costs(wanted: int) -> bytes:
+    """What it costs to take each octet for a wanted one, or for one of which nothing is known."""
+    if wanted == _ANY:
+        return bytes([_ANY_COST] * 256)
+    costs = bytearray(_A_BIT if (wanted ^ octet).bit_count() == 1 else _SPOILT for octet in range(256))
+    costs[wanted] = 0
+    return bytes(costs)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -35,11 +35,13 @@ class Gathered:
 def gathered(dissector: Dissector, first: int, stretches: Sequence[Stretch], late: LateColumns) -> Gathered:
     """The rows of stretches, of which one at least is a kernel's, as a table that begins with number `first`."""
     clean = [one for one in stretches if isinstance(one, Clean)]
-    of_kernel = clean[0].columns.take(np.concatenate([np.arange(one.begin, one.end) for one in clean]))
+    columns = clean[0].columns
     places, events, count = _heard(stretches)
+    is_frame, slack = np.ones(count, bool), np.zeros(count, np.int64)
     heard = _mask(count, places)
-    ends, is_frame, slack = np.empty(count, np.int64), np.ones(count, bool), np.zeros(count, np.int64)
-    ends[~heard], ends[heard] = of_kernel.end, [event.end for event in events]
+    ends = np.empty(count, np.int64)
+    ends[~heard] = np.concatenate([columns.end[one.begin : one.end] for one in clean])
+    ends[heard] = [event.end for event in events]
     is_frame[heard] = [isinstance(event, Frame) for event in events]
     slack[is_frame] = late.slack(ends[is_frame])
     given = []
@@ -51,11 +53,7 @@ def gathered(dissector: Dissector, first: int, stretches: Sequence[Stretch], lat
             event = replace(event, slack=int(slack[place]))
         slack[place] = event.slack
         given.append(Row(first + place, event, dissector.peek(event)))
-    frames = of_kernel
-    if given:
-        order = np.empty(count, np.int64)
-        order[~heard], order[heard] = np.arange(len(of_kernel)), np.arange(len(of_kernel), count)
-        frames = joined_columns(FrameColumns, [of_kernel, frame_columns(given)]).take(order)
+    frames = joined_columns(FrameColumns, list(_parts(stretches, columns, frame_columns(given))))
     lengths = frames.length.astype(np.int64)
     frames = replace(frames, offset=np.cumsum(lengths) - lengths)
     nowhere = np.full(count, NONE, np.int16)
@@ -87,6 +85,17 @@ def _heard(stretches: Sequence[Stretch]) -> tuple[list[int], list[Event], int]:
         events += one
         count += len(one)
     return places, events, count
+
+
+def _parts(stretches: Sequence[Stretch], of_kernel: FrameColumns, given: FrameColumns) -> Iterator[FrameColumns]:
+    """The columns of each stretch."""
+    at = 0
+    for one in stretches:
+        if isinstance(one, Clean):
+            yield of_kernel.take(slice(one.begin, one.end))
+        else:
+            yield given.take(slice(at, at + len(one)))
+            at += len(one)
 
 
 def _octets(stretch: Stretch) -> np.ndarray[tuple[int], np.dtype[np.uint8]]:

@@ -315,15 +315,15 @@ def joined_columns(kind: type[Named], parts: Sequence[Named]) -> Named:
     """Columns one after the other, their texts under common numbers."""
     names, columns = Names(), [one.name for one in fields(kind)[:-1]]
     held: dict[str, list[npt.NDArray[Any]]] = {name: [] for name in columns}
-    known: dict[tuple[str, ...], npt.NDArray[np.uint16]] = {}  # by their texts, which many parts share
+    known: dict[tuple[str, ...], npt.NDArray[np.uint16] | None] = {}  # by their texts, which many parts share
     for part in parts:
-        numbers = known.get(part.names)
-        if numbers is None:
-            numbers = np.array([names.number(text) for text in part.names], np.uint16)
-            known[part.names] = numbers
+        if part.names not in known:
+            told = [names.number(text) for text in part.names]
+            known[part.names] = None if told == list(range(len(told))) else np.array(told, np.uint16)
+        numbers = known[part.names]
         for name in columns:
             values = getattr(part, name)
-            held[name].append(numbers[values] if name in TEXTS else values)
+            held[name].append(numbers[values] if name in TEXTS and numbers is not None else values)
     texts = names.texts
     same = next((part.names for part in parts if part.names == texts), texts)  # shared again by the next joining
     return kind(**{name: np.concatenate(values) for name, values in held.items()}, names=same)

@@ -290,7 +290,13 @@ def types_of(dissector: Dissector) -> Mapping[str, FieldType]:
 
 def protocols(dissector: Dissector) -> tuple[Dissector, ...]:
     """That protocol, and behind it all others: a filter may be for several captures."""
-    return (dissector, *(one for one in registry.usable() if one.name != dissector.name))
+    return tuple(each_protocol(dissector))
+
+
+def each_protocol(dissector: Dissector) -> Iterator[Dissector]:
+    """The same one by one: whoever is content with the first needs no other imported."""
+    yield dissector
+    yield from (one for one in registry.usable() if one.name != dissector.name)
 
 
 def column_type(name: str, dissector: Dissector) -> FieldType:

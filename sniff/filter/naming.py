@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 from dissectors.field_types import FieldType, Kind
 from dissectors.manifest import Dissector
@@ -41,10 +42,14 @@ class Names:
         self.by_request: set[str] = set()
         self.begins: Begins | None = None
         self.elsewhere: list[Elsewhere] = []
-        self.layers = fields.layers(dissector)
         self._decoded: dict[str, fields.Decoded] = {}
         self._types: dict[str, FieldType | None] = {}
         self._points: set[str] = set()
+
+    @cached_property
+    def layers(self) -> dict[str, str]:
+        """Names of what a frame may carry, and how the names of its fields begin."""
+        return fields.layers(self.dissector)
 
     def type(self, name: str) -> FieldType | None:
         """What a field is, of whatever protocol; None where there is no such field."""
@@ -58,7 +63,7 @@ class Names:
             return told.type_of(name, self.scope.devices)
         if name in fields.COLUMN_TYPES:
             return fields.column_type(name, self.dissector)
-        for one in fields.protocols(self.dissector):
+        for one in fields.each_protocol(self.dissector):
             types = fields.types_of(one)
             if name in types:
                 return types[name]

@@ -7,6 +7,7 @@ import random
 import struct
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -39,6 +40,9 @@ MS = 1_000_000
 LINE = LineSettings(38400, 8, "N", 1)
 SESSION = Session("/dev/ttyUSB0", LINE, "mstp", BASE, "bus")
 TOKEN = bytes.fromhex("55ff0002010000") + b"\x8a"
+LONG, SOME = 1 << 20, 6000
+"""Octets from which on only so many items of a text are compared."""
+
 RELAXED = settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
@@ -91,6 +95,10 @@ def same_file(path: Path) -> list[Item | str]:
         capture = formats.read(path)
     except CaptureError:
         return []
+    if path.suffix == ".txt" and path.stat().st_size > LONG:  # its lines are all read alike
+        items = told(islice(capture.items(), SOME))
+        assert told(islice(unpacked(capture.blocks()), SOME)) == items
+        return items
     return same(capture)
 
 
