@@ -7,8 +7,17 @@ from __future__ import annotations
 
 import argparse
 from collections import Counter
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
+from sniff.analysis.plain import plain
 from sniff.cli import UNREADABLE, USAGE, Failure, arguments
+
+if TYPE_CHECKING:
+    from sniff.bus.file_source import FileFeed
+
+SAID = 76
+"""Characters of what is said at the start: a line of a terminal."""
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -23,12 +32,28 @@ def run(args: argparse.Namespace) -> int:
     """Show captures in the terminal UI."""
     if args.follow:
         return _follow(args)
+    _say_begin(args.files)
+    from sniff.tui import run as run_tui
+
+    for feeds in _feeds(args):
+        run_tui(feeds)
+    return 0
+
+
+def _say_begin(files: Sequence[str]) -> None:
+    """A terminal says at once what is done: the first screen takes a while."""
+    if arguments.on_terminal():
+        said = plain(f"sniff485: opening {', '.join(files)}")
+        print(said if len(said) <= SAID else said[: SAID - 1] + "…", flush=True)
+
+
+def _feeds(args: argparse.Namespace) -> list[list[FileFeed]]:
+    """The captures of each recording."""
     captures = arguments.open_captures(args.files)
     if not arguments.on_terminal():
         raise Failure("open needs a terminal; use `sniff485 show` for text", USAGE)
     from sniff.bus.file_source import FileFeed
     from sniff.bus.site import site_name
-    from sniff.tui import run as run_tui
 
     sites: dict[str, list[FileFeed]] = {}
     shares = Counter(site_name(path) for path, _ in captures)
@@ -36,9 +61,7 @@ def run(args: argparse.Namespace) -> int:
         session, name = arguments.settings_of(args, capture.session, path), site_name(path)
         feed = FileFeed(path, capture, session, arguments.noted_devices(args, session), shares[name])
         sites.setdefault(name, []).append(feed)
-    for feeds in sites.values():
-        run_tui(feeds)
-    return 0
+    return list(sites.values())
 
 
 def _follow(args: argparse.Namespace) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
+from textual import events
 from textual.app import ComposeResult
 from textual.screen import Screen
 from textual.widget import Widget
@@ -71,7 +72,7 @@ class ViewScreen(Screen[None]):
         """The rows."""
         return analyzer(self).store
 
-    def on_resize(self) -> None:
+    def on_resize(self, event: events.Resize) -> None:
         """What was laid out for another width is drawn anew, also where nothing comes any more."""
         self.call_after_refresh(analyzer(self).draw_screen)
 

@@ -9,6 +9,7 @@ from rich.text import Text
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Container, VerticalScroll
+from textual.events import Resize
 from textual.widgets import Static
 
 from dissectors.frame import LineError
@@ -245,7 +246,7 @@ class LineScreen(ViewScreen):
         if shown:
             plot.show(title, curve, least=0)
 
-    def on_resize(self) -> None:
+    def on_resize(self, event: Resize) -> None:
         """Charts take the new width, and stand beside each other where there is room."""
-        self.set_class(self.app.size.width >= BESIDE, "-beside")
-        self.call_after_refresh(self.draw)
+        self.set_class(event.size.width >= BESIDE, "-beside")
+        self._drawn = None

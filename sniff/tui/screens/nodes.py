@@ -21,6 +21,7 @@ from sniff.analysis.health import Health, station_of
 from sniff.analysis.nodes import Node
 from sniff.tui.analyzer import analyzer
 from sniff.tui.charts import spread
+from sniff.tui.hanging import hanging
 from sniff.tui.plain import plain
 from sniff.tui.screens.searching import SearchScreen
 from sniff.tui.still_judging import still_judging
@@ -45,6 +46,10 @@ def _percent(share: float | None) -> str:
 
 def _time(value: int | None) -> str:
     return "–" if value is None else milliseconds(value)
+
+
+LABEL, SIDES = 8, 3
+"""Cells of a label in the details, and of what stands at both sides of them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -242,7 +247,7 @@ class NodesScreen(SearchScreen):
         if node.latency.count:
             text.append("\nanswers after\n", style="dim")
             text.append("\n".join(spread(node.latency, max(10, self.size.width - 34))))
-        return text
+        return hanging(text, self.size.width - SIDES, LABEL)
 
     # -- keys --------------------------------------------------------------------------------------------------
 

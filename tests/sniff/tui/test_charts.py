@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from hypothesis import given
 from hypothesis import strategies as st
+from rich.text import Text
 
 from sniff.tui.charts import BARS, bar, sparkline
+from sniff.tui.hanging import hanging
 
 SHARES = st.floats(0, 1)
 
@@ -35,3 +37,12 @@ def test_bar_lengths() -> None:
     assert bar(1, 4) == "████"
     assert bar(0.5, 4) == "██  "
     assert bar(0.000001, 4) == "▏   "
+
+
+def test_long_lines_go_on_under_their_text() -> None:
+    text = Text("health  0 of 100: nobody answers\nframes  read 72\n\nends    " + "x" * 30)
+    text.stylize("bold", 8, 9)
+    made = hanging(text, 20, 8)
+    begun = ["health  0 of 100:", "        nobody", "        answers", "frames  read 72", "", "ends    " + "x" * 30]
+    assert made.plain.split("\n") == begun
+    assert [(span.start, span.end) for span in made.spans if span.style == "bold"] == [(8, 9)]
