@@ -108,6 +108,10 @@ class Assembly:
             return
         if role is not Role.DATA:
             self.was = Kind.STRANGE if role is None and line.spelling in self._plan.spellings else Kind.TEXT
+            if line.spelling == "one octet" and not line.bare and (line.stamp is not None or line.way):
+                self.was = Kind.TEXT  # the length of what stands below
+                yield from self._flush()
+                self._head(line)
             return
         if line.broken:  # what is left of it would be taken for a frame
             self.was = Kind.STRANGE

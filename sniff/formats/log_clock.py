@@ -169,7 +169,10 @@ def stamp_of(line: str, times: Times = AS_WRITTEN) -> Stamp | None:
         except ValueError:
             continue
         dated = clock.dated or ("number" in match.groupdict() and time >= EPOCH[0] * NS_PER_S)
-        assumed = not dated and match.groupdict().get("said", "") is None
+        groups = match.groupdict()
+        assumed = not dated and (
+            groups.get("said", "") is None or (groups.get("unit", "") or groups.get("unit_behind", "")) is None
+        )
         return Stamp(time, _tick(match), match.start(), match.end(), dated, clock.daily, assumed)
     return None
 

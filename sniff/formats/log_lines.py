@@ -25,6 +25,8 @@ MOST_STAMPS = 3
 MOST_WORDS = 4
 """Between a direction and the octets; with more it is a word of a sentence."""
 
+_NUMBERED = re.compile(r"\s*#\d+[\s:.)]")
+"""A line with its number, which is no remark."""
 _SPACES = re.compile(r"\s{4,}")
 _WORD = re.compile(r"[A-Za-z]{2,}")
 _DIGITS = re.compile(r"\d+")
@@ -95,7 +97,7 @@ def line_of(text: str, base: int = PAIRS_ONLY, rows: bool = True, times: Times =
     text = _SPACES.sub("   ", COLOURS.sub("", text))[:LONGEST].rstrip()
     if not text.strip():
         return EMPTY
-    if text.lstrip().startswith(REMARK):
+    if text.lstrip().startswith(REMARK) and not _NUMBERED.match(text):
         return REMARKED
     stamp, text = _without_stamps(text, times)
     known = shape_of(text)
@@ -146,7 +148,7 @@ def pieces(text: str) -> Iterator[str]:
 def numbers_of(text: str) -> tuple[str, ...]:
     """The numbers of a line that may be octets, as they are written."""
     text = _SPACES.sub("   ", COLOURS.sub("", text))[:LONGEST].rstrip()
-    if text.lstrip().startswith(REMARK):
+    if text.lstrip().startswith(REMARK) and not _NUMBERED.match(text):
         return ()
     text = _without_stamps(text)[1]
     return numbers_in(text) or ((alone,) if (alone := number_in(text)) else ())

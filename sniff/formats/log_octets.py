@@ -206,9 +206,9 @@ SPELLINGS: tuple[Spelling, ...] = (
 _PATTERNS = [(one, one.pattern()) for one in SPELLINGS]
 
 _DIGITS = re.compile(
-    r"(?<![0-9A-Za-z_#.])[0-9A-Fa-f]{1,3}(?![0-9A-Za-z_])"
-    r"(?:(?P<between>[ ]?[,;][ ]?|[:._/|-]|[ \t]{1,2})[0-9A-Fa-f]{1,3}(?![0-9A-Za-z_])"
-    r"(?:(?P=between)[ \t]?[0-9A-Fa-f]{1,3}(?![0-9A-Za-z_]))*)?"
+    r"(?<![0-9A-Za-z_#.])[0-9A-Fa-f]{1,3}(?![0-9A-Za-z_=])"
+    r"(?:(?P<between>[ ]?[,;][ ]?|[:._/|-]|[ \t]{1,2})[0-9A-Fa-f]{1,3}(?![0-9A-Za-z_=])"
+    r"(?:(?P=between)[ \t]?[0-9A-Fa-f]{1,3}(?![0-9A-Za-z_=]))*)?"
 )
 """A run of one to three digits with the same between any two (one space more is a column)."""
 _WORDS = re.compile(
@@ -231,7 +231,11 @@ def octets_in(line: str, base: int = PAIRS_ONLY) -> Run | None:
             if octets:
                 broken = is_broken(line, match.start(), match.end())
                 return Run(match.start(), match.end(), octets, spelling.name, broken)
-    run = _digits(line, base) or _words(line) or _single(line, base)
+    run = _digits(line, base)
+    if run is None or len(run.octets) < SURELY:
+        words = _words(line)
+        run = words if run is None or (words is not None and len(words.octets) > len(run.octets)) else run
+    run = run or _single(line, base)
     if run is None or base == 10:
         return run
     text = line[run.begin : run.end]

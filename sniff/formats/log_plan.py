@@ -78,6 +78,8 @@ class Plan:
         if line.family in self.roles and not line.bare:
             role = self.roles[line.family]
             return Role.NOTHING if role is None and (line.wordy or len(line.octets) < _TELLING) else role
+        if line.spelling == "one octet" and not line.bare:
+            return Role.NOTHING  # behind a label that no line of octets has: a length, an address
         if line.bare or line.way:
             return Role.DATA
         if line.octets in recent:

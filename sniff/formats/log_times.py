@@ -26,6 +26,9 @@ FASTEST = 130_000
 SLOWEST = 60 * NS_PER_S
 """ns from one line to the next, in the middle of a log, from which on a finer unit is meant."""
 
+SLOWEST_ANSWER = 5 * NS_PER_S
+"""The same for the shorter steps, from a request to its answer."""
+
 SLOWEST_OCTET = NS_PER_S // 5
 """The same where each line is an octet: most follow one another in a frame."""
 
@@ -39,7 +42,7 @@ _US, _NS = MS // 1000, 1
 _RISING = 0.9
 _DATE = re.compile(r"(?<![0-9A-Za-z:.])(\d{1,4})([-./])(\d{1,2})\2(\d{1,4})(?=[ T_,]+\d{1,2}:\d{2})")
 BARE = re.compile(
-    r"[\s>*|#]*(?:[^\W\d_]{1,12}(?::\s*|\s+))?[\[({<]?\s*(?P<number>-?\d{1,19}(?:\.\d{1,9}|,\d{3,9})?)"
+    r"[\s>*|#]*(?:[^\W\d_]{1,12}(?:[:=]\s*|\s+))?[\[({<]?\s*(?P<number>-?\d{1,19}(?:\.\d{1,9}|,\d{3,9})?)"
     r"(?=\s*[\])}>]|[:|;,]?[ \t]|[|;,\t:])"
 )
 """A number ahead of a line, behind a direction at most."""
@@ -154,7 +157,9 @@ def unit_of(numbers: Sequence[Decimal], lengths: Sequence[int]) -> tuple[int, bo
     needed = FASTEST * sum(lengths[1:])
     span = numbers[-1] - numbers[0] if numbers else Decimal(0)
     has_parts = any(number != int(number) for number in numbers)
-    units = (NS_PER_S, MS, _US) if has_parts else (MS, _US, _NS)
+    units: tuple[int, ...] = (NS_PER_S, MS, _US) if has_parts else (MS, _US, _NS)
+    if not has_parts and len(steps) >= 2 * LEAST and steps[len(steps) // 4] * MS > SLOWEST_ANSWER:
+        units = (_US, _NS)
     slowest = SLOWEST if sum(lengths) > 2 * len(lengths) else SLOWEST_OCTET
     if not has_parts and span * MS < needed:
         return NS_PER_S, False, False

@@ -965,3 +965,32 @@ add(
     ),
     delta=137_000_000,
 )
+
+
+add(
+    "numbered-with-a-cross",
+    "".join(
+        f"#{i} 10:00:{i:02d}.100 {'WRITE' if i % 2 == 0 else 'READ'}: Length: {len(f)}\n{hx(f)}\n"
+        for i, f in enumerate(FR)
+    ),
+    delta=10**9,
+)
+add(
+    "microseconds-in-brackets",
+    lines(lambda i, f: f"[{i * 137123:>10}] {way(i)}: {hx(f, ' ', '{:02x}')}") * 1,
+    delta=137_123_000,
+)
+add("microseconds-by-name", lines(lambda i, f: f"T={i * 13700123} {way(i)} {hx(f)}"), delta=13_700_123_000)
+add(
+    "numbers-before-digits-without-space",
+    lines(lambda i, f: f"10:00:{i:02d}.100 {way(i)}: slave={f[0] + 16} fc={f[1]} raw={f.hex()}"),
+    delta=10**9,
+)
+add(
+    "station-behind-octets",
+    "".join(
+        "".join(f"{1000 * i + 12 * k}-{1000 * i + 12 * k + 8} uart-1: {b:02X}\n" for k, b in enumerate(f))
+        + f"{1000 * i}-{1000 * i + 9} modbus-1: Slave ID: 17\n"
+        for i, f in enumerate(FR)
+    ),
+)
