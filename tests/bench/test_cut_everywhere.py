@@ -1,4 +1,4 @@
-"""Every small file of `captures/` cut at every octet of its begin and every seventh behind: read or refused, never a traceback, never more than was there."""
+"""Every small file of `captures/` cut anywhere: read or refused, never a traceback, never more than was there."""
 
 from __future__ import annotations
 
