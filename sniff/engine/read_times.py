@@ -132,8 +132,9 @@ def _hurried(reads: ReadTimes, char: int) -> int:
     computer that wakes now sooner, now later. A backlog of less than a character shows in nothing else.
     """
     pairs = [pair for pair in zip(reads.intervals, reads.octets, strict=True) if pair[0] >= 0]
+    least = HURRIED_LEAST + reads.unit
     sooner = [int(FAST * count * char) - interval for interval, count in pairs]
-    sooner = sorted(over for over in sooner if over > HURRIED_LEAST + reads.unit)
+    sooner = sorted(over for over in sooner if over > least)
     if len(sooner) < LEAST_INTERVALS or HURRIED_SHARE * len(sooner) < len(pairs):
         return 0
     return sooner[int(0.95 * (len(sooner) - 1))]

@@ -29,7 +29,7 @@ from sniff.recording.rotated import RotatedCapture
 from sniff.recording.rotation import Rotation
 from sniff.recording.writer import Recorder
 from tests.captures_shared import CAPTURES as SHARED
-from tests.seeds import IS_SEARCH
+from tests.seeds import IS_SEARCH, some
 
 OWN = Path(__file__).parents[2] / "captures"
 LARGE = 1 << 20
@@ -185,7 +185,7 @@ def _captures(folder: Path) -> list[Path]:
     )
 
 
-@pytest.mark.parametrize("path", _captures(OWN), ids=lambda path: path.name)
+@pytest.mark.parametrize("path", some(_captures(OWN), 3), ids=lambda path: path.name)
 def test_own_captures(path: Path) -> None:
     same_file(path)
 
@@ -378,14 +378,14 @@ NAMES = [*(f"bus{suffix}" for suffix in SUFFIXES), "plain.mcap", "250.pcap", "25
 def test_cut_at_any_octet(tmp_path: Path, files: dict[str, bytes], name: str) -> None:
     whole = files[name]
     dice = random.Random(10)
-    ends = [*range(len(whole) - 20, len(whole)), *(dice.randrange(len(whole)) for _ in range(20))]
+    ends = [*range(len(whole) - 10, len(whole)), *(dice.randrange(len(whole)) for _ in range(10))]
     for end in ends:
         path = tmp_path / name
         path.write_bytes(whole[:end])
         same_file(path)
 
 
-@RELAXED
+@settings(RELAXED, max_examples=1000 if IS_SEARCH else 12)
 @given(data=st.data())
 @pytest.mark.parametrize("name", NAMES)
 def test_damaged_octets(tmp_path: Path, files: dict[str, bytes], name: str, data: st.DataObject) -> None:
