@@ -249,7 +249,7 @@ class Senders:
         size = sum(len(senders) * count for senders, count in packets.items()) / total
         usual = min(1.0, size * self.by_name[name].frames / self.frames)  # of any packets
         others = max((rate for other, rate in rates.items() if other != name), default=0.0)
-        if within < 0.9 * total or rates[name] < 2 * others or at_least(within, total, usual) > UNLIKELY:
+        if within < 0.9 * total or rates[name] < 2 * others or len(rates) * at_least(within, total, usual) > UNLIKELY:
             return of_bus
         record = self.by_name[name]
         words += f", {within} of them with its frames: {record.flagged} of {counted(record.frames, 'frame')}, "

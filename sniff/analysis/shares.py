@@ -11,7 +11,7 @@ import math
 from collections.abc import Mapping
 
 UNLIKELY = 1e-3
-"""Chance below which a share is no chance."""
+"""Chance below which a share is no chance: that any of those compared is struck so often by what falls anywhere."""
 
 CLEARLY = 2.5
 """Times the rate of all others."""
@@ -55,7 +55,10 @@ def _standing_out(struck: Struck) -> set[str]:
         others = sum(pair[0] for pair in left.values())
         shares = sum(pair[1] for pair in left.values())
         is_clear = count * shares >= CLEARLY * others * share
-        if not count or not is_clear or at_least(count, count + others, share / (share + shares)) > UNLIKELY:
+        if not count or not is_clear:
+            break
+        chance = at_least(count, count + others, share / (share + shares))
+        if chance * (len(left) + 1 if others else 1) > UNLIKELY:  # any of those struck might have been struck most
             break
         out.add(name)
     return out
