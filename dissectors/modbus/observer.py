@@ -16,6 +16,7 @@ from dissectors.modbus.exchange import is_begin_of
 from dissectors.modbus.functions import BROADCAST, EXCEPTION_BIT, FUNCTIONS, answer_length
 from dissectors.modbus.learned_timing import READ
 from dissectors.modbus.pairing import is_answer
+from dissectors.modbus.ranges import SINGLE_WRITES
 from dissectors.modbus.remembered import (
     BEGIN,
     FINAL_KEPT,
@@ -42,6 +43,7 @@ _NO_WAIT = 10 * MS  # no master gives up so soon: it does not wait for one answe
 _STRAY_KEPT = 600  # octets, more than the longest frame; of more nothing is said
 _EXCESS_KEPT = 256
 _WORDS_KEPT = 16
+_COPIED = SINGLE_WRITES | {8}  # functions whose confirmation is the request again
 _TALKED_OVER = 3  # octets by which an answer must be too long before somebody else has spoken
 _MAY_BE_TORN = (Verdict.DAMAGED_ANSWER, Verdict.DAMAGED_REQUEST, Verdict.NO_RESPONSE)
 _SETTLED_ELSEWHERE = (Verdict.ECHO, Verdict.DATA, Verdict.OPEN, Verdict.BROADCAST)
@@ -134,6 +136,8 @@ class ModbusFindings(Remembered):
             self.repeats.append(transaction.id)
         if verdict is Verdict.ANSWERED_TWICE and transaction.of in self.copied:
             self.seen.asked_twice.add(transaction.start, transaction.response)  # what seemed an echo had its answer
+        elif verdict is Verdict.ANSWERED_TWICE and self._may_be_next_request(transaction, answer):
+            station.undecided.add(transaction.start, transaction.request, transaction.response)
         elif verdict is Verdict.ANSWERED_TWICE and transaction.of not in self.repeats:
             station.twice.add(transaction.start, transaction.response)
             first = self.final.get(transaction.of or 0)
@@ -148,6 +152,12 @@ class ModbusFindings(Remembered):
             self.settle_request(station, transaction, asked, code, answer)
             if verdict is Verdict.DAMAGED_ANSWER and asked.no not in self.no_requests:
                 self._settle_damaged(station, transaction, asked, stray, flaw)
+
+    def _may_be_next_request(self, transaction: Transaction, answer: bytes) -> bool:
+        """Whether a second answer may be the master's next request, the same again: it, or the frame before it, was
+        read too late to say how long the master paused."""
+        row = transaction.response
+        return row is not None and self.late_read >= row - 1 and len(answer) > 1 and answer[1] in _COPIED
 
     def word_exceptions(self, words: ExceptionWords) -> None:
         """See `dissectors.findings.WordsExceptions`."""

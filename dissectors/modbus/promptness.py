@@ -11,15 +11,19 @@ AT_ONCE = 50_000_000
 
 
 class Promptness:
-    """Compares times with what was learnt. `silence`: ns, the shortest time in which a station can begin an answer."""
+    """Compares times with what was learnt. `silence`: ns, the shortest time in which a station can begin an answer;
+    `latency`: ns that the adapter holds octets back, which is in all that was learnt."""
 
-    def __init__(self, learnt: LearnedTiming, silence: int) -> None:
+    def __init__(self, learnt: LearnedTiming, silence: int, latency: int) -> None:
         self._learnt = learnt
         self._silence = silence
+        self._latency = latency
 
     def in_time(self, request: Exchange, seen: Seen) -> bool:
-        """Whether it comes within the time in which that station answers."""
-        return self._learnt.in_time(request.unit, request.pace, request.gap(seen.frame.start))
+        """Whether it may have come within the time in which that station answers: a computer that was busy meanwhile
+        takes it later."""
+        late = max(0, seen.frame.slack - self._latency)
+        return self._learnt.in_time(request.unit, request.pace, request.gap(seen.frame.start - late))
 
     def knows(self, request: Exchange) -> bool:
         """Whether that station's response times are learnt."""

@@ -75,7 +75,7 @@ class ModbusTracker:
         self.learnt = LearnedTiming(timing)
         self._timing = timing
         self._silence = 7 * timing.char // 2 if silence is None else silence
-        self._times = Promptness(self.learnt, self._silence)
+        self._times = Promptness(self.learnt, self._silence, timing.latency)
         self._echoes = Echoes(timing, self._silence, self.learnt)
         self._held = Exchanges(self.learnt, self._echoes)
         self._last_end: int | None = None  # of the newest frame

@@ -252,6 +252,7 @@ CLEAN: tuple[Clean, ...] = (
     # badly heard
     Clean("RTU clean, one write again and again", _one_write()),
     Clean("RTU clean, one write again and again, hidden latency", _one_write(), LATE, hidden_latency),
+    Clean("RTU clean, one write again and again, busy host", _one_write(), hear=busy_host),
     Clean("RTU clean, slow bus, hidden latency", _slow_bus("4800,8E1"), LATE, hidden_latency),
     Clean("RTU clean, very slow bus, hidden latency", _slow_bus("1200,8N1"), LATE, hidden_latency),
     Clean("RTU clean, busy host", modbus, hear=busy_host),
