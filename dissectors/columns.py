@@ -361,3 +361,24 @@ class Kernel(Protocol):
     def __call__(self, reads: Reads, timing: Timing) -> FrameColumns:
         """The frames of all chains, ascending by `offset`, none overlapping another."""
         ...
+
+
+def disjoint(begins: Times, ends: Times) -> Masks:
+    """Which frames to keep so that none overlaps another: of those that do, each that begins behind the last kept.
+
+    `begins`, `ends`: places of their octets, [begin, end), ascending by `begins`.
+    """
+    kept = np.ones(len(begins), bool)
+    if not len(begins):
+        return kept
+    overlapped = np.flatnonzero(begins[1:] < np.maximum.accumulate(ends)[:-1]) + 1
+    before, end = -1, 0
+    for row in overlapped.tolist():
+        if row != before + 1:
+            end = int(ends[row - 1])
+        if begins[row] >= end:
+            end = int(ends[row])
+        else:
+            kept[row] = False
+        before = row
+    return kept

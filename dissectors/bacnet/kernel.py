@@ -22,7 +22,7 @@ from dissectors.bacnet import check_columns as checks
 from dissectors.bacnet.frame_types import HEADER, is_encoded
 from dissectors.bacnet.header_columns import headers
 from dissectors.bacnet.limits import FRAME_ABORT_BITS, MAX_DATA, MAX_ENCODED, MIN_ENCODED, T_FRAME_ABORT_MAX
-from dissectors.columns import CHECKS, DAMAGES, FOUNDS, NONE, FrameColumns, OctetTimes
+from dissectors.columns import CHECKS, DAMAGES, FOUNDS, NONE, FrameColumns, OctetTimes, disjoint
 from dissectors.frame import Check, Damage, Found
 
 if TYPE_CHECKING:
@@ -104,7 +104,7 @@ def _frames(octets: Octets, pauses: Times) -> tuple[Times, Times, npt.NDArray[np
         order = np.argsort(offset, kind="stable")
         offset, length = offset[order], np.concatenate((length, spoilt_length))[order]
         damage = np.concatenate((damage, np.full(len(spoilt), _BAD_HEADER, np.uint8)))[order]
-    kept = _disjoint(offset, offset + length)
+    kept = disjoint(offset, offset + length)
     return (offset, length, damage) if kept.all() else (offset[kept], length[kept], damage[kept])
 
 
@@ -192,24 +192,6 @@ def _any_inside(begins: Times, ends: Times, places: Times) -> Masks:
     """Whether one of the ascending `places` lies inside a stretch, not at its begin."""
     inside: Masks = np.searchsorted(places, ends, "left") > np.searchsorted(places, begins, "right")
     return inside
-
-
-def _disjoint(begins: Times, ends: Times) -> Masks:
-    """Which frames to keep so that none overlaps another: of those that do, each that begins behind the last kept."""
-    kept = np.ones(len(begins), bool)
-    if not len(begins):
-        return kept
-    overlapped = np.flatnonzero(begins[1:] < np.maximum.accumulate(ends)[:-1]) + 1
-    before, end = -1, 0
-    for row in overlapped.tolist():
-        if row != before + 1:
-            end = int(ends[row - 1])
-        if begins[row] >= end:
-            end = int(ends[row])
-        else:
-            kept[row] = False
-        before = row
-    return kept
 
 
 def _touched(begins: Times, lengths: Times, first: Times, beyond: Times) -> Masks:

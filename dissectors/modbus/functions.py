@@ -142,7 +142,7 @@ def answer_length(request: Octets) -> int | None:
         if len(request) < at + 2 + CHECK:
             return None
         return HEAD + 1 + ((request[at] << 8 | request[at + 1]) * bits + 7 >> 3) + CHECK
-    return len(request) if code in _COPIED else ANSWER_LENGTHS.get(code)
+    return len(request) if code in COPIED else ANSWER_LENGTHS.get(code)
 
 
 def _asked(messages: Messages) -> tuple[int, int] | None:
@@ -156,7 +156,9 @@ ITEMS_ASKED: Final[Mapping[int, tuple[int, int]]] = {
 }
 """By function: where the request says how many items its answer holds, and the bits of one."""
 
-_COPIED: Final = frozenset(code for code, messages in MESSAGES.items() if messages.request == messages.response)
+COPIED: Final = frozenset(code for code, messages in MESSAGES.items() if messages.request == messages.response)
+"""Functions whose confirmation looks like the request."""
+
 ANSWER_LENGTHS: Final[Mapping[int, int]] = {
     code: length for code, messages in MESSAGES.items() if (length := fixed_length(messages.response)) is not None
 }

@@ -13,10 +13,9 @@ from dissectors.line import MS
 from dissectors.modbus.asked import AskedRequest
 from dissectors.modbus.envelope import RTU_NAME, readable_adu, rtu_check
 from dissectors.modbus.exchange import is_begin_of
-from dissectors.modbus.functions import BROADCAST, EXCEPTION_BIT, FUNCTIONS, answer_length
+from dissectors.modbus.functions import BROADCAST, COPIED, EXCEPTION_BIT, FUNCTIONS, answer_length
 from dissectors.modbus.learned_timing import READ
 from dissectors.modbus.pairing import is_answer
-from dissectors.modbus.ranges import SINGLE_WRITES
 from dissectors.modbus.remembered import (
     BEGIN,
     FINAL_KEPT,
@@ -43,7 +42,6 @@ _NO_WAIT = 10 * MS  # no master gives up so soon: it does not wait for one answe
 _STRAY_KEPT = 600  # octets, more than the longest frame; of more nothing is said
 _EXCESS_KEPT = 256
 _WORDS_KEPT = 16
-_COPIED = SINGLE_WRITES | {8}  # functions whose confirmation is the request again
 _TALKED_OVER = 3  # octets by which an answer must be too long before somebody else has spoken
 _MAY_BE_TORN = (Verdict.DAMAGED_ANSWER, Verdict.DAMAGED_REQUEST, Verdict.NO_RESPONSE)
 _SETTLED_ELSEWHERE = (Verdict.ECHO, Verdict.DATA, Verdict.OPEN, Verdict.BROADCAST)
@@ -157,7 +155,9 @@ class ModbusFindings(Remembered):
         """Whether a second answer may be the master's next request, the same again: it, or the frame before it, was
         read too late to say how long the master paused."""
         row = transaction.response
-        return row is not None and self.late_read >= row - 1 and len(answer) > 1 and answer[1] in _COPIED
+        if row is None or self.late_read < row - 1 or len(answer) < 2 or answer[1] & EXCEPTION_BIT:
+            return False
+        return answer[1] in COPIED or answer[1] not in FUNCTIONS
 
     def word_exceptions(self, words: ExceptionWords) -> None:
         """See `dissectors.findings.WordsExceptions`."""

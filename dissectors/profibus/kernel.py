@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dissectors.columns import CHECKS, FOUNDS, FrameColumns, OctetTimes, holds_any
+from dissectors.columns import CHECKS, FOUNDS, FrameColumns, OctetTimes, disjoint, holds_any
 from dissectors.frame import Check, Found
 from dissectors.profibus.control import Control
 from dissectors.profibus.framing import SILENCE, STRAY_MOST
@@ -83,7 +83,7 @@ def _columns(octets: Octets, times: OctetTimes, offset: Times, length: Times) ->
 def _candidates(octets: Octets) -> tuple[Times, Times]:
     """Place and length of what may be telegrams, ascending, none overlapping another."""
     offset, length = _sound(octets)
-    kept = _disjoint(offset, offset + length)
+    kept = disjoint(offset, offset + length)
     offset, length = offset[kept], length[kept]
     tokens, shorts = _tokens(octets), np.flatnonzero(octets == SC)
     tokens, shorts = tokens[_outside(tokens, offset, length)], shorts[_outside(shorts, offset, length)]
@@ -133,24 +133,6 @@ def _outside(places: Times, offset: Times, length: Times) -> Masks:
     before = np.searchsorted(offset, places, "right") - 1
     outside: Masks = (before < 0) | (offset[before] + length[before] <= places)
     return outside
-
-
-def _disjoint(begins: Times, ends: Times) -> Masks:
-    """Of telegrams that overlap, those that begin behind the last kept, as one finds them who reads on."""
-    kept = np.ones(len(begins), bool)
-    if not len(begins):
-        return kept
-    overlapped = np.flatnonzero(begins[1:] < np.maximum.accumulate(ends)[:-1]) + 1
-    before, end = -1, 0
-    for row in overlapped.tolist():
-        if row != before + 1:
-            end = int(ends[row - 1])
-        if begins[row] >= end:
-            end = int(ends[row])
-        else:
-            kept[row] = False
-        before = row
-    return kept
 
 
 # What needs others to be believed

@@ -35,10 +35,10 @@ def busy_host(plan: Scenario, seconds: float, tap: TapModel) -> Heard:
     """A computer that now and then, every two seconds or so, does nothing for 50 … 300 ms: what came meanwhile is in
     one read at its end."""
     session, items = simulate(plan, seconds, tap)
-    return session, _held_back(items, Random(f"busy {plan.seed}"))
+    return session, held_back(items, Random(f"busy {plan.seed}"))
 
 
-def _held_back(items: Sequence[Item] | Iterator[Item], dice: Random) -> Iterator[Item]:
+def held_back(items: Sequence[Item] | Iterator[Item], dice: Random) -> Iterator[Item]:
     begins, ends = S, S
     held: list[Chunk] = []
     for item in items:
