@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, Self, runtime_check
 import numpy as np
 import numpy.typing as npt
 
-from dissectors.frame import Check, Damage, Found, Frame, Header, Role
+from dissectors.frame import Check, Damage, FoundBy, Frame, Header, Role
 from dissectors.line import Timing
 from dissectors.tracker import Interval, Transaction, Verdict
 
@@ -41,7 +41,7 @@ NONE = -1
 """An optional number that is not there."""
 
 CHECKS = tuple(Check)
-FOUNDS = tuple(Found)
+FOUNDS = tuple(FoundBy)
 DAMAGES = (None, *Damage)
 ROLES = tuple(Role)
 VERDICTS = tuple(Verdict)

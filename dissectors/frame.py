@@ -52,7 +52,7 @@ class Check(Enum):
     ABSENT = "absent"  # the frame type has none, or the frame ended before it
 
 
-class Found(Enum):
+class FoundBy(Enum):
     """How a frame's limits were found."""
 
     GAP = "gap"  # silence proved at both ends
@@ -139,7 +139,7 @@ class Frame:
     start: int
     end: int
     check: Check
-    found: Found
+    found: FoundBy
     damage: Damage | None = None
     expected: int | None = None
     skipped: int = 0

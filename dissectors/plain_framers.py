@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from dissectors.frame import Check, Chunk, Damage, Event, Found, Frame, Noise, Place, Reason
+from dissectors.frame import Check, Chunk, Damage, Event, FoundBy, Frame, Noise, Place, Reason
 from dissectors.framer import OctetWindow
 from dissectors.line import Timing
 
@@ -97,7 +97,7 @@ class PlainFramer:
         self._skipped += count
         return Noise(taken.octets, taken.start, taken.end, Place.BETWEEN, reason, taken.marks)
 
-    def _frame(self, count: int, found: Found, check: Check, damage: Damage | None, expected: int | None) -> Frame:
+    def _frame(self, count: int, found: FoundBy, check: Check, damage: Damage | None, expected: int | None) -> Frame:
         taken = self._window.take(count)
         skipped, self._skipped = self._skipped, 0
         return Frame(
@@ -138,7 +138,7 @@ class DelimitedFramer(PlainFramer):
                 events.append(self._damaged(again, Damage.RESTARTED))
             elif end > 0:
                 check, damage = form.judge(bytes(octets[: end + 1]))
-                events.append(self._frame(end + 1, Found.DELIMITER, check, damage, None))
+                events.append(self._frame(end + 1, FoundBy.DELIMITER, check, damage, None))
             elif len(octets) >= form.longest:
                 events.append(self._damaged(form.longest, Damage.LONG))
             elif last:
@@ -148,7 +148,7 @@ class DelimitedFramer(PlainFramer):
         return events
 
     def _damaged(self, count: int, damage: Damage) -> Frame:
-        return self._frame(count, Found.DELIMITER, Check.ABSENT, damage, None)
+        return self._frame(count, FoundBy.DELIMITER, Check.ABSENT, damage, None)
 
 
 class LengthFramer(PlainFramer):
@@ -179,7 +179,7 @@ class LengthFramer(PlainFramer):
                 events.append(self._noise(1, Reason.FALSE_START))
             elif self._is_good(0, length):
                 check, _ = form.judge(bytes(octets[:length]))
-                events.append(self._frame(length, Found.LENGTH, check, None, length))
+                events.append(self._frame(length, FoundBy.LENGTH, check, None, length))
             elif len(octets) < length and not last:
                 break
             else:
@@ -197,7 +197,7 @@ class LengthFramer(PlainFramer):
         if len(octets) < length:
             return self._damaged(len(octets), Damage.SHORT, length)
         check, damage = self._form.judge(bytes(octets[:length]))
-        return self._frame(length, Found.LENGTH, check, damage or Damage.CHECK, length)
+        return self._frame(length, FoundBy.LENGTH, check, damage or Damage.CHECK, length)
 
     def _good_inside(self, end: int, last: bool) -> int | None:
         """Where the first good frame begins among the octets 1 … end - 1; 0: nowhere; None: not decided yet."""
@@ -226,4 +226,4 @@ class LengthFramer(PlainFramer):
         return len(stretch) == length and self._form.judge(stretch) == (Check.GOOD, None)
 
     def _damaged(self, count: int, damage: Damage, expected: int | None) -> Frame:
-        return self._frame(count, Found.LENGTH, Check.ABSENT, damage, expected)
+        return self._frame(count, FoundBy.LENGTH, Check.ABSENT, damage, expected)

@@ -10,9 +10,9 @@ from typing import Protocol
 import numpy as np
 
 from dissectors.columns import Codes, FrameColumns, Masks, Numbers, Octets, Times
-from dissectors.readings import How
+from dissectors.readings import Origin
 
-HOWS = tuple(How)
+HOWS = tuple(Origin)
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ from enum import Enum
 from dissectors.frame import Frame
 
 
-class How(Enum):
+class Origin(Enum):
     """How a value came over the line."""
 
     READ = "read"  # a station answered a question
@@ -35,7 +35,7 @@ class Reading:
     address: int
     raw: int | None
     value: int | float | str
-    how: How
+    how: Origin
     part: str = ""
     sure: bool = True
     station: int | None = None

@@ -16,7 +16,7 @@ from dissectors.bacnet.content import oddities
 from dissectors.bacnet.frame_types import CARRIES_NPDU, HEADER, is_encoded
 from dissectors.bacnet.limits import BROADCAST
 from dissectors.fingerprints import LONGEST, fingerprints, gathered
-from dissectors.frame import Check, Found, Frame
+from dissectors.frame import Check, FoundBy, Frame
 
 if TYPE_CHECKING:
     from dissectors.columns import Masks, Octets, Times
@@ -60,7 +60,7 @@ class Read:
         frames = rows.frames
         begin = int(frames.offset[place])
         octets = rows.octets[begin : begin + int(frames.length[place])].tobytes()
-        if oddities(Frame(rows.protocol, octets, 0, 0, Check.GOOD, Found.LENGTH)):
+        if oddities(Frame(rows.protocol, octets, 0, 0, Check.GOOD, FoundBy.LENGTH)):
             return True
         if len(self._plain) >= _KEPT:
             self._plain.clear()

@@ -34,7 +34,7 @@ from dissectors.bacnet.limits import (
 )
 from dissectors.bacnet.mending import after_spoilt_preamble, body_is_good, header_is_good, is_like_header, mended
 from dissectors.checksums import crc8_mstp
-from dissectors.frame import Check, Chunk, Damage, Event, Found, Frame, LineError, Noise, Place, Reason, Repair
+from dissectors.frame import Check, Chunk, Damage, Event, FoundBy, Frame, LineError, Noise, Place, Reason, Repair
 from dissectors.framer import UNKNOWN_SILENCE, OctetWindow, Taken
 from dissectors.line import Timing
 
@@ -212,7 +212,7 @@ class MstpFramer:
             return whole
         return None if ended or not PREAMBLE.startswith(bytes(octets[HEADER : HEADER + 2])) else _WAIT
 
-    def _frame_at(self, at: int, quiet: int, final: bool) -> int | tuple[int, Check, Damage | None, Found]:
+    def _frame_at(self, at: int, quiet: int, final: bool) -> int | tuple[int, Check, Damage | None, FoundBy]:
         """The frame at a 55: (octets, check, damage, found), or how many octets here are noise, or _WAIT."""
         octets = self._window.octets
         stop, ended = self._reach(at, quiet, final)
@@ -243,11 +243,11 @@ class MstpFramer:
 
     def _complete(
         self, at: int, size: int, frame_type: int, length: int, quiet: int, ended: bool
-    ) -> int | tuple[int, Check, Damage | None, Found]:
+    ) -> int | tuple[int, Check, Damage | None, FoundBy]:
         octets, after = self._window.octets, at + size
         found = self._found(at)
         if self._silence_in(at + 1, after, T_FRAME_ABORT_MAX) is not None:
-            found = Found.JOINED
+            found = FoundBy.JOINED
         if after == len(octets):
             if not ended and quiet < self._pause:
                 self._needs_pause = self._pause
@@ -282,7 +282,9 @@ class MstpFramer:
         self._awaited = 0 if self._silences and self._silence_in(at + 1, heard, 0) is not None else end
         return _WAIT
 
-    def _incomplete(self, at: int, size: int, stop: int, ended: bool) -> int | tuple[int, Check, Damage | None, Found]:
+    def _incomplete(
+        self, at: int, size: int, stop: int, ended: bool
+    ) -> int | tuple[int, Check, Damage | None, FoundBy]:
         if not ended:
             return self._await(at, at + size)
         cut = self._good_header(at + HEADER, stop, stop)
@@ -290,7 +292,7 @@ class MstpFramer:
             return cut - at, Check.ABSENT, Damage.RESTARTED, self._found(at)
         return stop - at, Check.ABSENT, Damage.SHORT, self._found(at)
 
-    def _bad_body(self, at: int, size: int, stop: int, ended: bool) -> int | tuple[int, Check, Damage | None, Found]:
+    def _bad_body(self, at: int, size: int, stop: int, ended: bool) -> int | tuple[int, Check, Damage | None, FoundBy]:
         cut = self._good_header(at + HEADER, at + size, stop)
         if cut is None and not ended and self._undecided_header(at + HEADER, at + size, stop):
             self._needs_pause = T_NO_TOKEN
@@ -304,7 +306,7 @@ class MstpFramer:
 
     def _bad_header(
         self, at: int, frame_type: int, length: int, stop: int, ended: bool
-    ) -> int | tuple[int, Check, Damage | None, Found]:
+    ) -> int | tuple[int, Check, Damage | None, FoundBy]:
         octets = self._window.octets
         if octets[at + 2 : at + 4] == PREAMBLE:  # a doubled preamble: the second one counts
             return 2
@@ -394,15 +396,15 @@ class MstpFramer:
                 return True
         return False
 
-    def _found(self, at: int) -> Found:
+    def _found(self, at: int) -> FoundBy:
         if (at or self._skipped) and self._window.silence(at)[0] < self._pause:
-            return Found.SPLIT
-        return Found.LENGTH
+            return FoundBy.SPLIT
+        return FoundBy.LENGTH
 
     # Giving out
 
     def _take_frame(
-        self, size: int, check: Check, damage: Damage | None, found: Found, repair: Repair | None = None
+        self, size: int, check: Check, damage: Damage | None, found: FoundBy, repair: Repair | None = None
     ) -> Frame:
         octets = self._window.octets
         expected = None
@@ -435,7 +437,7 @@ class MstpFramer:
 
     def _take_plain(self, size: int) -> Frame:
         """A good frame without pad, as `_look` has found it."""
-        found = self._found(0) if self._skipped else Found.LENGTH
+        found = self._found(0) if self._skipped else FoundBy.LENGTH
         taken = self._take(size)
         skipped, self._skipped = self._skipped, 0
         self._plain = 0

@@ -19,7 +19,7 @@ from dissectors.bacnet.header import DAMAGE_WORDS, peek
 from dissectors.bacnet.limits import BROADCAST
 from dissectors.bacnet.npdu_columns import bodies
 from dissectors.columns import NONE, ROLES
-from dissectors.frame import Check, Damage, Found, Frame, Role
+from dissectors.frame import Check, Damage, FoundBy, Frame, Role
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -67,7 +67,7 @@ def _service_name(table: dict[int, str]) -> Callable[[int], str]:
 def _role(kind: int, destination: int) -> Role:
     """The role of a frame whose header alone is looked at."""
     octets = PREAMBLE + bytes((kind, destination, 0, 0, 0, 0))
-    return peek(Frame("mstp", octets, 0, 0, Check.BAD, Found.LENGTH, Damage.HEADER)).role
+    return peek(Frame("mstp", octets, 0, 0, Check.BAD, FoundBy.LENGTH, Damage.HEADER)).role
 
 
 _known = Vocabulary()
@@ -237,7 +237,7 @@ def _ask_peek(data: _Data, octets: Octets, offset: Times, length: Times, vocabul
         whole = octets[begin : begin + int(length[row])].tobytes()
         said = known.get(whole)
         if said is None:
-            header = peek(Frame("mstp", whole, 0, 0, Check.GOOD, Found.LENGTH))
+            header = peek(Frame("mstp", whole, 0, 0, Check.GOOD, FoundBy.LENGTH))
             address = NONE if header.address is None else header.address
             said = _CODES[header.role], vocabulary.place(header.kind), address, vocabulary.place(header.error)
             known[whole] = said

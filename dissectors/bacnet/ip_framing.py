@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from dissectors.frame import Check, Damage, Event, Found, Reason
+from dissectors.frame import Check, Damage, Event, FoundBy, Reason
 from dissectors.line import Timing
 from dissectors.plain_framers import SILENCE, PlainFramer
 
@@ -44,9 +44,9 @@ class IpFramer(PlainFramer):
                     begin = len(octets) if last else len(octets) - _HEADER + 1
                 events.append(self._noise(begin, Reason.NO_FRAME))
             elif len(octets) >= size:
-                events.append(self._frame(size, Found.LENGTH, Check.ABSENT, None, size))
+                events.append(self._frame(size, FoundBy.LENGTH, Check.ABSENT, None, size))
             elif last:
-                events.append(self._frame(len(octets), Found.LENGTH, Check.ABSENT, Damage.SHORT, size))
+                events.append(self._frame(len(octets), FoundBy.LENGTH, Check.ABSENT, Damage.SHORT, size))
             else:
                 break
         return events

@@ -23,7 +23,7 @@ from dissectors.bacnet.frame_types import HEADER, is_encoded
 from dissectors.bacnet.header_columns import headers
 from dissectors.bacnet.limits import FRAME_ABORT_BITS, MAX_DATA, MAX_ENCODED, MIN_ENCODED, T_FRAME_ABORT_MAX
 from dissectors.columns import CHECKS, DAMAGES, FOUNDS, NONE, FrameColumns, OctetTimes, disjoint
-from dissectors.frame import Check, Damage, Found
+from dissectors.frame import Check, Damage, FoundBy
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 _PREAMBLE = np.uint64(0xFF55)
 _ENCODED = np.array([is_encoded(kind) for kind in range(256)])
 _GOOD, _BAD = CHECKS.index(Check.GOOD), CHECKS.index(Check.BAD)
-_LENGTH = FOUNDS.index(Found.LENGTH)
+_LENGTH = FOUNDS.index(FoundBy.LENGTH)
 _BAD_DATA, _BAD_HEADER = DAMAGES.index(Damage.CHECK), DAMAGES.index(Damage.HEADER)
 _DAMAGES = {_BAD_DATA: Damage.CHECK, _BAD_HEADER: Damage.HEADER}
 _CRC = 2

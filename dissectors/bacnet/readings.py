@@ -15,7 +15,7 @@ from dissectors.bacnet.frame_types import HEADER
 from dissectors.bacnet.message import Message
 from dissectors.bacnet.values import BitString, ConstructedValue, Double, Enumerated, ObjectId, show
 from dissectors.frame import Frame
-from dissectors.readings import How, Reading
+from dissectors.readings import Origin, Reading
 
 PRESENT_VALUE = 85
 _READ, _READ_MULTIPLE, _WRITE, _WRITE_MULTIPLE = 12, 14, 15, 16
@@ -66,7 +66,7 @@ def _asked(record: ConstructedValue, station: int) -> Iterator[Reading]:
         if isinstance(thing, ObjectId):
             space, _, number = str(thing).partition(",")
             part = _part_of(one, one.get("property-array-index"))
-            yield Reading(space, int(number), None, "", How.READ, part, station=station)
+            yield Reading(space, int(number), None, "", Origin.READ, part, station=station)
 
 
 def _part_of(record: ConstructedValue, index: int | None) -> str:
@@ -97,10 +97,10 @@ def _told(message: Message) -> Iterator[Reading]:
         return
 
 
-Item = tuple[ObjectId, ConstructedValue, Any, How]
+Item = tuple[ObjectId, ConstructedValue, Any, Origin]
 
 
-def _property(how: How) -> Any:
+def _property(how: Origin) -> Any:
     def tell(record: ConstructedValue) -> Iterator[Item]:
         yield record["object-identifier"], record, record["property-value"], how
 
@@ -112,24 +112,24 @@ def _read_multiple(record: ConstructedValue) -> Iterator[Item]:
         for item in result.get("list-of-results", ()):
             ((kind, value),) = item["read-result"].entries
             if kind == "property-value":
-                yield result["object-identifier"], item, value, How.READ
+                yield result["object-identifier"], item, value, Origin.READ
 
 
 def _write_multiple(record: ConstructedValue) -> Iterator[Item]:
     for spec in record["list-of-write-access-specs"]:
         for item in spec["list-of-properties"]:
-            yield spec["object-identifier"], item, item["value"], How.WRITE
+            yield spec["object-identifier"], item, item["value"], Origin.WRITE
 
 
 def _change(record: ConstructedValue) -> Iterator[Item]:
     for item in record["list-of-values"]:
-        yield record["monitored-object-identifier"], item, item["value"], How.REPORT
+        yield record["monitored-object-identifier"], item, item["value"], Origin.REPORT
 
 
 _TELLERS: dict[tuple[int, int], Any] = {
-    (PduType.COMPLEX_ACK, _READ): _property(How.READ),
+    (PduType.COMPLEX_ACK, _READ): _property(Origin.READ),
     (PduType.COMPLEX_ACK, _READ_MULTIPLE): _read_multiple,
-    (PduType.CONFIRMED_REQUEST, _WRITE): _property(How.WRITE),
+    (PduType.CONFIRMED_REQUEST, _WRITE): _property(Origin.WRITE),
     (PduType.CONFIRMED_REQUEST, _WRITE_MULTIPLE): _write_multiple,
     (PduType.CONFIRMED_REQUEST, _CONFIRMED_COV): _change,
     (PduType.UNCONFIRMED_REQUEST, _UNCONFIRMED_COV): _change,
@@ -159,7 +159,7 @@ def _parts(record: ConstructedValue, value: Any) -> Iterator[tuple[int | None, A
 
 
 def _reading(
-    thing: ObjectId, record: ConstructedValue, index: int | None, value: Any, how: How, station: int | None
+    thing: ObjectId, record: ConstructedValue, index: int | None, value: Any, how: Origin, station: int | None
 ) -> Reading | None:
     space, _, number = str(thing).partition(",")
     part = _part_of(record, index)

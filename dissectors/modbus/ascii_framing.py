@@ -22,7 +22,7 @@ from binascii import unhexlify
 from typing import TYPE_CHECKING, Final
 
 from dissectors.checksums import sum8
-from dissectors.frame import Check, Chunk, Damage, Event, Flaw, Found, Frame, LineError, Noise, Reason, Repair
+from dissectors.frame import Check, Chunk, Damage, Event, Flaw, FoundBy, Frame, LineError, Noise, Reason, Repair
 from dissectors.framer import UNKNOWN_SILENCE, OctetWindow
 from dissectors.line import NS_PER_S, Timing
 from dissectors.modbus.damaged import ODD_LENGTH, Side, noise_place, predicted
@@ -279,7 +279,7 @@ class AsciiFramer:
                 start,
                 end,
                 check,
-                Found.DELIMITER,
+                FoundBy.DELIMITER,
                 damage,
                 expected,
                 skipped,

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from dissectors.columns import CHECKS, FOUNDS, NONE, FrameColumns, OctetTimes, holds_any
-from dissectors.frame import Check, Found
+from dissectors.frame import Check, FoundBy
 from dissectors.modbus.ascii_framing import LONGEST_SILENCE, MAX_CHARACTERS
 from dissectors.modbus.candidates import SHORT_FRAME
 from dissectors.modbus.header_columns import Words, headers
@@ -31,7 +31,7 @@ _DIAGNOSTICS: Final = 0x08
 _LEAST: Final = 1 + 2 * 3 + 2  # ':' unit function LRC CR LF
 _IS_UPPER = np.isin(np.arange(256), np.frombuffer(b"0123456789ABCDEF", np.uint8))
 _GOOD = np.uint8(CHECKS.index(Check.GOOD))
-_DELIMITER = np.uint8(FOUNDS.index(Found.DELIMITER))
+_DELIMITER = np.uint8(FOUNDS.index(FoundBy.DELIMITER))
 
 
 def kernel(reads: Reads, timing: Timing) -> FrameColumns:

@@ -17,7 +17,7 @@ from dissectors.modbus.layout import MESSAGES, SUB_FUNCTIONS
 from dissectors.modbus.notation import Field, Group, Means, Message
 from dissectors.modbus.readings import readings
 from dissectors.modbus.text import printable
-from dissectors.readings import How
+from dissectors.readings import Origin
 
 Value = int | float | str
 Fields = dict[str, Value]
@@ -52,7 +52,7 @@ def fields(frame: Frame, role: Role) -> Fields:
 
 def answer_fields(request: Frame, answer: Frame) -> Fields:
     """The numbers of the registers or bits that an answer holds, which only its request tells."""
-    numbers = [one.address for one in readings(request, answer) if one.how is How.READ]
+    numbers = [one.address for one in readings(request, answer) if one.how is Origin.READ]
     if not numbers or not answer.ok:
         return {}
     is_bit = readable_adu(answer)[1] in (0x01, 0x02)

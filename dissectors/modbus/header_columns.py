@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from dissectors.columns import NONE, ROLES
-from dissectors.frame import Check, Damage, Found, Frame, Role
+from dissectors.frame import Check, Damage, FoundBy, Frame, Role
 from dissectors.modbus.envelope import RTU_NAME
 from dissectors.modbus.functions import BROADCAST, EXCEPTION_BIT, FUNCTIONS, Function, is_open_length
 from dissectors.modbus.header import exception_name, peek_rtu
@@ -234,7 +234,7 @@ def _peeked(whole: bytes, good: bool, names: Words) -> tuple[int, ...]:
         0,
         0,
         Check.GOOD if good else Check.BAD,
-        Found.GAP,
+        FoundBy.GAP,
         None if good else Damage.CHECK,
         expected,
     )

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from dissectors.columns import CHECKS, DAMAGES, FOUNDS, FrameColumns, OctetTimes
-from dissectors.frame import Check, Damage, Found
+from dissectors.frame import Check, Damage, FoundBy
 from dissectors.modbus import damaged_columns, run_columns
 from dissectors.modbus.header_columns import Words, headers
 from dissectors.modbus.length_columns import PADDING
@@ -40,7 +40,7 @@ BLOCK: Final = 1 << 20
 _AT_ONCE: Final = 1 << 16  # rows of which the columns are made together
 _GOOD, _BAD = (np.uint8(CHECKS.index(check)) for check in (Check.GOOD, Check.BAD))
 _CHECK = np.uint8(DAMAGES.index(Damage.CHECK))
-_GAP, _LENGTH, _SPLIT = (np.uint8(FOUNDS.index(found)) for found in (Found.GAP, Found.LENGTH, Found.SPLIT))
+_GAP, _LENGTH, _SPLIT = (np.uint8(FOUNDS.index(found)) for found in (FoundBy.GAP, FoundBy.LENGTH, FoundBy.SPLIT))
 
 
 def kernel(reads: Reads, timing: Timing) -> FrameColumns:

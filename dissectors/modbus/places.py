@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dissectors.frame import Frame
 from dissectors.meaning import Span
 from dissectors.modbus.envelope import ASCII_NAME, adu
-from dissectors.readings import How, Reading
+from dissectors.readings import Origin, Reading
 
 _WORDS = {"holding": "Register", "input": "Input register", "coil": "Coil", "discrete": "Discrete input"}
 _FIRST = {"holding": 4, "input": 3}
@@ -35,7 +35,7 @@ def spans(frame: Frame, readings: Sequence[Reading]) -> list[Span | None]:
     octets = adu(frame)
     if len(octets) < 2 or not readings:
         return [None] * len(readings)
-    begin = _ANSWERED_AT if readings[0].how is How.READ else _WRITTEN_AT.get(octets[1], len(octets))
+    begin = _ANSWERED_AT if readings[0].how is Origin.READ else _WRITTEN_AT.get(octets[1], len(octets))
     step = 0 if octets[1] == 0x05 else 1
     found: list[Span | None] = []
     for place, reading in enumerate(readings):

@@ -6,11 +6,11 @@ import numpy as np
 
 from dissectors.columns import FrameColumns, Masks, Octets, Times
 from dissectors.reading_columns import HOWS, ReadingColumns
-from dissectors.readings import How
+from dissectors.readings import Origin
 
 _SPACES = ("holding", "input")
 _CHECK, _HEAD = 2, 6  # octets of the CRC; of unit, function, two words
-_READ, _WRITE = HOWS.index(How.READ), HOWS.index(How.WRITE)
+_READ, _WRITE = HOWS.index(Origin.READ), HOWS.index(Origin.WRITE)
 
 
 def reading_columns(asked: FrameColumns, answered: FrameColumns, has_answer: Masks, octets: Octets) -> ReadingColumns:

@@ -10,7 +10,7 @@ from dissectors.modbus.functions import EXCEPTION_BIT, ITEMS_ASKED
 from dissectors.modbus.layout import MESSAGES
 from dissectors.modbus.notation import Means, first, last
 from dissectors.modbus.ranges import AGREEMENTS
-from dissectors.readings import How, Reading
+from dissectors.readings import Origin, Reading
 
 _COIL_ON = 0xFF00
 _MOST_ASKED = 2000  # the standard's limit for bits
@@ -38,7 +38,7 @@ def readings(request: Frame | None, response: Frame | None) -> tuple[Reading, ..
     octets = answer[3:]
     if len(octets) < 2 * count or not answer[2:] or answer[2] != 2 * count:
         return ()
-    return (*_written(asked), *_registers(space, begin, octets[: 2 * count], How.READ))
+    return (*_written(asked), *_registers(space, begin, octets[: 2 * count], Origin.READ))
 
 
 def asks(frame: Frame) -> tuple[Reading, ...]:
@@ -48,7 +48,7 @@ def asks(frame: Frame) -> tuple[Reading, ...]:
         return ()
     at, _ = ITEMS_ASKED[octets[1]]
     space, begin, count = MESSAGES[octets[1]].space, _word(octets, at - 2), min(_word(octets, at), _MOST_ASKED)
-    return tuple(Reading(space, begin + step & 0xFFFF, None, "", How.READ) for step in range(count))
+    return tuple(Reading(space, begin + step & 0xFFFF, None, "", Origin.READ) for step in range(count))
 
 
 def refusal(frame: Frame) -> tuple[str, int] | None:
@@ -69,8 +69,8 @@ def _written(octets: bytes) -> tuple[Reading, ...]:
     quantity, count = _word(octets, agreement.quantity_at), octets[agreement.count_at]
     data = octets[agreement.count_at + 1 :]
     if agreement.bits == 1:
-        return _bits(space, begin, quantity, data[:count], How.WRITE)
-    return _registers(space, begin, data, How.WRITE) if len(data) == count == 2 * quantity else ()
+        return _bits(space, begin, quantity, data[:count], Origin.WRITE)
+    return _registers(space, begin, data, Origin.WRITE) if len(data) == count == 2 * quantity else ()
 
 
 _SINGLE = {
@@ -85,17 +85,17 @@ _SINGLE = {
 
 def _single(octets: bytes, space: str, at: int, value_at: int, among: Collection[int] | None) -> tuple[Reading, ...]:
     if among is None:
-        return _registers(space, _word(octets, at), octets[value_at : value_at + 2], How.WRITE)
+        return _registers(space, _word(octets, at), octets[value_at : value_at + 2], Origin.WRITE)
     value = _word(octets, value_at)
-    return (Reading(space, _word(octets, at), value, int(value == _COIL_ON), How.WRITE),) if value in among else ()
+    return (Reading(space, _word(octets, at), value, int(value == _COIL_ON), Origin.WRITE),) if value in among else ()
 
 
-def _registers(space: str, first: int, octets: bytes, how: How) -> tuple[Reading, ...]:
+def _registers(space: str, first: int, octets: bytes, how: Origin) -> tuple[Reading, ...]:
     values = (_word(octets, at) for at in range(0, len(octets) - 1, 2))
     return tuple(Reading(space, first + step & 0xFFFF, value, value, how) for step, value in enumerate(values))
 
 
-def _bits(space: str, first: int, count: int, octets: bytes, how: How = How.READ) -> tuple[Reading, ...]:
+def _bits(space: str, first: int, count: int, octets: bytes, how: Origin = Origin.READ) -> tuple[Reading, ...]:
     if len(octets) != (count + 7) // 8:
         return ()
     values = (octets[step >> 3] >> (step & 7) & 1 for step in range(count))

@@ -6,7 +6,7 @@ framing.py decides what is a frame; here is what it knows, and what becomes of i
 from __future__ import annotations
 
 from dissectors.checksums import crc16_modbus
-from dissectors.frame import Check, Damage, Event, Flaw, Found, Frame, Noise, Place, Reason, Repair
+from dissectors.frame import Check, Damage, Event, Flaw, FoundBy, Frame, Noise, Place, Reason, Repair
 from dissectors.framer import UNKNOWN_SILENCE, OctetWindow
 from dissectors.line import Timing
 from dissectors.modbus.best_split import LIKELY, PROVED
@@ -257,19 +257,19 @@ class RtuWindow:
         if self.cuts:
             self.cuts = [cut for cut in self.cuts if cut > self.base]
 
-    def _found(self, count: int) -> Found:
+    def _found(self, count: int) -> FoundBy:
         base, ends = self.base, self.end == count
         self.start_bits()
         if self.cuts:
             if self.inside(base, base + count):
-                return Found.JOINED
+                return FoundBy.JOINED
             end_proved = (ends and self.end_proved) or base + count in self.cuts
         else:
             end_proved = ends and self.end_proved
         if end_proved and self._start_proved:
-            return Found.GAP
+            return FoundBy.GAP
         touched = self._octets.gap(0) < self._t15 or (not ends and self._octets.gap(count) < self._t15)
-        return Found.SPLIT if touched else Found.LENGTH
+        return FoundBy.SPLIT if touched else FoundBy.LENGTH
 
     def _side_before(self) -> Side:
         return Side.SILENCE if self.start_bits() == PROVED else self._before

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dissectors.frame import Check, Chunk, Damage, Event, Found, Frame, LineError, Noise, Place, Reason
+from dissectors.frame import Check, Chunk, Damage, Event, FoundBy, Frame, LineError, Noise, Place, Reason
 from dissectors.framer import OctetWindow, Taken
 from dissectors.line import NS_PER_S, Timing
 from dissectors.n2.commands import Command, expected_length, parse_command
@@ -231,7 +231,7 @@ class N2Framer:
         self._flush_noise(self._place_before_frame())
         taken = self._window.take(len(octets))
         self._seams = [seam - len(octets) for seam in self._seams]
-        found = Found.SPLIT if piece.split else Found.JOINED if joined else Found.DELIMITER
+        found = FoundBy.SPLIT if piece.split else FoundBy.JOINED if joined else FoundBy.DELIMITER
         told = octets if piece.repair is None else piece.repair.octets
         is_command = told[0] == COMMAND
         self._out.append(

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dissectors.columns import CHECKS, FOUNDS, NONE, ROLES, FrameColumns, OctetTimes, holds_any
-from dissectors.frame import Check, Found, Frame
+from dissectors.frame import Check, FoundBy, Frame
 from dissectors.n2.commands import expected_length
 from dissectors.n2.envelope import ANSWER, COMMAND, CR, REFUSAL
 from dissectors.n2.framing import MAX_LENGTH
@@ -89,7 +89,7 @@ def _columns(octets: Octets, times: OctetTimes, offset: Times, length: Times, ch
         start=times.start(offset),
         end=times.end(offset + (length - 1)),
         check=np.where(checked, np.uint8(CHECKS.index(Check.GOOD)), np.uint8(CHECKS.index(Check.ABSENT))),
-        found=np.full(count, FOUNDS.index(Found.DELIMITER), np.uint8),
+        found=np.full(count, FOUNDS.index(FoundBy.DELIMITER), np.uint8),
         damage=np.zeros(count, np.uint8),
         source=np.full(count, NONE, np.int16),
         count=np.full(count, NONE, np.int32),
@@ -127,7 +127,7 @@ class _Said:
             column[rows[1:]] = column[rows[:1]]
 
     def _told(self, whole: bytes) -> tuple[int, ...]:
-        header = peek(Frame("n2", whole, 0, 0, Check.GOOD, Found.DELIMITER))
+        header = peek(Frame("n2", whole, 0, 0, Check.GOOD, FoundBy.DELIMITER))
         expected = expected_length(whole) if whole[0] == COMMAND else None
         numbers = (expected, header.destination, header.function, header.address)
         said = _ROLES[header.role], self._place(header.kind), self._place(header.error)

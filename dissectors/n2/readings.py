@@ -13,7 +13,7 @@ from dissectors.n2.commands import Command, parse_command
 from dissectors.n2.header import error_code
 from dissectors.n2.interpretation import ChangeOfState, Interpretation, interpret
 from dissectors.n2.objects import REGIONS, Encoding, attribute_name, is_hex, region_name
-from dissectors.readings import How, Reading
+from dissectors.readings import Origin, Reading
 
 _STATE_BIT = 6
 _BINARY = (2, 4)
@@ -46,7 +46,7 @@ def asks(frame: Frame) -> tuple[Reading, ...]:
     if command.type.kind != "read-attribute" or command.region is None or command.object is None:
         return ()
     part = part_of(command.region, command.attribute)
-    return (Reading(region_name(command.region), command.object, None, "", How.READ, part),)
+    return (Reading(region_name(command.region), command.object, None, "", Origin.READ, part),)
 
 
 def refusal(frame: Frame) -> tuple[str, int] | None:
@@ -62,7 +62,7 @@ def _change(record: ChangeOfState) -> Reading:
     value: int | float = record.status >> _STATE_BIT & 1
     if record.value is not None:
         raw, value = _raw(record.value), record.value
-    return Reading(region_name(record.region), record.object, raw, value, How.REPORT, sure=False)
+    return Reading(region_name(record.region), record.object, raw, value, Origin.REPORT, sure=False)
 
 
 def _commanded(command: Command) -> tuple[Reading, ...]:
@@ -73,8 +73,8 @@ def _commanded(command: Command) -> tuple[Reading, ...]:
     space, part = region_name(command.region), part_of(command.region, command.attribute)
     if command.attribute is not None and command.region in _BINARY and not part and isinstance(value, int):
         state = value >> _STATE_BIT & 1  # a write to the attribute writes the octet that a read of it answers
-        return (Reading(space, command.object, value, state, How.WRITE, sure=False),)
-    return (Reading(space, command.object, _raw(value), value, How.WRITE, part),)
+        return (Reading(space, command.object, value, state, Origin.WRITE, sure=False),)
+    return (Reading(space, command.object, _raw(value), value, Origin.WRITE, part),)
 
 
 def _read(told: Interpretation) -> tuple[Reading, ...]:
@@ -83,8 +83,8 @@ def _read(told: Interpretation) -> tuple[Reading, ...]:
     part, value = part_of(told.region, told.attribute), told.value
     space = region_name(told.region)
     if told.region in _BINARY and not part and isinstance(value, int):
-        return (Reading(space, told.object, value, value >> _STATE_BIT & 1, How.READ, sure=False),)
-    return (Reading(space, told.object, _raw(value), value, How.READ, part),)
+        return (Reading(space, told.object, value, value >> _STATE_BIT & 1, Origin.READ, sure=False),)
+    return (Reading(space, told.object, _raw(value), value, Origin.READ, part),)
 
 
 def part_of(region: int, attribute: int | None) -> str:

@@ -18,7 +18,7 @@ import re
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from dissectors.frame import Check, Event, Found, Frame, LineError, Reason
+from dissectors.frame import Check, Event, FoundBy, Frame, LineError, Reason
 from dissectors.line import MS, Timing
 from dissectors.plain_framers import PlainFramer
 from dissectors.profibus.control import REQUEST
@@ -186,7 +186,7 @@ class ProfibusFramer(PlainFramer):
 
     def _telegram(self, length: int) -> Frame:
         is_checked = length > 3
-        found, check = (Found.DELIMITER, Check.GOOD) if is_checked else (Found.LENGTH, Check.ABSENT)
+        found, check = (FoundBy.DELIMITER, Check.GOOD) if is_checked else (FoundBy.LENGTH, Check.ABSENT)
         frame = self._frame(length, found, check, None, length)
         self._learn(frame.octets)
         self._is_proved |= is_checked
@@ -207,7 +207,7 @@ class ProfibusFramer(PlainFramer):
         meant = octets[: told.count] if told.repair is None else told.repair.octets
         control = parse(meant).control
         self._is_open = control is not None and control.wants_answer
-        frame = self._frame(told.count, Found.DELIMITER, told.check, told.damage, told.expected)
+        frame = self._frame(told.count, FoundBy.DELIMITER, told.check, told.damage, told.expected)
         return frame if told.repair is None else replace(frame, repair=told.repair)
 
     def _learn(self, octets: bytes) -> None:

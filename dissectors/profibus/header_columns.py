@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dissectors.columns import NONE, ROLES
-from dissectors.frame import Check, Found, Frame, Role
+from dissectors.frame import Check, FoundBy, Frame, Role
 from dissectors.profibus.control import Control
 from dissectors.profibus.header import peek
 from dissectors.profibus.telegram import FIXED, HIGHEST, SC, SD2, SD4
@@ -100,7 +100,7 @@ def _count(whole: bytes) -> int:
 
 
 def _frame(whole: bytes) -> Frame:
-    return Frame("profibus", whole, 0, 0, Check.GOOD, Found.DELIMITER)
+    return Frame("profibus", whole, 0, 0, Check.GOOD, FoundBy.DELIMITER)
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dissectors.columns import CHECKS, FOUNDS, FrameColumns, OctetTimes, disjoint, holds_any
-from dissectors.frame import Check, Found
+from dissectors.frame import Check, FoundBy
 from dissectors.profibus.control import Control
 from dissectors.profibus.framing import SILENCE, STRAY_MOST
 from dissectors.profibus.header_columns import headers
@@ -61,7 +61,7 @@ def _columns(octets: Octets, times: OctetTimes, offset: Times, length: Times) ->
         start=times.start(offset),
         end=times.end(offset + (length - 1)),
         check=np.where(checked, np.uint8(CHECKS.index(Check.GOOD)), np.uint8(CHECKS.index(Check.ABSENT))),
-        found=np.where(checked, np.uint8(FOUNDS.index(Found.DELIMITER)), np.uint8(FOUNDS.index(Found.LENGTH))),
+        found=np.where(checked, np.uint8(FOUNDS.index(FoundBy.DELIMITER)), np.uint8(FOUNDS.index(FoundBy.LENGTH))),
         damage=np.zeros(count, np.uint8),
         expected=length.astype(np.int32),
         source=said.source,

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 from dissectors.profiles.model import Entry, Kind, Profile, Role
-from dissectors.readings import How, Reading
+from dissectors.readings import Origin, Reading
 
 MOST_WORDS = 128
 """Values that one line of words names: all registers of one read."""
@@ -59,7 +59,7 @@ class Value:
     words: str = ""
 
     @property
-    def how(self) -> How:
+    def how(self) -> Origin:
         return self.reading.how
 
     @property
@@ -76,7 +76,7 @@ def decode(profile: Profile | None, readings: Sequence[Reading]) -> tuple[Value,
     values: list[Value] = []
     for reading in readings:
         entry = None if reading.part else profile.at(reading.space, reading.address)
-        is_kept = reading.how is How.READ or not profile.forbids(reading.space, reading.address, reading.raw)
+        is_kept = reading.how is Origin.READ or not profile.forbids(reading.space, reading.address, reading.raw)
         if entry is not None and entry.reserved and is_kept:
             continue  # read or written along with its neighbours
         if entry is None or entry.reserved:
@@ -195,7 +195,7 @@ def _values(entry: Entry, reading: Reading, raws: Sequence[int | None]) -> Itera
     words = ""
     if isinstance(value, int) or (isinstance(value, float) and value.is_integer()):
         words = state_words(entry, int(value))
-        if not words and entry.states and reading.how is How.READ:  # a password may be written where a state is read
+        if not words and entry.states and reading.how is Origin.READ:  # a password may be written where a state is read
             words = f"code {int(value)}" + (", reserved" if int(value) in entry.reserved_codes else "")
     if raw is not None and (entry.bits or entry.parts):
         words = bit_words(entry, raw)

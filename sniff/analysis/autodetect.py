@@ -89,7 +89,7 @@ class Tally:
 
 
 @dataclass(frozen=True, slots=True)
-class Reading:
+class Candidature:
     """The best protocol of one candidate. `bits`: evidence for it less what speaks against it."""
 
     line: LineSettings
@@ -140,11 +140,11 @@ class Evidence:
             if deadline is not None and deadline <= now:
                 self._take(name, engine.advance(now))
 
-    def best(self) -> Reading:
+    def best(self) -> Candidature:
         """The reading with the most evidence."""
         name, tally = max(self.tallies.items(), key=lambda pair: (pair[1].bits, pair[1].octets))
         against = _NOISE_BITS * max(0, self.octets - tally.octets) + _MARK_BITS * self.marked
-        return Reading(
+        return Candidature(
             self.line,
             name,
             tally.bits - against,
@@ -228,7 +228,7 @@ class Outcome:
     """What a search came to. `reading`: None when silent. `tried`: how many settings heard octets."""
 
     ending: Ending
-    reading: Reading | None
+    reading: Candidature | None
     tried: int
     octets: int
     cannot_tell: tuple[str, ...] = ()
@@ -246,8 +246,8 @@ class Detecting:
     latency: int = 0
     reports: tuple[str, ...] | None = None
     octets: int = 0
-    found: Reading | None = None
-    best: Reading | None = None
+    found: Candidature | None = None
+    best: Candidature | None = None
     _index: int = 0
     _round: int = 0
     _tried: set[LineSettings] = field(default_factory=set)
@@ -344,7 +344,7 @@ class Detecting:
             self._was_hinted.clear()
         return self.lines[self._index]
 
-    def _cannot_tell(self, reading: Reading | None) -> tuple[str, ...]:
+    def _cannot_tell(self, reading: Candidature | None) -> tuple[str, ...]:
         if reading is None:
             return ()
         line = reading.line
@@ -360,7 +360,7 @@ class Detecting:
         return tuple(said)
 
 
-def sureness(reading: Reading) -> str:
+def sureness(reading: Candidature) -> str:
     """How sure it is, in words: "chance would give this once in a million times"."""
     bits = max(0.0, reading.bits)
     return "chance would not give this" if bits >= 40 else f"chance gives this once in {10 ** math.floor(bits * 0.301)}"

@@ -17,7 +17,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from dissectors.findings import Finding, Rule, merged, with_consequences
-from sniff.analysis.plain import plain
+from sniff.analysis.sanitizing import sanitized
 
 RUBBISH_LEAST = 60  # octets before "hardly anything is a frame" is said
 RUBBISH_TOLD = 40  # the same where it is known what they are
@@ -128,9 +128,9 @@ def _harmless(finding: Finding) -> Finding:
     """The same finding; what its words quote from a file or an adapter may be hostile."""
     return replace(
         finding,
-        subject=plain(finding.subject),
-        seen=plain(finding.seen),
-        means=plain(finding.means),
-        next=plain(finding.next),
-        cause=None if finding.cause is None else (finding.cause[0], plain(finding.cause[1])),
+        subject=sanitized(finding.subject),
+        seen=sanitized(finding.seen),
+        means=sanitized(finding.means),
+        next=sanitized(finding.next),
+        cause=None if finding.cause is None else (finding.cause[0], sanitized(finding.cause[1])),
     )

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from dissectors import registry
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
-from sniff.analysis.autodetect import COVERED_LEAST, FOUND_FRAMES, LIKELY_BITS, Evidence, Reading
+from sniff.analysis.autodetect import COVERED_LEAST, FOUND_FRAMES, LIKELY_BITS, Candidature, Evidence
 from sniff.analysis.slower_bus import slower_by
 
 SAMPLE_OCTETS = 3000
@@ -80,7 +80,7 @@ def _fits(sample: Sequence[Chunk], line: LineSettings, latency: int, protocol: s
     yield from _by_rate(sample, line)
 
 
-def _as_protocol(found: Reading, how: str, means: str, settle: str) -> Fit:
+def _as_protocol(found: Candidature, how: str, means: str, settle: str) -> Fit:
     checks = f"{found.frames} frames hold {found.covered:.0%} of {found.octets} octets"
     return Fit(f"{how} as {found.protocol} with good checks ({checks})", means, settle)
 
@@ -95,7 +95,7 @@ def _evidence(sample: Sequence[Chunk], line: LineSettings, latency: int) -> Evid
     return evidence
 
 
-def _convincing(evidence: Evidence) -> Reading | None:
+def _convincing(evidence: Evidence) -> Candidature | None:
     reading = evidence.best()
     enough = reading.frames >= FOUND_FRAMES and reading.covered >= COVERED_LEAST and reading.bits >= LIKELY_BITS
     return reading if enough else None

@@ -15,7 +15,7 @@ from typing import Any
 from dissectors.frame import Frame, Role
 from dissectors.manifest import Dissector
 from dissectors.meaning import Node
-from sniff.analysis.plain import plain
+from sniff.analysis.sanitizing import sanitized
 
 DEEPEST = 20
 """Layers and nested packets deeper than this are not shown; no honest frame has them."""
@@ -56,7 +56,7 @@ def fields_of(dissector: Dissector, frame: Frame, role: Role) -> tuple[Field, ..
         octets = bytes.fromhex(pairs[0].decode("ascii"))
         return _spelled(tuple(_layers(packet, octets, 0, len(octets), 0)), pairs.start())
     except Exception as error:  # a dissector from anywhere meets octets from anywhere
-        return (Field("packet", plain(f"not readable as a packet: {error}")), *_flat(dissector, frame, role))
+        return (Field("packet", sanitized(f"not readable as a packet: {error}")), *_flat(dissector, frame, role))
 
 
 def _placed(field: Field) -> bool:
@@ -78,9 +78,9 @@ def _spelled(fields: tuple[Field, ...], shift: int) -> tuple[Field, ...]:
 
 def _flat(dissector: Dissector, frame: Frame, role: Role) -> tuple[Field, ...]:
     try:
-        return tuple(Field(plain(name), plain(value)) for name, value in dissector.fields(frame, role).items())
+        return tuple(Field(sanitized(name), sanitized(value)) for name, value in dissector.fields(frame, role).items())
     except Exception as error:  # the same
-        return (Field("fields", plain(f"not readable: {error}")),)
+        return (Field("fields", sanitized(f"not readable: {error}")),)
 
 
 def _layers(packet: Any, octets: bytes, begin: int, end: int, depth: int) -> Iterator[Field]:
@@ -93,7 +93,7 @@ def _layers(packet: Any, octets: bytes, begin: int, end: int, depth: int) -> Ite
         nodes = own(layer) if own is not None else None
         if nodes is not None:  # the protocol has a better one than field by field
             fields = tuple(_of_node(node, None if walk.lost else begin) for node in nodes)
-        yield Field(plain(layer.name), "", *_cover(fields), fields)
+        yield Field(sanitized(layer.name), "", *_cover(fields), fields)
         begin, end = walk.begin, walk.end
         layer = layer.payload
         depth += 1
@@ -103,7 +103,7 @@ def _of_node(node: Node, shift: int | None) -> Field:
     known = shift is not None and node.begin is not None and node.end is not None
     begin, end = (shift + node.begin, shift + node.end) if known else (None, None)  # type: ignore[operator]  # known
     children = tuple(_of_node(child, shift) for child in node.children)
-    return Field(plain(node.name), plain(node.text), begin, end, children)
+    return Field(sanitized(node.name), sanitized(node.text), begin, end, children)
 
 
 def _cover(fields: tuple[Field, ...]) -> tuple[int | None, int | None]:
@@ -200,16 +200,16 @@ def _text(description: Any, layer: Any, value: Any) -> str:
     if isinstance(value, bytes) and type(description).i2repr.__module__.startswith("scapy."):
         return octets_text(value)
     try:
-        shown = plain(description.i2repr(layer, value))
+        shown = sanitized(description.i2repr(layer, value))
         plain_hex = isinstance(value, int) and shown.startswith("0x") and not CHECK.search(description.name)
         return f"{value} ({shown})" if plain_hex and value > 9 else shown
     except Exception:  # scapy's fields raise at will on values that they did not expect
-        return plain(repr(value))
+        return sanitized(repr(value))
 
 
 def field_name(name: str) -> str:
     """A field of scapy's or ours as words: "startAddr" and "start_addr" both become "start addr"."""
-    return plain(CAMEL.sub(" ", name).replace("_", " ").lower())
+    return sanitized(CAMEL.sub(" ", name).replace("_", " ").lower())
 
 
 def octets_text(octets: bytes) -> str:

@@ -11,10 +11,10 @@ from dissectors.columns import NONE, Codes, Masks, Numbers, Times
 from dissectors.histogram import Histogram
 from dissectors.profiles.decoding import Quality, Value, plain_name
 from dissectors.reading_columns import HOWS
-from dissectors.readings import How, Reading
+from dissectors.readings import Origin, Reading
 from sniff.analysis.points import HISTORY, Key, PointTable, Run, Sample, station_name
 
-_WRITE = HOWS.index(How.WRITE)
+_WRITE = HOWS.index(Origin.WRITE)
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,7 +20,7 @@ from dissectors.manifest import Dissector
 from dissectors.meaning import Meaning
 from dissectors.profiles import Devices, Entry
 from dissectors.profiles.decoding import Quality, Value, decode
-from dissectors.readings import How, Reading
+from dissectors.readings import Origin, Reading
 from dissectors.tracker import Transaction, Verdict
 from sniff.engine.engine import Output, Row
 
@@ -172,10 +172,16 @@ class PointReader:
         profile = self.devices.at(station)
         limits = profile.limits_on(self.dissector.profile_family) if profile is not None else None
         for value in decode(profile, readings):
-            if limits is not None and value.how is How.WRITE and limits.ignores(transaction.kind, value.reading.space):
+            if (
+                limits is not None
+                and value.how is Origin.WRITE
+                and limits.ignores(transaction.kind, value.reading.space)
+            ):
                 continue  # acknowledged, never done
-            carrier = response if response is not None and value.how is How.READ else request
-            yield Sample(confirmed, station, value, (response or carrier).no if value.how is How.REPORT else carrier.no)
+            carrier = response if response is not None and value.how is Origin.READ else request
+            yield Sample(
+                confirmed, station, value, (response or carrier).no if value.how is Origin.REPORT else carrier.no
+            )
 
     def _take(self, no: int | None) -> Remembered | None:
         frame = self.frames.pop(no, None) if no is not None else None
@@ -191,7 +197,7 @@ def meaning_of(dissector: Dissector, devices: Devices, row: Row, request: Frame 
         return None
     if placement.role is Role.RESPONSE:
         station, readings = placement.source, take(request, event) if request is not None else ()
-        readings = tuple(reading for reading in readings if reading.how is not How.WRITE)
+        readings = tuple(reading for reading in readings if reading.how is not Origin.WRITE)
     else:
         station, readings, request = placement.destination, take(event, None), None
         station = None if placement.role is Role.BROADCAST else station
@@ -244,7 +250,7 @@ class Point:
     @property
     def is_command(self) -> bool:
         """Whether the latest was written to the station, not read from it."""
-        return self.sample.value.how is How.WRITE
+        return self.sample.value.how is Origin.WRITE
 
     @property
     def quality(self) -> Quality:
@@ -278,7 +284,7 @@ class Point:
                 self.changed = sample.time
         self.sample = sample
         self.count += 1
-        self.written += sample.value.how is How.WRITE
+        self.written += sample.value.how is Origin.WRITE
         if sample.finite and not isinstance(sample.value.value, str):
             number = float(sample.value.value)
             self.history.append((sample.time, number))

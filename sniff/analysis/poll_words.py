@@ -70,7 +70,7 @@ def _names(span: Span, profile: Profile) -> list[str]:
     return list(found)
 
 
-class What(Enum):
+class ChangeKind(Enum):
     """What became of an entry."""
 
     BEGAN = "began"
@@ -83,7 +83,7 @@ class What(Enum):
 class Change:
     """When an entry changed: `time`, ns, right to `within`. `interval`: ns, from then on; None: not asked."""
 
-    what: What
+    what: ChangeKind
     time: int
     within: int
     interval: int | None = None
@@ -95,10 +95,10 @@ def changes(poll: Poll, begin: int, end: int) -> list[Change]:
         return []
     found, spare = [], max(2 * (poll.cycle.most or 0), SPARE)
     if poll.first - begin > spare:
-        found.append(Change(What.BEGAN, poll.first, 0, poll.interval))
+        found.append(Change(ChangeKind.BEGAN, poll.first, 0, poll.interval))
     found += _turns(poll)
     if end - poll.last > spare:
-        found.append(Change(What.ENDED, poll.last, 0))
+        found.append(Change(ChangeKind.ENDED, poll.last, 0))
     return found
 
 
@@ -128,7 +128,11 @@ def _turns(poll: Poll) -> list[Change]:
             since = at
             after = groups[at : at + _AFTER]
             rate, time = sum(after) / len(after), begin + at * long
-            change = Change(What.CHANGED, time, long, round(long / rate)) if rate else Change(What.PAUSED, time, long)
+            change = (
+                Change(ChangeKind.CHANGED, time, long, round(long / rate))
+                if rate
+                else Change(ChangeKind.PAUSED, time, long)
+            )
             found.append(change)
     return found
 
@@ -144,7 +148,7 @@ def told(found: Iterable[Change], clock: Callable[[int], str]) -> str:
     said = []
     for one in found:
         when = f"{'~' if one.within else ''}{clock(one.time)}"
-        if one.what is What.CHANGED and one.interval is not None:
+        if one.what is ChangeKind.CHANGED and one.interval is not None:
             said.append(f"every {duration(one.interval)} from {when} on")
         else:
             said.append(f"{one.what.value} {when}")

@@ -17,7 +17,7 @@ from dissectors.profiles import Devices, Entry, Profile
 from dissectors.profiles import Role as EntryRole
 from dissectors.profiles.decoding import Value, bit_words, decode, in_range, number, plain_name, state_words
 from dissectors.profiles.properties import due_property
-from dissectors.readings import How, Reading
+from dissectors.readings import Origin, Reading
 from dissectors.row_columns import RowColumns, in_turn
 from dissectors.subject import About, Subject, station
 from dissectors.tracker import Placement, Transaction
@@ -170,7 +170,7 @@ class ProfileFindings:
             self._judge_function(no, event, placement.destination, header.function)
         if placement.role is not Role.RESPONSE and self._readings is not None:
             station = None if placement.role is Role.BROADCAST else placement.destination
-            readings = tuple(reading for reading in self._readings(event, None) if reading.how is How.WRITE)
+            readings = tuple(reading for reading in self._readings(event, None) if reading.how is Origin.WRITE)
             if readings:
                 self._judge_writes(no, event, station, readings)
             self._remember_vain(no, header, placement, readings)
@@ -178,7 +178,7 @@ class ProfileFindings:
     def settle(self, transaction: Transaction) -> None:
         """Take a transaction that closed."""
         for sample in self._reader.add(Output(transactions=(transaction,))):
-            if sample.value.how is not How.WRITE:
+            if sample.value.how is not Origin.WRITE:
                 self._judge_value(sample)
         self._judge_time(transaction)
         vain = self._in_vain.pop(transaction.id, None)
@@ -308,7 +308,7 @@ class ProfileFindings:
             return
         low = "" if entry.low is None else f"{entry.low:g}"
         high = "" if entry.high is None else f"{entry.high:g}"
-        what = "written" if value.how is How.WRITE else "answered"
+        what = "written" if value.how is Origin.WRITE else "answered"
         seen = f"{entry.title} {number(value.value, entry, value.unit)} {what}, range {low} … {high} {entry.unit}"
         self._add("PR001", who, f"{entry.name} {what}", seen.rstrip(), time, no)
 

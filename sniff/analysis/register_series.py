@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from dissectors.columns import NONE, Times, counted
 from dissectors.reading_columns import HOWS
-from dissectors.readings import How
+from dissectors.readings import Origin
 from sniff.analysis.points import PointReader, Sample
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ ENOUGH = 2
 
 WORD_SPACES = ("holding", "input")
 
-_WRITE = HOWS.index(How.WRITE)
+_WRITE = HOWS.index(Origin.WRITE)
 
 Words = npt.NDArray[np.uint16]
 
@@ -107,7 +107,7 @@ class RegisterSeries:
                 self.objects.setdefault(sample.device, set()).add(reading.space)
             if reading.space not in WORD_SPACES or reading.raw is None or sample.value.bit:
                 continue
-            if reading.how is How.WRITE:
+            if reading.how is Origin.WRITE:
                 self.written.add((sample.device, reading.space, reading.address))
                 continue
             if run and not _follows(run[-1], sample):

@@ -10,7 +10,7 @@ from dissectors.meaning import Meaning
 from dissectors.tracker import Transaction
 from dissectors.words import milliseconds
 from sniff.analysis.packet_tree import Field, fields_of
-from sniff.analysis.plain import plain
+from sniff.analysis.sanitizing import sanitized
 from sniff.analysis.wording import duration, mark_names
 from sniff.engine.engine import Row
 
@@ -42,20 +42,20 @@ def values_of(dissector: Dissector, frame: Frame, meaning: Meaning) -> tuple[Fie
     """Every value by name, as one part of the tree: "drive 3", below it "Register 2524h (wire 0x2524) output
     frequency: 30.00 Hz (3000)"; nothing where the frame tells none."""
     if meaning.refused:
-        return (Field(plain(meaning.who), plain(meaning.refused)),)
+        return (Field(sanitized(meaning.who), sanitized(meaning.refused)),)
     spans = meaning.spans_in(frame, dissector.spans)
     lines = []
     for item, span in zip(meaning.items(dissector.place), spans, strict=False):
         begin, end = span or (None, None)
-        parts = tuple(Field(plain(name), plain(text)) for name, text in item.parts)
-        lines.append(Field(plain(item.name), plain(item.text), begin, end, parts))
+        parts = tuple(Field(sanitized(name), sanitized(text)) for name, text in item.parts)
+        lines.append(Field(sanitized(item.name), sanitized(item.text), begin, end, parts))
     if not lines and meaning.asked:
-        asked = tuple(Field(plain(where), plain(title)) for where, title in meaning.questions(dissector.place))
-        return (Field(plain(meaning.who), f"is asked for {len(asked)}", None, None, asked),)
+        asked = tuple(Field(sanitized(where), sanitized(title)) for where, title in meaning.questions(dissector.place))
+        return (Field(sanitized(meaning.who), f"is asked for {len(asked)}", None, None, asked),)
     if not lines:
         return ()
     count = f"{len(lines)} value{'s' if len(lines) != 1 else ''}"
-    return (Field(plain(meaning.who), count, *_cover(lines), tuple(lines)),)
+    return (Field(sanitized(meaning.who), count, *_cover(lines), tuple(lines)),)
 
 
 def _cover(lines: list[Field]) -> tuple[int | None, int | None]:
@@ -90,15 +90,15 @@ def _event(row: Row, time_text: Callable[[int], str]) -> Field:
     if event.slack:
         about.append(Field("ends up to", f"{milliseconds(event.slack)} earlier"))
     if event.flags:
-        about.append(Field("odd", plain(", ".join(event.flags))))
+        about.append(Field("odd", sanitized(", ".join(event.flags))))
     if row.header is not None and row.header.error:
-        about.append(Field("error", plain(row.header.error)))
+        about.append(Field("error", sanitized(row.header.error)))
     return Field("frame", f"{row.no}: {_octets(count)}", None, None, (*about, *times, *errors))
 
 
 def _transaction(transaction: Transaction, no: int) -> Field:
     parts = [
-        Field("kind", plain(transaction.kind)),
+        Field("kind", sanitized(transaction.kind)),
         Field("station", "none" if transaction.station is None else str(transaction.station)),
         Field("request", "not seen" if transaction.request is None else _frame(transaction.request, no)),
         Field("response", "none" if transaction.response is None else _frame(transaction.response, no)),
@@ -109,7 +109,7 @@ def _transaction(transaction: Transaction, no: int) -> Field:
         of = "" if transaction.of is None else f" of transaction {transaction.of}"
         parts.append(Field("attempt", f"{transaction.attempt}{of}"))
     if transaction.error:
-        parts.append(Field("error", plain(transaction.error)))
+        parts.append(Field("error", sanitized(transaction.error)))
     return Field("transaction", f"{transaction.id}: {transaction.verdict.words}", None, None, tuple(parts))
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from dissectors.columns import NONE, VERDICTS, Masks, Times
 from dissectors.frame import Frame
 from dissectors.reading_columns import HOWS, ReadingColumns
-from dissectors.readings import How
+from dissectors.readings import Origin
 from dissectors.tracker import Verdict
 from sniff.analysis.point_columns import PlainSamples, TableSamples, no_samples
 from sniff.analysis.points import ALONE, MOST_ASKED, MOST_OPEN, WHOLE, Exchange, Remembered, Sample
@@ -28,7 +28,7 @@ _WHOLE = np.array([verdict in WHOLE for verdict in VERDICTS])
 _ALONE = np.array([verdict in ALONE for verdict in VERDICTS])
 _LATE = VERDICTS.index(Verdict.LATE)
 _BROADCAST = VERDICTS.index(Verdict.BROADCAST)
-_READ, _REPORT = HOWS.index(How.READ), HOWS.index(How.REPORT)
+_READ, _REPORT = HOWS.index(Origin.READ), HOWS.index(Origin.REPORT)
 
 
 def samples_of(reader: PointReader, table: Table) -> TableSamples:

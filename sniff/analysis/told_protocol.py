@@ -25,8 +25,8 @@ from sniff.analysis.autodetect import (
     COVERED_LEAST,
     FOUND_BITS,
     FOUND_FRAMES,
+    Candidature,
     Evidence,
-    Reading,
     sureness,
 )
 from sniff.engine.engine import Engine
@@ -60,7 +60,7 @@ class Told:
     """
 
     sureness: Sureness
-    reading: Reading | None = None
+    reading: Candidature | None = None
     second: tuple[str, int] | None = None
 
     @property
@@ -114,7 +114,7 @@ def told_by(session: Session, only: str | None = None) -> Told:
     return Told(_how_sure(best, readings, second), best, second)
 
 
-def _readings(session: Session, protocols: Sequence[Dissector]) -> list[Reading]:
+def _readings(session: Session, protocols: Sequence[Dissector]) -> list[Candidature]:
     """What each protocol makes of the sample."""
     readings = []
     for dissector in protocols:
@@ -127,7 +127,7 @@ def _readings(session: Session, protocols: Sequence[Dissector]) -> list[Reading]
     return readings
 
 
-def _how_sure(best: Reading, readings: Sequence[Reading], second: tuple[str, int] | None) -> Sureness:
+def _how_sure(best: Candidature, readings: Sequence[Candidature], second: tuple[str, int] | None) -> Sureness:
     others = max((one.bits for one in readings if one is not best), default=0.0)
     apart = others < best.bits / 2 or second is not None
     if best.enough and apart:
@@ -142,7 +142,7 @@ def _how_sure(best: Reading, readings: Sequence[Reading], second: tuple[str, int
     return Sureness.NO
 
 
-def _second(session: Session, best: Reading, others: Sequence[str]) -> tuple[str, int] | None:
+def _second(session: Session, best: Candidature, others: Sequence[str]) -> tuple[str, int] | None:
     """Another protocol that makes good frames of what the best one calls noise."""
     if best.covered >= 1.0 or not others:
         return None

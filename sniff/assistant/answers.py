@@ -6,7 +6,7 @@ import json
 from collections.abc import Sequence
 from typing import Any
 
-from sniff.analysis.plain import plain
+from sniff.analysis.sanitizing import sanitized
 
 MOST_CHARACTERS = 40_000
 """Of one answer, as JSON."""
@@ -46,10 +46,10 @@ def as_json(told: dict[str, Any]) -> str:
 def harmless(value: Any) -> Any:
     """The same with texts cut and without characters that a terminal obeys or a reader cannot see; no empty members."""
     if isinstance(value, str):
-        text = "\n".join(map(plain, value.split("\n")))
+        text = "\n".join(map(sanitized, value.split("\n")))
         return text if len(text) <= MOST_OF_A_TEXT else f"{text[:MOST_OF_A_TEXT]}… ({len(text)} characters)"
     if isinstance(value, dict):
-        return {plain(name): harmless(one) for name, one in value.items() if one not in (None, "", [], {})}
+        return {sanitized(name): harmless(one) for name, one in value.items() if one not in (None, "", [], {})}
     if isinstance(value, list):
         return [harmless(one) for one in value[:100]]
     return value

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from datetime import UTC, datetime
 
 from dissectors.line import NS_PER_S
-from sniff.analysis.plain import plain
+from sniff.analysis.sanitizing import sanitized
 from sniff.box.status import BoxStatus, BusStatus, FindingLine, OutletLine, State
 
 _WORDS = {State.HEARD: "heard", State.SILENT: "SILENT", State.DOWN: "DOWN", State.OVER: "NOT HEARD"}
@@ -26,7 +26,7 @@ def headline(box: BoxStatus) -> str:
     octets = sum(bus.octets for bus in box.buses)
     lost = sum(bus.lost for bus in box.buses)
     numbers = f"{octets} octets" + (f", {lost} LOST" if lost else "")
-    return plain("; ".join([said, *bad, numbers]))
+    return sanitized("; ".join([said, *bad, numbers]))
 
 
 def text(box: BoxStatus) -> str:
@@ -36,20 +36,20 @@ def text(box: BoxStatus) -> str:
 
 def _head(box: BoxStatus) -> Iterator[str]:
     state = "recording" if box.recording else "NOT RECORDING"
-    yield plain(f"box {box.name}: {state}, up since {clock(box.since, box.now)} ({span(box.now - box.since)})")
+    yield sanitized(f"box {box.name}: {state}, up since {clock(box.since, box.now)} ({span(box.now - box.since)})")
     if box.trouble:
-        yield plain(f"  TROUBLE    {box.trouble}")
+        yield sanitized(f"  TROUBLE    {box.trouble}")
     current = f"{box.current}; " if box.current else ""
-    yield plain(f"  recording  {current}{counted(box.parts, 'part')}, {size(box.parts_size)}, in {box.folder}")
+    yield sanitized(f"  recording  {current}{counted(box.parts, 'part')}, {size(box.parts_size)}, in {box.folder}")
     if box.free is not None:
         floor = f" (floor {size(box.keep_free)})" if box.keep_free is not None else ""
         late = f"; the disk is {box.behind:.0f} s behind" if box.behind else ""
         yield f"  disk       {size(box.free)} free{floor}{late}"
     if box.capture_pid is not None and box.capture_since is not None:
         began = clock(box.capture_since, box.now)
-        yield plain(f"  capture    process {box.capture_pid} since {began}, priority {box.priority or 'unknown'}")
+        yield sanitized(f"  capture    process {box.capture_pid} since {began}, priority {box.priority or 'unknown'}")
     if box.restarts:
-        yield plain(f"  restarts   capture started anew {counted(box.restarts, 'time')}; last: {box.last_restart}")
+        yield sanitized(f"  restarts   capture started anew {counted(box.restarts, 'time')}; last: {box.last_restart}")
     if abs(box.clock_offset) >= NS_PER_S:
         yield (
             f"  clock      set by {box.clock_offset / NS_PER_S:+.0f} s since the capture began: the times in its file "
@@ -58,10 +58,10 @@ def _head(box: BoxStatus) -> Iterator[str]:
     if box.alerts_failed or box.alerts_dropped:
         yield f"  alerts     {box.alerts_failed} failed, {box.alerts_dropped} dropped"
     for outlet in box.outlets:
-        yield plain(f"  outlet     {outlet.name} {outlet.where}{_fares(outlet)}")
+        yield sanitized(f"  outlet     {outlet.name} {outlet.where}{_fares(outlet)}")
     for one in box.recovered:
         what = "closed" if one.closed else f"left as it is: {one.why_not}"
-        yield plain(f"  cut part   {one.name}: {one.text}; {what}")
+        yield sanitized(f"  cut part   {one.name}: {one.text}; {what}")
 
 
 def _fares(outlet: OutletLine) -> str:
@@ -84,7 +84,7 @@ def _table(box: BoxStatus) -> Iterator[str]:
 
 def _cells(bus: BusStatus, now: int) -> tuple[str, ...]:
     return (
-        plain(bus.name),
+        sanitized(bus.name),
         _WORDS[bus.state],
         f"{clock(bus.since, now)} ({span(now - bus.since)})",
         str(bus.octets),
@@ -100,14 +100,14 @@ def _reasons(box: BoxStatus) -> Iterator[str]:
     yield ""
     for bus in box.buses:
         settings = "searching for its settings" if bus.searching else f"{bus.line} {bus.protocol}"
-        yield plain(f"  {bus.name}: {bus.port} {settings}")
+        yield sanitized(f"  {bus.name}: {bus.port} {settings}")
         if bus.state is not State.HEARD and bus.why:
             heard = "" if bus.heard_at is None else f"; last heard {clock(bus.heard_at, box.now)}"
-            yield plain(f"  {bus.name}: {_WORDS[bus.state]}: {bus.why}{heard}")
+            yield sanitized(f"  {bus.name}: {_WORDS[bus.state]}: {bus.why}{heard}")
         if bus.downs:
-            yield plain(f"  {bus.name}: gone {counted(bus.downs, 'time')}, {span(bus.away)} altogether")
+            yield sanitized(f"  {bus.name}: gone {counted(bus.downs, 'time')}, {span(bus.away)} altogether")
         if bus.unseen:
-            yield plain(f"  {bus.name}: {bus.unseen} octets recorded and not looked at: this host did not keep up")
+            yield sanitized(f"  {bus.name}: {bus.unseen} octets recorded and not looked at: this host did not keep up")
 
 
 def _findings(box: BoxStatus) -> Iterator[str]:
@@ -121,12 +121,12 @@ def _findings(box: BoxStatus) -> Iterator[str]:
         for one in bus.findings:
             yield _finding(f"{bus.name}: ", one, box.now)
         if bus.more_findings:
-            yield plain(f"  {bus.name}: {bus.more_findings} more")
+            yield sanitized(f"  {bus.name}: {bus.more_findings} more")
 
 
 def _finding(bus: str, one: FindingLine, now: int) -> str:
     last = "" if one.last is None else f" (last {clock(one.last, now)})"
-    return plain(f"  {bus}{one.severity} {one.code} {one.subject}: {one.seen}{last}")
+    return sanitized(f"  {bus}{one.severity} {one.code} {one.subject}: {one.seen}{last}")
 
 
 def clock(time: int, now: int) -> str:

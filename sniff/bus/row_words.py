@@ -9,7 +9,7 @@ from dissectors.line import MS, NS_PER_S
 from dissectors.manifest import Dissector
 from sniff.analysis.json_text import dumps
 from sniff.analysis.json_text import iso as iso
-from sniff.analysis.plain import ascii_of
+from sniff.analysis.sanitizing import ascii_of
 from sniff.analysis.wording import describe, duration, is_error
 from sniff.engine.session import Session
 from sniff.engine.verdict_join import JudgedRow

@@ -212,6 +212,6 @@ def _no_such_command(word: str) -> str:
 
 def _plain(error: Exception | str) -> str:
     """A message may quote a hostile file."""
-    from sniff.analysis.plain import plain
+    from sniff.analysis.sanitizing import sanitized
 
-    return plain(error)
+    return sanitized(error)

@@ -11,7 +11,7 @@ from dataclasses import replace
 from dissectors import registry
 from dissectors.line import LineSettings
 from dissectors.profiles import Devices, ProfileError
-from sniff.analysis.plain import plain
+from sniff.analysis.sanitizing import sanitized
 from sniff.analysis.told_protocol import detected
 from sniff.cli import UNREADABLE, USAGE, Failure
 from sniff.config import AUTO
@@ -251,9 +251,11 @@ def say_assumed(session: Session, path: str, way_out: str = "") -> None:
     told = session.notes.get(PROTOCOL_NOTE)
     if told is not None:
         title = registry.get(session.protocol).title
-        print(f"sniff485: {plain(path)}: reading it as {title} ({plain(told)}); -p names another", file=sys.stderr)
+        print(
+            f"sniff485: {sanitized(path)}: reading it as {title} ({sanitized(told)}); -p names another", file=sys.stderr
+        )
     if session.line_is_assumed:
-        said = f"no line settings in {plain(path)}: assuming {session.line} for {session.protocol}{way_out}"
+        said = f"no line settings in {sanitized(path)}: assuming {session.line} for {session.protocol}{way_out}"
         print(f"sniff485: {said}", file=sys.stderr)
 
 

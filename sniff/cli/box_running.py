@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from dissectors.findings import Finding, Severity
-from sniff.analysis.plain import plain
+from sniff.analysis.sanitizing import sanitized
 from sniff.analysis.site_findings import SiteJudgement, judged
 from sniff.analysis.site_rules import SITE
 from sniff.box import notify, words
@@ -118,7 +118,7 @@ def run(told: Plan, wanted: Sequence[Target]) -> int:
     notifier = Notifier()
     try:
         where = f"{page.path or 'no socket'}" + (f", http://127.0.0.1:{page.port}/" if page.port is not None else "")
-        print(f"sniff485: box {told.name}: status at {plain(where)}", file=sys.stderr)
+        print(f"sniff485: box {told.name}: status at {sanitized(where)}", file=sys.stderr)
         return Box(told, wanted, page, notifier).run()
     finally:
         page.close()
@@ -300,7 +300,7 @@ class Box:
     # -- what is told --------------------------------------------------------------------------------------------------
 
     def _say(self, text: str) -> None:
-        print(f"sniff485: {plain(text)}", file=sys.stderr, flush=True)
+        print(f"sniff485: {sanitized(text)}", file=sys.stderr, flush=True)
 
     def _tell(self) -> None:
         """Renew the status page, and tell the service manager what it wants to hear."""

@@ -16,7 +16,7 @@ from dissectors.findings import Finding, Rule, Severity, merged, times, under_ca
 from dissectors.line import NS_PER_S
 from sniff.analysis.health import Health
 from sniff.analysis.judging import rules_over
-from sniff.analysis.plain import plain
+from sniff.analysis.sanitizing import sanitized
 from sniff.analysis.site_findings import SiteBus, judged
 from sniff.analysis.site_rules import SITE, SITE_RULES
 from sniff.analysis.wording import station_word
@@ -117,9 +117,9 @@ def _write_head(one: Checked, width: int) -> None:
     session = one.session
     heard = f"{_span(one.seconds)}, {one.frames} frames"
     if one.buses:
-        print(f"{plain(one.source)}: {plain(', '.join(one.buses))} together, {heard}")
+        print(f"{sanitized(one.source)}: {sanitized(', '.join(one.buses))} together, {heard}")
         return
-    print(f"{plain(one.source)}: {session.protocol_words}, {session.line_words}, {heard}")
+    print(f"{sanitized(one.source)}: {session.protocol_words}, {session.line_words}, {heard}")
     if one.note:
         print(f"  incomplete: {one.note}")
     if one.frames:

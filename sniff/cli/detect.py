@@ -13,8 +13,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from dissectors import registry
-from sniff.analysis.autodetect import Ending, Outcome, Reading, sureness
-from sniff.analysis.plain import plain
+from sniff.analysis.autodetect import Candidature, Ending, Outcome, sureness
+from sniff.analysis.sanitizing import sanitized
 from sniff.analysis.told_protocol import Sureness, detected, told_by
 from sniff.cli import PORT_TROUBLE, UNREADABLE, arguments, json_output, listening, targets
 from sniff.cli.searching import TIMEOUT, search, sentence
@@ -107,9 +107,9 @@ def _of_session(args: argparse.Namespace, session: Session) -> tuple[Outcome, st
 def write(port: str, outcome: Outcome, also: str = "", open_with: str = "live") -> None:
     """Print for people."""
     if open_with != "live" and outcome.reading is None:
-        print(f"{plain(port)}: {_of_no_protocol(outcome)}")
+        print(f"{sanitized(port)}: {_of_no_protocol(outcome)}")
         return
-    print(f"{plain(port)}: {sentence(outcome)}")
+    print(f"{sanitized(port)}: {sentence(outcome)}")
     reading = outcome.reading
     if reading is None:
         return
@@ -121,7 +121,7 @@ def write(port: str, outcome: Outcome, also: str = "", open_with: str = "live") 
     if open_with == "live":
         print(f"  next: sniff485 live {port} -s {reading.line} -p {reading.protocol}")
     else:
-        print(f"  next: sniff485 {open_with} {plain(port)} -p {reading.protocol}")
+        print(f"  next: sniff485 {open_with} {sanitized(port)} -p {reading.protocol}")
 
 
 def _of_no_protocol(outcome: Outcome) -> str:
@@ -130,7 +130,7 @@ def _of_no_protocol(outcome: Outcome) -> str:
     return f"no protocol makes good frames of its first {outcome.octets} octets; -p names one all the same"
 
 
-def evidence(reading: Reading) -> str:
+def evidence(reading: Candidature) -> str:
     """Why it is believed."""
     frames = "1 good frame holds" if reading.frames == 1 else f"{reading.frames} good frames hold"
     return (

@@ -16,7 +16,7 @@ from dissectors.line import MS, NS_PER_S
 from dissectors.manifest import Dissector
 from dissectors.profiles import Devices
 from dissectors.tracker import Transaction
-from sniff.analysis.plain import plain
+from sniff.analysis.sanitizing import sanitized
 from sniff.bus.offline import Source, survey
 from sniff.cli import USAGE, Failure, arguments
 from sniff.cli.progress import Watched
@@ -66,7 +66,7 @@ def filter_of(args: argparse.Namespace, capture: Source, session: Session, devic
         refused = args.of_others = getattr(args, "of_others", frozenset()) | {id(capture)}
         if len(refused) >= arguments.captures_open():
             raise Failure(f"filter {args.filter!r}: {error}", USAGE) from None
-        print(f"sniff485: {plain(session.port)}: {plain(error)}", file=sys.stderr)
+        print(f"sniff485: {sanitized(session.port)}: {sanitized(error)}", file=sys.stderr)
         return compile_filter(args.filter, dissector, scope, others=True)
     except FilterError as error:
         raise Failure(f"filter {args.filter!r}: {error}", USAGE) from None

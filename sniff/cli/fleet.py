@@ -15,7 +15,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from dissectors import registry
-from sniff.analysis.plain import plain
+from sniff.analysis.sanitizing import sanitized
 from sniff.cli import UNREADABLE, USAGE, Failure, arguments, json_output, writing
 from sniff.engine.capture import CaptureError
 from sniff.fleet import running
@@ -156,7 +156,7 @@ def _index(args: argparse.Namespace) -> Index | None:
     except CaptureError as error:
         if args.index:
             raise Failure(str(error), UNREADABLE) from None
-        print(f"sniff485: {plain(str(error))}; everything is read, nothing is kept (--index names another place)",
+        print(f"sniff485: {sanitized(str(error))}; everything is read, nothing is kept (--index names another place)",
               file=sys.stderr)  # fmt: skip
         return None
 
@@ -230,7 +230,7 @@ class _Progress:
             failed = f", {self._failed} failed" if self._failed else ""
             print(
                 f"\r\x1b[Kread {self._done} of {self._missing}{failed}; {self._known} known from the index; "
-                f"{plain(done.task.name)[-60:]}",
+                f"{sanitized(done.task.name)[-60:]}",
                 end="", file=sys.stderr, flush=True,
             )  # fmt: skip
 

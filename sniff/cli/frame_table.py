@@ -9,7 +9,7 @@ from pathlib import Path
 
 from dissectors.findings import counted
 from dissectors.profiles import Devices
-from sniff.analysis.plain import plain
+from sniff.analysis.sanitizing import sanitized
 from sniff.bus.offline import settled, settled_in_bulk
 from sniff.bus.row_files import save
 from sniff.cli import UNREADABLE, USAGE, Failure, filtering, writing
@@ -34,7 +34,7 @@ def write(args: argparse.Namespace, capture: Capture, session: Session, devices:
         count = save(target, _rows(args, capture, session, devices), dissector_for(session), session)
     except CaptureError as error:
         raise Failure(str(error), UNREADABLE) from None
-    print(f"{plain(target)}: {counted(count, 'row')}, frames and what was between them", file=sys.stderr)
+    print(f"{sanitized(target)}: {counted(count, 'row')}, frames and what was between them", file=sys.stderr)
 
 
 def _rows(args: argparse.Namespace, capture: Capture, session: Session, devices: Devices) -> Iterator[JudgedRow]:

@@ -11,7 +11,7 @@ from dissectors.line import MS, NS_PER_S
 from dissectors.tracker import Verdict
 from dissectors.words import milliseconds
 from sniff.analysis.nodes import Node
-from sniff.analysis.plain import plain
+from sniff.analysis.sanitizing import sanitized
 from sniff.analysis.summary import Summary, ranked
 from sniff.bus.row_words import iso
 from sniff.cli import arguments, filtering, json_output
@@ -137,7 +137,7 @@ def _node_as_json(node: Node) -> dict[str, Any]:
 def _print(path: str, capture: Capture, session: Session, summary: Summary, events: list[LineEvent]) -> None:
     complete = capture.completeness()
     adapter = session.adapter
-    print(plain(path))
+    print(sanitized(path))
     _line("file", complete.text if complete.whole else f"CUT: {complete.text}")
     if summary.load.first is None or summary.load.last is None:
         _line("content", "no octets" if not summary.searched else "only what was heard while searching for settings")
@@ -227,7 +227,7 @@ def _search(session: Session, summary: Summary, events: list[LineEvent]) -> str:
 
 
 def _line(name: str, text: str) -> None:
-    print(f"  {name:<13}{plain(text)}")
+    print(f"  {name:<13}{sanitized(text)}")
 
 
 def _span(seconds: float) -> str:

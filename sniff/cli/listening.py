@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 
 from dissectors.profiles import Devices
 from dissectors.words import milliseconds
-from sniff.analysis.plain import plain
+from sniff.analysis.sanitizing import sanitized
 from sniff.bus.live import LiveBus
 from sniff.bus.router import Router
 from sniff.capture.config import RecordSpec, SourceSpec
@@ -132,7 +132,7 @@ def _code(live: LiveBus, interrupted: bool) -> int:
     if live.ended is not None and not live.ended.clean:
         return PORT_TROUBLE
     if _gone_for_good(live):
-        print(f"sniff485: {plain(live.session.port)}: gone for good; nothing more can be heard", file=sys.stderr)
+        print(f"sniff485: {sanitized(live.session.port)}: gone for good; nothing more can be heard", file=sys.stderr)
         return PORT_TROUBLE
     if live.engine.searching:
         say_not_found(live, "interrupted" if interrupted else "ended")
@@ -171,7 +171,9 @@ def say_not_found(live: LiveBus, how: str) -> None:
     if live.search is None:
         return
     said = searching.sentence(live.search.outcome(), "a longer capture may find them")
-    print(f"sniff485: {plain(live.session.port)}: {how} while searching, no settings found: {said}", file=sys.stderr)
+    print(
+        f"sniff485: {sanitized(live.session.port)}: {how} while searching, no settings found: {said}", file=sys.stderr
+    )
     if live.status.path:
         print("sniff485: the recording has every octet; read it with -s and -p once they are known", file=sys.stderr)
 
@@ -180,7 +182,7 @@ def say_end(printers: Sequence[Printer]) -> None:
     """The closing lines on standard error: what was heard, what was lost, where it is."""
     alone = len(printers) == 1
     for number, printer in enumerate(printers, 1):
-        bus = "" if alone else f"{plain(printer.live.session.bus)}: "
+        bus = "" if alone else f"{sanitized(printer.live.session.bus)}: "
         _say_counts(printer, bus)
         say_recorded(printer.live, number == len(printers), bus)
 
@@ -225,10 +227,10 @@ def say_recorded(live: LiveBus, where: bool = True, bus: str = "") -> None:
         why = "" if status.error else ": the disk did not keep up"
         print(f"sniff485: {bus}{lost} octets NOT RECORDED{why}", file=sys.stderr)
     if live.file_is_gone:
-        print(f"sniff485: {plain(status.path or live.link.paths[0])} is not there any more", file=sys.stderr)
+        print(f"sniff485: {sanitized(status.path or live.link.paths[0])} is not there any more", file=sys.stderr)
     elif status.path and where:
         cut = "" if ended is None or ended.clean else ", cut where the capture was ended"
-        print(f"sniff485: recorded to {plain(status.path)}{cut}", file=sys.stderr)
+        print(f"sniff485: recorded to {sanitized(status.path)}{cut}", file=sys.stderr)
 
 
 class _Meter:
@@ -248,13 +250,13 @@ class _Meter:
         lines = [self._line(printer, now) for printer in self.printers]
         told = self.printers[0].telling
         if told is not None and told.counted:
-            lines[0] += f"  {plain(told.counted)}"
+            lines[0] += f"  {sanitized(told.counted)}"
         print(self._up() + "\n".join(f"\r\x1b[K{line}" for line in lines), end="", file=sys.stderr, flush=True)
         self._shown = len(lines)
 
     def _line(self, printer: Printer, now: float) -> str:
         summary, status = printer.summary, printer.live.status
-        bus = "" if len(self.printers) == 1 else f"{plain(printer.live.session.bus)}  "
+        bus = "" if len(self.printers) == 1 else f"{sanitized(printer.live.session.bus)}  "
         text = (
             f"{bus}{now - self.began:.0f} s  {summary.frames} frames  {summary.damaged} damaged  {status.size} octets"
         )

@@ -10,7 +10,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import replace
 
-from sniff.analysis.plain import plain
+from sniff.analysis.sanitizing import sanitized
 from sniff.bus.live import LiveBus
 from sniff.capture.config import RecordSpec
 from sniff.capture.ipc import Status
@@ -52,7 +52,7 @@ def run(args: argparse.Namespace) -> int:
     told_to = outlets.prepare(outlets.settings_of(args), [outlets.Printed()] if args.json else ())
     lives = listening.start_all(buses, RecordSpec(path) if path else None, args.duration)
     if path and not args.ports:
-        print(f"sniff485: recording to {plain(path)}", file=sys.stderr)
+        print(f"sniff485: recording to {sanitized(path)}", file=sys.stderr)
     return show(lives, args.json, args.lines, told_to)
 
 
@@ -84,7 +84,7 @@ def _on_screen(lives: Sequence[LiveBus]) -> int:
     feeds = [LiveFeed(live, tell, len(lives)) for live in lives]
     run_tui(feeds)
     for feed, live in zip(feeds, lives, strict=True):
-        bus = f"{plain(live.session.bus)}: " if len(lives) > 1 else ""
+        bus = f"{sanitized(live.session.bus)}: " if len(lives) > 1 else ""
         total = feed.store.load.total
         print(
             f"sniff485: {bus}{total.frames} frames ({total.damaged} damaged), {total.noise} octets of noise",
@@ -93,6 +93,6 @@ def _on_screen(lives: Sequence[LiveBus]) -> int:
         if live.engine.searching:
             listening.say_not_found(live, "ended")
         if live.status.error:
-            print(f"sniff485: recording: {plain(live.status.error)}", file=sys.stderr)
+            print(f"sniff485: recording: {sanitized(live.status.error)}", file=sys.stderr)
         listening.say_recorded(live, where=False, bus=bus)
     return UNREADABLE if any(listening.lost_something(live) for live in lives) else 0

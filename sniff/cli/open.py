@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from sniff.analysis.plain import plain
+from sniff.analysis.sanitizing import sanitized
 from sniff.cli import UNREADABLE, USAGE, Failure, arguments
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ def run(args: argparse.Namespace) -> int:
 def _say_begin(files: Sequence[str]) -> None:
     """A terminal says at once what is done: the first screen takes a while."""
     if arguments.on_terminal():
-        said = plain(f"sniff485: opening {', '.join(files)}")
+        said = sanitized(f"sniff485: opening {', '.join(files)}")
         print(said if len(said) <= SAID else said[: SAID - 1] + "…", flush=True)
 
 

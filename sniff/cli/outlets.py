@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-from sniff.analysis.plain import plain
+from sniff.analysis.sanitizing import sanitized
 from sniff.box.status import OutletLine
 from sniff.bus.live import LiveBus
 from sniff.cli import USAGE, Failure, targets
@@ -196,13 +196,13 @@ def telling(lives: Sequence[LiveBus], told: Telling | None) -> Iterator[Telling 
 
 def _say_end(told: Telling) -> None:
     for text in told.take_said():
-        print(f"sniff485: {plain(text)}", file=sys.stderr)
+        print(f"sniff485: {sanitized(text)}", file=sys.stderr)
     for outlet in told.outlets:
         if outlet.dropped:
             why = f" ({outlet.trouble})" if outlet.trouble else ""
             print(
                 f"sniff485: {outlet.name}: {outlet.sent} sent, {outlet.dropped} DROPPED: nobody took them in time"
-                f"{plain(why)}",
+                f"{sanitized(why)}",
                 file=sys.stderr,
             )
 

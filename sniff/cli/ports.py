@@ -6,7 +6,7 @@ import argparse
 
 from dissectors.line import MS
 from dissectors.words import milliseconds
-from sniff.analysis.plain import plain
+from sniff.analysis.sanitizing import sanitized
 from sniff.cli import json_output
 
 
@@ -38,7 +38,7 @@ def run(args: argparse.Namespace) -> int:
             print(json_output.dumps(record))
             continue
         reports = "unknown" if adapter.reports is None else ", ".join(adapter.reports) or "none"
-        name = plain(adapter.name)  # an adapter may call itself anything
+        name = sanitized(adapter.name)  # an adapter may call itself anything
         print(f"{port.device}  {name}{f' ({adapter.driver})' if adapter.driver else ''}")
         print(f"    holds octets back up to {milliseconds(adapter.latency)} ({adapter.latency_from})")
         print(f"    line errors it reports: {reports}{'; ' + adapter.detail if adapter.detail else ''}")

@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING
 
-from sniff.analysis.plain import plain
+from sniff.analysis.sanitizing import sanitized
 from sniff.analysis.summary import Summary
 from sniff.bus import row_words as rows
 from sniff.bus.live import LiveBus, LiveItem, LiveTables
@@ -80,7 +80,7 @@ class Printer:
             self._judge()
         for text in self.telling.take_said() if self.telling is not None else ():
             self.before_saying()
-            print(f"sniff485: {plain(text)}", file=sys.stderr)
+            print(f"sniff485: {sanitized(text)}", file=sys.stderr)
         if not self.quiet:
             sys.stdout.flush()
 
@@ -113,7 +113,7 @@ class Printer:
     def _say_event(self, event: LineEvent) -> None:
         if event.kind in (LineEventKind.UNPLUGGED, LineEventKind.REPLUGGED):
             self.before_saying()
-            print(f"sniff485: {plain(event.text)}", file=sys.stderr)  # names the port
+            print(f"sniff485: {sanitized(event.text)}", file=sys.stderr)  # names the port
         elif event.kind in (LineEventKind.NOTE, LineEventKind.REFUSED):
             self._say(event.text)
         elif event.kind is LineEventKind.TRIGGER:
@@ -145,11 +145,11 @@ class Printer:
             print(f'{{"bus": {json.dumps(session.bus)}, {line[1:]}' if self.names_bus else line)
         else:
             line = rows.text_line(settled, self.live.dissector, session, self.colour)
-            print(f"{plain(session.bus)}  {line}" if self.names_bus else line)
+            print(f"{sanitized(session.bus)}  {line}" if self.names_bus else line)
 
     def _say(self, text: str) -> None:
         self.before_saying()
-        print(f"sniff485: {self.live.session.port}: {plain(text)}", file=sys.stderr)
+        print(f"sniff485: {self.live.session.port}: {sanitized(text)}", file=sys.stderr)
 
 
 def waiting_words(status: Status) -> str:

@@ -17,7 +17,7 @@ from dissectors.line import MS
 from dissectors.profiles import Entry, Profile, ProfileError
 from dissectors.profiles.decoding import number, plain_name
 from dissectors.profiles.parsing import is_name
-from sniff.analysis.plain import plain
+from sniff.analysis.sanitizing import sanitized
 from sniff.bus.offline import survey
 from sniff.cli import UNREADABLE, USAGE, Failure, arguments, json_output, register_maps, tables, writing
 from sniff.cli.progress import Watched
@@ -282,7 +282,9 @@ def _draft(args: argparse.Namespace) -> int:
     register_maps.write_document(args, document)
     if args.write is not None:
         sure = sum(one.sure is Sure.SURE for one in chosen)
-        print(f"sniff485: {len(chosen)} values drafted to {plain(args.write)}, {sure} of them sure", file=sys.stderr)
+        print(
+            f"sniff485: {len(chosen)} values drafted to {sanitized(args.write)}, {sure} of them sure", file=sys.stderr
+        )
     if len({one.space for one in chosen}) > 1:
         print("sniff485: holding and input registers were read; each is described by itself", file=sys.stderr)
     return 0

@@ -6,7 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from sniff.analysis.plain import plain
+from sniff.analysis.sanitizing import sanitized
 from sniff.cli import UNREADABLE, Failure, arguments, writing
 from sniff.engine.capture import CaptureError
 
@@ -33,7 +33,7 @@ def run(args: argparse.Namespace) -> int:
     writing.write(args, session, capture, [args.file])
     complete = capture.completeness()
     said = "was whole" if complete.whole else complete.text
-    print(f"sniff485: {args.file}: {plain(said)}", file=sys.stderr)
+    print(f"sniff485: {args.file}: {sanitized(said)}", file=sys.stderr)
     return 0
 
 
@@ -57,5 +57,5 @@ def _all_buses(args: argparse.Namespace) -> int:
     except CaptureError as error:
         raise Failure(str(error), UNREADABLE) from None
     said = "was whole" if before.whole else before.text
-    print(f"sniff485: {plain(args.file)}: {plain(said)}", file=sys.stderr)
+    print(f"sniff485: {sanitized(args.file)}: {sanitized(said)}", file=sys.stderr)
     return 0

@@ -12,7 +12,7 @@ from dissectors import registry
 from dissectors.profiles import ProfileError, parse_text
 from dissectors.profiles.parsing import is_name
 from dissectors.register_maps import NUMBERINGS, TABLES, MapError, MapReader, RegisterMap, document
-from sniff.analysis.plain import plain
+from sniff.analysis.sanitizing import sanitized
 from sniff.cli import UNREADABLE, USAGE, Failure, arguments, writing
 
 LARGEST = 16 << 20
@@ -54,12 +54,12 @@ def run(args: argparse.Namespace) -> int:
     try:
         parse_text(text, name)
     except ProfileError as error:  # then the document says what is to be corrected
-        print(f"sniff485: to be corrected by hand: {plain(error)}", file=sys.stderr)
+        print(f"sniff485: to be corrected by hand: {sanitized(error)}", file=sys.stderr)
     write_document(args, text)
-    where = f" to {plain(args.write)}" if args.write is not None else ""
-    print(f"sniff485: {count} registers imported{where}; {'; '.join(map(plain, found.said))}", file=sys.stderr)
+    where = f" to {sanitized(args.write)}" if args.write is not None else ""
+    print(f"sniff485: {count} registers imported{where}; {'; '.join(map(sanitized, found.said))}", file=sys.stderr)
     for what, times in sorted(found.left_out.items()):
-        print(f"sniff485: left out: {plain(what)} ({times})", file=sys.stderr)
+        print(f"sniff485: left out: {sanitized(what)} ({times})", file=sys.stderr)
     return 0
 
 

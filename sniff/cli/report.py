@@ -11,7 +11,7 @@ import os
 import sys
 from pathlib import Path
 
-from sniff.analysis.plain import plain
+from sniff.analysis.sanitizing import sanitized
 from sniff.cli import UNREADABLE, USAGE, Failure, arguments, filtering, json_output
 from sniff.cli.progress import Watched
 from sniff.engine.capture import Capture
@@ -60,7 +60,7 @@ def run(args: argparse.Namespace) -> int:
         Path(place).write_text(text, "utf-8", "backslashreplace")  # names need not be text
     except OSError as error:
         raise Failure(f"{place}: cannot be written: {error.strerror}", UNREADABLE) from None
-    print(f"sniff485: report in {plain(place)}", file=sys.stderr)
+    print(f"sniff485: report in {sanitized(place)}", file=sys.stderr)
     return 0
 
 

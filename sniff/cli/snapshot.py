@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sniff.analysis.plain import plain
+from sniff.analysis.sanitizing import sanitized
 from sniff.cli import UNREADABLE, Failure, arguments, filtering
 from sniff.engine.capture import CaptureError
 
@@ -48,7 +48,7 @@ def run(args: argparse.Namespace) -> int:
         if args.check and expected != found:
             differing += 1
             said = difference(expected, found, place.name).splitlines() if expected else [f"{place}: no expectation"]
-            print("\n".join(map(plain, said)))
+            print("\n".join(map(sanitized, said)))
     if differing:
         print(f"sniff485: {differing} of {len(args.files)} captures differ", file=sys.stderr)
     return 1 if differing else 0

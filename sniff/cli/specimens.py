@@ -79,7 +79,7 @@ class Numbers:
 
 
 @dataclass(slots=True)
-class Found:
+class FoundSpecimens:
     """`which`: the specimen of each row, by number. `numbers`: rows with numbers of their own."""
 
     which: Times
@@ -110,9 +110,9 @@ class Specimens:
         self._classes.clear()
         self._count = self.asked = 0
 
-    def find(self, table: Table, at: Times) -> Found:
+    def find(self, table: Table, at: Times) -> FoundSpecimens:
         """Of rows at some places of a table; odd rows have none (-1)."""
-        found = Found(np.full(len(at), -1, np.int64))
+        found = FoundSpecimens(np.full(len(at), -1, np.int64))
         lengths = table.frames.length[at].astype(np.int64)
         usual = np.ones(len(at), bool)
         if table.odd:
@@ -122,7 +122,7 @@ class Specimens:
             self._find_of(table, at, rows, length, found)
         return found
 
-    def _find_of(self, table: Table, at: Times, rows: Times, length: int, found: Found) -> None:
+    def _find_of(self, table: Table, at: Times, rows: Times, length: int, found: FoundSpecimens) -> None:
         octets = stretches(table.octets, table.frames.offset[at[rows]], length)
         made = _made_of(table, at[rows])
         left = np.ones(len(rows), bool)

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Iterable, Sequence
 from typing import cast
 
-from sniff.analysis.plain import plain
+from sniff.analysis.sanitizing import sanitized
 from sniff.bus.row_files import safe_text
 from sniff.cli import json_output
 
@@ -62,7 +62,7 @@ def _shown(cell: Cell) -> str:
         return "–"
     if isinstance(cell, float):
         return f"{cell:.2f}" if abs(cell) < 100 else f"{cell:.0f}"
-    return plain(cell)
+    return sanitized(cell)
 
 
 def _write_text(headings: Sequence[str], rows: list[list[str]], bold: Sequence[bool]) -> None:

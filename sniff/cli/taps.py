@@ -9,7 +9,7 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-from sniff.analysis.plain import plain
+from sniff.analysis.sanitizing import sanitized
 from sniff.bus.offline import survey
 from sniff.cli import USAGE, Failure, arguments, json_output, tables
 from sniff.cli.progress import Watched
@@ -82,7 +82,7 @@ def _taps(words: Sequence[str]) -> list[tuple[str, Capture]]:
 def _say(found: Sequence[SegmentFault], heard: bool, common: bool, doubt: int, first: str, second: str) -> None:
     from sniff.taps import words
 
-    print(f"A: {plain(first)}, B: {plain(second)}; {words.certainty(doubt)}")
+    print(f"A: {sanitized(first)}, B: {sanitized(second)}; {words.certainty(doubt)}")
     if not heard:
         print("no frame was heard while both taps listened")
     elif not common:

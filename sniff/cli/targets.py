@@ -14,7 +14,7 @@ from pathlib import Path
 from dissectors import registry
 from dissectors.line import LineSettings
 from dissectors.profiles import Devices
-from sniff.analysis.plain import plain
+from sniff.analysis.sanitizing import sanitized
 from sniff.capture.config import SourceSpec
 from sniff.cli import UNREADABLE, USAGE, Failure, arguments
 from sniff.cli.searching import Unknowns
@@ -56,7 +56,7 @@ def targets_of(args: argparse.Namespace) -> list[Target]:
     targets = [_target(args, config, port) for port in wanted or [_only_port(config)]]
     twice = next((port for port, count in Counter(one.source.spec for one in targets).items() if count > 1), None)
     if twice is not None:
-        raise Failure(f"{plain(twice)}: named twice; a port is listened to once", USAGE)
+        raise Failure(f"{sanitized(twice)}: named twice; a port is listened to once", USAGE)
     return _with_names_of_their_own(targets)
 
 
@@ -86,7 +86,7 @@ def _target(args: argparse.Namespace, config: Config, wanted: str) -> Target:
         _refuse_unknown(wanted, config)
     port = (bus.port or wanted) if bus is not None else wanted
     if not (args.port if "port" in args else args.ports or args.all):
-        print(f"sniff485: no port named: listening to {plain(port)}, the only one there is", file=sys.stderr)
+        print(f"sniff485: no port named: listening to {sanitized(port)}, the only one there is", file=sys.stderr)
     configured = args.protocol or (bus.protocol if bus is not None else None)
     said: LineSettings | str | None = args.line or (bus.line if bus is not None else None)
     auto = AUTO in (said, configured)
@@ -124,7 +124,7 @@ def _refuse_unknown(word: str, config: Config) -> None:
         looked = f"there is no {FILE} in this folder, in one above it, or in the user's configuration"
     else:
         looked = f"{config.path} has {', '.join(config.buses) or 'none'}"
-    raise Failure(f"{plain(word)}: no such bus is configured: {looked}", USAGE)
+    raise Failure(f"{sanitized(word)}: no such bus is configured: {looked}", USAGE)
 
 
 def _only_port(config: Config) -> str:

@@ -6,7 +6,7 @@ import contextlib
 import sys
 from collections.abc import Iterator, Sequence
 
-from sniff.analysis.plain import plain
+from sniff.analysis.sanitizing import sanitized
 from sniff.bus.triggers import Triggers
 from sniff.cli import USAGE, Failure, targets
 from sniff.cli.printing import Printer
@@ -34,7 +34,7 @@ def alerting(printers: Sequence[Printer]) -> Iterator[None]:
     from sniff.outlets.alerts import Alerts
     from sniff.outlets.news import NewsDesk
 
-    alerts = Alerts(settings, lambda text: print(f"sniff485: {plain(text)}", file=sys.stderr))
+    alerts = Alerts(settings, lambda text: print(f"sniff485: {sanitized(text)}", file=sys.stderr))
     for printer in printers:
         printer.alerts = alerts, NewsDesk(settings.least, int(settings.every * 1e9))
     try:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sniff.analysis.plain import plain
+from sniff.analysis.sanitizing import sanitized
 from sniff.cli import arguments
 from sniff.formats.table import suffixes
 
@@ -41,7 +41,7 @@ def port_of(sources: Sequence[str]) -> str | None:
     if not named:
         return None
     if len(sources) > 1:
-        raise Failure(f"{plain(named[0])}: a port is listened to alone", USAGE)
+        raise Failure(f"{sanitized(named[0])}: a port is listened to alone", USAGE)
     return named[0]
 
 
@@ -151,6 +151,6 @@ def _headline(live: LiveBus) -> str:
     summary, session = live.model.summary, live.session
     what = "searching for settings" if live.searching is not None else f"{session.line_words} {session.protocol_words}"
     return (
-        f"{plain(session.port)} {what}: {summary.frames} frames ({summary.damaged} damaged), load "
+        f"{sanitized(session.port)} {what}: {summary.frames} frames ({summary.damaged} damaged), load "
         f"{summary.load.share():.0%}; Ctrl-C ends"
     )

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from dissectors.frame import Chunk
 from dissectors.profiles import Devices
-from sniff.analysis.plain import plain
+from sniff.analysis.sanitizing import sanitized
 from sniff.bus.capture_writer import create
 from sniff.bus.offline import Source
 from sniff.cli import UNREADABLE, USAGE, Failure
@@ -76,9 +76,9 @@ def write(
                 _write_items(writer, watched.items(), session, takers, counts)
     except CaptureError as error:
         raise Failure(str(error), UNREADABLE) from None
-    print(f"{plain(target)}: {counts.octets} octets in {counts.reads} reads", file=sys.stderr)
+    print(f"{sanitized(target)}: {counts.octets} octets in {counts.reads} reads", file=sys.stderr)
     for loss in getattr(writer, "losses", ()):
-        print(f"sniff485: {plain(target)}: {plain(loss)}", file=sys.stderr)
+        print(f"sniff485: {sanitized(target)}: {sanitized(loss)}", file=sys.stderr)
     return counts.octets
 
 
@@ -106,7 +106,7 @@ def say_incomplete(path: str, capture: Capture) -> None:
     complete = capture.completeness()
     if not complete.whole:
         sys.stdout.flush()
-        print(f"sniff485: {plain(path)}: {plain(complete.text)}", file=sys.stderr)
+        print(f"sniff485: {sanitized(path)}: {sanitized(complete.text)}", file=sys.stderr)
         cut_capture.said(path)
 
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from dissectors import registry
 from dissectors.field_types import FieldType, Kind, texts
-from dissectors.frame import Damage, Found, Frame, LineError, Role
+from dissectors.frame import Damage, FoundBy, Frame, LineError, Role
 from dissectors.line import MS
 from dissectors.manifest import Dissector
 from dissectors.tracker import Transaction, Verdict
@@ -61,7 +61,7 @@ COLUMN_TYPES: Mapping[str, FieldType] = {
     "error": FieldType(_TEXT, "exception, or why it is damaged", several=False),
     "noise": FieldType(Kind.TRUTH, "octets that are no frame"),
     "searching": FieldType(Kind.TRUTH, "heard while settings were searched for"),
-    "found": FieldType(_TEXT, "how its limits were found", texts(one.value for one in Found), closed=True),
+    "found": FieldType(_TEXT, "how its limits were found", texts(one.value for one in FoundBy), closed=True),
     "damage": FieldType(_TEXT, "why it is not good", texts(one.value for one in Damage), closed=True),
     "len": FieldType(_NUMBER, "octets", least=0),
     "noise_before": FieldType(_NUMBER, "octets of noise directly before it", least=0),

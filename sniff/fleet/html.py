@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from html import escape
 
-from sniff.analysis.plain import plain
+from sniff.analysis.sanitizing import sanitized
 from sniff.fleet.answer import Answer, Bus, Day
 from sniff.fleet.bus_day import NO_DATE
 from sniff.fleet.drift import Drift
@@ -126,4 +126,4 @@ def _class(score: int) -> str:
 
 
 def _safe(text: str) -> str:
-    return escape(plain(text))
+    return escape(sanitized(text))

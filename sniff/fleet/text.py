@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from dissectors.words import milliseconds
-from sniff.analysis.plain import plain
+from sniff.analysis.sanitizing import sanitized
 from sniff.fleet.answer import Answer, Bus, Change, Day, Fresh, StationChange, Trouble
 from sniff.fleet.bus_day import NO_DATE
 from sniff.fleet.drift import Drift, Sure
@@ -65,9 +65,9 @@ def _head(found: Answer) -> Iterator[str]:
 
 def _foot(found: Answer, shown: int) -> Iterator[str]:
     if found.gone:
-        yield f"gone since the run before: {_some([plain(each) for each in found.gone])}"
+        yield f"gone since the run before: {_some([sanitized(each) for each in found.gone])}"
     for path, why in list(found.unreadable.items())[:shown]:
-        yield f"not read: {plain(path)}: {plain(why)}"
+        yield f"not read: {sanitized(path)}: {sanitized(why)}"
     if len(found.unreadable) > shown:
         yield f"… and {len(found.unreadable) - shown} more that could not be read"
 
@@ -82,13 +82,13 @@ def _clipped(line: str, width: int) -> str:
 
 def _bus(bus: Bus, days: int) -> Iterator[str]:
     worst = bus.worst
-    yield f"{worst.health.score:6}  {worst.day:10}  {numbers(worst)}  {curve(bus, days):{days}}  {plain(bus.name)}"
+    yield f"{worst.health.score:6}  {worst.day:10}  {numbers(worst)}  {curve(bus, days):{days}}  {sanitized(bus.name)}"
     for trouble in bus.troubles[:TROUBLES]:
-        yield f"        {plain(trouble_words(trouble, bus))}"
+        yield f"        {sanitized(trouble_words(trouble, bus))}"
     if len(bus.troubles) > TROUBLES:
         yield f"        … and {len(bus.troubles) - TROUBLES} more findings"
     if not bus.troubles and worst.health.score < WELL:
-        yield f"        no finding; {plain('; '.join(worst.health.reasons))}"
+        yield f"        no finding; {sanitized('; '.join(worst.health.reasons))}"
     for change in bus.changes[:TROUBLES]:
         yield f"        {change_words(change, bus.noun)}"
     silence = silence_words(bus)
@@ -97,7 +97,7 @@ def _bus(bus: Bus, days: int) -> Iterator[str]:
     if bus.missing:
         yield f"        no capture on {_some(list(bus.missing))}"
     for note in bus.notes[:2]:
-        yield f"        {plain(note)}"
+        yield f"        {sanitized(note)}"
 
 
 def numbers(day: Day) -> str:

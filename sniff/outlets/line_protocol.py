@@ -18,7 +18,7 @@ from __future__ import annotations
 import math
 import re
 
-from sniff.analysis.plain import plain
+from sniff.analysis.sanitizing import sanitized
 from sniff.outlets.told import FindingTold, NumbersTold, StateTold, Told, ValueTold
 
 MOST_TEXT = 4096
@@ -93,7 +93,7 @@ def _field(value: Field) -> str | None:
         return f"{value}i" if _LEAST <= value <= _MOST else None
     if isinstance(value, float):
         return repr(value) if math.isfinite(value) else None
-    text = plain(value)[:MOST_TEXT]
+    text = sanitized(value)[:MOST_TEXT]
     return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
 
 
@@ -103,5 +103,5 @@ def _name(text: str) -> str:
 
 def _escaped(text: str, special: str) -> str:
     """A backslash before what is special; one of its own becomes a slash, since none can stand before what ends it."""
-    harmless = plain(text)[:MOST_TEXT].replace("\\", "/")
+    harmless = sanitized(text)[:MOST_TEXT].replace("\\", "/")
     return re.sub(f"([{re.escape(special)}])", r"\\\1", harmless)

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from dissectors.findings import Severity
 from dissectors.histogram import Histogram
 from dissectors.line import NS_PER_S
-from sniff.analysis.plain import plain
 from sniff.analysis.points import Point
+from sniff.analysis.sanitizing import sanitized
 from sniff.bus.model import BusModel
 from sniff.outlets.outlet import Outlet
 
@@ -144,4 +144,4 @@ def _labels(labels: dict[str, object]) -> str:
 
 def _escaped(text: str) -> str:
     """Label values come from captures and configurations: no control character leaves here."""
-    return plain(text).replace("\\", "\\\\").replace('"', '\\"')
+    return sanitized(text).replace("\\", "\\\\").replace('"', '\\"')

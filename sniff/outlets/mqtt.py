@@ -15,7 +15,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from sniff.analysis.plain import plain
+from sniff.analysis.sanitizing import sanitized
 from sniff.outlet_settings import MqttSettings, SettingsError
 from sniff.outlets.mqtt_messages import OFFLINE, ONLINE, Messages, Publication
 from sniff.outlets.outlet import Outlet
@@ -95,7 +95,7 @@ class MqttOutlet(Outlet):
                     return
             except (MqttError, OSError, TimeoutError) as error:
                 self._behind = True
-                self._fare(f"{self._where}: {plain(_reason(error))}")
+                self._fare(f"{self._where}: {sanitized(_reason(error))}")
             if self._closing:
                 return
             await self._wait(BACKOFF[min(failures, len(BACKOFF) - 1)])

@@ -23,9 +23,9 @@ from dataclasses import dataclass
 
 from dissectors.findings import Severity
 from sniff.analysis.json_text import dumps, iso
-from sniff.analysis.plain import plain
+from sniff.analysis.sanitizing import sanitized
 from sniff.outlets.json_lines import finding_record, finite
-from sniff.outlets.news import What
+from sniff.outlets.news import NewsKind
 from sniff.outlets.told import FindingTold, NumbersTold, StateTold, Told, ToldBus, ValueTold
 from sniff.version import __version__
 
@@ -104,7 +104,7 @@ class Topics:
 
 def level(name: str) -> str:
     """A name as part of a topic; slashes in it stay, as levels."""
-    text = re.sub(r"[^\w./()%°²³-]+", "-", plain(name))[:MOST_LEVEL]
+    text = re.sub(r"[^\w./()%°²³-]+", "-", sanitized(name))[:MOST_LEVEL]
     return "/".join(part for part in text.split("/") if part) or "-"
 
 
@@ -197,7 +197,7 @@ class Messages:
             return
         payload = dumps(finding_record(told)).encode()
         yield Publication(events, payload, retain=False)
-        over = told.news.what is What.GONE
+        over = told.news.what is NewsKind.GONE
         yield Publication(stands, b"" if over else payload)
         standing = self._standing.setdefault(bus, {})
         standing.pop(one.key, None)
@@ -237,17 +237,21 @@ class Messages:
         status = self._topic(bus.name, "status")
         whole = re.sub(r"[^A-Za-z0-9_-]+", "_", f"{self._prefix}_{bus.name}")
         unique = f"{whole}_{_number_of(name)}"
-        device: dict[str, object] = {"identifiers": [whole], "name": f"bus {plain(bus.name)}", "model": bus.protocol}
+        device: dict[str, object] = {
+            "identifiers": [whole],
+            "name": f"bus {sanitized(bus.name)}",
+            "model": bus.protocol,
+        }
         if station is not None:
             profile = bus.devices.at(int(station)) if station.isdecimal() else None
             device = {
                 "identifiers": [f"{whole}_{station}"],
-                "name": f"{plain(bus.name)} {plain(station)}",
+                "name": f"{sanitized(bus.name)} {sanitized(station)}",
                 "via_device": whole,
                 **({"model": profile.title} if profile is not None else {}),
             }
         content = {
-            "name": plain(title),
+            "name": sanitized(title),
             "unique_id": unique,
             "state_topic": topic,
             "availability": [{"topic": self.status_topic}, {"topic": status}],

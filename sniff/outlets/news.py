@@ -12,7 +12,7 @@ OVER_AFTER = 600_000_000_000
 """ns without another occurrence after which a finding is over."""
 
 
-class What(Enum):
+class NewsKind(Enum):
     """What happened to a finding."""
 
     NEW = "new"
@@ -24,7 +24,7 @@ class What(Enum):
 class News:
     """One thing to tell. `held_back`: how many of the same finding were not told since the last one."""
 
-    what: What
+    what: NewsKind
     finding: Finding
     held_back: int = 0
 
@@ -63,21 +63,21 @@ class NewsDesk:
                     told.append(news)
         return told
 
-    def _what(self, finding: Finding, now: int) -> What | None:
+    def _what(self, finding: Finding, now: int) -> NewsKind | None:
         known = self._known.get(finding.key)
         over = now - finding.last > OVER_AFTER
         if known is None:
             self._known[finding.key] = _Known(finding.severity, over)
-            return None if over else What.NEW
+            return None if over else NewsKind.NEW
         was_over, known.is_over = known.is_over, over
         if over:
-            return None if was_over else What.GONE
+            return None if was_over else NewsKind.GONE
         if was_over:
-            return What.NEW
+            return NewsKind.NEW
         worse, known.severity = finding.severity > known.severity, max(known.severity, finding.severity)
-        return What.WORSE if worse else None
+        return NewsKind.WORSE if worse else None
 
-    def _rationed(self, what: What, finding: Finding, now: int) -> News | None:
+    def _rationed(self, what: NewsKind, finding: Finding, now: int) -> News | None:
         known = self._known[finding.key]
         if known.told is not None and now - known.told < self._every:
             known.held_back += 1

@@ -12,8 +12,8 @@ from typing import Protocol
 
 from dissectors.findings import Severity
 from dissectors.line import NS_PER_S
-from sniff.analysis.plain import plain
 from sniff.analysis.points import MOST_POINTS, Sample
+from sniff.analysis.sanitizing import sanitized
 from sniff.bus.derived_topics import NODE, DerivedMessage
 from sniff.bus.live import LiveBus
 from sniff.engine.session import LineEvent, LineEventKind
@@ -118,7 +118,7 @@ class Teller:
         """A port went, or came back; settings were found."""
         bus = self._buses[live.bus]
         if event.kind in (LineEventKind.UNPLUGGED, LineEventKind.REPLUGGED):
-            self._state(live, event.time, event.kind is LineEventKind.REPLUGGED, plain(event.text))
+            self._state(live, event.time, event.kind is LineEventKind.REPLUGGED, sanitized(event.text))
         elif bus.about.protocol != live.session.protocol:
             bus.about = _about(live)
 

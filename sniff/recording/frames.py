@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import TYPE_CHECKING, Any
 
-from dissectors.frame import Check, Damage, Found, Frame, Header, LineError, Mark, Noise, Place, Reason, Role
+from dissectors.frame import Check, Damage, FoundBy, Frame, Header, LineError, Mark, Noise, Place, Reason, Role
 from dissectors.line import LineSettings
 from dissectors.tracker import Interval, Placement, Transaction, Verdict
 from sniff.engine.engine import Output, Row
@@ -60,7 +60,7 @@ EVENTS = (
     Column("slack", "<i8"),
     Column("protocol", "<u2", "text"),  # None for noise
     Column("check", "<u1", Check),
-    Column("found", "<u1", Found),
+    Column("found", "<u1", FoundBy),
     Column("damage", "<u1", Damage),
     Column("expected", "<i4", "optional"),
     Column("skipped", "<u4"),
@@ -235,7 +235,7 @@ def number_of(column: Column, value: Any, strings: dict[str, int]) -> int:
 
 _PLACES: dict[type[Enum], dict[Enum, int]] = {
     kind: {member: place for place, member in enumerate(kind)}
-    for kind in (Check, Found, Damage, Place, Reason, Role, Verdict)
+    for kind in (Check, FoundBy, Damage, Place, Reason, Role, Verdict)
 }
 
 
@@ -347,7 +347,7 @@ def _row(values: dict[str, Any], octets: bytes, marks: tuple[Mark, ...]) -> Row:
         start,
         end,
         values["check"] or Check.ABSENT,
-        values["found"] or Found.LENGTH,
+        values["found"] or FoundBy.LENGTH,
         values["damage"],
         values["expected"],
         values["skipped"],

@@ -32,7 +32,7 @@ from sniff.reporting.happenings import Happenings
 from sniff.reporting.numbers import (
     Distribution,
     Evidence,
-    Found,
+    FindingRow,
     Measurement,
     Numbers,
     RingNumbers,
@@ -124,7 +124,9 @@ def _value(trend: Trend, session: Session) -> ValueTrend:
     return ValueTrend(trend.station, trend.name, trend.unit, trend.how, at, tuple(trend.values))
 
 
-def verdict(health: Health | None, findings: tuple[Found, ...], stations: tuple[Station, ...], summary: Summary) -> str:
+def verdict(
+    health: Health | None, findings: tuple[FindingRow, ...], stations: tuple[Station, ...], summary: Summary
+) -> str:
     """The whole capture in a sentence or two."""
     if health is None and summary.searched:
         return "Octets were heard, but the settings of the bus were not found while this was recorded."
@@ -157,7 +159,7 @@ def _many(addresses: list[int]) -> str:
     return f"station{'s' if len(addresses) > 1 else ''} {', '.join(map(str, addresses))}"
 
 
-def _subject(finding: Found) -> str:
+def _subject(finding: FindingRow) -> str:
     return f"{finding.subject}: {finding.title}" if finding.title else f"{finding.subject}: {finding.seen}"
 
 
@@ -236,10 +238,10 @@ def _rows(capture: Source, session: Session, wanted: set[int], reference: bool) 
 
 def _found(
     findings: tuple[Finding, ...], words: dict[int, tuple[float, str]], session: Session, dissector: Dissector
-) -> tuple[Found, ...]:
+) -> tuple[FindingRow, ...]:
     rules = rules_over(dissector)
     return tuple(
-        Found(
+        FindingRow(
             code=finding.code,
             severity=finding.severity.label,
             title=rules[finding.code].title if finding.code in rules else "",

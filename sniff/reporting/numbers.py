@@ -34,7 +34,7 @@ class Evidence:
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class FindingRow:
     """One finding. `under`: whether the one before it that stands for itself explains it."""
 
     code: str
@@ -182,7 +182,7 @@ class Numbers:
     frames: int
     damaged: int
     load: float
-    findings: tuple[Found, ...]
+    findings: tuple[FindingRow, ...]
     stations: tuple[Station, ...]
     polled_only: tuple[int, ...]
     kinds: Mapping[str, int]

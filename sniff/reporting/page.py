@@ -10,7 +10,7 @@ from typing import Any
 from dissectors.line import MS
 from dissectors.tracker import Verdict
 from dissectors.words import bare_milliseconds
-from sniff.analysis.plain import plain
+from sniff.analysis.sanitizing import sanitized
 from sniff.analysis.wording import station_word
 from sniff.reporting.numbers import Numbers
 from sniff.reporting.pictures import pictures
@@ -41,7 +41,7 @@ def page(reports: Sequence[Numbers]) -> str:
         """What a capture says may be made for the terminal that the page is printed to."""
         if not isinstance(value, str) or isinstance(value, Markup):
             return value
-        return NARROW.join(plain(part) for part in value.split(NARROW))
+        return NARROW.join(sanitized(part) for part in value.split(NARROW))
 
     environment = Environment(
         autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True, finalize=harmless

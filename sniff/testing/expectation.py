@@ -10,8 +10,8 @@ from collections.abc import Iterator
 
 from dissectors.frame import Frame
 from dissectors.line import MS
-from sniff.analysis.plain import plain
 from sniff.analysis.points import Point
+from sniff.analysis.sanitizing import sanitized
 from sniff.analysis.wording import describe, mark_names
 from sniff.engine.verdict_join import JudgedRow
 from sniff.testing.capture_reading import CaptureReading
@@ -21,7 +21,7 @@ MAGIC = "#!sniff-expect 1"
 
 def render(reading: CaptureReading) -> str:
     """The whole expectation, ending with a newline; characters that a terminal obeys are escaped."""
-    return "\n".join(map(plain, _lines(reading))) + "\n"
+    return "\n".join(map(sanitized, _lines(reading))) + "\n"
 
 
 def difference(expected: str, found: str, name: str) -> str:

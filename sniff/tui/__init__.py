@@ -30,6 +30,6 @@ def run(feed: Feed | Sequence[Feed], start_screen: str = "frames") -> None:
 
 
 def _plain(text: str) -> str:
-    from sniff.tui.plain import plain
+    from sniff.analysis.sanitizing import sanitized
 
-    return plain(text)
+    return sanitized(text)

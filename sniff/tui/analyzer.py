@@ -13,7 +13,7 @@ from sniff.bus.feed import FeedStatus
 from sniff.bus.rows import Store
 from sniff.tui.health_meter import HealthMeter
 from sniff.tui.seats import BusLine
-from sniff.tui.viewing import Viewing
+from sniff.tui.view_state import Viewing
 
 
 class Analyzer(App[None]):

@@ -15,6 +15,7 @@ from textual.screen import Screen
 from textual.timer import Timer
 
 from dissectors.findings import Finding
+from sniff.analysis.sanitizing import sanitized
 from sniff.bus.feed import Feed, FeedStatus
 from sniff.bus.rows import Store
 from sniff.config import ConfigError, nearest
@@ -28,13 +29,12 @@ from sniff.tui.health_meter import HealthMeter
 from sniff.tui.help import HelpScreen
 from sniff.tui.key_names import KNOWN, named
 from sniff.tui.palette import ActionCommands
-from sniff.tui.plain import plain
 from sniff.tui.prompt import Prompt
 from sniff.tui.screens import SCREENS, STYLED, Entry, load
 from sniff.tui.screens.base import ViewScreen
 from sniff.tui.seats import BusLine, Seat
 from sniff.tui.site_meter import SiteMeter
-from sniff.tui.viewing import Viewing
+from sniff.tui.view_state import Viewing
 
 POLL_SECONDS = 0.1
 WORK_SECONDS = 0.02
@@ -188,7 +188,7 @@ class SnifferApp(Analyzer):
             for seat in self.seats:
                 seat.viewing.colour_rules(colours)
         except (ConfigError, FilterError) as error:
-            self.notify(plain(error), severity="error", markup=False)
+            self.notify(sanitized(error), severity="error", markup=False)
         self._take_keys()
         self._worker = self.set_interval(WORK_SECONDS, self._work, pause=True)
         self.set_interval(POLL_SECONDS, self.poll)
@@ -217,7 +217,7 @@ class SnifferApp(Analyzer):
         known = tuple(sorted(KNOWN))
         for name in keys:
             if name not in known:
-                said = plain(f"[keys] unknown name {name!r}{nearest(name, known)}")
+                said = sanitized(f"[keys] unknown name {name!r}{nearest(name, known)}")
                 self.notify(said, severity="error", markup=False)
         self.set_keymap({name: key for name, key in keys.items() if name in known and key})
 
@@ -255,12 +255,12 @@ class SnifferApp(Analyzer):
 
     def _tell(self, seat: Seat) -> None:
         """Say once what happened to the recording, to the view and to the capture."""
-        bus = f"{plain(seat.name)}: " if len(self.seats) > 1 else ""
+        bus = f"{sanitized(seat.name)}: " if len(self.seats) > 1 else ""
         status, store = seat.status, seat.feed.store
         trouble = status.trouble
         if trouble != seat.told_trouble:
             seat.told_trouble = trouble
-            said = bus + (plain(trouble) or "it goes on")
+            said = bus + (sanitized(trouble) or "it goes on")
             self.notify(said, title="recording", severity="error" if trouble else "information", markup=False)
         if store.dropped_rows and not seat.told_dropped:
             seat.told_dropped = True
@@ -269,7 +269,7 @@ class SnifferApp(Analyzer):
             self.notify(said, title="memory", markup=False)
         if status.ended and not seat.told_end:
             seat.told_end = True
-            said = bus + plain(why_ended(status, store)[1])
+            said = bus + sanitized(why_ended(status, store)[1])
             self.notify(said, title="the capture has ended", severity="warning", markup=False)
 
     def _take_what_was_found(self, seat: Seat) -> None:
@@ -277,7 +277,7 @@ class SnifferApp(Analyzer):
         if seat.status.ended:
             return
         bus = f"{seat.name}: " if len(self.seats) > 1 else ""
-        said = plain(f"{bus}found: {seat.status.protocol}, {seat.status.line}")
+        said = sanitized(f"{bus}found: {seat.status.protocol}, {seat.status.line}")
         self.notify(said, title="the search has ended", markup=False)
         try:
             seat.viewing.set_filter(seat.viewing.filter)
@@ -338,7 +338,7 @@ class SnifferApp(Analyzer):
         if self.status.live and self.status.recording and time.monotonic() - self._asked_to_quit > SURE_SECONDS:
             self._asked_to_quit = time.monotonic()
             self.notify(
-                f"recording to {plain(self.status.recording)}; q again stops it and quits",
+                f"recording to {sanitized(self.status.recording)}; q again stops it and quits",
                 severity="warning",
                 timeout=SURE_SECONDS,
                 markup=False,
@@ -382,7 +382,7 @@ class SnifferApp(Analyzer):
         try:
             self.viewing.set_filter(text)
         except FilterError as error:
-            self.notify(plain(error), severity="error", markup=False)
+            self.notify(sanitized(error), severity="error", markup=False)
             return
         self.draw_screen()
 
@@ -400,7 +400,7 @@ class SnifferApp(Analyzer):
         except OSError as error:
             where = f"until this view ends: {error.strerror or error}"
         if text is not None:
-            self.notify(f"mark on row {no}, kept {plain(where)}", timeout=3, markup=False)
+            self.notify(f"mark on row {no}, kept {sanitized(where)}", timeout=3, markup=False)
         self.viewing.take_marks()
         self.draw_screen()
 

@@ -11,9 +11,9 @@ from rich.text import Text
 from textual import events
 from textual.widget import Widget
 
+from sniff.analysis.sanitizing import sanitized
 from sniff.tui.analyzer import analyzer
 from sniff.tui.columns import fit
-from sniff.tui.plain import plain
 from sniff.tui.seats import BusLine, BusState
 
 BEYOND = "…!"
@@ -36,15 +36,15 @@ def _trouble(bus: BusLine) -> str:
 
 def _full(bus: BusLine) -> str:
     said = _trouble(bus) or f"health {_health(bus)}"
-    return f"{plain(bus.name)} {said} load {bus.load:.0%} err {bus.errors}"
+    return f"{sanitized(bus.name)} {said} load {bus.load:.0%} err {bus.errors}"
 
 
 def _close(bus: BusLine) -> str:
-    return f"{plain(bus.name)} {_trouble(bus) or _health(bus)} {bus.load:.0%} err {bus.errors}"
+    return f"{sanitized(bus.name)} {_trouble(bus) or _health(bus)} {bus.load:.0%} err {bus.errors}"
 
 
 def _short(bus: BusLine) -> str:
-    return f"{plain(bus.name)} {_trouble(bus) or _health(bus)}"
+    return f"{sanitized(bus.name)} {_trouble(bus) or _health(bus)}"
 
 
 def is_poor(bus: BusLine) -> bool:

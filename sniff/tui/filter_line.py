@@ -5,9 +5,9 @@ from __future__ import annotations
 from rich.text import Text
 from textual.widgets import Static
 
+from sniff.analysis.sanitizing import sanitized
 from sniff.tui.index import Index
-from sniff.tui.plain import plain
-from sniff.tui.viewing import Viewing
+from sniff.tui.view_state import Viewing
 
 
 class FilterLine(Static):
@@ -20,7 +20,7 @@ class FilterLine(Static):
             return
         whole = max(0, index.last - index.first + 1)
         state = f", {index.pending} to be searched" if index.pending else ""
-        text = Text(f"filter: {plain(viewing.filter)}", no_wrap=True, overflow="ellipsis")
+        text = Text(f"filter: {sanitized(viewing.filter)}", no_wrap=True, overflow="ellipsis")
         tail = f"{len(index)} of {whole} {things}{state} · esc removes it "
         text.truncate(max(20, self.app.size.width - len(tail) - 2), overflow="ellipsis", pad=True)
         self.update(text.append("  ").append(tail))

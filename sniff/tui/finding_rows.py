@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 
 from sniff.filter.completion import written
 from sniff.tui.index import Index
-from sniff.tui.viewing import Viewing
+from sniff.tui.view_state import Viewing
 
 SECONDS = 1.0
 """How long one search may take; pressing again goes on from where it ended."""

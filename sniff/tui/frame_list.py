@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from rich.cells import cell_len
 
-from dissectors.frame import Event, Found, Frame, LineError
+from dissectors.frame import Event, FoundBy, Frame, LineError
 from dissectors.tracker import Transaction, Verdict
+from sniff.analysis.sanitizing import sanitized
 from sniff.engine.engine import Row
 from sniff.tui.analyzer import analyzer
 from sniff.tui.columns import Cell, Column
-from sniff.tui.plain import plain
 from sniff.tui.store_list import StoreList
 from sniff.tui.verdicts import latency_cell, verdict_cell
 
@@ -25,7 +25,7 @@ COLUMNS = (
     Column("flags", "flag", 4),
 )
 USUAL = frozenset({Verdict.ANSWERED, Verdict.BROADCAST, Verdict.DATA})
-FOUND_LETTERS = {Found.SPLIT: "s", Found.JOINED: "j"}
+FOUND_LETTERS = {FoundBy.SPLIT: "s", FoundBy.JOINED: "j"}
 
 
 def mark_letter(error: LineError) -> str:
@@ -89,9 +89,9 @@ class FrameList(StoreList):
         if self.viewing.colours and not style:
             style = self.viewing.colour_of(row, transaction)
         source, destination = self._addresses(row)
-        text = plain(self.store.text(row))
+        text = sanitized(self.store.text(row))
         said = self.viewing.marks.get(number, "")
-        text = f"[{plain(said)}] {text}" if said else text
+        text = f"[{sanitized(said)}] {text}" if said else text
         answers = transaction is not None and (transaction.response in (number, None))
         return {
             "no": Cell(str(number), "dim"),

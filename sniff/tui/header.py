@@ -11,14 +11,14 @@ from rich.text import Text
 from textual.widget import Widget
 
 from sniff.analysis.health import Health
+from sniff.analysis.sanitizing import sanitized
 from sniff.bus.feed import FeedStatus
 from sniff.bus.rows import Store
 from sniff.engine.session import LineEventKind, gone_why
 from sniff.tui.analyzer import analyzer
 from sniff.tui.columns import fit
-from sniff.tui.plain import plain
 from sniff.tui.times import size
-from sniff.tui.viewing import Viewing
+from sniff.tui.view_state import Viewing
 
 ROOMY = 100
 """Width from which two spaces stand between the pieces; by the width alone, so that nothing jumps."""
@@ -99,11 +99,11 @@ def status_line(
 ) -> list[tuple[str, str]]:
     """Pieces of text with a style name each, together at most `width` cells: the port gives way first."""
     state, words = record_state(status), state_words(status)
-    reason = plain(why_ended(status, store)[0])
+    reason = sanitized(why_ended(status, store)[0])
     shown_state = f"{words}: {fit(reason, min(cell_len(reason), REASON))}" if reason else words
     pieces = [
-        *([(f"searching {plain(status.searching)} …", "doubt")] if status.searching else []),
-        *([] if status.searching else [(plain(status.line), ""), (plain(status.protocol), "")]),
+        *([(f"searching {sanitized(status.searching)} …", "doubt")] if status.searching else []),
+        *([] if status.searching else [(sanitized(status.line), ""), (sanitized(status.protocol), "")]),
         (f"load {store.load.share():.0%}", ""),
         *([] if health is None else [(f"health {health.score}", _health_style(health.score))]),
         (f"err {store.error_total}", "bad" if store.error_total else ""),
@@ -125,7 +125,7 @@ def status_line(
         pieces.append(("FOLLOW OFF", "dim"))
     gap = "  " if width >= ROOMY else " "
     room = width - sum(cell_len(text) + len(gap) for text, _ in pieces)
-    port = plain(status.port)
+    port = sanitized(status.port)
     if cell_len(port) > room:  # the end of a path says more than its beginning
         port = port.rsplit("/", 1)[-1] if cell_len(port.rsplit("/", 1)[-1]) <= room else fit(port, max(0, room))
     line: list[tuple[str, str]] = [(port, "port")] if port else []

@@ -14,10 +14,10 @@ from textual.scroll_view import ScrollView
 from textual.strip import Strip
 
 from dissectors.frame import Mark
+from sniff.analysis.sanitizing import ascii_of
 from sniff.analysis.wording import mark_names
 from sniff.tui.frame_list import mark_letter
 from sniff.tui.key_names import named
-from sniff.tui.plain import ascii_of
 
 WIDE = 72
 """Width in cells from which 16 octets stand on a line instead of 8."""

@@ -24,7 +24,7 @@ from sniff.tui.analyzer import analyzer
 from sniff.tui.columns import Cell, Column, pieces
 from sniff.tui.index import Index
 from sniff.tui.key_names import named
-from sniff.tui.viewing import Viewing
+from sniff.tui.view_state import Viewing
 
 SHIFT = 16
 """Cells by which the text scrolls at once."""

@@ -12,8 +12,8 @@ from textual.containers import Vertical
 from textual.screen import ModalScreen
 from textual.widgets import DataTable
 
+from sniff.analysis.sanitizing import sanitized
 from sniff.bus.rows import Store
-from sniff.tui.plain import plain
 from sniff.tui.tables import StationTable
 from sniff.tui.times import clock
 
@@ -46,7 +46,7 @@ class MarksScreen(ModalScreen[int | None]):
         for no, said in sorted(self._marks.items()):
             row = self._store.by_no(no)
             at, what = ("", "no longer in memory") if row is None else (clock(row.event.start), self._store.text(row))
-            table.add_row(Text(str(no)), Text(at), Text(plain(said)), Text(plain(what)), key=str(no))
+            table.add_row(Text(str(no)), Text(at), Text(sanitized(said)), Text(sanitized(what)), key=str(no))
         table.focus()
 
     def on_data_table_row_selected(self, event: DataTable.RowSelected) -> None:

@@ -11,7 +11,7 @@ from textual.widget import Widget
 from textual.widgets import Sparkline, Static
 
 from dissectors.line import NS_PER_S
-from sniff.tui.plain import plain
+from sniff.analysis.sanitizing import sanitized
 
 HAS_PLOT = find_spec("textual_plot") is not None
 if HAS_PLOT:
@@ -61,7 +61,7 @@ class HistoryPlot(Vertical):
             return
         self._drawn = state
         few = len(history) < LEAST
-        self.query_one("#plot-title", Static).update(plain(f"{title}: too few values for a plot" if few else title))
+        self.query_one("#plot-title", Static).update(sanitized(f"{title}: too few values for a plot" if few else title))
         canvas = self.query_one("#plot-canvas")
         if isinstance(canvas, Sparkline):
             canvas.data = [] if few else [value for _, value in history]

@@ -13,8 +13,8 @@ from textual.message import Message
 from textual.suggester import Suggester
 from textual.widgets import Input, Label
 
+from sniff.analysis.sanitizing import sanitized
 from sniff.filter.completion import Completion
-from sniff.tui.plain import plain
 
 Check = Callable[[str], str]
 """Gives what is wrong with a text, an empty string when nothing is."""
@@ -139,7 +139,7 @@ class Prompt(Vertical):
             verdict = ""
         if self._complete is not None:
             verdict = f"{verdict}{self._ways(text)}"
-        self.query_one("#validity", Label).update(plain(verdict))
+        self.query_one("#validity", Label).update(sanitized(verdict))
         self.set_class(bool(wrong), "invalid")
         return wrong
 

@@ -8,7 +8,7 @@ from enum import Enum
 from sniff.bus.feed import Feed, FeedStatus
 from sniff.engine.session import LineEventKind
 from sniff.tui.health_meter import HealthMeter
-from sniff.tui.viewing import Viewing
+from sniff.tui.view_state import Viewing
 
 
 class BusState(Enum):

@@ -10,7 +10,7 @@ from sniff.tui.columns import Column, chosen, lay_out
 from sniff.tui.linelist import LineList
 from sniff.tui.times import TimeMode, clock, seconds
 from sniff.tui.verdicts import latency_title
-from sniff.tui.viewing import Viewing
+from sniff.tui.view_state import Viewing
 
 WIDE = 110
 """From this width on the verdict is written in full."""

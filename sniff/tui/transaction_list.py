@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dissectors.tracker import Transaction, Verdict
+from sniff.analysis.sanitizing import sanitized
 from sniff.bus.rows import is_trouble
 from sniff.tui.analyzer import analyzer
 from sniff.tui.columns import Cell, Column
-from sniff.tui.plain import plain
 from sniff.tui.store_list import StoreList
 from sniff.tui.verdicts import latency_cell, verdict_cell
 
@@ -72,8 +72,8 @@ class TransactionList(StoreList):
         response = transaction.response
         if self.width_of("kind") < LINE and response is not None and self.store.told(response):
             rows.reverse()  # values first: both do not fit
-        parts = [plain(self.store.text(row)) for row in rows if row is not None] or [plain(transaction.kind)]
-        error = plain(transaction.error or "")
+        parts = [sanitized(self.store.text(row)) for row in rows if row is not None] or [sanitized(transaction.kind)]
+        error = sanitized(transaction.error or "")
         if error and not any(error in part for part in parts):
             parts.append(error)
         if transaction.of is not None and transaction.verdict in (Verdict.LATE, Verdict.ECHO, Verdict.ANSWERED_TWICE):

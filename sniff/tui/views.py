@@ -9,7 +9,7 @@ from sniff.tui.columns import Column
 from sniff.tui.frame_list import COLUMNS as FRAMES
 from sniff.tui.times import TimeMode
 from sniff.tui.transaction_list import COLUMNS as TRANSACTIONS
-from sniff.tui.viewing import Viewing
+from sniff.tui.view_state import Viewing
 
 LISTS: dict[str, tuple[Column, ...]] = {"frames": FRAMES, "transactions": TRANSACTIONS}
 

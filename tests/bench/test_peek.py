@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import pytest
 
-from dissectors.frame import Check, Found, Frame, Role
+from dissectors.frame import Check, FoundBy, Frame, Role
 from dissectors.line import LineSettings, Timing
 from dissectors.modbus.envelope import seal_ascii, seal_rtu
 from dissectors.modbus.fields import fields
@@ -28,7 +28,7 @@ ADUS = [
 
 def frames(seal, protocol):
     return [
-        Frame(protocol, seal(adu), no * 20_000_000, no * 20_000_000 + 5_000_000, Check.GOOD, Found.GAP)
+        Frame(protocol, seal(adu), no * 20_000_000, no * 20_000_000 + 5_000_000, Check.GOOD, FoundBy.GAP)
         for no, adu in enumerate(ADUS)
     ]
 

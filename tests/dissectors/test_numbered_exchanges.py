@@ -7,7 +7,7 @@ from collections import Counter
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dissectors.frame import Check, Found, Frame, Header, Role
+from dissectors.frame import Check, FoundBy, Frame, Header, Role
 from dissectors.numbered_exchanges import NumberedExchanges
 from dissectors.tracker import Transaction, Verdict
 
@@ -17,7 +17,7 @@ MOST = 4
 
 def frame(octets: bytes, second: float) -> Frame:
     start = int(second * S)
-    return Frame("paper", octets, start, start + 1000, Check.GOOD, Found.LENGTH)
+    return Frame("paper", octets, start, start + 1000, Check.GOOD, FoundBy.LENGTH)
 
 
 def header(role: Role) -> Header:

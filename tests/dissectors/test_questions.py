@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from dissectors import registry
 from dissectors.bacnet.envelope import frame as mstp_frame
 from dissectors.columns import FrameColumns, Octets
-from dissectors.frame import Check, Found, Frame
+from dissectors.frame import Check, FoundBy, Frame
 from dissectors.modbus.envelope import seal_ascii, seal_rtu
 from dissectors.n2.envelope import make_command
 from dissectors.n2.objects import attribute_name
@@ -24,7 +24,7 @@ NAMES = [one.name for one in registry.usable() if one.questions is not None]
 
 
 def frame(protocol: str, octets: bytes) -> Frame:
-    return Frame(protocol, octets, 0, len(octets), Check.GOOD, Found.GAP, None)
+    return Frame(protocol, octets, 0, len(octets), Check.GOOD, FoundBy.GAP, None)
 
 
 def asked(protocol: str, octets: bytes) -> Question:

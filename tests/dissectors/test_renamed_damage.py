@@ -6,7 +6,7 @@ import pytest
 
 from dissectors.bacnet.renamer import MstpRenamer
 from dissectors.checksums import crc8_mstp, crc16_modbus
-from dissectors.frame import Check, Damage, Found, Frame
+from dissectors.frame import Check, Damage, FoundBy, Frame
 from dissectors.modbus.renamer import RtuRenamer
 from dissectors.pseudonyms import inflicted
 
@@ -15,7 +15,7 @@ RENAMED = bytes.fromhex("55ff0003020000aa")
 
 
 def _frame(octets: bytes, check: Check, damage: Damage | None) -> Frame:
-    return Frame("any", octets, 0, len(octets), check, Found.LENGTH, damage)
+    return Frame("any", octets, 0, len(octets), check, FoundBy.LENGTH, damage)
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from dissectors.bacnet import cobs
 from dissectors.bacnet.frame_types import PREAMBLE
 from dissectors.bacnet.framing import MstpFramer
 from dissectors.checksums import crc8_mstp, crc16_x25
-from dissectors.frame import Check, Chunk, Damage, Event, Found, Frame, Noise
+from dissectors.frame import Check, Chunk, Damage, Event, FoundBy, Frame, Noise
 from dissectors.line import LineSettings, Timing
 from sniff.testing.framer_contract import framer_contract
 
@@ -106,7 +106,7 @@ def test_a_late_read_inside_a_good_frame_joins_it(at, pause):
     events = drive(frame[:at], (pause * MS, frame[at:]), (20 * MS, TOKEN))
     assert [e.octets for e in events] == [frame, TOKEN]
     assert events[0].ok
-    assert events[0].found is Found.JOINED
+    assert events[0].found is FoundBy.JOINED
 
 
 def test_after_silence_a_good_header_ends_a_cut_frame_at_once():

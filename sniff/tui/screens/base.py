@@ -16,7 +16,7 @@ from sniff.tui.header import StatusHeader
 from sniff.tui.key_names import named
 from sniff.tui.keybar import KeyBar
 from sniff.tui.prompt import Prompt
-from sniff.tui.viewing import Viewing
+from sniff.tui.view_state import Viewing
 
 
 class ViewScreen(Screen[None]):

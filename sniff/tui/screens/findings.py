@@ -15,10 +15,10 @@ from textual.widgets import DataTable, Static
 
 from dissectors.findings import Finding, Severity, under_causes
 from sniff.analysis.judging import rules_over
+from sniff.analysis.sanitizing import sanitized
 from sniff.analysis.site_rules import SITE_RULES
 from sniff.tui.analyzer import analyzer
 from sniff.tui.columns import fit
-from sniff.tui.plain import plain
 from sniff.tui.screens.searching import SearchScreen
 from sniff.tui.still_judging import still_judging
 from sniff.tui.tables import StationTable
@@ -138,8 +138,8 @@ class FindingsScreen(SearchScreen):
         room = max(LEAST_SEEN, self._width - self._others())
         cells = {
             "how grave": Text(("└ " if under else "") + _WORDS[finding.severity], style=_STYLES[finding.severity]),
-            "about": Text(plain(finding.subject)),
-            "what was seen": Text(fit(plain(finding.seen), room).rstrip()),
+            "about": Text(sanitized(finding.subject)),
+            "what was seen": Text(fit(sanitized(finding.seen), room).rstrip()),
             "times": Text("" if finding.is_once else str(finding.count), justify="right"),
             "last": Text(clock(finding.last)),
             "code": Text(finding.code, style="dim"),
@@ -165,21 +165,21 @@ class FindingsScreen(SearchScreen):
             return
         text.append(f"{_WORDS[finding.severity]} ", style=_STYLES[finding.severity])
         title = self._titles.get(finding.code, "")
-        text.append(plain(f"{finding.subject}: {title}" if title else finding.subject), style="bold")
+        text.append(sanitized(f"{finding.subject}: {title}" if title else finding.subject), style="bold")
         text.append(f"  {finding.code}\n", style="dim")
-        text.append(plain(finding.seen) + "\n")
+        text.append(sanitized(finding.seen) + "\n")
         if finding.means:
-            text.append("means  ", style="dim").append(plain(finding.means) + "\n")
+            text.append("means  ", style="dim").append(sanitized(finding.means) + "\n")
         text.rstrip()
         words.update(text)
-        advice.update(f"next   {plain(finding.next)}" if finding.next else "")
+        advice.update(f"next   {sanitized(finding.next)}" if finding.next else "")
         advice.display = bool(finding.next)
         places.update(self._places(finding))
 
     def _places(self, finding: Finding) -> Text:
         text = Text()
         if finding.cause is not None:
-            text.append("comes from  ", style="dim").append(plain(" ".join(reversed(finding.cause))) + "\n")
+            text.append("comes from  ", style="dim").append(sanitized(" ".join(reversed(finding.cause))) + "\n")
         if finding.evidence:
             text.append("frames  ", style="dim")
             text.append(", ".join(self._place(no) for no in finding.evidence[:EVIDENCE]))

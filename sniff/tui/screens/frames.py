@@ -14,9 +14,10 @@ from textual.widget import Widget
 from dissectors.frame import Frame
 from dissectors.tracker import Transaction
 from sniff.analysis.row_tree import tree_of
+from sniff.analysis.sanitizing import sanitized
 from sniff.engine.capture import CaptureError
 from sniff.engine.engine import Row
-from sniff.tui import places
+from sniff.tui import goto
 from sniff.tui.analyzer import analyzer
 from sniff.tui.field_tree import FieldTree
 from sniff.tui.filter_line import FilterLine
@@ -26,7 +27,6 @@ from sniff.tui.hex_pane import HexPane
 from sniff.tui.index import Known
 from sniff.tui.linelist import LineList
 from sniff.tui.marks import MarksScreen
-from sniff.tui.plain import plain
 from sniff.tui.prompt import Prompt
 from sniff.tui.saving import save, why_not
 from sniff.tui.screens.listing import ListingScreen
@@ -252,7 +252,7 @@ class FramesScreen(ListingScreen):
     def _no_place(self, text: str) -> str:
         if text.strip():
             try:
-                places.find(self.store, text, self.viewing.last_row)
+                goto.find(self.store, text, self.viewing.last_row)
             except ValueError as error:
                 return str(error)
         return ""
@@ -261,7 +261,7 @@ class FramesScreen(ListingScreen):
         """Go there."""
         if message.purpose == "go to" and message.text.strip():
             message.stop()
-            found = places.find(self.store, message.text, self.viewing.last_row)
+            found = goto.find(self.store, message.text, self.viewing.last_row)
             if found is not None:
                 self.lines.go_to(found)
         elif message.purpose == "mark":
@@ -280,9 +280,9 @@ class FramesScreen(ListingScreen):
         try:
             count = save(self.store, (index[place] for place in range(len(index))), path)
         except (CaptureError, OSError) as error:
-            self.notify(plain(error), severity="error", markup=False)
+            self.notify(sanitized(error), severity="error", markup=False)
             return
-        self.notify(f"{plain(path)}: {count} rows", markup=False)
+        self.notify(f"{sanitized(path)}: {count} rows", markup=False)
 
     def action_alike(self) -> None:
         """Show what is alike: the octets of the field that is picked, else the kind and station of the row."""

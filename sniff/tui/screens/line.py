@@ -15,13 +15,13 @@ from textual.widgets import Static
 from dissectors.frame import LineError
 from dissectors.line import NS_PER_S
 from dissectors.words import milliseconds
+from sniff.analysis.sanitizing import sanitized
 from sniff.bus.feed import FeedStatus
 from sniff.bus.rows import Store
 from sniff.engine.session import LineEvent
 from sniff.tui.analyzer import analyzer
 from sniff.tui.charts import spread
 from sniff.tui.key_names import named
-from sniff.tui.plain import plain
 from sniff.tui.plot import LEAST, HistoryPlot
 from sniff.tui.screens.base import ViewScreen
 from sniff.tui.times import clock, date_and_clock, size
@@ -50,11 +50,11 @@ def settings(store: Store, status: FeedStatus) -> list[Part]:
     """Line settings, adapter, capture."""
     session = store.session
     timing, adapter = session.timing, session.adapter
-    names = ", ".join(plain(part) for part in (adapter.name, adapter.driver, adapter.serial_number) if part)
+    names = ", ".join(sanitized(part) for part in (adapter.name, adapter.driver, adapter.serial_number) if part)
     characters = f"one character {milliseconds(timing.char)}, 3.5 of them {milliseconds(timing.t35)}"
-    held = f"holds octets back up to {milliseconds(adapter.latency)} ({plain(adapter.latency_from)})"
+    held = f"holds octets back up to {milliseconds(adapter.latency)} ({sanitized(adapter.latency_from)})"
     return [
-        ("line", Text(f"{plain(session.line)} · {characters}")),
+        ("line", Text(f"{sanitized(session.line)} · {characters}")),
         ("adapter", Text(f"{names} · {held if adapter.latency else 'times are exact'}")),
         ("reports", Text(reports(store))),
         ("started", Text(date_and_clock(session.started) if session.started else "unknown")),
@@ -71,22 +71,24 @@ def reports(store: Store) -> str:
     elif not adapter.reports:
         said = "no line errors at all: 0 means unknown"
     else:
-        said = ", ".join(plain(name) for name in adapter.reports)
-    return said + (f" ({plain(adapter.detail)})" if adapter.detail else "")
+        said = ", ".join(sanitized(name) for name in adapter.reports)
+    return said + (f" ({sanitized(adapter.detail)})" if adapter.detail else "")
 
 
 def capture(status: FeedStatus) -> str:
     """What happens to what comes in."""
-    parts = [f"recorded to {plain(status.recording)}, {size(status.file_size)}" if status.recording else "not recorded"]
+    parts = [
+        f"recorded to {sanitized(status.recording)}, {size(status.file_size)}" if status.recording else "not recorded"
+    ]
     if not status.live:
-        parts = [f"from {plain(status.port)}, {size(status.file_size)}"]
+        parts = [f"from {sanitized(status.port)}, {size(status.file_size)}"]
     if status.follows:
-        parts = [f"from {plain(status.follows)}, {size(status.file_size)}, which another process goes on to write"]
+        parts = [f"from {sanitized(status.follows)}, {size(status.file_size)}, which another process goes on to write"]
     if status.priority:
-        parts.append(f"priority {plain(status.priority)}")
+        parts.append(f"priority {sanitized(status.priority)}")
     parts.append(f"{status.dropped} lost" if status.dropped else "nothing lost")
     if status.ended:
-        parts.append(f"ended: {plain(status.ended)}")
+        parts.append(f"ended: {sanitized(status.ended)}")
     return " · ".join(parts)
 
 
@@ -165,7 +167,7 @@ def events(happened: list[LineEvent]) -> list[Part]:
     lines = []
     for event in reversed(happened[-EVENTS_SHOWN:]):
         count = f" {event.number}" if event.number > 0 else " (how many is unknown)" if event.number < 0 else ""
-        words = f": {plain(event.text)}" if event.text else ""
+        words = f": {sanitized(event.text)}" if event.text else ""
         lines.append(f"{clock(event.moment)}  {event.kind.value}{count}{words}")
     if len(happened) > EVENTS_SHOWN:
         lines.append(f"and {len(happened) - EVENTS_SHOWN} earlier ones")

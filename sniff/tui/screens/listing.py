@@ -8,6 +8,7 @@ from typing import ClassVar
 
 from textual.binding import Binding, BindingType
 
+from sniff.analysis.sanitizing import sanitized
 from sniff.config import FILE, ConfigError, View, load, save_view
 from sniff.filter import FilterError
 from sniff.filter.completion import Completion, completions
@@ -18,7 +19,6 @@ from sniff.tui.finding_rows import find
 from sniff.tui.guest import is_guest
 from sniff.tui.index import Index, Known
 from sniff.tui.linelist import LineList
-from sniff.tui.plain import plain
 from sniff.tui.prompt import Prompt
 from sniff.tui.screens.searching import SearchScreen
 from sniff.tui.store_list import StoreList
@@ -195,9 +195,9 @@ class ListingScreen(SearchScreen):
                 self.notify("who looks from another machine saves no views here", severity="warning", timeout=4)
             else:
                 path = save_view(name, view_of(self.viewing))
-                self.notify(f"view {name} saved in {plain(path)}", timeout=4, markup=False)
+                self.notify(f"view {name} saved in {sanitized(path)}", timeout=4, markup=False)
         except (ConfigError, FilterError, OSError) as error:
-            self.notify(plain(str(error)), severity="error", markup=False)
+            self.notify(sanitized(str(error)), severity="error", markup=False)
         analyzer(self).draw_screen()
 
     def on_prompt_answered(self, message: Prompt.Answered) -> None:

@@ -19,10 +19,10 @@ from dissectors.tracker import Verdict
 from dissectors.words import milliseconds
 from sniff.analysis.health import Health, station_of
 from sniff.analysis.nodes import Node
+from sniff.analysis.sanitizing import sanitized
 from sniff.tui.analyzer import analyzer
 from sniff.tui.charts import spread
 from sniff.tui.hanging import hanging
-from sniff.tui.plain import plain
 from sniff.tui.screens.searching import SearchScreen
 from sniff.tui.still_judging import still_judging
 from sniff.tui.tables import StationTable
@@ -221,17 +221,17 @@ class NodesScreen(SearchScreen):
         text = Text()
         text.append(f"{self.store.dissector.noun} {node.address}", style="bold")
         if one.device and profile is not None:
-            text.append(plain(f" · {profile.title}"))
+            text.append(sanitized(f" · {profile.title}"))
         if one.identity:
             text.append(f" · calls itself device {' and '.join(map(str, one.identity))}")
         score = "not known yet" if one.health is None else f"{one.health.score} of 100"
         text.append("\nhealth  ", style="dim").append(score, style="bold")
         if one.health is not None and one.health.reasons:
-            text.append(plain(": " + "; ".join(one.health.reasons)))
+            text.append(sanitized(": " + "; ".join(one.health.reasons)))
         for finding in one.findings[:SOME]:
-            text.append(f"\n{finding.severity.label:<8}", style="dim").append(plain(finding.seen))
+            text.append(f"\n{finding.severity.label:<8}", style="dim").append(sanitized(finding.seen))
         if node.kinds:
-            text.append("\nframes  ", style="dim").append(plain(kinds(node, SOME)))
+            text.append("\nframes  ", style="dim").append(sanitized(kinds(node, SOME)))
         spoilt = Counter({verdict.words: count for verdict, count in node.verdicts.items()})
         if spoilt:
             text.append("\nends    ", style="dim").append(
@@ -239,7 +239,7 @@ class NodesScreen(SearchScreen):
             )
         if node.errors:
             named = (f"{error} {count}" for error, count in node.errors.most_common(SOME))
-            text.append("\nerrors  ", style="dim").append(plain(", ".join(named)))
+            text.append("\nerrors  ", style="dim").append(sanitized(", ".join(named)))
         if node.passed:
             text.append("\ntokens  ", style="dim").append(
                 f"{node.passed} tokens and polls for masters came to it, {node.unused} tokens of those it did not use"
@@ -279,4 +279,4 @@ def _cell(title: str, text: str, one: Station) -> Text:
     poor = title == "health" and one.health is not None and one.health.score < POOR
     if poor or (title in TROUBLE and text != "0"):
         return Text(f"!{text}", style="bold", justify=justify)  # type: ignore[arg-type]  # a literal of two
-    return Text(plain(text), justify=justify)  # type: ignore[arg-type]
+    return Text(sanitized(text), justify=justify)  # type: ignore[arg-type]

@@ -15,9 +15,9 @@ from dissectors.line import MS, NS_PER_S
 from dissectors.profiles.decoding import Quality, Value, number
 from sniff.analysis.guessed_points import GuessedPoint, LatestGuesses, guess_of
 from sniff.analysis.points import Point
+from sniff.analysis.sanitizing import sanitized
 from sniff.tui.analyzer import analyzer
 from sniff.tui.charts import BARS
-from sniff.tui.plain import plain
 from sniff.tui.plot import HistoryPlot
 from sniff.tui.screens.tabling import TableScreen
 from sniff.tui.still_judging import still_judging
@@ -62,7 +62,7 @@ def age(nanoseconds: int) -> str:
 def shown_value(value: Value, room: int = WORDS) -> str:
     """The value with unit, or what it says in words, in so many cells."""
     text = value.words or number(value.value, value.entry, value.unit)
-    return plain(text if len(text) <= room else text[: room - 1] + "…")
+    return sanitized(text if len(text) <= room else text[: room - 1] + "…")
 
 
 NARROW: tuple[str, ...] = ("", "stn", "point", "value", "age", "n", "every ms")
@@ -235,7 +235,7 @@ class PointsScreen(TableScreen):
             words.append(guess.words + ("" if guess.value is None else f", so read {guess.value:.7g}"))
         words += _seen(point, guess)
         words.append(f"row {point.sample.frame}")
-        return plain(" · ".join(word for word in words if word) + f" · {self.said}" + self._more())
+        return sanitized(" · ".join(word for word in words if word) + f" · {self.said}" + self._more())
 
     def _more(self) -> str:
         hidden = getattr(self, "_hidden", 0)
@@ -342,7 +342,7 @@ def _cells(point: Point, now: int, pinned: list[Key], guess: GuessedPoint | None
     return [
         Text(mark),
         Text(sample.station, justify="right"),
-        Text(plain(sample.name)),
+        Text(sanitized(sample.name)),
         Text(("*" if fresh else "") + shown, style=style, justify="right"),
         Text(age(now - sample.time), justify="right"),
         Text(str(point.count), justify="right"),
@@ -351,5 +351,5 @@ def _cells(point: Point, now: int, pinned: list[Key], guess: GuessedPoint | None
         Text(f"{low:.5g}" if low is not None and is_number else "–", justify="right"),
         Text(f"{high:.5g}" if high is not None and is_number else "–", justify="right"),
         Text(trend([number for _, number in point.history])),
-        Text(plain(entry.title if entry is not None else guess.words if guess is not None else "")),
+        Text(sanitized(entry.title if entry is not None else guess.words if guess is not None else "")),
     ]

@@ -13,9 +13,9 @@ from dissectors.line import MS
 from dissectors.words import milliseconds
 from sniff.analysis.poll import Poll
 from sniff.analysis.poll_words import asked, changes, told
+from sniff.analysis.sanitizing import sanitized
 from sniff.tui.analyzer import analyzer
 from sniff.tui.charts import sparkline
-from sniff.tui.plain import plain
 from sniff.tui.screens.tabling import TableScreen
 from sniff.tui.still_judging import still_judging
 from sniff.tui.tables import StationTable
@@ -146,7 +146,7 @@ class PollsScreen(TableScreen):
 
     def _cells(self, poll: Poll) -> list[Text]:
         room = max(20, self.app.size.width - (44 if self._columns == NARROW else 78))
-        said = plain(self._asks(poll, room))
+        said = sanitized(self._asks(poll, room))
         said = said if len(said) <= room else said[: room - 1] + "…"
         return [Text(_who(poll), justify="right"), Text(said), *(_cell(title, of(poll)) for title, of in self._columns)]
 
@@ -175,7 +175,7 @@ class PollsScreen(TableScreen):
         turned = told(changes(poll, begin, end), lambda time: clock(time)[:8])
         words += [turned] if turned else []
         chart = _chart(poll)
-        return plain(" · ".join(words)) + (f"\nhow often  {chart}" if chart else "")
+        return sanitized(" · ".join(words)) + (f"\nhow often  {chart}" if chart else "")
 
     def _here(self) -> Poll | None:
         key = self.query_one(StationTable).key_here()

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from textual.binding import Binding, BindingType
 
-from sniff.tui.plain import plain
+from sniff.analysis.sanitizing import sanitized
 from sniff.tui.prompt import Prompt
 from sniff.tui.screens.searching import SearchScreen
 
@@ -43,7 +43,7 @@ class TableScreen(SearchScreen):
     def said(self) -> str:
         """How the table is sorted and what was looked for, in words."""
         order = f"sorted by {self.ORDERS[self.order]}"
-        return f"{order} · only with {' '.join(map(plain, self.words))} (esc: all)" if self.words else order
+        return f"{order} · only with {' '.join(map(sanitized, self.words))} (esc: all)" if self.words else order
 
     def action_find(self) -> None:
         """Ask for words."""

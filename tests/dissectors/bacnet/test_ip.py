@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from dissectors.bacnet import BACNET_IP
 from dissectors.bacnet.ip import make_ip
 from dissectors.bacnet.ip_framing import IpFramer
-from dissectors.frame import Check, Chunk, Damage, Found, Frame, Header, Role
+from dissectors.frame import Check, Chunk, Damage, FoundBy, Frame, Header, Role
 from dissectors.line import LineSettings, Timing
 from dissectors.tracker import Verdict
 from sniff.testing.framer_contract import framer_contract
@@ -86,7 +86,7 @@ def test_what_a_frame_says() -> None:
     role=st.sampled_from(Role),
 )
 def test_everything_is_total(octets: bytes, damaged: bool, role: Role) -> None:
-    frame = Frame(BACNET_IP.name, octets, 0, 0, Check.ABSENT, Found.LENGTH, Damage.SHORT if damaged else None)
+    frame = Frame(BACNET_IP.name, octets, 0, 0, Check.ABSENT, FoundBy.LENGTH, Damage.SHORT if damaged else None)
     header = BACNET_IP.peek(frame)
     assert isinstance(header, Header)
     assert BACNET_IP.text(frame, header, role).isprintable()

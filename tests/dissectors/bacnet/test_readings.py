@@ -15,14 +15,14 @@ from dissectors.bacnet.f510 import f510
 from dissectors.bacnet.frame_types import FrameType
 from dissectors.bacnet.readings import readings
 from dissectors.bacnet.values import Enumerated
-from dissectors.frame import Check, Found, Frame
+from dissectors.frame import Check, FoundBy, Frame
 
 MASTER, DRIVE = 1, 5
 
 
 def frame(source: int, destination: int, npdu: bytes, expecting: bool = False) -> Frame:
     octets = npdu_frame(destination, source, npdu, expecting)
-    return Frame("mstp", octets, 0, 1, Check.GOOD, Found.DELIMITER)
+    return Frame("mstp", octets, 0, 1, Check.GOOD, FoundBy.DELIMITER)
 
 
 def exchange(request: bytes) -> list[tuple[Any, ...]]:
@@ -85,7 +85,7 @@ def test_change_of_value() -> None:
 
 def test_tokens_tell_nothing() -> None:
     token = bytes.fromhex("55ff0010050000 8c".replace(" ", ""))
-    assert readings(Frame("mstp", token, 0, 1, Check.GOOD, Found.DELIMITER), None) == ()
+    assert readings(Frame("mstp", token, 0, 1, Check.GOOD, FoundBy.DELIMITER), None) == ()
 
 
 @given(st.binary(max_size=40), st.none() | st.binary(max_size=40))

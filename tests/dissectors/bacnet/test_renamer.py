@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from dissectors.bacnet.renamer import MstpRenamer
 from dissectors.checksums import crc8_mstp, crc16_x25
-from dissectors.frame import Check, Found, Frame
+from dissectors.frame import Check, FoundBy, Frame
 
 
 def _renamed(rename: MstpRenamer, apdu: bytes) -> bytes:
     data = b"\x01\x04" + apdu
     header = bytes([5, 2, 7, *len(data).to_bytes(2, "big")])
     octets = b"\x55\xff" + header + bytes([crc8_mstp(header)]) + data + crc16_x25(data).to_bytes(2, "little")
-    found = rename(Frame("mstp", octets, 0, 0, Check.GOOD, Found.DELIMITER))
+    found = rename(Frame("mstp", octets, 0, 0, Check.GOOD, FoundBy.DELIMITER))
     assert len(found) == len(octets)
     assert crc16_x25(found[8:-2]).to_bytes(2, "little") == found[-2:]
     return found[10:-2]

@@ -15,7 +15,7 @@ from dissectors.bacnet import MSTP
 from dissectors.bacnet.envelope import frame
 from dissectors.bacnet.simulated import Poller, SimulatedNode, f510
 from dissectors.bacnet.turn import Turn
-from dissectors.frame import Check, Chunk, Damage, Flaw, Found, Frame, Noise, Role
+from dissectors.frame import Check, Chunk, Damage, Flaw, FoundBy, Frame, Noise, Role
 from dissectors.line import LineSettings, Timing
 from sniff.simulation.wire import Burst, Party, Wire
 from tests.dissectors.bacnet.ring_script import data, poll, rounds, script, spoil, token
@@ -115,8 +115,8 @@ def test_damaged_frames_have_their_sender(harm: Harm, least: float, latency: int
 def test_any_octets_have_a_sender_or_none(octets: bytes, before: list[bytes]):
     turn = Turn(TIMING)
     for earlier in before:
-        turn.see(Frame("mstp", earlier, 0, 10, Check.GOOD, Found.LENGTH), earlier[2], earlier[4], earlier[3])
-    speaker = turn.speaker(Frame("mstp", octets, 20, 30, Check.BAD, Found.LENGTH, Damage.HEADER))
+        turn.see(Frame("mstp", earlier, 0, 10, Check.GOOD, FoundBy.LENGTH), earlier[2], earlier[4], earlier[3])
+    speaker = turn.speaker(Frame("mstp", octets, 20, 30, Check.BAD, FoundBy.LENGTH, Damage.HEADER))
     assert speaker is None or 0 <= speaker.source <= 255
 
 

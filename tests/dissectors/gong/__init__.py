@@ -19,7 +19,7 @@ from dissectors.manifest import Dissector
 from dissectors.plain_framers import Delimited, DelimitedFramer
 from dissectors.plain_tracker import Polling
 from dissectors.pseudonyms import Pseudonyms
-from dissectors.readings import How, Reading
+from dissectors.readings import Origin, Reading
 from dissectors.simulated import Party, Send, SimulatedBus
 from dissectors.simulated_faults import BitFlips, LostResponse
 
@@ -95,7 +95,7 @@ def readings(request: Frame | None, response: Frame | None) -> tuple[Reading, ..
     if held is None:
         return ()
     value = int(held, 16)
-    return (Reading("place", int(asked[3], 16), value, value, How.WRITE if is_write else How.READ),)
+    return (Reading("place", int(asked[3], 16), value, value, Origin.WRITE if is_write else Origin.READ),)
 
 
 class GongRenamer:

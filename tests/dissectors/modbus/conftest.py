@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from dissectors.checksums import crc16_modbus
-from dissectors.frame import Check, Damage, Event, Found, Frame, Header, Noise, Place, Reason
+from dissectors.frame import Check, Damage, Event, FoundBy, Frame, Header, Noise, Place, Reason
 from dissectors.line import LineSettings, Timing
 from dissectors.modbus.envelope import seal_ascii, seal_rtu, unseal
 from dissectors.modbus.header import peek_ascii, peek_rtu
@@ -33,7 +33,7 @@ def make_frame(octets: bytes, start: int = 0, end: int | None = None, slack: int
         start,
         end,
         Check.GOOD if good else Check.BAD,
-        Found.DELIMITER if is_ascii else Found.GAP,
+        FoundBy.DELIMITER if is_ascii else FoundBy.GAP,
         None if good else Damage.CHECK,
         slack=slack,
     )

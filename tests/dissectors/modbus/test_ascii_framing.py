@@ -16,7 +16,7 @@ from dissectors.frame import (
     Damage,
     Event,
     Flaw,
-    Found,
+    FoundBy,
     Frame,
     LineError,
     Mark,
@@ -66,7 +66,7 @@ def test_frames_are_given_with_their_delimiters_as_soon_as_they_end() -> None:
     (event,) = framer.feed(chunks[-1])
     assert brief([event]) == [(REQUEST,)]
     assert isinstance(event, Frame)
-    assert (event.found, event.expected, event.end) == (Found.DELIMITER, len(REQUEST), octets[-1][0])
+    assert (event.found, event.expected, event.end) == (FoundBy.DELIMITER, len(REQUEST), octets[-1][0])
     assert framer.deadline() is None
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from dissectors.checksums import crc16_modbus
-from dissectors.frame import Check, Chunk, Damage, Event, Found, Frame, LineError, Mark, Noise, Place, Reason
+from dissectors.frame import Check, Chunk, Damage, Event, FoundBy, Frame, LineError, Mark, Noise, Place, Reason
 from dissectors.line import LineSettings, Timing
 from dissectors.modbus.framing import WINDOW, RtuFramer
 from sniff.testing.driving import drive
@@ -70,13 +70,13 @@ def brief(events: Iterable[Event]) -> list[tuple[object, ...]]:
 
 def test_clean_frames_are_found_by_their_gaps() -> None:
     events = read((0, REQUEST), (5, RESPONSE), (50, OTHER))
-    assert brief(events) == [(Found.GAP, REQUEST), (Found.GAP, RESPONSE), (Found.GAP, OTHER)]
+    assert brief(events) == [(FoundBy.GAP, REQUEST), (FoundBy.GAP, RESPONSE), (FoundBy.GAP, OTHER)]
 
 
 @pytest.mark.parametrize("count", range(1, 251))
 def test_frames_of_every_length_wait_for_the_silence_that_follows(count: int) -> None:
     frame = rtu(f"05 01 {count:02X}" + "55" * count)
-    assert brief(read((0, frame))) == [(Found.GAP, frame)]
+    assert brief(read((0, frame))) == [(FoundBy.GAP, frame)]
 
 
 def test_a_clean_frame_is_given_as_soon_as_silence_is_proved() -> None:
@@ -86,21 +86,21 @@ def test_a_clean_frame_is_given_as_soon_as_silence_is_proved() -> None:
     due = framer.deadline()
     assert due == octets[-1][0] + TIMING.t35 + TIMING.char
     assert framer.advance(due - 1) == []
-    assert brief(framer.advance(due)) == [(Found.LENGTH, REQUEST)]  # nothing is known of the time before it
+    assert brief(framer.advance(due)) == [(FoundBy.LENGTH, REQUEST)]  # nothing is known of the time before it
     assert framer.deadline() is None
 
 
 def test_frames_without_silence_between_are_split() -> None:
     assert brief(read((0, REQUEST + RESPONSE + OTHER))) == [
-        (Found.SPLIT, REQUEST),
-        (Found.SPLIT, RESPONSE),
-        (Found.SPLIT, OTHER),
+        (FoundBy.SPLIT, REQUEST),
+        (FoundBy.SPLIT, RESPONSE),
+        (FoundBy.SPLIT, OTHER),
     ]
 
 
 def test_a_reply_too_early_for_the_gap_rule_is_found_by_length() -> None:
     events = read((0, REQUEST), (2.5, RESPONSE))
-    assert brief(events) == [(Found.LENGTH, REQUEST), (Found.LENGTH, RESPONSE)]
+    assert brief(events) == [(FoundBy.LENGTH, REQUEST), (FoundBy.LENGTH, RESPONSE)]
 
 
 def test_several_frames_in_one_read_of_a_slow_adapter() -> None:
@@ -137,7 +137,7 @@ def test_slack_and_marks_go_with_the_frame() -> None:
 @pytest.mark.parametrize("at", range(1, len(RESPONSE)))
 def test_a_frame_cut_by_a_late_read_is_joined(at: int) -> None:
     events = read((0, REQUEST), (5, RESPONSE[:at]), (8, RESPONSE[at:]), (60, OTHER))
-    assert brief(events) == [(Found.GAP, REQUEST), (Found.JOINED, RESPONSE), (Found.GAP, OTHER)]
+    assert brief(events) == [(FoundBy.GAP, REQUEST), (FoundBy.JOINED, RESPONSE), (FoundBy.GAP, OTHER)]
 
 
 def test_a_frame_cut_before_the_zero_that_its_crc_ends_with_is_joined() -> None:
@@ -145,8 +145,8 @@ def test_a_frame_cut_before_the_zero_that_its_crc_ends_with_is_joined() -> None:
     assert request[-1] == 0
     assert crc16_modbus(request[:-1]) == 0
     assert brief(read((0, request[:-1]), (8, request[-1:]), (60, OTHER))) == [
-        (Found.JOINED, request),
-        (Found.GAP, OTHER),
+        (FoundBy.JOINED, request),
+        (FoundBy.GAP, OTHER),
     ]
     (alone,) = read((0, request[:-1]))
     assert isinstance(alone, Frame)
@@ -169,10 +169,10 @@ def test_a_frame_that_never_goes_on_is_damaged_and_given_in_bounded_time() -> No
 def test_the_next_request_ends_the_wait_for_the_rest() -> None:
     events = read((0, REQUEST), (5, RESPONSE[:5]), (5, OTHER), (60, REQUEST))
     assert brief(events) == [
-        (Found.GAP, REQUEST),
+        (FoundBy.GAP, REQUEST),
         (Damage.SHORT, RESPONSE[:5], Check.ABSENT, 9),
-        (Found.GAP, OTHER),
-        (Found.GAP, REQUEST),
+        (FoundBy.GAP, OTHER),
+        (FoundBy.GAP, REQUEST),
     ]
 
 
@@ -183,7 +183,7 @@ def test_a_good_frame_is_never_held() -> None:
     octets = wire((0, REQUEST), (50, request))
     for chunk in exact(octets):
         framer.feed(chunk)
-    assert brief(framer.advance(octets[-1][0] + TIMING.t35 + TIMING.char)) == [(Found.GAP, request)]
+    assert brief(framer.advance(octets[-1][0] + TIMING.t35 + TIMING.char)) == [(FoundBy.GAP, request)]
 
 
 # --- the two traps ----------------------------------------------------------------------------------------------------
@@ -241,20 +241,20 @@ def test_a_response_with_the_length_of_a_request_is_told_by_what_was_asked() -> 
 def test_an_unknown_function_is_found_between_two_silences() -> None:
     frame = rtu("01 64 0102030405")
     (event,) = read((0, frame))
-    assert brief([event]) == [(Found.GAP, frame)]
+    assert brief([event]) == [(FoundBy.GAP, frame)]
     assert isinstance(event, Frame)
     assert event.expected is None
 
 
 def test_loop_back_data_may_be_of_any_length() -> None:
     frame = rtu("01 08 0000 0102 0304 0506")
-    assert brief(read((0, frame))) == [(Found.GAP, frame)]
+    assert brief(read((0, frame))) == [(FoundBy.GAP, frame)]
 
 
 def test_a_right_crc_at_a_wrong_length_is_said_as_it_is() -> None:
     frame = rtu("07 03 02 0000 0000")
     (event,) = read((0, frame))
-    assert brief([event]) == [(Found.GAP, frame)]
+    assert brief([event]) == [(FoundBy.GAP, frame)]
     assert isinstance(event, Frame)
     assert (event.expected, event.flags) == (7, ("odd-length",))
 
@@ -262,13 +262,13 @@ def test_a_right_crc_at_a_wrong_length_is_said_as_it_is() -> None:
 @pytest.mark.parametrize("code", [0x10, 0x20, 0x51, 0x52, 0x99])
 def test_vendor_exception_codes_are_frames_between_silences(code: int) -> None:
     frame = rtu(f"01 83 {code:02X}")
-    assert brief(read((0, REQUEST), (5, frame))) == [(Found.GAP, REQUEST), (Found.GAP, frame)]
+    assert brief(read((0, REQUEST), (5, frame))) == [(FoundBy.GAP, REQUEST), (FoundBy.GAP, frame)]
 
 
 @pytest.mark.parametrize("unit", [0xF8, 0xFE, 0xFF])
 def test_units_above_247_are_taken_when_silence_or_the_request_speaks_for_them(unit: int) -> None:
     asked, answered = rtu(f"{unit:02X} 06 2502 1770"), rtu(f"{unit:02X} 06 2502 1770")
-    assert brief(read((0, asked), (5, answered))) == [(Found.GAP, asked), (Found.GAP, answered)]
+    assert brief(read((0, asked), (5, answered))) == [(FoundBy.GAP, asked), (FoundBy.GAP, answered)]
     assert [e.octets for e in read((0, asked + answered), (9, OTHER))] == [asked, answered, OTHER]
 
 
@@ -278,18 +278,18 @@ def test_units_above_247_are_taken_when_silence_or_the_request_speaks_for_them(u
 def test_a_wrong_check_is_a_damaged_frame_of_its_station() -> None:
     bad = RESPONSE[:-1] + bytes([RESPONSE[-1] ^ 1])
     assert brief(read((0, REQUEST), (5, bad), (50, OTHER))) == [
-        (Found.GAP, REQUEST),
+        (FoundBy.GAP, REQUEST),
         (Damage.CHECK, bad, Check.BAD, 9),
-        (Found.GAP, OTHER),
+        (FoundBy.GAP, OTHER),
     ]
 
 
 def test_the_open_request_tells_the_length_that_a_damaged_byte_count_hides() -> None:
     bad = bytes.fromhex("01 03 24") + RESPONSE[3:]
     assert brief(read((0, REQUEST), (5, bad), (5, OTHER))) == [
-        (Found.GAP, REQUEST),
+        (FoundBy.GAP, REQUEST),
         (Damage.CHECK, bad, Check.BAD, 9),
-        (Found.GAP, OTHER),
+        (FoundBy.GAP, OTHER),
     ]
 
 
@@ -309,23 +309,23 @@ def test_octets_too_many_make_a_long_frame() -> None:
 def test_damage_between_frames_without_silence_is_attributed_too() -> None:
     bad = RESPONSE[:4] + b"\x55" + RESPONSE[5:]
     events = read((0, REQUEST + bad + OTHER), latency=FTDI_LATENCY, style=ftdi)
-    assert brief(events) == [(Found.SPLIT, REQUEST), (Damage.CHECK, bad, Check.BAD, 9), (Found.SPLIT, OTHER)]
+    assert brief(events) == [(FoundBy.SPLIT, REQUEST), (Damage.CHECK, bad, Check.BAD, 9), (FoundBy.SPLIT, OTHER)]
 
 
 def test_random_bursts_put_no_stations_on_a_bus_with_stations() -> None:
     burst = bytes.fromhex("63 03 17 99 20 41")
-    assert brief(read((0, burst), (50, OTHER))) == [(Reason.NO_FRAME, burst, Place.BETWEEN), (Found.GAP, OTHER)]
+    assert brief(read((0, burst), (50, OTHER))) == [(Reason.NO_FRAME, burst, Place.BETWEEN), (FoundBy.GAP, OTHER)]
 
 
 def test_the_place_of_noise() -> None:
     events = read((0, b"\xff" + REQUEST), (5, RESPONSE + b"\xfe"), (30, b"\x99"), (30, OTHER))
     assert brief(events) == [
         (Reason.NO_FRAME, b"\xff", Place.BEFORE),
-        (Found.SPLIT, REQUEST),
-        (Found.SPLIT, RESPONSE),
+        (FoundBy.SPLIT, REQUEST),
+        (FoundBy.SPLIT, RESPONSE),
         (Reason.NO_FRAME, b"\xfe", Place.AFTER),
         (Reason.NO_FRAME, b"\x99", Place.BETWEEN),
-        (Found.GAP, OTHER),
+        (FoundBy.GAP, OTHER),
     ]
 
 
@@ -394,7 +394,7 @@ def test_every_printed_frame_is_good_on_its_own_and_in_a_row(latency: int) -> No
     timing = Timing(TIMING.line, latency)
     for frame in frames:
         events = drive(RtuFramer(timing), exact(laid_out([frame], timing, 0)))
-        assert brief(events) == [(Found.LENGTH, frame)]
+        assert brief(events) == [(FoundBy.LENGTH, frame)]
     events = drive(RtuFramer(timing), exact(laid_out(frames, timing, 50 * MS)))
     assert [e.octets for e in events] == frames
     assert all(isinstance(e, Frame) and e.ok for e in events)

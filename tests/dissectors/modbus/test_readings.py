@@ -6,17 +6,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dissectors.frame import Check, Damage, Found, Frame
+from dissectors.frame import Check, Damage, FoundBy, Frame
 from dissectors.modbus.envelope import seal_ascii, seal_rtu
 from dissectors.modbus.readings import readings, refusal
-from dissectors.readings import How
+from dissectors.readings import Origin
 
 
 def frame(pdu: str | bytes, damage: Damage | None = None, is_ascii: bool = False) -> Frame:
     octets = bytes.fromhex(pdu) if isinstance(pdu, str) else pdu
     sealed = seal_ascii(octets) if is_ascii else seal_rtu(octets)
     name = "modbus-ascii" if is_ascii else "modbus-rtu"
-    return Frame(name, sealed, 0, 1, Check.BAD if damage else Check.GOOD, Found.GAP, damage)
+    return Frame(name, sealed, 0, 1, Check.BAD if damage else Check.GOOD, FoundBy.GAP, damage)
 
 
 def told(request: str, response: str | None, is_ascii: bool = False) -> list[tuple[str, int, int | float | str, str]]:
@@ -86,4 +86,4 @@ def test_any_octets(request_pdu: bytes, response_pdu: bytes | None, is_ascii: bo
     answer = None if response_pdu is None else frame(response_pdu, is_ascii=is_ascii)
     for reading in readings(frame(request_pdu, is_ascii=is_ascii), answer):
         assert 0 <= reading.address <= 0xFFFF
-        assert isinstance(reading.how, How)
+        assert isinstance(reading.how, Origin)

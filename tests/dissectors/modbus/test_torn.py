@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from dissectors.frame import Check, Damage, Found, Frame, Noise, Place, Reason
+from dissectors.frame import Check, Damage, FoundBy, Frame, Noise, Place, Reason
 from dissectors.modbus.envelope import ASCII_NAME, RTU_NAME, seal_ascii, seal_rtu
 from dissectors.modbus.torn import FREE, SELDOM, TornFrames
 
@@ -13,7 +13,7 @@ ASCII = seal_ascii(bytes.fromhex("01 03 04 00 01 00 02"))
 
 
 def _damaged(octets: bytes, protocol: str = RTU_NAME) -> Frame:
-    return Frame(protocol, octets, 0, 1_000_000, Check.BAD, Found.GAP, Damage.CHECK)
+    return Frame(protocol, octets, 0, 1_000_000, Check.BAD, FoundBy.GAP, Damage.CHECK)
 
 
 def _noise(octets: bytes) -> Noise:

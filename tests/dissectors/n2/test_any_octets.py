@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dissectors.checksums import sum8
-from dissectors.frame import Check, Damage, Found, Frame, Role
+from dissectors.frame import Check, Damage, FoundBy, Frame, Role
 from dissectors.line import Timing
 from dissectors.n2 import N2Findings, N2Tracker, fields, interpret, packet, peek, text
 from dissectors.n2.framing import judge
@@ -33,7 +33,7 @@ octets = st.one_of(
 
 def frame_of(octets: bytes) -> Frame:
     check, damage = judge(octets) if octets.endswith(b"\r") else (Check.ABSENT, Damage.TIMEOUT)
-    return Frame("n2", octets, 0, 10**6, check, Found.DELIMITER, damage)
+    return Frame("n2", octets, 0, 10**6, check, FoundBy.DELIMITER, damage)
 
 
 @relaxed
@@ -103,7 +103,7 @@ def test_findings_may_be_asked_at_any_time(parts):
     for no, part in enumerate(parts, 1):
         now += 10**8
         check, damage = judge(part) if part.endswith(b"\r") else (Check.ABSENT, Damage.TIMEOUT)
-        frame = Frame("n2", part, now, now + 10**7, check, Found.DELIMITER, damage)
+        frame = Frame("n2", part, now, now + 10**7, check, FoundBy.DELIMITER, damage)
         header = peek(frame)
         tracked = tracker.track(no, frame, header)
         for found in (curious, patient):

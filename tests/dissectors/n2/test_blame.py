@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dissectors.frame import Check, Damage, Found, Frame
+from dissectors.frame import Check, Damage, FoundBy, Frame
 from dissectors.n2.blame import blamed
 from dissectors.n2.commands import parse_command
 from dissectors.n2.masters import HASTE, Masters, OpenCommand
@@ -68,7 +68,7 @@ def test_what_is_answered_late_is_not_missing():
 
 def asked(octets: bytes, start: int, damage: Damage | None = None) -> OpenCommand:
     check = Check.GOOD if damage is None else Check.ABSENT
-    frame = Frame("n2", octets, start, start + len(octets) * MS, check, Found.DELIMITER, damage)
+    frame = Frame("n2", octets, start, start + len(octets) * MS, check, FoundBy.DELIMITER, damage)
     return OpenCommand(start, frame, parse_command(octets))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from dissectors.frame import Check, Chunk, Damage, Event, Found, Frame, Noise, Place, Reason, Role
+from dissectors.frame import Check, Chunk, Damage, Event, FoundBy, Frame, Noise, Place, Reason, Role
 from dissectors.line import Timing
 from dissectors.n2 import N2, N2Framer, fields, interpret, packet, peek, text
 from dissectors.n2.framing import SILENCE, judge
@@ -17,7 +17,7 @@ TIMING = Timing()
 def frame_of(octets: bytes) -> Frame:
     """The frame of whole octets, as the framer would judge it."""
     check, damage = judge(octets)
-    return Frame("n2", octets, 0, len(octets) * TIMING.char, check, Found.DELIMITER, damage)
+    return Frame("n2", octets, 0, len(octets) * TIMING.char, check, FoundBy.DELIMITER, damage)
 
 
 def line(octets: bytes) -> str:
@@ -117,7 +117,7 @@ def test_a_frame_without_end_is_given_up_after_silence():
 def test_a_pause_inside_a_frame_is_told():
     (event,) = wire(b">01110", b"10387\r")
     assert event.ok
-    assert event.found is Found.JOINED
+    assert event.found is FoundBy.JOINED
 
 
 def test_the_256_character_limit():
@@ -134,8 +134,8 @@ def test_the_256_character_limit():
 def test_an_answer_is_found_behind_a_command_that_lost_its_end():
     events = wire(b">0111010387\x8dA0042910000F0\r")
     assert [(e.octets, e.damage, e.found) for e in events] == [
-        (b">0111010387\x8d", Damage.FORM, Found.DELIMITER),
-        (b"A0042910000F0\r", None, Found.SPLIT),
+        (b">0111010387\x8d", Damage.FORM, FoundBy.DELIMITER),
+        (b"A0042910000F0\r", None, FoundBy.SPLIT),
     ]
 
 

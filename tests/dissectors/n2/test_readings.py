@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dissectors.frame import Check, Damage, Found, Frame
+from dissectors.frame import Check, Damage, FoundBy, Frame
 from dissectors.n2.envelope import make_answer as answer
 from dissectors.n2.readings import readings, refusal
 from dissectors.n2.simulated import command
@@ -16,7 +16,7 @@ from dissectors.n2.simulated import refusal as refuse
 
 
 def frame(octets: bytes, damage: Damage | None = None) -> Frame:
-    return Frame("n2", octets, 0, 1, Check.BAD if damage else Check.GOOD, Found.DELIMITER, damage)
+    return Frame("n2", octets, 0, 1, Check.BAD if damage else Check.GOOD, FoundBy.DELIMITER, damage)
 
 
 def hex_of(value: float) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from dissectors.frame import Chunk, Damage, Event, Flaw, Found, Frame, Noise, Repair
+from dissectors.frame import Chunk, Damage, Event, Flaw, FoundBy, Frame, Noise, Repair
 from dissectors.line import Timing
 from dissectors.n2 import N2Framer, fields, interpret, peek, text
 from dissectors.n2.stretch import STRAY
@@ -94,7 +94,7 @@ def test_a_command_in_the_middle_of_a_command_is_found():
 def test_an_answer_behind_a_command_that_lost_its_end_is_found(end):
     events = wire(POLL, ACK, READ[:-1] + end + VALUE, latency=17 * MS)
     assert [event.octets for event in events] == [POLL, ACK, READ[:-1] + end, VALUE]
-    assert events[-1].found is Found.SPLIT
+    assert events[-1].found is FoundBy.SPLIT
     flaw = Flaw.LAST_SPOILT if end else Flaw.LAST_MISSING
     assert repairs(events) == [Repair(flaw, READ)]
 

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from dissectors.frame import Check, Damage, Flaw, Found, Frame, Noise, Place, Reason, Repair
+from dissectors.frame import Check, Damage, Flaw, FoundBy, Frame, Noise, Place, Reason, Repair
 from dissectors.line import LineSettings, Timing
 from dissectors.n2.record import Damages
 from dissectors.n2.torn import TornFrames
@@ -12,7 +12,7 @@ TIMING = Timing(LineSettings.parse("9600,8N1"), 0)
 
 def _frame(octets: bytes, *, slack: int = 0, damage: Damage | None = None) -> Frame:
     check = Check.GOOD if damage is None else Check.BAD
-    return Frame("n2", octets, 0, 1_000_000, check, Found.DELIMITER, damage, slack=slack)
+    return Frame("n2", octets, 0, 1_000_000, check, FoundBy.DELIMITER, damage, slack=slack)
 
 
 def _struck_by(*rows: Frame) -> int:

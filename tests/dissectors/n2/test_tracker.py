@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dissectors.frame import Check, Chunk, Damage, Found, Frame, Noise, Place, Reason, Role
+from dissectors.frame import Check, Chunk, Damage, FoundBy, Frame, Noise, Place, Reason, Role
 from dissectors.line import Timing
 from dissectors.n2 import N2Framer, N2Tracker, peek
 from dissectors.n2.commands import parse_command
@@ -37,7 +37,7 @@ class Bus:
         self.now = start + len(octets) * TIMING.char
         self.no += 1
         check, judged = judge(octets)
-        frame = Frame("n2", octets, start, self.now, check, Found.DELIMITER, damage or judged)
+        frame = Frame("n2", octets, start, self.now, check, FoundBy.DELIMITER, damage or judged)
         return self._take(self.tracker.track(self.no, frame, peek(frame)))
 
     def noise(self, octets: bytes, reason: Reason = Reason.NO_DELIMITER) -> Tracked:
@@ -269,7 +269,7 @@ def test_any_times(parts):
     tracker = N2Tracker(TIMING)
     for no, (octets, time) in enumerate(parts, 1):
         if octets:
-            frame = Frame("n2", octets, time, time + 1, Check.GOOD, Found.DELIMITER)
+            frame = Frame("n2", octets, time, time + 1, Check.GOOD, FoundBy.DELIMITER)
             tracker.track(no, frame, peek(frame))
             tracker.advance(time)
     tracker.close()

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dissectors.frame import Check, Found, Frame, Role
+from dissectors.frame import Check, FoundBy, Frame, Role
 from dissectors.meaning import Node
 from dissectors.profibus import PROFIBUS
 from dissectors.profibus.configuration import parse_configuration
@@ -17,7 +17,7 @@ from dissectors.profibus.telegram import telegram
 
 
 def framed(octets: bytes) -> Frame:
-    return Frame("profibus", octets, 0, 1, Check.GOOD, Found.DELIMITER)
+    return Frame("profibus", octets, 0, 1, Check.GOOD, FoundBy.DELIMITER)
 
 
 def request(point: int, data: bytes) -> Frame:

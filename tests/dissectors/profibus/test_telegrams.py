@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from dissectors.frame import Check, Chunk, Damage, Flaw, Found, Frame, Role
+from dissectors.frame import Check, Chunk, Damage, Flaw, FoundBy, Frame, Role
 from dissectors.line import LineSettings, Timing
 from dissectors.profibus import PROFIBUS, ProfibusFramer
 from dissectors.profibus.telegram import telegram
@@ -16,7 +16,7 @@ SEEN = telegram(8, 2, 0x49)
 def frame(hexed: str) -> Frame:
     octets = bytes.fromhex(hexed)
     check = Check.GOOD if len(octets) > 3 else Check.ABSENT
-    return Frame("profibus", octets, 0, 1, check, Found.DELIMITER)
+    return Frame("profibus", octets, 0, 1, check, FoundBy.DELIMITER)
 
 
 def read(*parts: bytes) -> list[Frame]:

@@ -11,14 +11,14 @@ from hypothesis import strategies as st
 
 from dissectors.profiles import Devices, packaged, parse_text
 from dissectors.profiles.decoding import Quality, decode, plain_name, say
-from dissectors.readings import How, Reading
+from dissectors.readings import Origin, Reading
 
 E510 = packaged("teco-e510")
 F510 = packaged("teco-f510")
 ACN = packaged("automationdirect-acn")
 
 
-def holding(first: int, *values: int, how: How = How.READ) -> tuple[Reading, ...]:
+def holding(first: int, *values: int, how: Origin = Origin.READ) -> tuple[Reading, ...]:
     return tuple(Reading("holding", first + step, value, value, how) for step, value in enumerate(values))
 
 
@@ -78,9 +78,9 @@ def test_values_out_of_range_are_bad_and_doubtful_ones_uncertain() -> None:
     good, bad = decode(E510, holding(0x2502, 59_900)), decode(E510, holding(0x2502, 59_901))
     assert (good[0].quality, bad[0].quality) == (Quality.GOOD, Quality.BAD)
     assert decode(E510, holding(0x0102, 6000))[0].quality == Quality.UNCERTAIN
-    unsure = Reading("holding", 0x2524, 1, 1, How.READ, sure=False)
+    unsure = Reading("holding", 0x2524, 1, 1, Origin.READ, sure=False)
     assert decode(E510, (unsure,))[0].quality == Quality.UNCERTAIN
-    nan = Reading("AI", 10, 0x7FC00000, math.nan, How.READ)
+    nan = Reading("AI", 10, 0x7FC00000, math.nan, Origin.READ)
     assert decode(packaged("teco-f510"), (nan,))[0].quality == Quality.BAD
 
 
@@ -90,12 +90,12 @@ def test_a_doubt_is_marked_once() -> None:
         (0x2001, "status running, forward, preparing, frequency reference from Profibus (?)"),
         (0x0001, "status running, forward, preparing (?)"),
     ):
-        assert say(drive, (Reading("dp-input", 0, word, word, How.READ),)) == said
+        assert say(drive, (Reading("dp-input", 0, word, word, Origin.READ),)) == said
 
 
 def test_cyclic_outputs_are_sent_whole_and_what_is_reserved_in_them_as_0() -> None:
     drive = packaged("teco-f510")
-    zeros = tuple(Reading("dp-output", at, 0, 0, How.WRITE) for at in range(16))
+    zeros = tuple(Reading("dp-output", at, 0, 0, Origin.WRITE) for at in range(16))
     assert not any(value.entry is None for value in decode(drive, zeros))
     assert [drive.forbids("dp-output", 2, raw) for raw in (0, 1)] == [False, True]
     assert not drive.forbids("dp-output", 1, 1)
@@ -124,7 +124,7 @@ def test_codes_in_the_manuals_words() -> None:
 
 
 def test_bits_that_must_be_zero_are_said() -> None:
-    (command, *_) = decode(E510, holding(0x2501, 0x3001, how=How.WRITE))
+    (command, *_) = decode(E510, holding(0x2501, 0x3001, how=Origin.WRITE))
     assert command.text == "run, forward, reserved bit C, reserved bit D"
 
 
@@ -159,13 +159,13 @@ def test_a_register_read_along_with_its_neighbours_is_no_point() -> None:
 @pytest.mark.parametrize(
     ("readings", "said"),
     [
-        (holding(0x2502, 6000, how=How.WRITE), "frequency command 60.00 Hz"),
-        (holding(0x2501, 1, how=How.WRITE), "run, forward"),
-        (holding(0x2501, 3, how=How.WRITE), "run, reverse"),
-        (holding(0x2501, 0, how=How.WRITE), "stop, forward"),
-        (holding(0x2501, 1, 6000, how=How.WRITE), "run, forward; frequency command 60.00 Hz"),
-        (holding(0x2521, 0, how=How.READ), "no fault"),
-        (holding(0x2521, 17, how=How.READ), "fault external fault 01"),
+        (holding(0x2502, 6000, how=Origin.WRITE), "frequency command 60.00 Hz"),
+        (holding(0x2501, 1, how=Origin.WRITE), "run, forward"),
+        (holding(0x2501, 3, how=Origin.WRITE), "run, reverse"),
+        (holding(0x2501, 0, how=Origin.WRITE), "stop, forward"),
+        (holding(0x2501, 1, 6000, how=Origin.WRITE), "run, forward; frequency command 60.00 Hz"),
+        (holding(0x2521, 0, how=Origin.READ), "no fault"),
+        (holding(0x2521, 17, how=Origin.READ), "fault external fault 01"),
         (holding(0x0064, 1), ""),
     ],
 )
@@ -174,8 +174,8 @@ def test_what_an_exchange_says(readings: tuple[Reading, ...], said: str) -> None
 
 
 def test_acn_commands_in_words() -> None:
-    assert say(ACN, holding(0x0381, 3, how=How.WRITE)) == "run, forward"
-    assert say(ACN, holding(0x0381, 1, how=How.WRITE)) == "run, reverse"
+    assert say(ACN, holding(0x0381, 3, how=Origin.WRITE)) == "run, forward"
+    assert say(ACN, holding(0x0381, 1, how=Origin.WRITE)) == "run, reverse"
 
 
 @pytest.mark.parametrize(
@@ -205,14 +205,14 @@ readings = st.builds(
     st.integers(0, 0xFFFF) | st.integers(0x2500, 0x2530) | st.integers(0, 40),
     st.none() | st.integers(0, 2**64),
     st.integers(-(2**63), 2**64) | st.floats() | st.text(max_size=5),
-    st.sampled_from(list(How)),
+    st.sampled_from(list(Origin)),
     st.sampled_from(["", "units"]),
     st.booleans(),
 )
 
 
 @given(st.sampled_from(["teco-e510", "teco-f510", "automationdirect-acn"]), st.lists(readings, max_size=8))
-@example("teco-e510", [Reading("holding", 9475, None, 0, How.READ)])  # a signed register without its bits
+@example("teco-e510", [Reading("holding", 9475, None, 0, Origin.READ)])  # a signed register without its bits
 def test_any_readings_decode(name: str, given_readings: list[Reading]) -> None:
     for value in decode(packaged(name), given_readings):
         assert value.text

@@ -17,10 +17,10 @@ from sniff.analysis.autodetect import (
     DWELL,
     FOUND_BITS,
     FOUND_FRAMES,
+    Candidature,
     Detecting,
     Ending,
     Evidence,
-    Reading,
     bits_of,
     candidates,
 )
@@ -268,7 +268,7 @@ def test_one_frame_is_never_enough(protocol: str) -> None:
 
 def test_what_is_enough() -> None:
     line = LineSettings.parse("9600,8N1")
-    good = Reading(line, "n2", FOUND_BITS, FOUND_FRAMES, 100, 0.9, 0.0)
+    good = Candidature(line, "n2", FOUND_BITS, FOUND_FRAMES, 100, 0.9, 0.0)
     assert good.enough
     assert not replace(good, bits=FOUND_BITS - 1).enough
     assert not replace(good, frames=FOUND_FRAMES - 1).enough

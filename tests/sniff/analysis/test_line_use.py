@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from dissectors.findings import Finding, Severity
-from dissectors.frame import Check, Found, Frame, Role
+from dissectors.frame import Check, FoundBy, Frame, Role
 from dissectors.line import LineSettings
 from sniff.analysis.line_use import LineUse
 from sniff.simulation.tap import EXACT, FTDI
@@ -26,7 +26,7 @@ def used(shares: list[float], broadcast: float = 0.0) -> dict[str, Finding]:
             if tenth < round(10 * share):
                 no += 1
                 end = 7 * S + second * S + (tenth + 1) * S // 10
-                frame = Frame("x", bytes(OCTETS), end - OCTETS * LINE.char, end, Check.GOOD, Found.GAP)
+                frame = Frame("x", bytes(OCTETS), end - OCTETS * LINE.char, end, Check.GOOD, FoundBy.GAP)
                 use.see(no, frame, Role.BROADCAST if (no % 10) / 10 < broadcast else Role.REQUEST)
     return {one.code: one for one in use.findings()}
 

@@ -11,14 +11,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dissectors.frame import Check, Found, Frame, Role
+from dissectors.frame import Check, FoundBy, Frame, Role
 from sniff.analysis.packet_tree import Field, fields_of
 
 CAPTURES = Path(__file__).parents[3] / "../shared/captures"
 
 
 def frame(octets: bytes) -> Frame:
-    return Frame("x", octets, 0, 0, Check.GOOD, Found.GAP)
+    return Frame("x", octets, 0, 0, Check.GOOD, FoundBy.GAP)
 
 
 def dissector(packet: Any, fields: Any = None) -> Any:
@@ -50,7 +50,7 @@ def flat(fields: tuple[Field, ...]) -> Iterator[Field]:
 
 
 def spans(of: Any, octets: bytes, role: Role, protocol: str = "x") -> dict[str, str]:
-    made = Frame(protocol, octets, 0, 0, Check.GOOD, Found.GAP)
+    made = Frame(protocol, octets, 0, 0, Check.GOOD, FoundBy.GAP)
     return {
         field.name: octets[field.begin : field.end].hex(" ")
         for field in flat(fields_of(of, made, role))
@@ -129,7 +129,7 @@ def test_a_failing_packet_falls_back_to_flat_fields() -> None:
 )
 def test_any_octets_any_protocol(octets: bytes, role: Role, protocol: str) -> None:
     of = {"n2": n2, "mstp": mstp}.get(protocol, modbus)()
-    made = Frame(protocol, octets, 0, 0, Check.BAD, Found.GAP)
+    made = Frame(protocol, octets, 0, 0, Check.BAD, FoundBy.GAP)
     for field in flat(fields_of(of, made, role)):
         assert field.name.isprintable()
         assert field.value.isprintable()

@@ -10,7 +10,7 @@ import pytest
 
 from dissectors.profiles import Devices, packaged
 from dissectors.profiles.decoding import Quality
-from dissectors.readings import How
+from dissectors.readings import Origin
 from sniff.analysis.points import Point, PointReader, PointTable, Sample
 from sniff.bus.offline import settled
 from sniff.engine.follow_settings import dissector_for
@@ -57,7 +57,7 @@ def test_a_value_is_of_the_end_of_the_frame_that_carried_it() -> None:
     (sample,) = samples(("010325240001", "0103021770"), devices=ALL_E510)
     assert (sample.name, sample.value.value, sample.value.unit) == ("output-frequency", 60.0, "Hz")
     assert sample.time == items[1].time
-    assert sample.value.how is How.READ
+    assert sample.value.how is Origin.READ
 
 
 @pytest.mark.parametrize(
@@ -77,7 +77,7 @@ def test_what_is_not_confirmed_is_no_value(exchange: tuple[str, str | None]) -> 
 
 def test_a_confirmed_write_is_a_value_of_the_request() -> None:
     (sample,) = samples(("010625021770", "010625021770"), devices=ALL_E510)
-    assert (sample.name, sample.value.value, sample.value.how, sample.frame) == ("set-frequency", 60.0, How.WRITE, 1)
+    assert (sample.name, sample.value.value, sample.value.how, sample.frame) == ("set-frequency", 60.0, Origin.WRITE, 1)
 
 
 def test_a_broadcast_is_for_all() -> None:

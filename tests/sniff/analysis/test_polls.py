@@ -17,7 +17,7 @@ from dissectors.modbus.envelope import seal_rtu
 from dissectors.profiles import Devices, parse_text
 from dissectors.questions import Question, Span
 from sniff.analysis.poll import MOST_SLICES, Poll, Slices
-from sniff.analysis.poll_words import What, asked, changes, told
+from sniff.analysis.poll_words import ChangeKind, asked, changes, told
 from sniff.analysis.polls import Polls
 from sniff.bus.offline import outputs
 from sniff.engine.blocks import blocks_of
@@ -122,12 +122,12 @@ def test_when_it_began_ended_and_changed() -> None:
     end = BEGIN + 1_200 * SECOND
     assert changes(polls[1], BEGIN, end) == []
     (change,) = changes(polls[2], BEGIN, end)
-    assert (change.what, change.interval is not None) == (What.CHANGED, True)
+    assert (change.what, change.interval is not None) == (ChangeKind.CHANGED, True)
     assert abs(change.time - BEGIN - 400 * SECOND) <= 2 * change.within
     assert change.interval is not None
     assert abs(change.interval - 5 * SECOND) < SECOND // 2
     began, ended = changes(polls[3], BEGIN, end)
-    assert (began.what, ended.what) == (What.BEGAN, What.ENDED)
+    assert (began.what, ended.what) == (ChangeKind.BEGAN, ChangeKind.ENDED)
     assert told([began], lambda time: f"{(time - BEGIN) // SECOND} s") == "began 300 s"
 
 

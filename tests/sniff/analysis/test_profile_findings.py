@@ -13,7 +13,7 @@ import pytest
 from dissectors.findings import Finding, Severity
 from dissectors.profiles import Devices, packaged
 from dissectors.profiles.decoding import decode
-from dissectors.readings import How, Reading
+from dissectors.readings import Origin, Reading
 from sniff.analysis.health import health_of
 from sniff.analysis.judging import Judging
 from sniff.analysis.points import Sample
@@ -213,7 +213,7 @@ def test_objects_tell_of_faults_and_warnings(space: str, address: int, code: str
     session = bus.SESSION
     judge = ProfileFindings(session.timing, dissector_for(session), Devices(default=F510))
     for state in (0, 1):
-        reading = Reading(space, address, state, state, How.READ, sure=sure)
+        reading = Reading(space, address, state, state, Origin.READ, sure=sure)
         (value,) = decode(F510, (reading,))
         judge._judge_value(Sample(10, 1, value, 1))
     (found,) = judge.findings()

@@ -10,7 +10,7 @@ from dissectors.bacnet.application import confirmed
 from dissectors.bacnet.envelope import npdu_frame
 from dissectors.bacnet.f510 import f510
 from dissectors.bacnet.readings import readings
-from dissectors.frame import Check, Found, Frame
+from dissectors.frame import Check, FoundBy, Frame
 from dissectors.profiles import packaged
 from sniff.analysis.profile_guess import Guess, Guessing, Heard, guess
 from sniff.bus.offline import outputs
@@ -88,7 +88,7 @@ def test_a_device_as_its_manual_has_it_fits_wholly() -> None:
         answer = drive.answer(1, request)
         assert answer is not None
         frames = [
-            Frame("mstp", npdu_frame(to, source, npdu, source == 1), 0, 1, Check.GOOD, Found.DELIMITER)
+            Frame("mstp", npdu_frame(to, source, npdu, source == 1), 0, 1, Check.GOOD, FoundBy.DELIMITER)
             for source, to, npdu in ((1, 5, request), (5, 1, answer))
         ]
         for reading in readings(*frames):

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import pytest
 
 from dissectors.findings import Severity
-from dissectors.frame import Check, Damage, Found, Frame, Noise, Place, Reason
+from dissectors.frame import Check, Damage, FoundBy, Frame, Noise, Place, Reason
 from dissectors.line import LineSettings
 from sniff.analysis.line_findings import LineFindings
 from sniff.engine.engine import Row
@@ -38,11 +38,11 @@ def _hear(line: LineFindings, *, slack: int = 0, damage: Damage | None = None, r
     octets = bytes.fromhex("01 03 00 00 00 01 84 0A")
     for no in range(2, 4 * rounds, 4):
         time = no * second
-        before = Frame("modbus-rtu", octets, time, time, Check.GOOD, Found.GAP, damage)
+        before = Frame("modbus-rtu", octets, time, time, Check.GOOD, FoundBy.GAP, damage)
         line.see(Row(no, before, None, None))
         place = Place.BEFORE if damage else Place.AFTER
         line.see(Row(no + 1, Noise(b"\x01", time + second, time + second, place, Reason.NO_FRAME), None, None))
-        late = Frame("modbus-rtu", octets, time + 2 * second, time + 2 * second, Check.GOOD, Found.GAP, slack=slack)
+        late = Frame("modbus-rtu", octets, time + 2 * second, time + 2 * second, Check.GOOD, FoundBy.GAP, slack=slack)
         line.see(Row(no + 2, late, None, None))
     return next((one.severity for one in line.findings() if one.code in ("LN201", "LN202", "LN203")), None)
 

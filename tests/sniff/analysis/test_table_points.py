@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from dissectors.columns import FrameColumns
-from dissectors.frame import Check, Found, Frame
+from dissectors.frame import Check, FoundBy, Frame
 from dissectors.modbus.envelope import make_rtu
 from dissectors.modbus.reading_columns import reading_columns
 from dissectors.modbus.readings import readings
@@ -83,7 +83,7 @@ def test_registers_by_columns_are_the_readings(asked: str, answered: str | None)
     octets = np.frombuffer(b"".join(frames), np.uint8)
     request, response = (_columns(0, frames[0]), _columns(len(frames[0]), frames[-1]))
     made = reading_columns(request, response, np.array([answered is not None]), octets)
-    objects = [Frame("modbus-rtu", one, 0, 1, Check.GOOD, Found.LENGTH) for one in frames]
+    objects = [Frame("modbus-rtu", one, 0, 1, Check.GOOD, FoundBy.LENGTH) for one in frames]
     expected = readings(objects[0], objects[1] if answered is not None else None)
     columns = zip(made.space.tolist(), made.address.tolist(), made.raw.tolist(), made.how.tolist(), strict=True)
     if made.done[0]:

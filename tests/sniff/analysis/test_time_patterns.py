@@ -6,7 +6,7 @@ from functools import partial
 
 import pytest
 
-from dissectors.frame import Check, Damage, Found, Frame
+from dissectors.frame import Check, Damage, FoundBy, Frame
 from dissectors.line import LineSettings
 from dissectors.simulated_faults import BitFlips, MarkParity, NoiseInGaps
 from sniff.analysis.time_patterns import TimePatterns
@@ -94,7 +94,7 @@ def test_one_stations_own_rhythm_is_no_hum() -> None:
         octets, start = bytes(8), no * 50 * MS
         damage = Damage.CHECK if no % 2 else None
         check = Check.BAD if no % 2 else Check.GOOD
-        frame = Frame("x", octets, start + no % 2 * 3 * MS, start + 5 * MS, check, Found.GAP, damage)
+        frame = Frame("x", octets, start + no % 2 * 3 * MS, start + 5 * MS, check, FoundBy.GAP, damage)
         told.see(no, frame, "station 6" if no % 2 else "master")
     assert list(told.findings()) == []
 

@@ -12,7 +12,7 @@ import pytest
 
 from dissectors.profiles import Devices, packaged
 from dissectors.profiles.decoding import decode
-from dissectors.readings import How, Reading
+from dissectors.readings import Origin, Reading
 from sniff.analysis.points import Sample
 from sniff.bus import value_topics as value_channels
 from sniff.bus.value_topics import ValueChannels, ValueMessage
@@ -38,7 +38,7 @@ def samples(*readings: Reading, device: int | None = 5, time: int = 7) -> list[S
 
 
 def holding(address: int, value: int) -> Reading:
-    return Reading("holding", address, value, value, How.READ)
+    return Reading("holding", address, value, value, Origin.READ)
 
 
 def write(*given: Sample, bus: str = "boiler room") -> list[ValueMessage]:
@@ -71,10 +71,10 @@ def test_the_check_itself_finds_what_it_should() -> None:
 def test_every_message_fits_its_schema() -> None:
     readings = [
         *(holding(address, 0xFFFF) for address in range(0x2500, 0x2530)),
-        Reading("AI", 10, 0x42340000, 45.0, How.READ),
-        Reading("device", 5, None, "TECO \x1b[2J", How.READ, "object-name"),
-        Reading("analog-input", 4, 0x7FC00000, math.nan, How.READ),
-        Reading("holding", 1, 2, 2, How.READ),
+        Reading("AI", 10, 0x42340000, 45.0, Origin.READ),
+        Reading("device", 5, None, "TECO \x1b[2J", Origin.READ, "object-name"),
+        Reading("analog-input", 4, 0x7FC00000, math.nan, Origin.READ),
+        Reading("holding", 1, 2, 2, Origin.READ),
     ]
     messages = write(*samples(*readings), *samples(*readings, device=None))
     assert len(messages) > 60
@@ -104,8 +104,8 @@ def test_a_bit_is_written_when_it_changes() -> None:
 
 
 def test_a_channel_has_one_schema_and_there_are_not_too_many(monkeypatch: pytest.MonkeyPatch) -> None:
-    name = Reading("device", 5, None, "x", How.READ, "object-name")
-    number = Reading("device", 5, 1, 1, How.READ, "object-name")
+    name = Reading("device", 5, None, "x", Origin.READ, "object-name")
+    number = Reading("device", 5, 1, 1, Origin.READ, "object-name")
     assert len(write(*samples(name, number))) == 1
     monkeypatch.setattr(value_channels, "MOST_CHANNELS", 2)
     assert len(write(*samples(*(holding(address, 1) for address in range(9))))) == 2

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dissectors.field_types import FieldType, Kind
-from dissectors.frame import Check, Found, Frame, Header, Noise, Place, Reason, Role
+from dissectors.frame import Check, FoundBy, Frame, Header, Noise, Place, Reason, Role
 from dissectors.manifest import Dissector
 from dissectors.tracker import Interval, Placement, Transaction, Verdict
 from sniff.engine.engine import Row
@@ -28,7 +28,7 @@ DISSECTOR = Dissector(
         "modbus.regval_uint16": FieldType(Kind.NUMBER),
     },
 )
-FRAME = Frame("test", bytes.fromhex("0310"), 0, 1, Check.GOOD, Found.GAP)
+FRAME = Frame("test", bytes.fromhex("0310"), 0, 1, Check.GOOD, FoundBy.GAP)
 ROW = Row(
     7,
     FRAME,

@@ -8,10 +8,10 @@ from typing import Any
 
 from dissectors.findings import Finding, Severity
 from dissectors.profiles.decoding import Quality, Value
-from dissectors.readings import How, Reading
+from dissectors.readings import Origin, Reading
 from sniff.analysis.points import Sample
 from sniff.bus.derived_topics import DerivedMessage
-from sniff.outlets.news import News, What
+from sniff.outlets.news import News, NewsKind
 from sniff.outlets.outlet import Outlet
 from sniff.outlets.told import FindingTold, NumbersTold, StateTold, Told, ToldBus, ValueTold
 
@@ -21,7 +21,7 @@ FOUND = Finding("MB001", Severity.ERROR, "station 3", NOW, NOW, 4, (), "no answe
 
 
 def sample(value: Any = 60.0, name: str = "output-frequency", time: int = NOW, **more: Any) -> Sample:
-    reading = Reading("holding", 1, 0, 0, How.READ)
+    reading = Reading("holding", 1, 0, 0, Origin.READ)
     raw = None if isinstance(value, str) else 6000
     return Sample(time, 3, Value(name, value, raw, more.pop("unit", "Hz"), Quality.GOOD, reading, **more), 12)
 
@@ -30,7 +30,7 @@ def value(told: Any = 60.0, name: str = "output-frequency", bus: ToldBus = BUS, 
     return ValueTold(bus, sample(told, name, **more))
 
 
-def finding(what: What = What.NEW, found: Finding = FOUND, bus: ToldBus = BUS) -> FindingTold:
+def finding(what: NewsKind = NewsKind.NEW, found: Finding = FOUND, bus: ToldBus = BUS) -> FindingTold:
     return FindingTold(bus, NOW, News(what, found))
 
 

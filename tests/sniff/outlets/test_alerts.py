@@ -15,10 +15,10 @@ from dissectors.findings import Finding, Severity
 from sniff.config import AlertSettings, ConfigError, parse
 from sniff.outlets import alerts as alerts_module
 from sniff.outlets.alerts import MOST_WAITING, Alerts, post
-from sniff.outlets.news import News, What
+from sniff.outlets.news import News, NewsKind
 
 FOUND = Finding("MB001", Severity.ERROR, "station 3", 1, 2, 4, (), "no answer", "it is off", "switch it on")
-NEWS = News(What.NEW, FOUND)
+NEWS = News(NewsKind.NEW, FOUND)
 
 
 class Server(ThreadingHTTPServer):

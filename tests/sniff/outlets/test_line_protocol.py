@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sniff.analysis.plain import plain
+from sniff.analysis.sanitizing import sanitized
 from sniff.outlets import line_protocol
 from sniff.outlets.told import ToldBus
 from tests.sniff.outlets.given import NOW, finding, numbers, state, value
@@ -60,6 +60,6 @@ def test_whatever_names_and_texts_hold_it_is_one_line_of_the_protocol(bus: str, 
     _, tags, fields, time = read(line)
     assert time == NOW
     for tag, text in (("bus", bus), ("point", name)):
-        assert tags.get(tag, "") == plain(text).replace("\\", "/")
+        assert tags.get(tag, "") == sanitized(text).replace("\\", "/")
     if isinstance(told, str):
-        assert fields["text"] == plain(told)
+        assert fields["text"] == sanitized(told)

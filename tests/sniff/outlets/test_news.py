@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from dissectors.findings import Finding, Severity
-from sniff.outlets.news import OVER_AFTER, NewsDesk, What
+from sniff.outlets.news import OVER_AFTER, NewsDesk, NewsKind
 
 S = 1_000_000_000
 FOUND = Finding("MB001", Severity.WARNING, "station 3", 0, 10 * S, 4, (), "no answer", "", "")
@@ -13,15 +13,15 @@ FOUND = Finding("MB001", Severity.WARNING, "station 3", 0, 10 * S, 4, (), "no an
 
 def test_new_then_silence_then_worse_then_gone_then_new_again() -> None:
     desk = NewsDesk(Severity.WARNING, 0)
-    assert [one.what for one in desk.look([FOUND], 11 * S)] == [What.NEW]
+    assert [one.what for one in desk.look([FOUND], 11 * S)] == [NewsKind.NEW]
     assert desk.look([FOUND], 12 * S) == []
     grave = replace(FOUND, severity=Severity.ERROR, last=20 * S)
-    assert [one.what for one in desk.look([grave], 21 * S)] == [What.WORSE]
+    assert [one.what for one in desk.look([grave], 21 * S)] == [NewsKind.WORSE]
     later = 20 * S + OVER_AFTER + 1
-    assert [one.what for one in desk.look([grave], later)] == [What.GONE]
+    assert [one.what for one in desk.look([grave], later)] == [NewsKind.GONE]
     assert desk.look([grave], later + S) == []
     again = replace(grave, last=later + 2 * S)
-    assert [one.what for one in desk.look([again], later + 3 * S)] == [What.NEW]
+    assert [one.what for one in desk.look([again], later + 3 * S)] == [NewsKind.NEW]
 
 
 def test_notes_and_consequences_are_nobodys_business() -> None:
@@ -42,7 +42,7 @@ def test_what_is_held_back_is_counted() -> None:
     other.look([FOUND], over)
     late = replace(FOUND, last=over + 200 * S)
     (news,) = other.look([late], over + 200 * S)
-    assert (news.what, news.held_back) == (What.NEW, 1)
+    assert (news.what, news.held_back) == (NewsKind.NEW, 1)
 
 
 def test_each_finding_has_its_own_ration() -> None:

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dissectors.frame import Check, Chunk, Damage, Found, Frame, Header, LineError, Mark, Noise, Place, Reason, Role
+from dissectors.frame import Check, Chunk, Damage, FoundBy, Frame, Header, LineError, Mark, Noise, Place, Reason, Role
 from dissectors.line import LineSettings
 from dissectors.tracker import Interval, Placement, Transaction, Verdict
 from sniff.engine.engine import Output, Row
@@ -34,7 +34,7 @@ FRAME = st.builds(
     I64,
     I64,
     st.sampled_from(Check),
-    st.sampled_from(Found),
+    st.sampled_from(FoundBy),
     st.none() | st.sampled_from(Damage),
     st.none() | st.integers(0, 2**31 - 1),
     st.integers(0, 2**32 - 1),
@@ -107,7 +107,7 @@ def test_damage_never_crashes(data: st.DataObject) -> None:
     some.append(
         Row(
             2,
-            Frame("n2", b"cd", 3, 4, Check.GOOD, Found.GAP, Damage.LONG, 7, flags=("odd",)),
+            Frame("n2", b"cd", 3, 4, Check.GOOD, FoundBy.GAP, Damage.LONG, 7, flags=("odd",)),
             Header("n2", 1, 2, Role.POLL, "poll", error="what"),
             Placement(2, 1, Role.POLL),
         )

@@ -16,7 +16,7 @@ import pytest
 from textual import events
 from textual.keys import _character_to_key, key_to_character
 
-from dissectors.frame import Check, Damage, Found, Frame, Header, LineError, Mark, Noise, Place, Reason, Role
+from dissectors.frame import Check, Damage, FoundBy, Frame, Header, LineError, Mark, Noise, Place, Reason, Role
 from dissectors.line import LineSettings
 from dissectors.manifest import Dissector
 from dissectors.tracker import Interval, Placement, Transaction, Verdict
@@ -101,7 +101,7 @@ class Bus:
         start = self.now
         self.now += len(octets) * self.store.session.line.char
         check = Check.GOOD if damage is None else Check.BAD
-        return Frame("toy", octets, start, self.now, check, Found.GAP, damage, marks=marks, **more)
+        return Frame("toy", octets, start, self.now, check, FoundBy.GAP, damage, marks=marks, **more)
 
     def row(self, event: Frame | Noise, tx: int | None = None, role: Role = Role.UNKNOWN) -> Row:
         self.no += 1

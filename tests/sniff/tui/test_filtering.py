@@ -11,7 +11,7 @@ from dissectors.frame import Role
 from dissectors.tracker import Transaction, Verdict
 from sniff.engine.engine import Output
 from sniff.tui.prompt import Prompt
-from sniff.tui.viewing import Viewing
+from sniff.tui.view_state import Viewing
 
 
 async def filter_by(see: Any, text: str) -> None:

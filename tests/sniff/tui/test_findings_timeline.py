@@ -15,7 +15,7 @@ from sniff.engine.observer import observe
 from sniff.engine.session import LineEvent, LineEventKind
 from sniff.simulation.scenarios import simulate
 from sniff.tui.timeline_picture import LABEL
-from sniff.tui.viewing import Viewing
+from sniff.tui.view_state import Viewing
 from tests.faults.buses import modbus
 
 START = 1_772_359_200_000_000_000

@@ -11,7 +11,7 @@ from rich.cells import cell_len
 from sniff.bus.feed import FeedStatus
 from sniff.engine.session import LineEvent, LineEventKind
 from sniff.tui.header import state_words, status_line, why_ended
-from sniff.tui.viewing import Viewing
+from sniff.tui.view_state import Viewing
 
 LIVE = FeedStatus("/dev/ttyUSB0", "19200,8E1", "modbus-rtu", "/tmp/x.mcap", 12_345_678, live=True)
 

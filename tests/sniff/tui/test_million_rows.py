@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dissectors.columns import CHECKS, FOUNDS, NONE, ROLES, FrameColumns, PlacementColumns
-from dissectors.frame import Check, Found, Role
+from dissectors.frame import Check, FoundBy, Role
 from sniff.bus.rows import Store
 from sniff.engine.engine import Row
 from sniff.engine.table import Table, transaction_columns
@@ -29,7 +29,7 @@ def made_table(first: int, count: int) -> Table:
         start=numbers * 10 * MS,
         end=numbers * 10 * MS + MS,
         check=np.full(count, CHECKS.index(Check.GOOD), np.uint8),
-        found=np.full(count, FOUNDS.index(Found.GAP), np.uint8),
+        found=np.full(count, FOUNDS.index(FoundBy.GAP), np.uint8),
         damage=nothing,
         expected=none,
         source=none.astype(np.int16),

@@ -12,7 +12,7 @@ _HARMFUL = {"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp", "Mn", "Me"}
 """Controls, format characters (bidi, zero width), surrogates, private and unassigned ones, and marks that stack."""
 
 
-def plain(text: object) -> str:
+def sanitized(text: object) -> str:
     """The text with every harmful character written out: "\\x1b", "\\u202e". Never raises."""
     string = text if isinstance(text, str) else str(text)
     if string.isascii() and string.isprintable():

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from sniff.tui.places import find
+from sniff.tui.goto import find
 
 
 @pytest.mark.parametrize(

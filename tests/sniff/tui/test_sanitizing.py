@@ -8,15 +8,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sniff.tui.plain import ascii_of, plain
+from sniff.analysis.sanitizing import ascii_of, sanitized
 
 
 @given(st.text(st.characters(exclude_categories=())))
 def test_only_harmless_characters_come_out(text: str) -> None:
-    harmless = plain(text)
+    harmless = sanitized(text)
     for character in harmless:
         assert unicodedata.category(character) not in {"Cc", "Cf", "Cs", "Zl", "Zp", "Mn", "Me"}
-    assert plain(harmless) == harmless
+    assert sanitized(harmless) == harmless
 
 
 @pytest.mark.parametrize(
@@ -35,12 +35,12 @@ def test_only_harmless_characters_come_out(text: str) -> None:
     ],
 )
 def test_what_is_written_out(text: str, wanted: str) -> None:
-    assert plain(text) == wanted
+    assert sanitized(text) == wanted
 
 
 def test_other_values_become_text() -> None:
-    assert plain(ValueError("a\x00b")) == "a\\x00b"
-    assert plain(7) == "7"
+    assert sanitized(ValueError("a\x00b")) == "a\\x00b"
+    assert sanitized(7) == "7"
 
 
 @given(st.binary())

@@ -8,7 +8,7 @@ import pytest
 
 from sniff.engine.session import LineEvent, LineEventKind
 from sniff.filter import FilterError
-from sniff.tui.viewing import Viewing
+from sniff.tui.view_state import Viewing
 
 
 def test_freeze_stops_the_view_and_counts(busy_bus: Any) -> None:
