@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 from dissectors.findings import Tally
 from dissectors.frame import Flaw
+from dissectors.late_speakers import LateSpeakers
 from dissectors.line import NS_PER_S, Timing
 from dissectors.modbus.station_record import Cycles, StationRecord
 from dissectors.strikes import Strikes
@@ -47,9 +48,11 @@ class BusRecord:
     requests: int = 0
     answers: int = 0
     echoes: int = 0
+    apart: int = 0  # stretches of octets that are no frame, when nobody was asked
     stations: dict[int, StationRecord] = field(default_factory=dict)
     damaged_requests: Tally = field(default_factory=Tally)
     strikes: Strikes = field(default_factory=Strikes)  # "master", "station 3" …
+    late_speakers: LateSpeakers = field(default_factory=LateSpeakers)
     unasked: Tally = field(default_factory=Tally)
     asked_twice: Tally = field(default_factory=Tally)
     answers_to_broadcast: Tally = field(default_factory=Tally)
