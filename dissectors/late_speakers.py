@@ -17,11 +17,11 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 from dissectors.chances import at_least
-from dissectors.findings import Tally
+from dissectors.findings import Finding, Tally, counted, times
 from dissectors.line import NS_PER_S
 
 MASTER: Final = "master"
@@ -61,16 +61,17 @@ class Window:
 
 @dataclass(frozen=True, slots=True)
 class Due:
-    """The answer that is due, on the line. `address`: its first octets; `begin`: all that are known, empty where a
-    request may begin so too; `length`: octets, 0 where a request may be as long or nobody knows."""
+    """The answer that is due, on the line. `address`: its first octets, empty where answers have none; `begin`: all
+    that are known, empty where a request may begin so too; `length`: octets, 0 where a request may be as long or nobody
+    knows."""
 
-    address: bytes
+    address: bytes = b""
     begin: bytes = b""
     length: int = 0
 
     def is_shown_by(self, octets: bytes, is_answer: bool) -> bool:
         """Whether octets that are no good frame show it. `is_answer`: they stand where another station answers."""
-        if not octets.startswith(self.address):
+        if not self.address or not octets.startswith(self.address):
             return False
         return (
             is_answer or (self.begin != b"" and octets.startswith(self.begin)) or 0 < self.length <= len(octets) + _CUT
@@ -92,6 +93,7 @@ class LateSpeakers:
 
     def __init__(self) -> None:
         self.windows: dict[int, Window] = {}  # by the station that was waited for
+        self.damaged: Counter[str] = Counter()  # everywhere, by sender
         self.until = 0  # when all windows are closed again
         self._open: dict[int, _Open] = {}
 
@@ -119,6 +121,7 @@ class LateSpeakers:
 
     def damaged_request(self, octets: bytes, start: int, *rows: int | None) -> None:
         """A damaged request."""
+        self.damaged[MASTER] += 1
         for other in self._due(start):
             self._strike(other, MASTER, start, rows, self._open[other].due.is_shown_by(octets, is_answer=False))
 
@@ -127,6 +130,7 @@ class LateSpeakers:
     ) -> None:
         """A whole request, and something damaged in answer. `start`: of the request. `is_longer`: it begins as the
         answer that was asked for, and is longer than that can be."""
+        self.damaged[sender] += 1
         for other in self._due(start):
             self._window(other).whole[MASTER] += 1
             if other != station:
@@ -137,6 +141,7 @@ class LateSpeakers:
 
     def noise(self, start: int, *rows: int | None) -> None:
         """Octets that are no frame, where nobody was asked for an answer."""
+        self.damaged[NOBODY] += 1
         for other in self._due(start):
             self._strike(other, NOBODY, start, rows, is_shown=False)
 
@@ -203,19 +208,40 @@ class LateSpeaker:
     silenced: frozenset[int]
     is_sure: bool
 
+    @property
+    def stations_hit(self) -> set[int]:
+        """The stations among those that are hit."""
+        return {int(sender.split()[1]) for sender in self.hit if sender not in (MASTER, NOBODY)}
 
-def late_speakers(
-    windows: Mapping[int, Window],
-    damaged: Mapping[str, int],
-    frames: Mapping[str, int],
-    heard: Mapping[int, Heard],
-) -> Iterator[LateSpeaker]:
-    """Who speaks late, the surest first.
 
-    `damaged`, `frames`: damaged ones and all, of each sender; of nobody, stretches of octets that are no frame, and
-    these with all whole requests.
-    """
-    nobody = Heard(0, 0, 0)
+def told(one: LateSpeaker) -> str:
+    """What is seen of a late speaker, in words."""
+    words = f"{counted(one.window.damage.count, 'damaged frame')} while its answer was overdue"
+    if one.of_elsewhere:
+        words += f": {one.struck} of {one.of} then, of the same senders {one.elsewhere} of {one.of_elsewhere} elsewhere"
+    hits = ["requests"] if not one.hit.isdisjoint((MASTER, NOBODY)) else []
+    hit = sorted(one.stations_hit)
+    hits += [f"answers of station{'s' * (len(hit) > 1)} {', '.join(map(str, hit))}"] if hit else []
+    words += f"; hit: {' and '.join(hits)}" if hits else ""
+    shown = one.window.shown.total()
+    words += f"; {times(shown)} the octets show that two spoke at once" if shown else ""
+    return words if one.is_sure else f"{words}; those that are hit were hardly heard elsewhere, so it may be theirs"
+
+
+def reaching(finding: Finding, late: LateSpeakers) -> Finding:
+    """What is said of late answers of a station: often enough, it explains what is said of the line at all that were
+    heard while they were due."""
+    station = finding.about.station
+    if station is None or station not in late.windows or finding.count < _LEAST:
+        return finding
+    beside = {int(sender.split()[1]) for sender in late.windows[station].whole if sender != MASTER}
+    return replace(finding, stations=(station, *sorted(beside - {station})))
+
+
+def late_speakers(late: LateSpeakers, whole: Mapping[str, int], heard: Mapping[int, Heard]) -> Iterator[LateSpeaker]:
+    """Who speaks late, the surest first. `whole`: good frames of each sender on the bus, and as nobody's those of the
+    master; `heard`: of each station."""
+    nobody, windows = Heard(0, 0, 0), late.windows
 
     def weight(station: int) -> tuple[bool, int, int]:
         window = windows[station]
@@ -226,20 +252,22 @@ def late_speakers(
         window, known = windows[station], heard.get(station, nobody)
         if station in innocent or window.damage.count < _LEAST:
             continue
-        found = _judge(station, window, damaged, frames, heard)
+        found = _judge(station, late, whole, heard)
         if found is not None and (known.answers or known.late or found.is_sure):
             innocent |= found.silenced
             yield found
 
 
 def _judge(
-    station: int, window: Window, damaged: Mapping[str, int], frames: Mapping[str, int], heard: Mapping[int, Heard]
+    station: int, late: LateSpeakers, whole: Mapping[str, int], heard: Mapping[int, Heard]
 ) -> LateSpeaker | None:
+    window = late.windows[station]
     struck = of = elsewhere = of_elsewhere = 0
     hit = set()
     for sender in (window.struck | window.whole).keys() - {f"station {station}"}:
         here = window.struck[sender] + window.whole[MASTER if sender == NOBODY else sender]
-        others, damaged_others = frames.get(sender, 0) - here, max(0, damaged.get(sender, 0) - window.struck[sender])
+        others = late.damaged[sender] + whole.get(sender, 0) - here
+        damaged_others = late.damaged[sender] - window.struck[sender]
         if others >= _ELSEWHERE and _SHARE * others >= here:
             is_shown = 2 * window.shown[sender] > window.struck[sender]
             if window.struck[sender] and 4 * damaged_others * here >= window.struck[sender] * others and not is_shown:

@@ -48,7 +48,6 @@ class BusRecord:
     requests: int = 0
     answers: int = 0
     echoes: int = 0
-    apart: int = 0  # stretches of octets that are no frame, when nobody was asked
     stations: dict[int, StationRecord] = field(default_factory=dict)
     damaged_requests: Tally = field(default_factory=Tally)
     strikes: Strikes = field(default_factory=Strikes)  # "master", "station 3" …

@@ -257,7 +257,6 @@ class ModbusFindings(Remembered):
                 self.seen.noise_after_broadcast.add(event.start, self.broadcast.no, no)
             return
         if self.open is None and self.broadcast is None and len(event.octets) >= BEGIN:
-            self.seen.apart += 1
             self.seen.late_speakers.noise(event.start, no)
         self.broadcast = None
 

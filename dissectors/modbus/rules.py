@@ -247,7 +247,7 @@ _ALL = (
         "Good answers that come after the master's timeout, often into the next request.",
         "the master's timeout is too short for this station",
         "raise the master's response timeout above the times seen here",
-        explains=("MB101", "MB104", "MB201", "MB301", "MB010"),
+        explains=("MB101", "MB104", "MB201", "MB301", "MB010", *_OF_LINE),
     ),
     Rule(
         "MB104",

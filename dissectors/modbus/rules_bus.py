@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from dissectors.findings import Finding, Severity, Tally, counted, found, times
-from dissectors.late_speakers import MASTER, NOBODY, Heard, LateSpeaker, late_speakers
+from dissectors.late_speakers import MASTER, NOBODY, Heard, late_speakers, told
 from dissectors.line import MS
 from dissectors.modbus.bus_record import BusRecord
 from dissectors.modbus.damage_shares import DamageShare, shares_of_damage, to_blame
@@ -260,41 +260,20 @@ def _common_damage(seen: BusRecord, damage: DamageShare) -> list[Finding]:
 
 def _of_late_speakers(seen: BusRecord) -> Iterator[Finding]:
     """Stations that answer into what follows: those that are hit are not to blame for their damage."""
-    damaged = {f"station {unit}": one.damaged.count for unit, one in seen.stations.items()}
-    frames = {f"station {unit}": one.answered + one.damaged.count for unit, one in seen.stations.items()}
-    damaged[MASTER], frames[MASTER] = seen.damaged_requests.count, seen.requests
-    damaged[NOBODY], frames[NOBODY] = seen.apart, seen.apart + seen.requests - seen.damaged_requests.count
+    whole = {f"station {unit}": one.answered for unit, one in seen.stations.items()}
+    whole[MASTER] = whole[NOBODY] = seen.requests - seen.damaged_requests.count
     heard = {unit: Heard(one.answered, one.late.count, one.missing.count) for unit, one in seen.stations.items()}
-    told: set[int] = set()
-    for one in late_speakers(seen.late_speakers.windows, damaged, frames, heard):
-        told |= {one.station, *_stations_of(one)}
-        hit = sorted(_stations_of(one))
+    named: set[int] = set()
+    for one in late_speakers(seen.late_speakers, whole, heard):
+        hit = one.stations_hit
+        named |= {one.station, *hit}
         severity = None if heard[one.station].answers else Severity.ERROR  # all that it says is lost
-        made = one.window.damage.found(RULES["MB106"], f"station {one.station}", _late_words(one, hit), severity)
+        made = one.window.damage.found(RULES["MB106"], f"station {one.station}", told(one), severity)
         yield replace(made, stations=(one.station, *sorted({*hit, *one.silenced} - {one.station})))
     for unit, station in sorted(seen.stations.items()):
-        if station.outlasting.count >= _COMMON_LEAST and unit not in told:
+        if station.outlasting.count >= _COMMON_LEAST and unit not in named:
             words = f"{counted(station.outlasting.count, 'answer')} not over when the master gave up, which then spoke"
             yield station.outlasting.found(RULES["MB106"], f"station {unit}", f"{words} into them")
-
-
-def _stations_of(one: LateSpeaker) -> set[int]:
-    """Stations that a late speaker hits."""
-    return {int(sender.split()[1]) for sender in one.hit if sender not in (MASTER, NOBODY)}
-
-
-def _late_words(one: LateSpeaker, hit: list[int]) -> str:
-    """What is seen of a late speaker."""
-    words = f"{counted(one.window.damage.count, 'damaged frame')} while its answer was overdue"
-    if one.of_elsewhere:
-        words += f": {one.struck} of {one.of} then, of the same senders {one.elsewhere} of {one.of_elsewhere} elsewhere"
-    hits = ["requests"] if not one.hit.isdisjoint((MASTER, NOBODY)) else []
-    hits += [f"answers of {units(hit)}"] if hit else []
-    words += f"; hit: {' and '.join(hits)}" if hits else ""
-    shown = one.window.shown.total()
-    if shown:
-        words += f"; {times(shown)} the octets show that two spoke at once"
-    return words if one.is_sure else f"{words}; those that are hit were never heard elsewhere, so it may be theirs"
 
 
 def _cycle(seen: BusRecord) -> Iterator[Finding]:
