@@ -48,10 +48,11 @@ _KEPT = 256  # stations that are waited for, and senders in their windows
 class Window:
     """What came while the late answer of one station was due.
 
-    `struck`, `whole`: frames by sender; `shown`: damaged ones that show that it spoke; `silenced`: requests to others
-    that nothing followed.
+    `opened`: how often it was waited for; `struck`, `whole`: frames by sender; `shown`: damaged ones that show that it
+    spoke; `silenced`: requests to others that nothing followed.
     """
 
+    opened: int = 0
     damage: Tally = field(default_factory=Tally)
     struck: Counter[str] = field(default_factory=Counter)
     whole: Counter[str] = field(default_factory=Counter)
@@ -104,6 +105,7 @@ class LateSpeakers:
             if other != station:
                 self._window(other).silenced[station] += 1
         lasts = LASTS * (PATIENCE if patience is None else min(patience, PATIENCE))
+        self._window(station).opened += 1
         self._open[station] = _Open(end + lasts, lasts, due)
         if len(self._open) > _OPEN_KEPT:
             del self._open[next(iter(self._open))]
@@ -263,27 +265,53 @@ def _judge(
 ) -> LateSpeaker | None:
     window = late.windows[station]
     struck = of = elsewhere = of_elsewhere = 0
-    hit = set()
+    hit, only_here = set(), set()
     for sender in (window.struck | window.whole).keys() - {f"station {station}"}:
-        here = window.struck[sender] + window.whole[MASTER if sender == NOBODY else sender]
+        here = _frames(window, sender)
         others = late.damaged[sender] + whole.get(sender, 0) - here
         damaged_others = late.damaged[sender] - window.struck[sender]
-        if others >= _ELSEWHERE and _SHARE * others >= here:
-            is_shown = 2 * window.shown[sender] > window.struck[sender]
-            if window.struck[sender] and 4 * damaged_others * here >= window.struck[sender] * others and not is_shown:
-                continue  # damaged elsewhere as well: its own doing
-            struck, of = struck + window.struck[sender], of + here
-            elsewhere, of_elsewhere = elsewhere + damaged_others, of_elsewhere + others
+        if others < _ELSEWHERE or _SHARE * others < here:
+            only_here.add(sender)
+            continue
+        is_shown = 2 * window.shown[sender] > window.struck[sender]
+        if window.struck[sender] and 4 * damaged_others * here >= window.struck[sender] * others and not is_shown:
+            continue  # damaged elsewhere as well: its own doing
+        struck, of = struck + window.struck[sender], of + here
+        elsewhere, of_elsewhere = elsewhere + damaged_others, of_elsewhere + others
         if window.struck[sender]:
             hit.add(sender)
-    if sum(window.struck[sender] for sender in hit) < _LEAST:
-        return None
     chance = at_least(struck, struck + elsewhere, of / (of + of_elsewhere)) if struck else 1.0
     shown = window.shown.total()
-    is_sure = (shown >= _SHOWN and 2 * shown >= window.damage.count) or (struck >= _LEAST and chance < _SELDOM)
-    if not is_sure and struck:
-        return None  # those that can be compared are struck as often elsewhere
+    is_shown = shown >= _SHOWN and 2 * shown >= window.damage.count
+    is_sure = is_shown or (struck >= _LEAST and chance < _SELDOM)
+    hit = (hit if is_sure else set()) | (
+        {sender for sender in only_here if window.struck[sender]} if is_shown else _standing_out(window, only_here)
+    )
+    if sum(window.struck[sender] for sender in hit) < _LEAST:
+        return None
     silenced = frozenset(
         other for other, count in window.silenced.items() if 4 * count >= 3 * heard.get(other, Heard(0, 0, 1)).missing
     )
     return LateSpeaker(station, window, struck, of, elsewhere, of_elsewhere, frozenset(hit), silenced, is_sure)
+
+
+def _frames(window: Window, sender: str) -> int:
+    return window.struck[sender] + window.whole[MASTER if sender == NOBODY else sender]
+
+
+def _standing_out(window: Window, senders: set[str]) -> set[str]:
+    """Those of some senders that are struck in a window far more than all others, since noise strikes all alike; and
+    often: who is late once is late as a rule."""
+    hit = {sender for sender in senders if window.struck[sender] >= _LEAST}
+    struck = sum(window.struck[sender] for sender in hit)
+    here = sum(_frames(window, sender) for sender in hit)
+    everybody = (window.struck | window.whole).keys()
+    all_struck, all_here = window.struck.total(), sum(_frames(window, sender) for sender in everybody)
+    if (
+        not hit
+        or 3 * struck < window.opened
+        or here >= all_here
+        or 4 * (all_struck - struck) * here > struck * (all_here - here)
+    ):
+        return set()
+    return hit if at_least(struck, all_struck, here / all_here) < _SELDOM else set()

@@ -271,7 +271,8 @@ def _of_late_speakers(seen: BusRecord) -> Iterator[Finding]:
         made = one.window.damage.found(RULES["MB106"], f"station {one.station}", told(one), severity)
         yield replace(made, stations=(one.station, *sorted({*hit, *one.silenced} - {one.station})))
     for unit, station in sorted(seen.stations.items()):
-        if station.outlasting.count >= _COMMON_LEAST and unit not in named:
+        many = 4 * station.outlasting.count >= station.damaged.count
+        if station.outlasting.count >= _COMMON_LEAST and many and unit not in named:
             words = f"{counted(station.outlasting.count, 'answer')} not over when the master gave up, which then spoke"
             yield station.outlasting.found(RULES["MB106"], f"station {unit}", f"{words} into them")
 

@@ -47,7 +47,7 @@ def _case(name: str, bus: Modbus | N2, tap: TapModel | None = None) -> Case:
 
 LATE_CASES: tuple[Case, ...] = (
     _case("RTU answers into the next station, no repeats", _bus(240, retries=0)),
-    _case("N2 answers into the next station", _n2(240, 15)),
+    _case("N2 answers into the next station", _n2(250, 15)),
 )
 
 FURTHER_LATE_CASES: tuple[Case, ...] = (
