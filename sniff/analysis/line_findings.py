@@ -67,9 +67,10 @@ class _Stray(NamedTuple):
 class LineFindings:
     """Counts of one bus; `findings` may be asked at any time."""
 
+    _nouns = staticmethod(cache(station_word))  # asked for every frame
+
     def __init__(self, session: Session) -> None:
         self._session = session
-        self._nouns = cache(station_word)  # asked for every frame
         self._patterns = TimePatterns(session)
         self._use = LineUse(session.line)
         adapter = session.adapter
