@@ -200,7 +200,7 @@ SPELLINGS: tuple[Spelling, ...] = (
     Spelling("decimals in brackets", r"[^\s()\[\]]{0,4}\(\d{3}\)", r"[ \t]{0,2}", _by(r"\((\d{3})\)", 10), 2,
              before=r"(?:(?<=\s)|^)", after=""),
     Spelling("three decimals in brackets", r"\[\d{3}\]", r"[ ,]?", _by(r"\[(\d{3})\]", 10), 3, before="", after=""),
-    Spelling("digits behind their base", r"16#[0-9A-Fa-f]{1,2}", r"[ ]?[,;]?[ ]?", _by(r"16#([0-9A-Fa-f]{1,2})", 16), 2),
+    Spelling("digits behind 16#", r"16#[0-9A-Fa-f]{1,2}", r"[ ]?[,;]?[ ]?", _by(r"16#([0-9A-Fa-f]{1,2})", 16), 2),
     Spelling("digits and h", rf"{_H2}[hH]", _SEPARATOR, _by(rf"({_H2})[hH]", 16), 2),
     Spelling("character codes", r"#\d{1,3}", "", _codes, SURELY, before=r"(?<![0-9A-Za-z_])"),
     Spelling("digits after a sign", rf"[$%&#]{_H2}", r"[ ,;]{0,2}", _HEX, 2, before=r"(?<![0-9A-Za-z_])"),

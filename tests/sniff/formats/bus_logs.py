@@ -355,8 +355,9 @@ add(
 add(
     "multi-line-json",
     "".join(
-        '{\n  "time": "%s",\n  "direction": "%s",\n  "data": "%s"\n}\n'
-        % (iso(s, 6, "T", "Z"), tx(s, "tx", "rx"), s.octets.hex())
+        '{{\n  "time": "{}",\n  "direction": "{}",\n  "data": "{}"\n}}\n'.format(
+            iso(s, 6, "T", "Z"), tx(s, "tx", "rx"), s.octets.hex()
+        )
         for s in TALK
     ),
     0.00001,
