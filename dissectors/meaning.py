@@ -148,7 +148,8 @@ class Meaning:
         if reading.part:
             due = due_property(entry, reading)
             text = raw if due is None else f"{raw}; the manual has {due}"
-            return Item(reading, where, _titled(entry), text, values[0] if values else None, reading.beside)
+            about = f"of {_titled(entry)}"
+            return Item(reading, where, about, text, values[0] if values else None, reading.beside)
         if entry.reserved:
             return Item(reading, where, "reserved", raw, None, reading.beside)
         if not values:  # the first register of the number stands for all of it
