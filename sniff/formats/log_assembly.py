@@ -188,7 +188,8 @@ class Assembly:
             if 0 < self._expected - offset < 2 and self._held:
                 del self._held[-1:]  # an odd octet was filled up to a word
             return
-        if offset != self._expected or (offset == 0 and self._held) or line.stamp is not None:
+        goes_on = offset == self._expected and offset > 0 and self._is_at_once(line.stamp)
+        if not goes_on and (offset != self._expected or (offset == 0 and self._held) or line.stamp is not None):
             yield from self._flush()
             self._expected = offset
         if not self._held:
@@ -202,6 +203,11 @@ class Assembly:
         if len(self._held) >= LONGEST:
             yield from self._flush()
             self._glued = True
+
+    def _is_at_once(self, stamp: Stamp | None) -> bool:
+        """Whether a row came with the first of its block: a tool that stamps each row of one message."""
+        first = self._stamp
+        return bool(self._held) and stamp is not None and first is not None and abs(stamp.time - first.time) < COARSE
 
     def _between_rows(self, line: Line, text: str) -> Iterator[Chunk]:
         if text.strip() == "*":

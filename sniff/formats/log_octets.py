@@ -10,6 +10,7 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+from dissectors.checksums import crc16_modbus
 from sniff.formats.log_shapes import WAYS
 
 SURELY = 4
@@ -245,6 +246,26 @@ def octets_in(line: str, base: int = PAIRS_ONLY) -> Run | None:
     text = line[run.begin : run.end]
     wordy = not any(sign.isdigit() for sign in text) and len(set(run.octets)) > 1
     return replace(run, wordy=True) if wordy else run
+
+
+def whole_in(line: str, run: Run) -> Run:
+    """The run with the pairs that stand apart from it on its line, between names or signs, where they are a message of
+    Modbus together with its check, and it alone is none: `addr:01 func:03 data:00 06 crc:39 84`.
+    """
+    if len(run.octets) < 2 or not crc16_modbus(run.octets):
+        return run
+    begin, pairs = run.begin, list(_APART.finditer(line))
+    while pairs and pairs[0].end() <= run.begin and not _NAMED_BY.search(line[: pairs[0].start()]):
+        pairs.pop(0)  # of a time, a number
+    octets = bytes(int(pair[0], 16) for pair in pairs)
+    if len(octets) <= len(run.octets) or len(octets) < SURELY or crc16_modbus(octets) or run.octets not in octets:
+        return run
+    begin, end = pairs[0].start(), pairs[-1].end()
+    return Run(begin, end, octets, run.spelling)
+
+
+_APART = re.compile(r"(?<![0-9A-Za-z_.])[0-9A-Fa-f]{2}(?![0-9A-Za-z_.])")
+_NAMED_BY = re.compile(r"[A-Za-z]\w*[ ]?[:=][ ]?$")
 
 
 def numbers_in(line: str) -> tuple[str, ...]:

@@ -401,3 +401,33 @@ add(
     0.010,
 )
 add("truncated-last-line", lines(lambda s: f"{clock(s)} {tx(s)} {hx(s.octets)}")[:-13], 0.002)
+
+
+# -- each of these was lost once --------------------------------------------------------------------------------
+
+add("ticks-in-hex", lines(lambda s: f"0x{round(s.at * 1e6):08X} {tx(s)} {hx(s.octets)}"))
+add("tai64n", lines(lambda s: f"@{(1 << 62) + 10 + s.epoch // NS:016x}{s.epoch % NS:08x} {tx(s)} {hx(s.octets)}"), 1e-5)
+add("check-behind-a-bar", lines(lambda s: f"{clock(s)} {tx(s)} {hx(s.octets[:-2])} | {hx(s.octets[-2:])}"), 0.002)
+add(
+    "fields-by-name",
+    lines(
+        lambda s: (
+            f"{clock(s)} {tx(s)} addr:{s.octets[0]:02X} func:{s.octets[1]:02X} data:{hx(s.octets[2:-2])} crc:{hx(s.octets[-2:])}"
+        )
+    ),
+    0.002,
+)
+add(
+    "kernel-hex-dump",
+    "".join(
+        f"[{s.at:12.6f}] {tx(s, 'tx', 'rx')}: {at:08x}: {hx(s.octets[at : at + 16], ' ', '{:02x}')}\n"
+        for s in TALK
+        for at in range(0, len(s.octets), 16)
+    ),
+    1e-5,
+)
+add(
+    "count-in-a-cell",
+    "time;dir;n;b0;b1\n" + lines(lambda s: f"{s.at:.6f};{tx(s)};{len(s.octets)};{hx(s.octets, ';')}"),
+    1e-5,
+)
