@@ -26,6 +26,10 @@ def _no_words(unit: int, code: int) -> str:
     return ""
 
 
+def _unknown(unit: int) -> bool:
+    return False
+
+
 @dataclass(slots=True)
 class BusRecord:
     """What was seen on the bus. Times are ns.
@@ -39,7 +43,8 @@ class BusRecord:
     who answered. `cut_echoes`: requests given back in part. `octets`, `frames`: of each sender ("master", "station 3").
     `late_frames`: answers that came too late. `broadcast_answers`: who answered broadcasts. `pairs`: (unit asked, unit
     that answered); `repeated_elsewhere`: repeats of requests that such a pair is about, by unit asked.
-    `maker_words`: unit and exception code → what the maker of the device says of it, empty where not known.
+    `maker_words`: unit and exception code → what the maker of the device says of it, empty where not known;
+    `has_numbers`: unit → whether its papers say which numbers it can be given.
     """
 
     timing: Timing
@@ -76,6 +81,7 @@ class BusRecord:
     broadcast_answers: Counter[int] = field(default_factory=Counter)
     cycles: Cycles = field(default_factory=Cycles)
     maker_words: Callable[[int, int], str] = _no_words
+    has_numbers: Callable[[int], bool] = _unknown
 
     @property
     def span(self) -> int:

@@ -6,6 +6,8 @@ station: it is slow when even the shortest reading is too long, too quick when e
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from dissectors.checksums import crc16_modbus
 from dissectors.findings import ExceptionWords, Finding, Tally
 from dissectors.frame import Damage, Event, Flaw, Frame, Header, Noise, Role
@@ -167,6 +169,10 @@ class ModbusFindings(Remembered):
     def word_exceptions(self, words: ExceptionWords) -> None:
         """See `dissectors.findings.WordsExceptions`."""
         self.seen.maker_words = words
+
+    def know_stations(self, said: Callable[[int], bool]) -> None:
+        """See `dissectors.findings.KnowsStations`."""
+        self.seen.has_numbers = said
 
     def findings(self) -> tuple[Finding, ...]:
         """See `dissectors.findings.Judge`."""

@@ -64,7 +64,7 @@ def of_station(
         words = f"{counted(station.undecided.count, 'frame')} may be the answer or the request again"
         yield station.undecided.found(RULES["MB403"], name, words)
     yield from _two_times(name, station)
-    if station.reserved.count:
+    if station.reserved.count and not seen.has_numbers(unit):
         yield station.reserved.found(
             RULES["MB205"], name, f"{counted(station.reserved.count, 'frame')} from or to this address"
         )
