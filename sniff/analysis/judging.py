@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from dissectors import registry
-from dissectors.findings import Finding, KnowsResponseTimes, Rule, WordsExceptions
+from dissectors.findings import Finding, KnowsResponseTimes, KnowsStations, Rule, WordsExceptions
 from dissectors.frame import Noise, Place, Reason
 from dissectors.manifest import Dissector
 from dissectors.profiles import Devices
@@ -79,6 +79,9 @@ class Judging:
         if devices and isinstance(self.judge, WordsExceptions):
             family = dissector.profile_family
             self.judge.word_exceptions(lambda station, code: devices.exception(station, family, code))
+        if devices and isinstance(self.judge, KnowsStations):
+            family = dissector.profile_family
+            self.judge.know_stations(lambda station: devices.says_numbers(station, family))
         if devices and isinstance(self.judge, KnowsResponseTimes):
             family, baud = dissector.profile_family, session.timing.line.baud
             self.judge.know_response_times(lambda station: devices.response_at(station, family, baud))
