@@ -1,4 +1,4 @@
-"""Settings of all tests: how many examples hypothesis makes.
+"""Settings of all tests: how many examples hypothesis makes, how many tests run at once, and which begin.
 
 The suite is to run in minutes on two cores and to say the same of the same code each time: its examples are drawn from
 the test, not by chance. `HYPOTHESIS_PROFILE=thorough` searches longer, and elsewhere each time. No example has a
@@ -8,10 +8,27 @@ deadline: how long one takes depends on what else the machine does.
 from __future__ import annotations
 
 import os
+from pathlib import Path
 
+import pytest
 from hypothesis import HealthCheck, settings
 
 SLOW = [HealthCheck.too_slow]
 settings.register_profile("suite", max_examples=40, deadline=None, derandomize=True, suppress_health_check=SLOW)
 settings.register_profile("thorough", max_examples=1000, deadline=None, suppress_health_check=SLOW)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "suite"))
+
+os.environ["LANGUAGE"] = "C"
+"""Else argparse looks for files of translations at each of its words: most of what a command of some frames costs."""
+
+END_TO_END = Path(__file__).parent / "e2e"
+
+
+def pytest_xdist_auto_num_workers() -> int:
+    """One more than there are cores: somebody always waits for a process, a port or a disk."""
+    return len(os.sched_getaffinity(0)) + 1
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Those that wait come first: the others have work for the cores meanwhile, to the end."""
+    items.sort(key=lambda item: not item.path.is_relative_to(END_TO_END))

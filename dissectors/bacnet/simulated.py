@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 from enum import Enum, auto
+from functools import lru_cache
 
 from dissectors.bacnet.application import Application, Device, Outgoing, Poller, Quiet
 from dissectors.bacnet.envelope import frame, npdu_frame
@@ -306,13 +307,19 @@ class SimulatedNode:
 
 def _frames(octets: bytes, now: int, timing: Timing) -> list[bytes]:
     """The good frames in a burst."""
-    if header_is_good(octets):
-        length = data_length(octets)
-        if len(octets) == total(length) and body_is_good(octets[2], length, octets[HEADER:]):
-            return [octets]
+    if _is_one_good(octets):
+        return [octets]
     framer = MstpFramer(timing)
     events = framer.feed(Chunk(now, octets)) + framer.close()
     return [event.octets for event in events if isinstance(event, Frame) and event.ok]
+
+
+@lru_cache(maxsize=1024)  # every node hears every burst, and most of a ring are tokens
+def _is_one_good(octets: bytes) -> bool:
+    if not header_is_good(octets):
+        return False
+    length = data_length(octets)
+    return len(octets) == total(length) and body_is_good(octets[2], length, octets[HEADER:])
 
 
 _ANSWERS = frozenset((*CARRIES_NPDU, FrameType.TEST_RESPONSE, FrameType.REPLY_POSTPONED))

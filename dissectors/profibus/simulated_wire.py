@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import lru_cache
 
 from dissectors.profibus.envelope import is_sound, length_of
 from dissectors.profibus.telegram import HIGHEST, SC, SD4, Telegram, parse
 
 
-def telegrams_of(octets: bytes) -> Iterator[tuple[bytes, Telegram]]:
+@lru_cache(maxsize=1024)  # every station hears every burst, and cycles repeat
+def telegrams_of(octets: bytes) -> tuple[tuple[bytes, Telegram], ...]:
     """Octets and parts of the telegrams of a burst; total."""
+    return tuple(_telegrams(octets))
+
+
+def _telegrams(octets: bytes) -> Iterator[tuple[bytes, Telegram]]:
     at = 0
     while at < len(octets):
         length = _length(octets, at)

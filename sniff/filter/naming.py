@@ -63,7 +63,7 @@ class Names:
             return told.type_of(name, self.scope.devices)
         if name in fields.COLUMN_TYPES:
             return fields.column_type(name, self.dissector)
-        for one in fields.each_protocol(self.dissector):
+        for one in () if name[:1].isdigit() else fields.each_protocol(self.dissector):  # no field begins with a digit
             types = fields.types_of(one)
             if name in types:
                 return types[name]

@@ -89,10 +89,10 @@ def pieces(table: Table, cuts: Sequence[int]) -> list[Table]:
     return [table.part(begin, end) for begin, end in pairwise(edges)]
 
 
-def filled(name: str, cuts: Sequence[int], pack: int, keep: int = 10**6, later: bool = False) -> Store:
-    """A store that took the bus in pieces; those of `pack` rows and more packed."""
+def filled(name: str, cuts: Sequence[int], pack: int, keep: int = 10**6) -> Store:
+    """A store that took the bus in pieces and judged none of it; those of `pack` rows and more packed."""
     session = bus_of(name)[0]
-    store = Store(session, dissector_for(session), keep, judge_later=later)
+    store = Store(session, dissector_for(session), keep, judge_later=True)
     for piece in pieces(table_of(name), cuts):
         store.add_prepared(prepare(piece, pack=len(piece) >= pack))
     return store
@@ -217,7 +217,7 @@ def test_what_is_dropped_was_judged_before(name: str, cuts: list[int], keep: int
     session = bus_of(name)[0]
     model = BusModel(session, dissector_for(session))
     model.add_table(table_of(name))
-    store = filled(name, cuts, 100, keep, later=True)
+    store = filled(name, cuts, 100, keep)
     while store.judge(50):
         pass
     assert store.findings() == model.findings()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import random
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 
 import pytest
@@ -32,8 +32,9 @@ def times_of(chunks: list[Chunk], rounded: int = 1) -> ReadTimes:
     return ReadTimes.of([(chunk.time // rounded * rounded, len(chunk.octets)) for chunk in chunks])
 
 
-def heard(bus: str, tap: TapModel, seconds: float = 10, seed: int = 1) -> tuple[list[Chunk], LineSettings]:
-    session, items = simulate(BUSES[bus](seed=seed), seconds, tap)
+@cache
+def heard(bus: str, tap: TapModel) -> tuple[list[Chunk], LineSettings]:
+    session, items = simulate(BUSES[bus](seed=1), 10, tap)
     return [item for item in items if isinstance(item, Chunk)], session.line
 
 
