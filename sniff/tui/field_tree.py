@@ -193,6 +193,8 @@ class FieldTree(ScrollView, can_focus=True, inherit_bindings=False):
         strip = Strip(segments)
         if self.shifted:
             strip = strip.crop(self.shifted, max(self.shifted, strip.cell_length))
+        if strip.cell_length > width > 0:  # what is cut says so: → goes on
+            return Strip.join([strip.crop(0, width - 1), Strip([Segment("…", base)])]).adjust_cell_length(width, base)
         return strip.adjust_cell_length(width, base)
 
 

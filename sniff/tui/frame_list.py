@@ -17,7 +17,7 @@ COLUMNS = (
     Column("no", "no", 6, right=True),
     Column("time", "time", 12, right=True),
     Column("src", "src", 4, right=True, needs=94),
-    Column("dst", "dst", 4, right=True, needs=94),
+    Column("dst", "dst ", 5, right=True, needs=94),  # what stands behind it begins with a number too
     Column("text", "what", spills=True),
     Column("verdict", "verdict", 9),
     Column("latency", "latency ms", 8, right=True),
@@ -97,7 +97,7 @@ class FrameList(StoreList):
             "no": Cell(str(number), "dim"),
             "time": Cell(self._time(row, line)),
             "src": Cell("" if source is None else str(source)),
-            "dst": Cell("" if destination is None else str(destination)),
+            "dst": Cell("" if destination is None else f"{destination} "),
             "text": Cell(text, style),
             "verdict": self._verdict(transaction, text),
             "latency": latency_cell(

@@ -13,7 +13,7 @@ from sniff.tui.verdicts import latency_cell, verdict_cell
 COLUMNS = (
     Column("tx", "tx", 6, right=True),
     Column("time", "time", 12, right=True),
-    Column("station", "stn", 3, right=True, needs=100),  # what stands in `kind` begins with it
+    Column("station", "stn ", 4, right=True, needs=100),  # what stands in `kind` begins with it
     Column("kind", "what"),
     Column("verdict", "verdict", 12),
     Column("latency", "latency ms", 8, right=True),
@@ -57,7 +57,7 @@ class TransactionList(StoreList):
         return {
             "tx": Cell(str(transaction.id), "dim"),
             "time": Cell(self._time(transaction, line)),
-            "station": Cell("" if transaction.station is None else str(transaction.station)),
+            "station": Cell("" if transaction.station is None else f"{transaction.station} "),
             "kind": Cell(self._what(transaction)),
             "verdict": verdict_cell(transaction, self.width_of("verdict"), attempts=False),
             "latency": latency_cell(transaction.latency, self.store.session.adapter.latency),

@@ -9,6 +9,7 @@ from textual import events
 from textual.app import ComposeResult
 from textual.widgets import DataTable, Static
 
+from dissectors.findings import counted
 from dissectors.line import MS, NS_PER_S
 from dissectors.words import milliseconds
 from sniff.analysis.poll import Poll
@@ -206,7 +207,7 @@ class PollsScreen(TableScreen):
         counts = f"{poll.answered} of {poll.asked + poll.repeats} answered"
         if key.station is None and not poll.answered:  # nobody answers what is for all
             counts = f"said {poll.asked + poll.repeats} times" if poll.asked + poll.repeats > 1 else "said once"
-        words.append(counts + (f", {poll.repeats} were repeats" if poll.repeats else ""))
+        words.append(counts + (f", {counted(poll.repeats, 'repeat')} among them" if poll.repeats else ""))
         if poll.latency.count:
             low, high = poll.latency.quantile(0.5), poll.latency.most
             words.append(f"answers after {milliseconds(low or 0)}, at most {milliseconds(high or 0)}")

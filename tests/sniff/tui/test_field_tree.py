@@ -91,3 +91,13 @@ def test_parent_and_ends(with_tree: Callable[..., None]) -> None:
         tree.action_parent()
 
     with_tree(script)
+
+
+def test_what_is_cut_says_so_and_can_be_scrolled_to(with_tree: Callable[..., None]) -> None:
+    def script(tree: FieldTree) -> None:
+        tree.show((Field("start", "2026-03-01 10:00:05.381854 +0000", None, None), Field("name", "x" * 30, None, None)))
+        assert [tree.render_line(y).text.rstrip()[-6:] for y in (0, 1)] == ["4 +00…", "xxxxxx"]
+        tree.action_right()
+        assert tree.render_line(0).text.rstrip().endswith(" +0000")
+
+    with_tree(script)
