@@ -151,6 +151,16 @@ class WordsExceptions(Protocol):
 
 
 @runtime_checkable
+class KnowsStations(Protocol):
+    """A judge that can be told of which stations the device's papers say what numbers it can be given, so that the
+    standard's range is not theirs."""
+
+    def know_stations(self, said: Callable[[int], bool]) -> None:
+        """Use these from here on, also for what was seen before."""
+        ...
+
+
+@runtime_checkable
 class KnowsResponseTimes(Protocol):
     """A judge that can be told how long each station may take to answer by the papers of its device."""
 

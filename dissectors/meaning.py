@@ -41,7 +41,7 @@ class Node:
 class Item:
     """One value in words. `place`: where it is; `title`: what it is, empty where nobody knows; `text`: the value with
     its unit, and its bits where they say more; `value`: None for what is only part of another one. `parts`: its named
-    bits, as names and texts."""
+    bits and what came beside it, as names and texts."""
 
     reading: Reading
     place: str
@@ -143,20 +143,22 @@ class Meaning:
         if reading.words:
             raw = reading.words + (f" ({raw})" if reading.raw is not None else "")
         if entry is None:
-            return Item(reading, where, "reserved" if kept else "", raw, values[0] if values else None)
+            value = values[0] if values else None
+            return Item(reading, where, "reserved" if kept else "", raw, value, reading.beside)
         if reading.part:
             due = due_property(entry, reading)
             text = raw if due is None else f"{raw}; the manual has {due}"
-            return Item(reading, where, _titled(entry), text, values[0] if values else None)
+            about = f"of {_titled(entry)}"
+            return Item(reading, where, about, text, values[0] if values else None, reading.beside)
         if entry.reserved:
-            return Item(reading, where, "reserved", raw)
+            return Item(reading, where, "reserved", raw, None, reading.beside)
         if not values:  # the first register of the number stands for all of it
             word = entry.word_of(reading.address)
-            return Item(reading, where, said_title(word), raw)
-        value, *bits = values
+            return Item(reading, where, said_title(word), raw, None, reading.beside)
+        first, *bits = values
         doubt = " (?)" if entry.doubt or not reading.sure else ""
-        titled = _titled(value.entry or entry)
-        return Item(reading, where, titled, _text(value, raw) + doubt, value, _parts(entry, bits))
+        titled = _titled(first.entry or entry)
+        return Item(reading, where, titled, _text(first, raw) + doubt, first, (*_parts(entry, bits), *reading.beside))
 
 
 def _number(entry: Entry | None, reading: Reading, offset: int, kept: bool) -> str:

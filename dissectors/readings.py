@@ -28,7 +28,8 @@ class Reading:
     `station`: whose thing it is; None when that is the station of the transaction. `space`: which table of the station
     ("holding", "AI", "analog-input"); `address`: the place in it, as on the wire; `part`: the attribute or property,
     empty for the value itself. `raw`: the bits as they were on the wire, unsigned; None for text. `sure`: False where
-    no public source confirms the layout. `words`: the value in the protocol's own words, where it has some.
+    no public source confirms the layout. `words`: the value in the protocol's own words, where it has some; `beside`:
+    what came with it, as names and texts.
     """
 
     space: str
@@ -40,6 +41,7 @@ class Reading:
     sure: bool = True
     station: int | None = None
     words: str = field(default="", compare=False)
+    beside: tuple[tuple[str, str], ...] = field(default=(), compare=False)
 
 
 Readings = Callable[[Frame | None, Frame | None], tuple[Reading, ...]]

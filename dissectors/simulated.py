@@ -78,11 +78,12 @@ class SimulatedBus:
     `parties(line, faults)`: makes them afresh for each run, in any process, so it is a function of a module (or a
     `partial` of one); `faults`: whether stations may misbehave, too. `line`: the settings of this bus; where empty, the
     protocol's usual ones. `gap`: ns of silence that the framing wants before a frame. `devices`: device profiles by
-    address. `text`: who is there and what is wrong, in a line for people.
+    address. `text`: who is there, in a line for people; `misbehaving`: what `faults` adds to it.
     """
 
     parties: Callable[[LineSettings, bool], Sequence[Party]]
     text: str = ""
+    misbehaving: str = ""
     line: str = ""
     faults: tuple[Fault, ...] = ()
     gap: Callable[[Timing], int] = no_gap

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dissectors.bacnet.ring import Ring, RingEventKind
+from dissectors.findings import counted
 from dissectors.histogram import Histogram
 from dissectors.line import MS
 from dissectors.token_ring import Cell
@@ -94,7 +95,7 @@ def _users(ring: Ring) -> list[str]:
     said = []
     if held and ring.span:
         shares = ", ".join(
-            f"MAC {mac} {time / ring.span:.0%} (up to {ring.nodes[mac].most_in_a_hold} frames a token)"
+            f"MAC {mac} {time / ring.span:.0%} (up to {counted(ring.nodes[mac].most_in_a_hold, 'frame')} a token)"
             for time, mac in held[:3]
         )
         said.append(f"the token is longest with {shares}")

@@ -18,7 +18,8 @@ def scenarios() -> Mapping[str, SimulatedBus]:
         parties=_parties,
         faults=(BitFlips(2e-5), CutShort(0.0005), NoiseInGaps(0.002, places=(Place.AFTER,)), Break(0.0002)),
         devices=dict.fromkeys((5, 9), "teco-f510"),
-        text="four masters, two of them TECO F510 drives; the drive at 9 drops the token now and then",
+        text="four masters, two of them TECO F510 drives",
+        misbehaving="the drive at 9 drops the token now and then",
     )
     return {"mstp": bus}
 

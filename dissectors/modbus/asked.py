@@ -5,8 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from dissectors.frame import Frame, Header, Role
-from dissectors.modbus.functions import BROADCAST, EXCEPTION_BIT
+from dissectors.late_speakers import Due
+from dissectors.modbus.envelope import ASCII_NAME
+from dissectors.modbus.functions import BROADCAST, EXCEPTION_BIT, ITEMS_ASKED, answer_length
+from dissectors.modbus.notation import CHECK, HEAD
 from dissectors.modbus.station_record import Key
+
+LONGEST_READ = 11
+"""Octets: no RTU request that reads is longer, and what is stuck to it by noise."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +33,25 @@ class AskedRequest:
     def key(self) -> Key:
         """What it asks for, as a poll list has it."""
         return self.header.kind, self.header.address
+
+    @property
+    def due(self) -> Due:
+        """Its answer, as it is on the line."""
+        is_ascii = self.frame.protocol == ASCII_NAME
+        unit = b":" + self.octets[:1].hex().upper().encode() if is_ascii else self.octets[:1]
+        begin = self._answer_begin()
+        size = begin[-1] + HEAD + 1 + CHECK if begin else 0
+        on_line = b":" + begin.hex().upper().encode() if is_ascii and begin else begin
+        return Due(unit, on_line, size if size > LONGEST_READ and not is_ascii else 0)
+
+    def _answer_begin(self) -> bytes:
+        """Unit, function and count of its answer; empty where it may itself begin so."""
+        code = self.octets[1] if len(self.octets) > 1 else 0
+        length = answer_length(self.octets + bytes(CHECK)) if code in ITEMS_ASKED else None
+        if length is None or length - HEAD - 1 - CHECK > 0xFF:
+            return b""
+        begin = self.octets[:HEAD] + bytes((length - HEAD - 1 - CHECK,))
+        return b"" if self.octets.startswith(begin) else begin
 
     @property
     def is_for_nobody(self) -> bool:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 from dissectors.findings import Tally
 from dissectors.frame import Flaw
+from dissectors.late_speakers import LateSpeakers
 from dissectors.line import NS_PER_S, Timing
 from dissectors.modbus.station_record import Cycles, StationRecord
 from dissectors.strikes import Strikes
@@ -25,6 +26,10 @@ def _no_words(unit: int, code: int) -> str:
     return ""
 
 
+def _unknown(unit: int) -> bool:
+    return False
+
+
 @dataclass(slots=True)
 class BusRecord:
     """What was seen on the bus. Times are ns.
@@ -38,7 +43,8 @@ class BusRecord:
     who answered. `cut_echoes`: requests given back in part. `octets`, `frames`: of each sender ("master", "station 3").
     `late_frames`: answers that came too late. `broadcast_answers`: who answered broadcasts. `pairs`: (unit asked, unit
     that answered); `repeated_elsewhere`: repeats of requests that such a pair is about, by unit asked.
-    `maker_words`: unit and exception code → what the maker of the device says of it, empty where not known.
+    `maker_words`: unit and exception code → what the maker of the device says of it, empty where not known;
+    `has_numbers`: unit → whether its papers say which numbers it can be given.
     """
 
     timing: Timing
@@ -50,6 +56,7 @@ class BusRecord:
     stations: dict[int, StationRecord] = field(default_factory=dict)
     damaged_requests: Tally = field(default_factory=Tally)
     strikes: Strikes = field(default_factory=Strikes)  # "master", "station 3" …
+    late_speakers: LateSpeakers = field(default_factory=LateSpeakers)
     unasked: Tally = field(default_factory=Tally)
     asked_twice: Tally = field(default_factory=Tally)
     answers_to_broadcast: Tally = field(default_factory=Tally)
@@ -74,6 +81,7 @@ class BusRecord:
     broadcast_answers: Counter[int] = field(default_factory=Counter)
     cycles: Cycles = field(default_factory=Cycles)
     maker_words: Callable[[int, int], str] = _no_words
+    has_numbers: Callable[[int], bool] = _unknown
 
     @property
     def span(self) -> int:

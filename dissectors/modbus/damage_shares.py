@@ -10,13 +10,12 @@ among themselves.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import erfc, exp, lgamma, log, log1p, sqrt
 
+from dissectors.chances import at_least
 from dissectors.modbus.bus_record import BusRecord
 
 _SELDOM = 0.002  # with a handful of senders, one in a hundred buses blames somebody wrongly
 _SELDOM_ALONE = 0.05  # where nobody else has any damage, which speaks for itself
-_EXACT_MOST = 400
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +43,7 @@ def shares_of_damage(seen: BusRecord) -> DamageShare:
     if requests and "master" not in blamed:
         share = octets["master"] / sum(octets.values())
         alone = not any(count for sender, count in hits.items() if sender != "master")
-        if chance(requests, sum(hits.values()), share) < (_SELDOM_ALONE if alone else _SELDOM):
+        if at_least(requests, sum(hits.values()), share) < (_SELDOM_ALONE if alone else _SELDOM):
             blamed.add("master")
     common = {sender: count for sender, count in frames.items() if count > 0 and sender not in blamed}
     return DamageShare(frozenset(blamed), common)
@@ -55,7 +54,9 @@ def to_blame(hits: dict[str, int], octets: dict[str, int]) -> set[str]:
     left, blamed = dict(hits), set[str]()
     while len(left) > 1:
         damaged, sent = sum(left.values()), sum(octets[sender] for sender in left)
-        chances = {sender: chance(count, damaged, octets[sender] / sent) for sender, count in left.items() if count > 0}
+        chances = {
+            sender: at_least(count, damaged, octets[sender] / sent) for sender, count in left.items() if count > 0
+        }
         if not chances:
             break
         worst = min(chances, key=lambda sender: chances[sender])
@@ -64,16 +65,3 @@ def to_blame(hits: dict[str, int], octets: dict[str, int]) -> set[str]:
         blamed.add(worst)
         del left[worst]
     return blamed
-
-
-def chance(count: int, of: int, share: float) -> float:
-    """How likely `count` or more of `of` fall on a sender with that share: the upper tail of the binomial."""
-    if count <= 0 or share >= 1:
-        return 1.0
-    if of > _EXACT_MOST:
-        return erfc((count - 0.5 - of * share) / sqrt(2 * of * share * (1 - share))) / 2
-    whole, hit, missed = lgamma(of + 1), log(share), log1p(-share)
-    terms = (
-        exp(whole - lgamma(k + 1) - lgamma(of - k + 1) + k * hit + (of - k) * missed) for k in range(count, of + 1)
-    )
-    return min(1.0, sum(terms))

@@ -6,6 +6,8 @@ station: it is slow when even the shortest reading is too long, too quick when e
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from dissectors.checksums import crc16_modbus
 from dissectors.findings import ExceptionWords, Finding, Tally
 from dissectors.frame import Damage, Event, Flaw, Frame, Header, Noise, Role
@@ -112,7 +114,9 @@ class ModbusFindings(Remembered):
         if ended is not None:
             self._see_end(*ended)
         if verdict is Verdict.DAMAGED_REQUEST:
+            octets = asked.frame.octets if asked is not None else b""
             self.seen.strikes.struck("master")
+            self.seen.late_speakers.damaged_request(octets, transaction.start, transaction.request)
             self.seen.damaged_requests.add(transaction.start, transaction.request)
             if flaw is not None:
                 tallies = self.seen.requests_damaged_by
@@ -122,7 +126,7 @@ class ModbusFindings(Remembered):
             self._settle_for_nobody(transaction, asked)
             return
         if verdict is Verdict.UNSOLICITED:
-            self._settle_unasked(transaction)
+            self._settle_unasked(transaction, ended)
             return
         if transaction.station is None:
             return
@@ -147,8 +151,11 @@ class ModbusFindings(Remembered):
                 self.final[transaction.id] = answer
                 if len(self.final) > FINAL_KEPT:
                     del self.final[next(iter(self.final))]
+            damaged = verdict is Verdict.DAMAGED_ANSWER and asked.no not in self.no_requests
+            if damaged:
+                self._see_hit(transaction, asked, stray)
             self.settle_request(station, transaction, asked, code, answer)
-            if verdict is Verdict.DAMAGED_ANSWER and asked.no not in self.no_requests:
+            if damaged:
                 self._settle_damaged(station, transaction, asked, stray, flaw)
 
     def _may_be_next_request(self, transaction: Transaction, answer: bytes) -> bool:
@@ -162,6 +169,10 @@ class ModbusFindings(Remembered):
     def word_exceptions(self, words: ExceptionWords) -> None:
         """See `dissectors.findings.WordsExceptions`."""
         self.seen.maker_words = words
+
+    def know_stations(self, said: Callable[[int], bool]) -> None:
+        """See `dissectors.findings.KnowsStations`."""
+        self.seen.has_numbers = said
 
     def findings(self) -> tuple[Finding, ...]:
         """See `dissectors.findings.Judge`."""
@@ -251,6 +262,8 @@ class ModbusFindings(Remembered):
             if len(event.octets) >= 3:
                 self.seen.noise_after_broadcast.add(event.start, self.broadcast.no, no)
             return
+        if self.open is None and self.broadcast is None and len(event.octets) >= BEGIN:
+            self.seen.late_speakers.noise(event.start, no)
         self.broadcast = None
 
     def _is_answer_to_broadcast(self, asked: AskedRequest) -> bool:
@@ -287,8 +300,9 @@ class ModbusFindings(Remembered):
         if _ends_badly(frame):
             station.last_octet.add(frame.end, no)
 
-    def _settle_unasked(self, transaction: Transaction) -> None:
-        """An answer that fits no request: of another unit than the one asked, or of nobody's asking."""
+    def _settle_unasked(self, transaction: Transaction, ended: tuple[int, int, Frame] | None) -> None:
+        """An answer that fits no request: of another unit than the one asked, or of nobody's asking. `ended`: itself,
+        with its station and row, where it is damaged."""
         other = self.asked.get(transaction.of) if transaction.of is not None else None
         if other is not None and transaction.station is not None and transaction.station != other.unit:
             self.elsewhere[other.no] = transaction.station
@@ -302,6 +316,10 @@ class ModbusFindings(Remembered):
         if not self.seen.requests and self.seen.answers == 1:
             return  # the capture began between a request and its answer
         if transaction.id in self.damaged:  # more likely a request, when nobody was asked
+            octets = ended[2].octets if ended is not None else b""
+            self.seen.late_speakers.damaged_request(octets, transaction.start, transaction.response)
+            if self.seen.late_speakers.shows(octets, transaction.start):
+                return
             self.seen.strikes.struck("master")
             self.seen.damaged_requests.add(transaction.start, transaction.response)
             return
@@ -336,6 +354,9 @@ class ModbusFindings(Remembered):
             request.missing.add(transaction.start, transaction.request)
             station.missing.add(transaction.start, transaction.request)
             station.silent.add(transaction.start, transaction.request)
+            self.seen.late_speakers.unanswered(
+                asked.unit, asked.due, transaction.start, transaction.end, self.learnt.timeout
+            )
             self.lost[transaction.id] = Lost(asked.unit, asked.key, asked.no)
             if len(self.lost) > LOST_KEPT:
                 del self.lost[next(iter(self.lost))]
@@ -347,6 +368,7 @@ class ModbusFindings(Remembered):
             station.garbled += transaction.response is None
             return
         self.seen.strikes.whole()
+        self.seen.late_speakers.answered(asked.unit, f"station {asked.unit}", transaction.start)
         station.answered += 1
         station.copies += answer == asked.octets
         if transaction.latency is not None and not self.torn.is_torn(transaction.id):
@@ -399,6 +421,17 @@ class ModbusFindings(Remembered):
             seen.for_nobody[transaction.station or 0] += 1
         seen.cycles.add(asked.octets, asked.key, transaction.start)
 
+    def _see_hit(self, transaction: Transaction, asked: AskedRequest, stray: bytes) -> None:
+        """A damaged answer that the late one of another station may have hit."""
+        self.seen.late_speakers.damaged_answer(
+            asked.unit,
+            f"station {asked.unit}",
+            stray,
+            transaction.start,
+            *(transaction.request, transaction.response),
+            is_longer=_excess(asked, stray) is not None,
+        )
+
     def _settle_damaged(
         self, station: StationRecord, transaction: Transaction, asked: AskedRequest, stray: bytes, flaw: Flaw | None
     ) -> None:
@@ -408,21 +441,24 @@ class ModbusFindings(Remembered):
             return
         if not stray:
             return
-        if len(stray) == _STRAY_KEPT:
-            return
+        if len(stray) == _STRAY_KEPT or self.seen.late_speakers.is_due_from_another(asked.unit, transaction.start):
+            return  # two may have spoken at once, which says nothing of how this one speaks
         begins = stray[:1] == b":" if asked.frame.protocol != RTU_NAME else stray[:1] == asked.octets[:1]
         frames = transaction.request, transaction.response
         marked = transaction.id in self.marked
         station.garbage.add(stray, transaction.end, *frames, is_marked=marked, begins=begins)
-        if asked.frame.protocol != RTU_NAME or stray[:2] != asked.octets[:2] or stray[1] not in FUNCTIONS:
-            return
-        expected = answer_length(asked.frame.octets)
-        if expected is None:
-            return
-        if len(stray) >= expected + _TALKED_OVER:
+        excess = _excess(asked, stray)
+        if excess is not None and self._outlasts(transaction, asked):
+            station.outlasting.add(transaction.end, transaction.request, transaction.response)
+        elif excess is not None:
             station.talked_over.add(transaction.end, transaction.request, transaction.response)
             if len(station.excess) < _EXCESS_KEPT:
-                station.excess.append(len(stray) - expected)
+                station.excess.append(excess)
+
+    def _outlasts(self, transaction: Transaction, asked: AskedRequest) -> bool:
+        """Whether what came was not over when the master gave up: it is the master that spoke into it."""
+        timeout = self.learnt.timeout
+        return timeout is not None and transaction.end - asked.frame.end > timeout - self.timing.latency
 
     def _gather(self, event: Event) -> None:
         """Keep octets that are no good frame, in the transaction of the newest request."""
@@ -458,6 +494,15 @@ class ModbusFindings(Remembered):
             return False
         gap = max(0, event.start - asked.frame.end)
         return gap < (AT_ONCE if asked.header.role is Role.REQUEST else self.timing.t35)
+
+
+def _excess(asked: AskedRequest, stray: bytes) -> int | None:
+    """By how many octets what came is too long, where it began as the answer; None where it did not, or is not."""
+    if asked.frame.protocol != RTU_NAME or stray[:2] != asked.octets[:2] or stray[1] not in FUNCTIONS:
+        return None
+    expected = answer_length(asked.frame.octets)
+    excess = len(stray) - expected if expected is not None else 0
+    return excess if excess >= _TALKED_OVER else None
 
 
 def _ends_badly(frame: Frame) -> bool:

@@ -6,7 +6,8 @@ bounded.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections import OrderedDict
+from collections.abc import Collection
 from typing import Final
 
 from dissectors.frame import Flaw
@@ -34,7 +35,7 @@ class Past:
     __slots__ = ("_calls", "_constant", "_flaws", "_lengths", "_requests", "_strays", "learnt")
 
     def __init__(self) -> None:
-        self._requests: dict[bytes, None] = {}  # in the order they came first
+        self._requests: OrderedDict[bytes, None] = OrderedDict()  # in the order they came first
         self._lengths: dict[int, int] = {}  # unit, function, direction → a bit for each length
         self._constant: dict[int, tuple[int, int]] = {}  # of functions of unknown layout: first length, how often
         self._calls: set[int] = set()  # unit and function of all requests
@@ -91,7 +92,7 @@ class Past:
         if request and octets not in self._requests:
             self._requests[octets] = None
             if len(self._requests) > _MOST_REQUESTS:
-                del self._requests[next(iter(self._requests))]
+                self._requests.popitem(last=False)
         if (known and request) or code & EXCEPTION_BIT or code in ANSWER_LENGTHS:
             return
         key = _key(octets[0], code, not request)
@@ -105,18 +106,19 @@ class Past:
                 (length, min(times + 1, _CONSTANT)) if length == len(octets) and times >= 0 else (0, -1)
             )
 
-    def note_requests(self, asked: Iterable[bytes]) -> None:
+    def note_requests(self, asked: Collection[bytes]) -> None:
         """Good requests of functions whose layout is known: the same as `note` of one after the other."""
+        for _ in asked:
+            if not self._strays >> 6:
+                break
+            self._strays -= self._strays >> 6
         requests, calls = self._requests, self._calls
         for octets in asked:
-            if self._strays:
-                self._strays -= self._strays >> 6
-            if octets in requests:
-                continue
-            calls.add(octets[0] << 8 | octets[1])
-            requests[octets] = None
-            if len(requests) > _MOST_REQUESTS:
-                del requests[next(iter(requests))]
+            if octets not in requests:
+                calls.add(octets[0] << 8 | octets[1])
+                requests[octets] = None
+                if len(requests) > _MOST_REQUESTS:
+                    requests.popitem(last=False)
 
     def note_stray_zero(self) -> None:
         """A zero behind a frame that cannot be its last octet."""

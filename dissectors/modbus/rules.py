@@ -7,9 +7,11 @@ from __future__ import annotations
 
 from dissectors.findings import Rule, Severity
 
+_OF_LINE = ("LN101", "LN103", "LN201", "LN202", "LN203", "LN204")
+
 _OF_COLLISIONS = (
-    *("MB005", "MB007", "MB008", "MB009", "MB010", "MB103", "MB104", "MB207", "MB208"),
-    *("LN101", "LN103", "LN201", "LN202", "LN203", "LN204"),
+    *("MB005", "MB007", "MB008", "MB009", "MB010", "MB103", "MB104", "MB106", "MB207", "MB208"),
+    *_OF_LINE,
 )
 """What two senders at once make of good frames."""
 
@@ -245,7 +247,7 @@ _ALL = (
         "Good answers that come after the master's timeout, often into the next request.",
         "the master's timeout is too short for this station",
         "raise the master's response timeout above the times seen here",
-        explains=("MB101", "MB104", "MB201", "MB301", "MB010"),
+        explains=("MB101", "MB104", "MB201", "MB301", "MB010", *_OF_LINE),
     ),
     Rule(
         "MB104",
@@ -264,6 +266,22 @@ _ALL = (
         "A warning above 5%.",
         "every poll of an absent station costs a timeout, and its repeats too; all others are read less often",
         "take absent stations out of the poll list, or let the master ask them seldom",
+    ),
+    Rule(
+        "MB106",
+        Severity.WARNING,
+        "answers into what comes next",
+        "Damage that stands directly behind waits for one station in vain, at least three times, and far more often "
+        "there than in frames of the same senders elsewhere (chance under 1 in 500). An answer after the master's "
+        "timeout falls on the next request or on the answer to it, and two senders at once are no frame. Or damage "
+        "that begins as its answer where others were asked, or answers that are longer than they can be and not over "
+        "when the master's timeout is.",
+        "the station answers when its master has given up; those whose frames are hit are not to blame",
+        "raise the master's response timeout, or find out why this station is slow; nobody else's cable",
+        explains=(
+            *("MB001", "MB002", "MB003", "MB004", "MB005", "MB007", "MB009", "MB010", "MB019", "MB103", "MB104"),
+            *("MB105", "MB207", *_OF_LINE),
+        ),
     ),
     Rule(
         "MB201",

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from dissectors.findings import Finding, Severity, Tally, counted, found, times
+from dissectors.late_speakers import MASTER, NOBODY, Heard, late_speakers, told
 from dissectors.line import MS
 from dissectors.modbus.bus_record import BusRecord
 from dissectors.modbus.damage_shares import DamageShare, shares_of_damage, to_blame
@@ -33,6 +34,7 @@ def judge(seen: BusRecord, timeout: int | None) -> tuple[Finding, ...]:
         *_of_gaps(seen),
         *_of_ends(seen),
         *_common_damage(seen, damage),
+        *_of_late_speakers(seen),
     ]
     for unit in sorted(seen.stations):
         made += of_station(seen, unit, seen.stations[unit], timeout, f"station {unit}" not in damage.blamed)
@@ -254,6 +256,25 @@ def _common_damage(seen: BusRecord, damage: DamageShare) -> list[Finding]:
     finding = tally.found(RULES["MB007"], "bus", words, note_if(seen.rare(damaged, asked)))
     last = max(seen.stations[unit].damaged.last for unit in struck)
     return [replace(finding, count=answers, last=last)]
+
+
+def _of_late_speakers(seen: BusRecord) -> Iterator[Finding]:
+    """Stations that answer into what follows: those that are hit are not to blame for their damage."""
+    whole = {f"station {unit}": one.answered for unit, one in seen.stations.items()}
+    whole[MASTER] = whole[NOBODY] = seen.requests - seen.damaged_requests.count
+    heard = {unit: Heard(one.answered, one.late.count, one.missing.count) for unit, one in seen.stations.items()}
+    named: set[int] = set()
+    for one in late_speakers(seen.late_speakers, whole, heard):
+        hit = one.stations_hit
+        named |= {one.station, *hit}
+        severity = None if heard[one.station].answers else Severity.ERROR  # all that it says is lost
+        made = one.window.damage.found(RULES["MB106"], f"station {one.station}", told(one), severity)
+        yield replace(made, stations=(one.station, *sorted({*hit, *one.silenced} - {one.station})))
+    for unit, station in sorted(seen.stations.items()):
+        many = 4 * station.outlasting.count >= station.damaged.count
+        if station.outlasting.count >= _COMMON_LEAST and many and unit not in named:
+            words = f"{counted(station.outlasting.count, 'answer')} not over when the master gave up, which then spoke"
+            yield station.outlasting.found(RULES["MB106"], f"station {unit}", f"{words} into them")
 
 
 def _cycle(seen: BusRecord) -> Iterator[Finding]:

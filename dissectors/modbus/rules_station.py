@@ -8,6 +8,7 @@ from itertools import pairwise
 
 from dissectors.findings import Finding, Severity, Tally, counted, found, times
 from dissectors.frame import Flaw
+from dissectors.late_speakers import reaching
 from dissectors.line import MS
 from dissectors.modbus.bus_record import BusRecord
 from dissectors.modbus.finding_words import note_if, request_words, wilson
@@ -63,7 +64,7 @@ def of_station(
         words = f"{counted(station.undecided.count, 'frame')} may be the answer or the request again"
         yield station.undecided.found(RULES["MB403"], name, words)
     yield from _two_times(name, station)
-    if station.reserved.count:
+    if station.reserved.count and not seen.has_numbers(unit):
         yield station.reserved.found(
             RULES["MB205"], name, f"{counted(station.reserved.count, 'frame')} from or to this address"
         )
@@ -250,9 +251,8 @@ def _times(
     if station.late.count:
         words = f"{counted(station.late.count, 'answer')} came after the master had given up"
         waits = f"; it waits {fine_milliseconds(timeout)}" if timeout is not None else ""
-        yield station.late.found(
-            RULES["MB103"], name, words + waits, note_if(seen.rare(station.late.count, station.asked))
-        )
+        severity = note_if(seen.rare(station.late.count, station.asked))
+        yield reaching(station.late.found(RULES["MB103"], name, words + waits, severity), seen.late_speakers)
     if station.answered and station.repeats.count:
         share = station.repeats_cost / seen.span
         words = (

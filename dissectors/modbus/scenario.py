@@ -38,7 +38,8 @@ def _bus(is_ascii: bool = False, busy: bool = False, line: str = "") -> Simulate
         ),
         gap=no_gap if is_ascii else _rtu_gap,
         devices=dict.fromkeys((1, 2, 3), "teco-e510"),
-        text="three TECO E510 drives; unit 4 is absent, drive 3 lets go of the line too early now and then",
+        text="three TECO E510 drives; unit 4 is absent",
+        misbehaving="drive 3 lets go of the line too early now and then",
     )
 
 

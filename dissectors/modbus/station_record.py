@@ -153,6 +153,7 @@ class StationRecord:
     cut: int = 0  # of the damaged answers: ended early
     last_octet: Tally = field(default_factory=Tally)  # only the last octet is wrong
     talked_over: Tally = field(default_factory=Tally)  # begun as an answer, and longer than it can be
+    outlasting: Tally = field(default_factory=Tally)  # the same, and not over when the master gave up
     excess: list[int] = field(default_factory=list)  # octets by which those were too long
     garbled: int = 0  # octets in place of an answer that are no frame at all
     garbage: Garbage = field(default_factory=Garbage)  # what came in place of an answer, whole

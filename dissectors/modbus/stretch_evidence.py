@@ -164,6 +164,7 @@ class StretchEvidence:
         octets, begins, ends, became, low = one.octets, one.begin, one.end, one.became, one.low
         address, kind, started = one.address, one.kind, one.started
         has_reserved = max(one.unit[begin:end]) > LAST_STANDARD_UNIT
+        late_speakers = self._judge.seen.late_speakers
         waiting: int | None = None  # the exchange before, if nothing answered it
         for at in range(begin, end):
             said = octets[begins[at] : ends[at]]
@@ -180,6 +181,8 @@ class StretchEvidence:
             request = requests.get(said)
             if request is None or request.address != address[at] or request.kind != kind[at]:
                 request = self._new_request(at, said)
+            if started[at] < late_speakers.until:
+                late_speakers.answered(one.unit[at], f"station {one.unit[at]}", started[at])
             requested = request.requested
             requested.tries += 1
             requested.turns += 1

@@ -319,7 +319,7 @@ class ModbusTracker:
         """Whether a damaged frame came in answer. One that was cut may have the length of a request by chance: it is
         an answer all the same when it comes as soon as that station's answers do, which no master does."""
         if seen.header.role is Role.REQUEST:
-            return request.is_for(seen.octets) and self._times.is_prompt(request, seen)
+            return seen.unit == request.unit and self._times.is_prompt(request, seen)
         if request.is_for(seen.octets):
             return True
         return self._times.in_time(request, seen) and not names_another(seen, request.unit, self._units)

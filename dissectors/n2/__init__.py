@@ -10,7 +10,7 @@ from dissectors.n2.findings import N2Findings
 from dissectors.n2.framing import N2Framer
 from dissectors.n2.header import peek
 from dissectors.n2.interpretation import Interpretation, interpret
-from dissectors.n2.readings import asks, readings, refusal
+from dissectors.n2.readings import asks, readings, refusal, spans
 from dissectors.n2.renamer import N2Renamer
 from dissectors.n2.rules import RULES
 from dissectors.n2.text import meant, text
@@ -64,6 +64,7 @@ N2 = Dissector(
     judge=judge,
     rules=RULES,
     readings=readings,
+    spans=spans,
     refusal=refusal,
     questions=questions,
     renamer=N2Renamer,

@@ -12,9 +12,11 @@ from collections import OrderedDict
 
 from dissectors.findings import Finding, Tally
 from dissectors.frame import Damage, Event, Frame, Header, Noise
+from dissectors.late_speakers import Due, LateSpeakers, reaching
 from dissectors.line import Timing
 from dissectors.n2.commands import parse_command
 from dissectors.n2.header import meant
+from dissectors.n2.late import of_late_speakers
 from dissectors.n2.masters import Masters, OpenCommand
 from dissectors.n2.record import Damages, N2StationRecord, Override
 from dissectors.n2.torn import TornFrames
@@ -48,6 +50,8 @@ class N2Findings:
         self.masters = Masters()
         self.torn = TornFrames(timing)
         self.strikes = Strikes()
+        self.late_speakers = LateSpeakers()
+        self.newest = 0  # ns, the start of the newest row
         self._stray = Tally()
         self._codes: dict[int, str] = {}  # transaction → error code, of refusals that are still to close
         self._answers: OrderedDict[int, bytes] = OrderedDict()  # transaction → its good answer
@@ -58,6 +62,7 @@ class N2Findings:
         """Take the next row: event, its header and placement (None for noise)."""
         self.first = event.start if self.first is None else self.first
         self.now = max(self.now, event.end)
+        self.newest = event.start
         self.torn.see(no, event, placement.tx if placement else None, is_good_frame=header is not None and header.ok)
         if isinstance(event, Noise) or header is None or placement is None:
             if not event.octets or event.octets.strip(b"\r\n"):
@@ -118,9 +123,13 @@ class N2Findings:
         code = self._codes.pop(transaction.id, "")
         verdict = transaction.verdict
         if verdict is Verdict.UNSOLICITED:
-            if transaction.response != self._bad and not self.torn.may_answer(transaction.response):
+            if transaction.response == self._bad:
+                self.late_speakers.noise(transaction.start, transaction.response)
+            elif not self.torn.may_answer(transaction.response):
                 self._stray.add(transaction.start, transaction.response)
             return
+        if verdict is Verdict.DAMAGED_REQUEST:
+            self.late_speakers.damaged_request(b"", transaction.start, transaction.request)
         if transaction.station is None or verdict in _NOT_JUDGED:
             return
         station = self.station(transaction.station)
@@ -147,11 +156,19 @@ class N2Findings:
             if verdict is Verdict.NO_RESPONSE:
                 if self.torn.is_answered(transaction.request):
                     return
+                self.unanswered(transaction.station or 0, transaction.start, transaction.end, self.newest)
                 station.missing.add(transaction.id, transaction.end, transaction.request)
             elif verdict is Verdict.DAMAGED_ANSWER and not self.torn.is_torn(transaction.id, transaction.request):
                 self.strikes.struck(f"station {transaction.station}")
+                self._see_hit(transaction)
                 station.sent.add_bad(transaction.end, transaction.request)
             return
+        if verdict is Verdict.DAMAGED_ANSWER:
+            self._see_hit(transaction)
+        elif not asked.frame.ok:  # understood all the same, or refused for it
+            self.late_speakers.damaged_request(b"", transaction.start, transaction.request)
+        else:
+            self.late_speakers.answered(transaction.station or 0, f"station {transaction.station}", transaction.start)
         station.answered += 1
         self._judge_latency(station, transaction)
         if verdict is Verdict.EXCEPTION:
@@ -159,11 +176,21 @@ class N2Findings:
         elif verdict in (Verdict.ANSWERED, Verdict.RETRY):
             self.obeyed(station, asked, transaction)
 
+    def unanswered(self, station: int, start: int, end: int, after: int) -> None:
+        """A command that nothing followed until `after`; ns."""
+        self.late_speakers.unanswered(station, Due(), start, end, after - end)
+
+    def _see_hit(self, transaction: Transaction) -> None:
+        station, rows = transaction.station or 0, (transaction.request, transaction.response)
+        name = f"station {station}"
+        self.late_speakers.damaged_answer(station, name, b"", transaction.start, *rows, is_longer=False)
+
     def findings(self) -> tuple[Finding, ...]:
         """All findings so far: the bus first, then station by station."""
         seconds = (self.now - (self.first or 0)) / 1e9
         heard = N2Evidence(self.now, seconds, self.master, self.stations, self.masters.seen, self._stray, self.strikes)
-        return tuple(worded(heard))
+        found = (reaching(one, self.late_speakers) if one.code == "N2011" else one for one in worded(heard))
+        return (*found, *of_late_speakers(heard, self.late_speakers))
 
     # --- judging ---
 

@@ -15,26 +15,35 @@ from dissectors.n2.commands import VENDOR_DEVICE, Command, error_text, fields_of
 from dissectors.n2.header import error_code
 from dissectors.n2.objects import (
     ATTRIBUTES,
+    BINARY,
     REGIONS,
     Encoding,
     attribute_name,
     decode,
+    flags_word,
     guessed_bits,
     holds_current_value,
     is_hex,
     number,
     object_name,
+    state_word,
 )
+
+NO_OTHER_BIT = "no other status bit set"
+"""What is said of all change records whose status octet is not."""
 
 
 @dataclass(frozen=True, slots=True)
 class ChangeOfState:
-    """One tentative change-of-state record; `status` and `value` None where the record has none."""
+    """One tentative change-of-state record; `value` None where the record has none. `begin`, `end`: its characters
+    in the data of the answer, end exclusive."""
 
     region: int
     object: int
     status: int
     value: int | float | None
+    begin: int = 0
+    end: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +52,8 @@ class Interpretation:
 
     `raw`: the data characters as they came. `value`: what was read, or what was written or overridden and then
     acknowledged; None where nothing certain can be said. `written`: which of the two. `name`: the attribute's.
-    `error`: a refusal or damage in words. `tentative`: readings that no public source confirms.
+    `status`: the octet before a current value, or that a binary object is read by, None where there is none. `error`: a
+    refusal or damage in words. `tentative`: readings that no public source confirms.
     """
 
     station: int | None
@@ -55,6 +65,7 @@ class Interpretation:
     value: int | float | None = None
     written: bool = False
     raw: str = ""
+    status: int | None = None
     error: str | None = None
     tentative: tuple[str, ...] = ()
     records: tuple[ChangeOfState, ...] = ()
@@ -137,10 +148,11 @@ def _read(base: Interpretation, command: Command) -> Interpretation:
     encoding = command.encoding
     if encoding is None:
         return base
-    raw, doubt = base.raw, []
+    raw, doubt = base.raw, list[str]()
+    status: int | None = None
     if holds_current_value(region, attribute) and len(raw) == encoding.width + 2 and is_hex(raw):
-        doubt.append(f"status {raw[:2]}h in front")
-        raw = raw[2:]
+        doubt.append(f"status {raw[:2]}h in front" + (", no bit set" if raw[:2] == "00" else ""))
+        status, raw = int(raw[:2], 16), raw[2:]
     value = decode(raw, encoding, signed=REGIONS[region].signed)
     if value is None:
         return replace(base, tentative=(f"no {encoding.name.lower()}",)) if raw else base
@@ -149,7 +161,8 @@ def _read(base: Interpretation, command: Command) -> Interpretation:
         doubt.append(f"{known.name}, elsewhere {known.otherwise}")
     if encoding is Encoding.BYTE and isinstance(value, int):
         doubt.extend(guessed_bits(region, attribute, value))
-    return replace(base, value=value, tentative=tuple(doubt))
+        status = value if region in BINARY and attribute == 2 else status
+    return replace(base, value=value, status=status, tentative=tuple(doubt))
 
 
 def _identify(base: Interpretation) -> Interpretation:
@@ -173,7 +186,9 @@ def change_records(raw: str) -> tuple[tuple[ChangeOfState, ...], tuple[str, ...]
         return (), ("change records, layout not known",)
     if len(distinct) > 1:
         return (), (f"change records, {len(distinct)} readings fit",)
-    return distinct[0], tuple(map(_record_text, distinct[0]))
+    told = distinct[0]
+    silent = any(not flags_word(one.region, one.status) for one in told)
+    return told, (*map(_record_text, told), *([NO_OTHER_BIT] if silent else []))
 
 
 def _records(raw: str, region_width: int, binary_width: int) -> tuple[ChangeOfState, ...]:
@@ -191,14 +206,20 @@ def _records(raw: str, region_width: int, binary_width: int) -> tuple[ChangeOfSt
             value = decode(raw[at + head : at + head + width], region.value, signed=region.signed)
             if value is None:
                 return ()
-        records.append(ChangeOfState(region.number, point, status, value))
-        at += head + width
+        end = at + head + width
+        records.append(ChangeOfState(region.number, point, status, value, at, end))
+        at = end
     return tuple(records)
 
 
 def _record_text(record: ChangeOfState) -> str:
-    value = "" if record.value is None else f" = {number(record.value)}"
-    return f"{object_name(record.region, record.object)}{value} status {record.status:02X}h"
+    value = "" if record.value is None else f"= {number(record.value)}"
+    words = (
+        object_name(record.region, record.object),
+        value or state_word(record.region, record.status),
+        flags_word(record.region, record.status),
+    )
+    return " ".join(word for word in words if word)
 
 
 _TIME_LAYOUTS = ((4, 2, 2, 2, 2, 2), (2, 2, 2, 2, 2, 2))  # year month day hour minute second

@@ -57,6 +57,9 @@ class _Regular:
     kind: Times
 
 
+_LOOKED_AT = 1024  # exchanges at a time
+
+
 class BulkN2Findings(N2Findings):
     """The same from many rows at once (`dissectors.row_columns.JudgesColumns`)."""
 
@@ -134,6 +137,8 @@ class _Judging:
         self._count(which)
         for at in (begin + np.flatnonzero(self._events[which])).tolist():
             self._see_event(at)
+        self._see_late(begin, end)
+        judge.newest = int(frames.start[stretch.stop - 1])
         self._keep_answers(begin, end)
         judge.turn = int(self.found.unit[end - 1])
 
@@ -160,6 +165,28 @@ class _Judging:
         distinct, first = np.unique(unit, return_index=True)
         for one in distinct[np.argsort(first)].tolist():
             _add(judge.station(one), *counts[one])
+
+    def _see_late(self, begin: int, end: int) -> None:
+        """What came while an answer was overdue, and what no answer came to."""
+        judge, rows, found, start = self._judge, self._rows, self.found, self._closed.start
+        late = judge.late_speakers
+        silent = ~(found.answered | found.to_all)
+        at = begin
+        while at < end:
+            some = slice(at, min(at + _LOOKED_AT, end))
+            told = np.flatnonzero(silent[some] | (start[some] < late.until))
+            if not len(told):
+                at = some.stop
+                continue
+            at += int(told[0])
+            station = int(found.unit[at])
+            if found.answered[at]:
+                late.answered(station, f"station {station}", int(start[at]))
+            elif silent[at]:
+                place = int(found.stretches.request[at])
+                after = int(rows.frames.start[place + 1])
+                judge.unanswered(station, int(start[at]), int(self._closed.end[at]), after)
+            at += 1
 
     def _see_event(self, at: int) -> None:
         """What changes what is known of a station."""

@@ -193,14 +193,31 @@ def number(value: float) -> str:
     return f"{value:.9g}"
 
 
+STATE_BIT = 6
+"""Of the status octet of a binary object: its state. Tentative."""
+
+BINARY = frozenset((2, 4))
+"""Regions of which the status octet holds the state."""
+
 _ANALOG_CONFIGURATION = ((0, "change of state reported"), (2, "alarm enabled"), (3, "warning enabled"))
 _BINARY_CONFIGURATION = ((0, "change of state reported"), (1, "normal state on"), (2, "alarm enabled"))
 _BITS: dict[tuple[int, int], tuple[tuple[int, str], ...]] = {
     (1, 1): _ANALOG_CONFIGURATION,
     (2, 1): _BINARY_CONFIGURATION,
-    (2, 2): ((6, "state on"),),
-    (4, 2): ((6, "state on"),),
+    (2, 2): ((STATE_BIT, "state on"),),
+    (4, 2): ((STATE_BIT, "state on"),),
 }
+
+
+def state_word(region: int, status: int) -> str:
+    """ "on" or "off", as the status octet of a binary object has it; empty of others. Tentative."""
+    return "" if region not in BINARY else "on" if status >> STATE_BIT & 1 else "off"
+
+
+def flags_word(region: int, status: int) -> str:
+    """The status octet beside the state of a binary object: "status 41h"; empty where no other bit is set."""
+    others = status & ~(1 << STATE_BIT) if region in BINARY else status
+    return f"status {status:02X}h" if others else ""
 
 
 def guessed_bits(region: int, attribute: int, octet: int) -> tuple[str, ...]:

@@ -7,16 +7,24 @@ not sure. Reports of changes are tentative altogether.
 from __future__ import annotations
 
 import struct
+from collections.abc import Sequence
 
 from dissectors.frame import Frame
-from dissectors.n2.commands import Command, parse_command
-from dissectors.n2.header import error_code
-from dissectors.n2.interpretation import ChangeOfState, Interpretation, interpret
-from dissectors.n2.objects import REGIONS, Encoding, attribute_name, is_hex, region_name
+from dissectors.n2.commands import Command, fields_of, parse_command
+from dissectors.n2.header import error_code, meant
+from dissectors.n2.interpretation import ChangeOfState, Interpretation, change_records, interpret, printable
+from dissectors.n2.objects import (
+    BINARY,
+    REGIONS,
+    STATE_BIT,
+    Encoding,
+    attribute_name,
+    guessed_bits,
+    is_hex,
+    region_name,
+    state_word,
+)
 from dissectors.readings import Origin, Reading
-
-_STATE_BIT = 6
-_BINARY = (2, 4)
 
 
 def readings(request: Frame | None, response: Frame | None) -> tuple[Reading, ...]:
@@ -57,12 +65,33 @@ def refusal(frame: Frame) -> tuple[str, int] | None:
     return "n2", int(code) if code.isdigit() else int(code, 16)
 
 
+def spans(frame: Frame, readings: Sequence[Reading]) -> list[tuple[int, int] | None]:
+    """The octets of each reading of an answer: of its record, or all data. Total."""
+    octets = meant(frame)
+    if octets[:1] != b"A" or octets != frame.octets:
+        return [None] * len(readings)
+    data = printable(fields_of(octets))
+    records = change_records(data)[0] if len(data) == len(fields_of(octets)) else ()
+    if [(region_name(one.region), one.object) for one in records] == [(one.space, one.address) for one in readings]:
+        return [(1 + one.begin, 1 + one.end) for one in records]
+    return [(1, 1 + len(data))] if len(readings) == 1 else [None] * len(readings)
+
+
 def _change(record: ChangeOfState) -> Reading:
     raw: int = record.status
-    value: int | float = record.status >> _STATE_BIT & 1
+    value: int | float = record.status >> STATE_BIT & 1
+    words = state_word(record.region, record.status)
     if record.value is not None:
-        raw, value = _raw(record.value), record.value
-    return Reading(region_name(record.region), record.object, raw, value, Origin.REPORT, sure=False)
+        raw, value, words = _raw(record.value), record.value, ""
+    beside = _status(record.region, record.status)
+    space = region_name(record.region)
+    return Reading(space, record.object, raw, value, Origin.REPORT, "", False, words=words, beside=beside)
+
+
+def _status(region: int, status: int) -> tuple[tuple[str, str], ...]:
+    """The status octet in words."""
+    said = ", ".join(guessed_bits(region, 2, status)) or ("bits of unknown meaning" if status else "no bit set")
+    return ((f"status {status:02X}h", f"{said} (tentative)"),)
 
 
 def _commanded(command: Command) -> tuple[Reading, ...]:
@@ -71,9 +100,9 @@ def _commanded(command: Command) -> tuple[Reading, ...]:
     if value is None or command.region is None or command.object is None:
         return ()
     space, part = region_name(command.region), part_of(command.region, command.attribute)
-    if command.attribute is not None and command.region in _BINARY and not part and isinstance(value, int):
-        state = value >> _STATE_BIT & 1  # a write to the attribute writes the octet that a read of it answers
-        return (Reading(space, command.object, value, state, Origin.WRITE, sure=False),)
+    if command.attribute is not None and command.region in BINARY and not part and isinstance(value, int):
+        state = value >> STATE_BIT & 1  # a write to the attribute writes the octet that a read of it answers
+        return (_of_status(command.region, command.object, value, state, Origin.WRITE),)
     return (Reading(space, command.object, _raw(value), value, Origin.WRITE, part),)
 
 
@@ -82,9 +111,16 @@ def _read(told: Interpretation) -> tuple[Reading, ...]:
         return ()
     part, value = part_of(told.region, told.attribute), told.value
     space = region_name(told.region)
-    if told.region in _BINARY and not part and isinstance(value, int):
-        return (Reading(space, told.object, value, value >> _STATE_BIT & 1, Origin.READ, sure=False),)
-    return (Reading(space, told.object, _raw(value), value, Origin.READ, part),)
+    if told.region in BINARY and not part and isinstance(value, int):
+        return (_of_status(told.region, told.object, value, value >> STATE_BIT & 1, Origin.READ),)
+    beside = () if told.status is None else _status(told.region, told.status)
+    return (Reading(space, told.object, _raw(value), value, Origin.READ, part, beside=beside),)
+
+
+def _of_status(region: int, number: int, status: int, state: int, how: Origin) -> Reading:
+    """A binary object by its status octet."""
+    words, beside = state_word(region, status), _status(region, status)
+    return Reading(region_name(region), number, status, state, how, "", False, words=words, beside=beside)
 
 
 def part_of(region: int, attribute: int | None) -> str:

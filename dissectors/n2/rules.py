@@ -79,7 +79,7 @@ RULES: dict[str, Rule] = {
             "master does that. At least two such.",
             "two masters on one bus, or a commissioning tool beside the controller",
             "find the second master and take it off",
-            explains=("N2004", "N2005", "N2008", "N2010", "N2011", "N2013", "LN1", "LN2"),
+            explains=("N2004", "N2005", "N2008", "N2010", "N2011", "N2013", "N2014", "LN1", "LN2"),
         ),
         Rule(
             "N2008",
@@ -89,7 +89,7 @@ RULES: dict[str, Rule] = {
             "command may not have been heard here.",
             "two stations have the same address",
             "switch the station off and see whether something still answers",
-            explains=("N2004", "N2011", "N2013", "LN101", "LN103", "LN2"),
+            explains=("N2004", "N2011", "N2013", "N2014", "LN101", "LN103", "LN2"),
         ),
         Rule(
             "N2009",
@@ -114,7 +114,7 @@ RULES: dict[str, Rule] = {
             "Answers without a command before them, or after the master had gone on.",
             "a master that is not heard at this place of the bus, or a station far slower than the master's timeout",
             "compare the answer times with the master's timeout; move the tap",
-            explains=("N2005", "N2003"),
+            explains=("N2005", "N2003", "LN1", "LN2"),
         ),
         Rule(
             "N2012",
@@ -139,6 +139,17 @@ RULES: dict[str, Rule] = {
             "a repeater or converter that gives back what it hears, a station that sends twice, or two stations with "
             "one address that hold the same",
             "switch the station off and see whether something still answers; then the repeater",
+        ),
+        Rule(
+            "N2014",
+            Severity.WARNING,
+            "answers into what comes next",
+            "Damage that stands while the answer of one station is overdue, at least three times, and far more often "
+            "then than in frames of the same senders elsewhere (chance under 1 in 500). An answer after the master's "
+            "timeout falls on the next command or on the answer to it, and two senders at once are no frame.",
+            "the station answers when its master has given up; those whose frames are hit are not to blame",
+            "raise the message timeout of the master, or find out why this station is slow; nobody else's cable",
+            explains=("N2003", "N2004", "N2005", "N2006", "N2011", "LN1", "LN2"),
         ),
     )
 }

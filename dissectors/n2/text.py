@@ -12,7 +12,7 @@ from dissectors.n2.commands import NATIVE, UNKNOWN, Command, error_text, fields_
 from dissectors.n2.header import damage_of, error_code
 from dissectors.n2.header import meant as meant_octets
 from dissectors.n2.interpretation import Interpretation, guessed_time, interpret, printable
-from dissectors.n2.objects import Encoding, attribute_name, guessed_bits, number, object_name
+from dissectors.n2.objects import BINARY, Encoding, attribute_name, guessed_bits, number, object_name, state_word
 
 MOST_RAW = 40
 """Characters of an answer that follow what it means."""
@@ -57,6 +57,8 @@ def _answer(told: Interpretation, asked: Command) -> str:
     """What an answer says to its command, the object first: `AI 3 = 72.5`; of a poll what changed, one by one."""
     if told.value is not None and not told.written:
         what = [] if asked.region is None or asked.object is None else [object_name(asked.region, asked.object)]
+        if told.status is not None and told.region in BINARY:
+            return f"{' '.join(what)} {state_word(told.region, told.status)} (status {told.status:02X}h, tentative)"
         what += [told.name] if told.name and told.name != "current value" else []
         doubt = f" ({'; '.join(told.tentative)}, tentative)" if told.tentative else ""
         return f"{' '.join(what)} = {number(told.value)}{doubt}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dissectors.findings import counted
 from dissectors.line import MS, NS_PER_S
 from dissectors.profibus.ring import Ring, SlaveRow
 from dissectors.token_ring import Cell
@@ -101,6 +102,6 @@ def sentences(ring: Ring) -> list[str]:
 
 def _slave(address: int, slave: SlaveRow, first: int) -> str:
     steps = slave.changes[-_CHANGES_TOLD:]
-    told = ", ".join(f"{(time - first) / NS_PER_S:.3f} s {state.value}" for time, state in steps)
+    told = ", ".join(f"{state.value} at {(time - first) / NS_PER_S:.3f} s" for time, state in steps)
     more = "… " if slave.changed > len(steps) else ""
-    return f"slave {address}: {slave.state.value}, {slave.exchanges} exchanges of data ({more}{told})"
+    return f"slave {address}: {slave.state.value}, {counted(slave.exchanges, 'exchange')} of data ({more}{told})"

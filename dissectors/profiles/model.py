@@ -293,6 +293,11 @@ class Devices:
         profile = self.at(address)
         return "" if profile is None else profile.exception(family, code)
 
+    def says_numbers(self, address: int, family: str) -> bool:
+        """Whether the papers of the device there say which numbers it can be given."""
+        profile = self.at(address)
+        return profile is not None and profile.limits_on(family).stations is not None
+
     def response_at(self, address: int, family: str, baud: int) -> int | None:
         """ns that a station may take to answer at a rate, by its papers; None where they do not say."""
         profile = self.at(address)

@@ -80,6 +80,7 @@ class BulkLineFindings(LineFindings):
         """Take good frames that follow one another, which have been counted."""
         table = columns.table
         first, last = (columns.name(int(columns.sender[place]), self._nouns) for place in (begin, end - 1))
+        self._pieces.forget()
         self._settle_strays(first, int(table.slack[begin]))
         only_master = bool(columns.asks[begin:end].all())
         self._senders.see_good(last, int(table.frames.end[end - 1]), only_master)

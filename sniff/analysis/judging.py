@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from dissectors import registry
-from dissectors.findings import Finding, KnowsResponseTimes, Rule, WordsExceptions
+from dissectors.findings import Finding, KnowsResponseTimes, KnowsStations, Rule, WordsExceptions
 from dissectors.frame import Noise, Place, Reason
 from dissectors.manifest import Dissector
 from dissectors.profiles import Devices
@@ -31,33 +31,82 @@ _DOUBTFUL = frozenset(
 )
 
 
+class LineJudging:
+    """The line's part of `Judging`, which needs nothing of the rest: fed the same."""
+
+    def __init__(self, session: Session) -> None:
+        self.findings = BulkLineFindings(session)
+        self._searching = False
+
+    def add(self, output: Output) -> None:
+        """Take rows and closed transactions."""
+        for row in output.rows:
+            if row.searched is None:
+                self.findings.see(row)
+            else:  # a request may be among it whose answer comes next
+                self.findings.pass_by(row)
+        for transaction in output.transactions:
+            self.findings.settle(transaction)
+
+    def add_table(self, table: Table) -> None:
+        """Take many rows: the same as one after the other."""
+        if is_strange(table):
+            for output in table.outputs():
+                self.add(output)
+        else:
+            self.findings.add_table(table)
+
+    def add_line_event(self, event: LineEvent) -> None:
+        """Take something that happened to the line."""
+        change = settings_change(event)
+        if change is not None:
+            self._searching = (self._searching or change.searching) and not change.found
+        if not self._searching or event.kind is not LineEventKind.ERRORS:  # wrong settings make them
+            self.findings.add_line_event(event)
+
+
 class Judging:
-    """Fed what the engine gives; `findings` may be asked at any time. What merges of it is its `judgement`."""
+    """Fed what the engine gives; `findings` may be asked at any time. What merges of it is its `judgement`.
+
+    `of_line`: the line's part; None while somebody else feeds it.
+    """
 
     def __init__(self, session: Session, dissector: Dissector, devices: Devices | None = None) -> None:
         self.judge = dissector.judge(session.timing) if dissector.judge is not None else None
-        self.line = BulkLineFindings(session)
+        self.of_line: LineJudging | None = LineJudging(session)
         self._rules = rules_over(dissector)
         self.devices = ProfileFindings(session.timing, dissector, devices) if devices else None
         if devices and isinstance(self.judge, WordsExceptions):
             family = dissector.profile_family
             self.judge.word_exceptions(lambda station, code: devices.exception(station, family, code))
+        if devices and isinstance(self.judge, KnowsStations):
+            family = dissector.profile_family
+            self.judge.know_stations(lambda station: devices.says_numbers(station, family))
         if devices and isinstance(self.judge, KnowsResponseTimes):
             family, baud = dissector.profile_family, session.timing.line.baud
             self.judge.know_response_times(lambda station: devices.response_at(station, family, baud))
-        self._searching = False
         self._hole: int | None = None  # when octets were lost, by the newest line event that says so
         self._first_after: int | None = None  # number of the first row that ends after it
 
+    @property
+    def line(self) -> BulkLineFindings:
+        """What the line's part found; nobody else may be feeding it."""
+        assert self.of_line is not None
+        return self.of_line.findings
+
     def add(self, output: Output) -> None:
         """Take rows and closed transactions. What was heard with wrong settings says nothing about the bus."""
-        judge, line, devices = self.judge, self.line, self.devices
+        if self.of_line is not None:
+            self.of_line.add(output)
+        self._add(output)
+
+    def _add(self, output: Output) -> None:
+        """All but what is the line's."""
+        judge, devices = self.judge, self.devices
         for row in output.rows:
-            if row.searched is not None:  # a request may be among it whose answer comes next
+            if row.searched is not None:
                 self._hole, self._first_after = row.event.end, None
-                line.pass_by(row)
                 continue
-            line.see(row)
             if self._hole is not None and self._first_after is None and row.event.end >= self._hole:
                 self._first_after = row.no
                 if judge is not None:  # something was there that nobody heard: no silence
@@ -68,7 +117,6 @@ class Judging:
             if devices is not None:
                 devices.see(row.no, row.event, row.header, row.placement)
         for transaction in output.transactions:
-            line.settle(transaction)
             if self._is_torn(transaction):
                 continue
             if judge is not None:
@@ -78,9 +126,11 @@ class Judging:
 
     def add_table(self, table: Table) -> None:
         """Take many rows: the same as one after the other."""
-        if any(row.searched is not None for row in table.odd.values()) or not table.has_true_times:
+        if self.of_line is not None:
+            self.of_line.add_table(table)
+        if is_strange(table):
             for output in table.outputs():
-                self.add(output)
+                self._add(output)
             return
         if self._hole is not None and self._first_after is None:
             self._across_hole(table, self._hole)
@@ -95,14 +145,13 @@ class Judging:
             self._take(table.part(0, place))
         if place < len(table):
             for output in table.part(place, place + 1).outputs():
-                self.add(output)
+                self._add(output)
         if place + 1 < len(table):
             self._take(table.part(place + 1, len(table)))
 
     def _take(self, table: Table) -> None:
         """Take rows none of which is the first after a hole."""
         judge, devices = self.judge, self.devices
-        self.line.add_table(table)
         if self._hole is not None:
             torn = self._are_torn(table.transactions, self._hole)
             table = table.without(torn) if torn.any() else table
@@ -115,12 +164,8 @@ class Judging:
 
     def add_line_event(self, event: LineEvent) -> None:
         """Take something that happened to the line."""
-        change = settings_change(event)
-        if change is not None:
-            self._searching = (self._searching or change.searching) and not change.found
-        if self._searching and event.kind is LineEventKind.ERRORS:
-            return  # wrong settings made them
-        self.line.add_line_event(event)
+        if self.of_line is not None:
+            self.of_line.add_line_event(event)
         if event.kind.is_hole:
             self._hole, self._first_after = event.time, None
 
@@ -161,6 +206,11 @@ class Judging:
         made = (*(self.judge.findings() if self.judge is not None else ()),)
         made += self.devices.findings() if self.devices is not None else ()
         return replace(judged, bus=made)
+
+
+def is_strange(table: Table) -> bool:
+    """Whether rows of a table have to be taken one by one: what a search heard, times that columns cannot hold."""
+    return any(row.searched is not None for row in table.odd.values()) or not table.has_true_times
 
 
 def rules_of(dissector: Dissector) -> Mapping[str, Rule]:

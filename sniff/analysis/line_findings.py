@@ -20,9 +20,11 @@ from sniff.analysis.other_settings import SAMPLE_OCTETS, Fit, other_protocol, wh
 from sniff.analysis.sender_findings import BUS, WRONG, Senders
 from sniff.analysis.slower_bus import slower_by
 from sniff.analysis.time_patterns import Stop, TimePatterns
+from sniff.analysis.torn_pieces import TornPieces
 from sniff.analysis.unsure_strays import UnsureStrays
 from sniff.analysis.wording import station_word
 from sniff.engine.engine import Row
+from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import LineEvent, LineEventKind, Session
 
 STRAY_MOST = 3
@@ -65,9 +67,10 @@ class _Stray(NamedTuple):
 class LineFindings:
     """Counts of one bus; `findings` may be asked at any time."""
 
+    _nouns = staticmethod(cache(station_word))  # asked for every frame
+
     def __init__(self, session: Session) -> None:
         self._session = session
-        self._nouns = cache(station_word)  # asked for every frame
         self._patterns = TimePatterns(session)
         self._use = LineUse(session.line)
         adapter = session.adapter
@@ -88,6 +91,7 @@ class LineFindings:
         self._asker: str | None = None  # who sent the newest frame, if that was a request
         self._pending: list[_Stray] = []  # noise beside frames, of which the frame to come tells
         self._begins = UnsureStrays()  # noise that may be the begin of the frame to come
+        self._pieces = TornPieces(dissector_for(session), session.timing, STRAY_MOST)
         self._sample: list[Chunk] = []  # what came first, to ask what else it may be
         self._sampled = 0
         self._rests: list[bytes] = []  # the first stretches that are no frame
@@ -187,6 +191,10 @@ class LineFindings:
             self._good += 1
             self._in_frames += len(frame.octets)
         self._senders.see(sender, row.no, frame)
+        if frame.ok:
+            self._pieces.forget()
+        elif self._pieces.complete(frame.octets):
+            self._take_back_strays()
         self._settle_strays(sender, frame.slack)
         self._asker = sender if role is Role.REQUEST else None
         return sender
@@ -197,14 +205,22 @@ class LineFindings:
             for stray in self._pending:
                 self._senders.stray(*stray.told(sender), stray.no, stray.noise)
             self._begins.forget()
+            self._pending.clear()
         else:
-            self._begins.take_back(self._senders)
-        self._pending.clear()  # before a frame that was read late they are the rest of one that was torn
+            self._take_back_strays()
+
+    def _take_back_strays(self) -> None:
+        """They are what was read in time of a frame that was torn."""
+        self._begins.take_back(self._senders)
+        self._pending.clear()
 
     def _see_noise(self, no: int, noise: Noise) -> None:
         if noise.reason in (Reason.BREAK, Reason.PAD) or any(m.error & LineError.BREAK for m in noise.marks):
             return
         if self._rows == 1:  # the capture began in the middle of something
+            return
+        if self._pieces.complete(noise.octets):
+            self._take_back_strays()
             return
         of_damaged = noise.place is not Place.BETWEEN and not self._before_ok  # where a damaged frame ends nobody knows
         if len(noise.octets) > STRAY_MOST or of_damaged:

@@ -126,6 +126,14 @@ PROFILE_RULES: dict[str, Rule] = {
             "another software version of the device, the wrong profile, or somebody renamed the object",
             "compare the device with its profile (`profile guess`)",
         ),
+        Rule(
+            "PR012",
+            Severity.NOTE,
+            "number that the device cannot be given",
+            "A station answered under a number outside the range that the manual of its device gives.",
+            "the wrong profile, or another device than the plan says",
+            "compare the device with its profile (`profile guess`)",
+        ),
     )
 }
 
@@ -166,6 +174,8 @@ class ProfileFindings:
         if not isinstance(event, Frame) or not event.ok or placement is None:
             return
         self._judge_length(no, event, placement)
+        if placement.role is Role.RESPONSE:
+            self._judge_number(no, event, placement.source)
         if placement.role is Role.REQUEST and header is not None and header.function is not None:
             self._judge_function(no, event, placement.destination, header.function)
         if placement.role is not Role.RESPONSE and self._readings is not None:
@@ -237,6 +247,14 @@ class ProfileFindings:
             way = "from" if placement.role is Role.RESPONSE else "to"
             seen = f"frames of {len(frame.octets)} octets {way} it, {longest} allowed"
             self._add("PR006", _subject(profile, station), way, seen, frame.end, no)
+
+    def _judge_number(self, no: int, frame: Frame, station: int | None) -> None:
+        profile = self._devices.at(station)
+        known = profile.limits_on(self._family).stations if profile is not None else None
+        if profile is None or known is None or station is None or known[0] <= station <= known[1]:
+            return
+        seen = f"it answered as {station}; its manual has {known[0]} … {known[1]}"
+        self._add("PR012", _subject(profile, station), f"{station}", seen, frame.end, no)
 
     def _judge_function(self, no: int, frame: Frame, station: int | None, code: int) -> None:
         profile = self._devices.at(station)

@@ -10,13 +10,14 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 
+from dissectors.chances import at_least
 from dissectors.findings import Finding, Severity, Tally, counted, times
 from dissectors.frame import Event, Frame, LineError, Mark, Noise
 from dissectors.line import Timing
 from dissectors.strikes import Strikes
 from sniff.analysis.flag_runs import FlagRuns
 from sniff.analysis.line_rules import LINE_RULES as RULES
-from sniff.analysis.shares import UNLIKELY, at_least, only_struck, standing_out
+from sniff.analysis.shares import UNLIKELY, only_struck, standing_out
 
 WRONG = LineError.PARITY | LineError.FRAMING
 MOST_SENDERS = 600

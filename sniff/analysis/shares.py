@@ -7,8 +7,9 @@ of them have and the master has not is common to them.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
+
+from dissectors.chances import at_least
 
 UNLIKELY = 1e-3
 """Chance below which a share is no chance: that any of those compared is struck so often by what falls anywhere."""
@@ -62,14 +63,3 @@ def _standing_out(struck: Struck) -> set[str]:
             break
         out.add(name)
     return out
-
-
-def at_least(count: int, of: int, chance: float) -> float:
-    """Chance that `count` or more of `of` fall where each falls with `chance`; the normal law where they are many."""
-    if count <= 0:
-        return 1.0
-    if of > 400:
-        deviation = math.sqrt(of * chance * (1 - chance)) or 1e-9
-        return 0.5 * math.erfc((count - 0.5 - of * chance) / deviation / math.sqrt(2))
-    below = sum(math.comb(of, n) * chance**n * (1 - chance) ** (of - n) for n in range(count))
-    return max(0.0, 1 - below)

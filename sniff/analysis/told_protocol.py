@@ -29,12 +29,9 @@ from sniff.analysis.autodetect import (
     Evidence,
     sureness,
 )
+from sniff.analysis.rest_evidence import second_in
 from sniff.engine.engine import Engine
 from sniff.engine.session import ASSUMED, LINE_NOTE, PROTOCOL_NOTE, SECOND_NOTE, Session
-
-SECOND_FRAMES = 2
-SECOND_BITS = 40.0
-"""Evidence from which on octets that are no frames of the first protocol are taken for frames of a second one."""
 
 LEAST_BITS = 8.0
 """Evidence of the only frame there is, from which on its protocol is worth a guess."""
@@ -77,9 +74,7 @@ class Told:
             said += ", too few to be sure"
         if self.second is not None:
             title = registry.get(self.second[0]).title
-            said += (
-                f"; with foreign frames that read as {title} ({self.second[1]}; -p {self.second[0]} shows them alone)"
-            )
+            said += f"; with foreign frames that read as {title} ({self.second[1]})"
         return said
 
 
@@ -147,19 +142,7 @@ def _second(session: Session, best: Candidature, others: Sequence[str]) -> tuple
     if best.covered >= 1.0 or not others:
         return None
     rest = noise_of(session, best.protocol, best.line)
-    found: list[tuple[float, str, int]] = []
-    for name in others:
-        dissector = registry.get(name)
-        line = LineSettings.parse(dissector.default_line) if session.line_is_assumed else best.line
-        evidence = Evidence(line, (name,), session.adapter.latency)
-        for chunk in rest:
-            evidence.feed(chunk)
-        if rest:
-            evidence.advance(rest[-1].time + 10 * NS_PER_S)
-        tally = evidence.tallies[name]
-        if tally.frames >= SECOND_FRAMES and tally.bits >= SECOND_BITS:
-            found.append((tally.bits, name, tally.frames))
-    return max(found)[1:] if found else None
+    return second_in(rest, replace(session, line=best.line), others)
 
 
 def noise_of(session: Session, protocol: str, line: LineSettings) -> list[Chunk]:

@@ -26,9 +26,9 @@ from sniff.engine.blocks import in_pieces
 from sniff.engine.bulk import tables
 from sniff.engine.capture import Capture, CaptureError
 from sniff.engine.follow_settings import dissector_for
-from sniff.engine.session import LineEvent, LineEventKind, Session
+from sniff.engine.session import LineEvent, Session
 from sniff.formats.files import watched
-from sniff.formats.mark_file import add_mark, mark_file, place_of
+from sniff.formats.mark_file import MarksBeside, mark_event, mark_file, place_of
 
 FIRST_READS, READS = 512, 16_384
 """Reads that are taken together, at first and later."""
@@ -66,6 +66,10 @@ class FileFeed:
         self._polled = -1  # version of the store at the last poll
         self._at_once = LEAST_JUDGED  # rows that are judged in one slice
         self._progress = Progress()
+        self._place = place_of(path, capture)
+        self._beside = None if self._place is None else MarksBeside(self._place.file, self._place.bus)
+        if self._beside is not None:
+            self._beside.changes()  # they stand in the capture
         self._size = sum(map(_size, getattr(capture, "parts", [capture]))) or _size(path)
 
     @property
@@ -78,6 +82,8 @@ class FileFeed:
         if self._polled < 0:
             self._begin()
         self._work()
+        for mark in self._beside.changes() if self._beside is not None else ():
+            self._store.add_mark(mark)  # which somebody else wrote, who looks at the same file
         changed = self._store.version != self._polled or self._polled < 0
         self._polled = self._store.version
         return changed
@@ -173,13 +179,11 @@ class FileFeed:
 
     def mark(self, time: int, text: str | None) -> str:
         """Write it beside the file, which stays as it is."""
-        kind = LineEventKind.UNMARK if text is None else LineEventKind.MARK
-        self._store.add_mark(LineEvent(time, kind, text or ""))
-        place = place_of(self.path, self.capture)
-        if place is None:
+        self._store.add_mark(mark_event(time, text))
+        if self._beside is None or self._place is None:
             return "until this view ends: no single file is shown"
-        add_mark(place.file, time, text, place.bus)
-        return f"in {mark_file(place.file)}"
+        self._beside.add(time, text)
+        return f"in {mark_file(self._place.file)}"
 
     def close(self) -> None:
         """Have the thread end."""

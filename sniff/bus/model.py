@@ -8,7 +8,7 @@ from dissectors.findings import Finding
 from dissectors.manifest import Dissector
 from dissectors.profiles import Devices
 from sniff.analysis.health import HealthReport, health_of
-from sniff.analysis.judging import Judging
+from sniff.analysis.judging import Judging, LineJudging
 from sniff.analysis.load import KEPT_SECONDS
 from sniff.analysis.points import PointReader, PointTable, Sample
 from sniff.analysis.polls import Polls
@@ -97,6 +97,17 @@ class BusModel:
         self.version += 1
         self.summary.add_line_event(event)
         self.judging.add_line_event(event)
+
+    def lend(self) -> LineJudging:
+        """What judges the line, which somebody else feeds until it is taken back (`two_processes.py`)."""
+        lent = self.judging.of_line
+        assert lent is not None
+        self.judging.of_line = None
+        return lent
+
+    def take_back(self, part: LineJudging) -> None:
+        """The same as it has become."""
+        self.judging.of_line = part
 
     def findings(self) -> tuple[Finding, ...]:
         """What the rules found so far, the gravest first."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from contextlib import closing
 from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from dissectors.profiles import Devices
@@ -58,9 +59,15 @@ def survey(capture: Source, session: Session, *observers: Observer, reference: b
     if reference:
         observe(outputs(capture.items(), session), *observers)
         return
+    from sniff.bus import two_processes
     from sniff.engine.bulk import tables
 
-    observe_tables(tables(capture.blocks(), session), *observers)
+    items = tables(capture.blocks(), session)
+    if not two_processes.divides(session, observers):
+        observe_tables(items, *observers)
+        return
+    with closing(two_processes.divided(items, observers, capture)) as made:
+        observe_tables(made, *observers)
 
 
 def settled(

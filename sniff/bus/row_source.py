@@ -11,9 +11,9 @@ from sniff.bus.live import LiveBus
 from sniff.bus.rows import KEPT_ROWS, Store
 from sniff.capture.ipc import Status
 from sniff.engine.engine import Output
-from sniff.engine.session import LineEvent, LineEventKind
+from sniff.engine.session import LineEvent
 from sniff.engine.table import Table
-from sniff.formats.mark_file import add_mark, mark_file
+from sniff.formats.mark_file import MarksBeside, mark_event, mark_file
 
 LEAST_ROWS = 100_000
 ROW_OCTETS = 120
@@ -47,6 +47,7 @@ class LiveFeed:
         rows = min(KEPT_ROWS, rows_that_fit(buses))
         self._store = Store(live.session, live.dissector, rows, model=live.model, ear=live.ear)
         self._session = live.session
+        self._beside = MarksBeside(follows) if follows else None
 
     @property
     def store(self) -> Store:
@@ -73,6 +74,8 @@ class LiveFeed:
             elif isinstance(item, LineEvent):
                 self._store.add_line_event(item)
         self._store.add_outputs(outputs)
+        for mark in self._beside.changes() if self._beside is not None else ():
+            self._store.add_mark(mark)
         return self._store.version != before
 
     def work(self) -> bool:
@@ -101,11 +104,9 @@ class LiveFeed:
 
     def mark(self, time: int, text: str | None) -> str:
         """Have it written into the recording; beside it, where that is another's."""
-        if self._follows:
-            self._store.add_mark(
-                LineEvent(time, LineEventKind.UNMARK if text is None else LineEventKind.MARK, text or "")
-            )
-            add_mark(self._follows, time, text)
+        if self._beside is not None:
+            self._store.add_mark(mark_event(time, text))
+            self._beside.add(time, text)
             return f"in {mark_file(self._follows)}"
         self.live.link.mark(self.live.bus, time, text)
         return f"in {self.live.status.path}" if self.live.status.path else "until this view ends: nothing is recorded"

@@ -138,7 +138,11 @@ def _failed(error: Exception, traced: bool) -> int:
 
 def _place(error: Exception) -> str:
     """Where it happened: file and line of the innermost frame of our own."""
-    frames = traceback.extract_tb(error.__traceback__)
+    elsewhere = getattr(error, "places_elsewhere", ())  # in the process that read a capture (bus/two_processes.py)
+    frames = [
+        *traceback.extract_tb(error.__traceback__),
+        *(traceback.FrameSummary(file, line, "") for file, line in elsewhere),
+    ]
     ours = [frame for frame in frames if any(f"{os.sep}{name}{os.sep}" in frame.filename for name in _OURS)]
     frame = (ours or frames)[-1]
     return f"{os.path.basename(os.path.dirname(frame.filename))}/{os.path.basename(frame.filename)}:{frame.lineno}"

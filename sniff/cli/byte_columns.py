@@ -152,9 +152,10 @@ def hex_words(values: npt.NDArray[np.integer[Any]]) -> Bytes:
 def hex_octets(octets: Octets, begins: Times, lengths: Times) -> Bytes:
     """Stretches of octets as hexadecimal digits, lower case."""
     longest = int(lengths.max()) if len(lengths) else 0
-    held = stretches(octets, begins, longest).astype(np.uint16)
-    held[np.arange(longest) >= lengths[:, None]] = 0x100
-    digits_of: Bytes = _hex_pairs(False)[held].view(np.uint8).reshape(len(begins), -1)
+    digits_of: Bytes = np.zeros((len(begins), 2 * longest), np.uint8)
+    for length in np.flatnonzero(np.bincount(lengths)).tolist():  # most rows are much shorter than the longest
+        rows = np.flatnonzero(lengths == length)
+        digits_of[rows, : 2 * length] = _hex_pairs(False)[stretches(octets, begins[rows], length)].view(np.uint8)
     return digits_of
 
 
@@ -191,4 +192,4 @@ def _decimals() -> Bytes:
 @cache
 def _hex_pairs(upper: bool) -> npt.NDArray[np.uint16]:
     form = b"%02X" if upper else b"%02x"
-    return np.frombuffer(b"".join(form % number for number in range(256)) + b"\0\0", np.uint16)
+    return np.frombuffer(b"".join(form % number for number in range(256)), np.uint16)

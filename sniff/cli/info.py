@@ -7,13 +7,16 @@ import sys
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+from dissectors.findings import counted
 from dissectors.line import MS, NS_PER_S
+from dissectors.manifest import Dissector
 from dissectors.tracker import Verdict
 from dissectors.words import milliseconds
 from sniff.analysis.nodes import Node
 from sniff.analysis.sanitizing import sanitized
 from sniff.analysis.summary import Summary, ranked
 from sniff.bus.row_words import iso
+from sniff.bus.second_protocol import ForeignFrames
 from sniff.cli import arguments, filtering, json_output
 from sniff.engine.capture import Capture
 from sniff.engine.engine import Output
@@ -25,6 +28,9 @@ if TYPE_CHECKING:
 
 UNDATED = 366 * 86_400 * NS_PER_S
 """ns since 1970: a capture from before has no date, but times since its begin or since midnight."""
+
+Foreign = tuple[Dissector, int] | None
+"""A second protocol on the bus, and how many frames of it."""
 
 MOST_LISTED = 10
 """Kinds, errors and the like that are named in a line."""
@@ -44,20 +50,22 @@ def run(args: argparse.Namespace) -> int:
     opened = [one for path in args.files for one in arguments.open_buses(path)]
     for number, (path, capture) in enumerate(opened):
         session = arguments.settings_of(args, capture.session, path)
-        summary, events = _summarise(args, capture, session)
+        summary, foreign, events = _summarise(args, capture, session)
         if args.json:
-            print(json_output.dumps(_as_json(path, capture, session, summary)))
+            print(json_output.dumps(_as_json(path, capture, session, summary, foreign)))
             continue
         if number:
             print()
-        _print(path, capture, session, summary, events)
+        _print(path, capture, session, summary, foreign, events)
     return 0
 
 
-def _summarise(args: argparse.Namespace, capture: Capture, session: Session) -> tuple[Summary, list[LineEvent]]:
-    summary, happened = Summary(session.line), _Happened()
-    filtering.surveyed(args, capture, session, summary, happened)
-    return summary, happened.events
+def _summarise(
+    args: argparse.Namespace, capture: Capture, session: Session
+) -> tuple[Summary, Foreign, list[LineEvent]]:
+    summary, foreign, happened = Summary(session.line), ForeignFrames(session), _Happened()
+    filtering.surveyed(args, capture, session, summary, foreign, happened)
+    return summary, foreign.told(), happened.events
 
 
 class _Happened:
@@ -78,7 +86,7 @@ class _Happened:
             self.events.append(event)
 
 
-def _as_json(path: str, capture: Capture, session: Session, summary: Summary) -> dict[str, Any]:
+def _as_json(path: str, capture: Capture, session: Session, summary: Summary, foreign: Foreign) -> dict[str, Any]:
     complete = capture.completeness()
     return {
         "file": path,
@@ -101,6 +109,7 @@ def _as_json(path: str, capture: Capture, session: Session, summary: Summary) ->
         "noise_octets": summary.noise,
         "load": summary.load.overall(),
         "damages": ranked(summary.damages),
+        "second_protocol": None if foreign is None else {"protocol": foreign[0].name, "frames": foreign[1]},
         "kinds": ranked(summary.kinds),
         "found": ranked(summary.found),
         "line_errors": ranked(summary.marks),
@@ -134,7 +143,14 @@ def _node_as_json(node: Node) -> dict[str, Any]:
     }
 
 
-def _print(path: str, capture: Capture, session: Session, summary: Summary, events: list[LineEvent]) -> None:
+def _print(
+    path: str,
+    capture: Capture,
+    session: Session,
+    summary: Summary,
+    foreign: Foreign,
+    events: list[LineEvent],
+) -> None:
     complete = capture.completeness()
     adapter = session.adapter
     print(sanitized(path))
@@ -159,6 +175,9 @@ def _print(path: str, capture: Capture, session: Session, summary: Summary, even
     searched = f"{summary.searched} of them while searching, " if summary.searched else ""
     octets = summary.octets + summary.searched
     _line("octets", f"{octets}, {searched}{summary.noise} of them noise; bus load {summary.load.overall():.1%}")
+    if foreign is not None:
+        many = counted(foreign[1], "frame")
+        _line("foreign", f"{many} of {foreign[0].title} among what is none of {dissector_for(session).title}")
     _print_traffic(summary, adapter)
     _print_nodes(summary)
     for event in events[:20]:

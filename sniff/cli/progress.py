@@ -35,6 +35,11 @@ class Watched:
         self._stream = sys.stderr if stream is None else stream
         self._clock = clock
 
+    @property
+    def wrapped(self) -> Source:
+        """The capture."""
+        return self._capture
+
     def items(self) -> Iterator[Item]:
         """What the capture gives."""
         return self._told(self._capture.items(), lambda item: len(getattr(item, "octets", b"")))

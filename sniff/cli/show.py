@@ -17,7 +17,7 @@ from sniff.analysis.packet_tree import Field
 from sniff.analysis.row_tree import tree_of
 from sniff.bus import row_words as rows
 from sniff.bus.offline import settled, settled_columns, settled_in_bulk
-from sniff.bus.second_protocol import of_both
+from sniff.bus.second_protocol import of_both, with_second
 from sniff.cli import USAGE, Failure, arguments, filtering, standard_streams, writing
 from sniff.cli.progress import Watched
 from sniff.cli.tables import Cell, plain_cell
@@ -76,6 +76,7 @@ def _show_all(args: argparse.Namespace, table: ParquetWriter | None) -> int:
     left = args.count
     for path, capture in arguments.open_captures(args.files):
         session = arguments.settings_of(args, capture.session, path)
+        session = with_second(capture, session, args.reference)
         devices = arguments.noted_devices(args, session)
         wanted = filtering.filter_of(args, capture, session, devices)
         if args.explain:

@@ -62,8 +62,24 @@ def check_range(left: Expression, wanted: Any, written: Value) -> None:
         return
     if (least is None or wanted >= least) and (most is None or wanted <= most):
         return
-    span = f"{least} … {most}" if most is not None else f"{least} or more"
-    raise FilterError(f"{left.words} is {span}, never {spelled(written)}", written.column)
+    raise FilterError(f"{left.words} is {_span(type)}, never {spelled(written)}", written.column)
+
+
+def check_reach(left: Expression, operator: str, wanted: Any, written: Value) -> None:
+    """Refuse an order that no number it can be is in: more than the most, less than the least. Raises FilterError."""
+    type = left.type
+    least = 0 if type.kind is Kind.DURATION and left.field else type.least  # no time of a field is before 0
+    if not isinstance(wanted, int | float) or isinstance(wanted, bool):
+        return
+    if operator == ">" and type.most is not None and wanted >= type.most:
+        raise FilterError(f"{left.words} is {_span(type)}, never more than {spelled(written)}", written.column)
+    if operator == "<" and least is not None and wanted <= least:
+        said = _span(type) if type.least is not None else "0 or more"
+        raise FilterError(f"{left.words} is {said}, never less than {spelled(written)}", written.column)
+
+
+def _span(type: FieldType) -> str:
+    return f"{type.least} … {type.most}" if type.most is not None else f"{type.least} or more"
 
 
 def check_equal(left: Expression, wanted: int | float | str | bytes, written: Word | Quoted) -> None:
@@ -111,6 +127,16 @@ def check_holding(left: Expression, wanted: str, written: Word | Quoted) -> None
         )
     if not type.also or (not _MAY_HOLD.search(wanted) and not re.search(r"\d", wanted)):
         raise FilterError(f"no {left.words} holds {spelled(written)} ({nearest(wanted, words)})", written.column)
+
+
+def check_fitting(left: Expression, pattern: re.Pattern[str], written: Word | Quoted) -> None:
+    """Refuse a regular expression that none of its words fits. Raises FilterError."""
+    type = left.type
+    if not type.closed or type.also or left.letters:
+        return
+    words = [str(value) for value in type.words.values()]
+    if not any(pattern.search(word) for word in words):
+        raise FilterError(f"no {left.words} fits {spelled(written)} ({nearest(written.text, words)})", written.column)
 
 
 _MAY_HOLD = re.compile(r"function|reserved|proprietary|service|vendor|message|network|0x|/|-")

@@ -16,8 +16,10 @@ from sniff.filter.agreeing import (
     article,
     check_alike,
     check_equal,
+    check_fitting,
     check_holding,
     check_order,
+    check_reach,
     refuse_size,
     spelled,
 )
@@ -243,6 +245,8 @@ class _Compiler:
             return When(operator, wanted[0])
         if operator not in ORDERED:
             check_equal(left, wanted[0], written)
+        if operator in ORDERED:
+            check_reach(left, operator, wanted[0], written)
         if operator in ORDERED and len(wanted) > 1:
             raise FilterError(f"{written.text!r} is {len(wanted)} stations: they have no order", written.column)
         return With(operator, wanted)
@@ -284,6 +288,7 @@ class _Compiler:
         if not isinstance(parsed.pattern, Word | Quoted):
             raise FilterError("matches is followed by a regular expression", parsed.pattern.column)
         pattern = pattern_of(parsed.pattern.text, parsed.pattern.column)
+        check_fitting(left, pattern, parsed.pattern)
         words = f"{left.words} matches {spelled(parsed.pattern)}"
         return leaf(left, Fitting(pattern, left.spelled), parsed.quantifier == "all", words)
 

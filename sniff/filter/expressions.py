@@ -139,11 +139,17 @@ def reckoned(operator: str, left: Expression, right: Expression, type: FieldType
     there = all(
         one.columns is not None or isinstance(number, int) for one, number in zip((left, right), fixed, strict=True)
     )
-    words = f"{left.words} {operator} {right.words}"
+    words = f"{_one(left.words)} {operator} {_one(right.words)}"
     closing = left.of_closing or right.of_closing
     whole = all(isinstance(number, int) for number in fixed)
     nowhere = left.nowhere or right.nowhere
     return Expression(words, type, get, columns if there and not whole else None, closing, nowhere=nowhere)
+
+
+def _one(words: str) -> str:
+    """In parentheses where it is reckoned itself."""
+    is_whole = words.startswith(("len(", "count(", "abs(", "min(", "max(")) or " " not in words
+    return words if is_whole else f"({words})"
 
 
 def _reckon(operator: str, left: Any, right: Any) -> int | float | None:

@@ -63,7 +63,7 @@ class Names:
             return told.type_of(name, self.scope.devices)
         if name in fields.COLUMN_TYPES:
             return fields.column_type(name, self.dissector)
-        for one in fields.each_protocol(self.dissector):
+        for one in () if name[:1].isdigit() else fields.each_protocol(self.dissector):  # no field begins with a digit
             types = fields.types_of(one)
             if name in types:
                 return types[name]
@@ -145,13 +145,17 @@ class Names:
             return None
         known = {one.name for one in fields.protocols(self.dissector)}
         if name in known:
+            if name != self.dissector.name:
+                title = next(one.title for one in fields.protocols(self.dissector) if one.name == name)
+                return self._no_frame(name, f"no frame is {title}", word.column)
             return leaf(self.field(Word("proto", word.column)), With("==", (name,)), False, f"protocol {name}")
         prefix = self.layers.get(name)
         if prefix is None:
             return None
         holding = [one for one in fields.protocols(self.dissector) if prefix in one.prefixes]
         if all(one.name != self.dissector.name for one in holding):
-            return Leaf(lambda row, tx: False, None, f"{name}: carried by other protocols")
+            others = _listed([one.title for one in holding])
+            return self._no_frame(name, f"{name} is carried by {others}", word.column)
         decoded = self.decoded()
         proto = self.field(Word("proto", word.column))
         own = leaf(proto, With("==", (self.dissector.name,)), False, f"protocol {self.dissector.name}")
@@ -160,8 +164,16 @@ class Names:
         )
         return joined("&&", [own, inside])
 
+    def _no_frame(self, name: str, said: str, column: int) -> Leaf:
+        """What no frame of this protocol is or carries."""
+        self.elsewhere.append(Elsewhere(f"{said}; {self._these()}", column))
+        return Leaf(lambda row, tx: False, None, f"{name}: of other protocols", fixed=False)
+
     def is_elsewhere(self, left: Expression, wanted: object, written: Word | Quoted) -> bool:
         """Whether only frames of other protocols can have this value; remembered then."""
+        if left.field == "proto" and wanted != self.dissector.name and isinstance(wanted, str):
+            self.elsewhere.append(Elsewhere(f"no frame is {written.text!r}; {self._these()}", written.column))
+            return True
         if left.field not in fields.SHARED_WORDS or not isinstance(wanted, str):
             return False
         having = fields.having_word(left.field, wanted, self.dissector)

@@ -157,7 +157,8 @@ class Values:
             raise FilterError(f"nothing is divided by 0: {value.operator} 0 has no value", value.right.column)
         kind = self._kind_of(value, sides)
         unit = next((one.type.unit for one in sides if one.type.unit), "s")
-        return reckoned(value.operator, sides[0], sides[1], FieldType(kind, unit=unit), fixed)
+        least, most = _reach(value.operator, sides, fixed) if kind is Kind.NUMBER else (None, None)
+        return reckoned(value.operator, sides[0], sides[1], FieldType(kind, unit=unit, least=least, most=most), fixed)
 
     def _kind_of(self, value: Arithmetic, sides: Sequence[Expression]) -> Kind:
         """What comes of it: times and durations stay what they are."""
@@ -187,6 +188,28 @@ def _difference(type: FieldType) -> FieldType:
     if type.kind is Kind.TIME:
         return FieldType(Kind.DURATION, unit="s")
     return FieldType(Kind.DURATION, unit=type.unit) if type.kind is Kind.DURATION else FieldType(Kind.NUMBER)
+
+
+def _reach(operator: str, sides: Sequence[Expression], fixed: Sequence[Any]) -> tuple[int | None, int | None]:
+    """The least and the most that comes of whole numbers; None: nobody can tell."""
+    ends = [
+        (number, number) if isinstance(number, int) else (one.type.least, one.type.most)
+        for one, number in zip(sides, fixed, strict=True)
+    ]
+    (low, high), (least, most) = ends
+    if low is None or least is None:
+        return None, None
+    if operator == "+":
+        return low + least, None if high is None or most is None else high + most
+    if operator == "-":
+        return (None, None) if most is None else (low - most, None if high is None else high - least)
+    if operator == "*" and low >= 0 and least >= 0:
+        return low * least, None if high is None or most is None else high * most
+    if operator == "%" and low >= 0 and isinstance(fixed[1], int) and fixed[1] > 0:
+        return 0, fixed[1] - 1 if high is None else min(high, fixed[1] - 1)
+    if operator == "&" and low >= 0 and isinstance(fixed[1], int) and fixed[1] >= 0:
+        return 0, fixed[1] if high is None else min(high, fixed[1])
+    return None, None
 
 
 def _as_text(found: Any, kind: Kind) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from dissectors.findings import counted
 from dissectors.words import milliseconds
 from sniff.analysis.sanitizing import sanitized
 from sniff.fleet.answer import Answer, Bus, Change, Day, Fresh, StationChange, Trouble
@@ -86,7 +87,7 @@ def _bus(bus: Bus, days: int) -> Iterator[str]:
     for trouble in bus.troubles[:TROUBLES]:
         yield f"        {sanitized(trouble_words(trouble, bus))}"
     if len(bus.troubles) > TROUBLES:
-        yield f"        … and {len(bus.troubles) - TROUBLES} more findings"
+        yield f"        … and {counted(len(bus.troubles) - TROUBLES, 'more finding')}"
     if not bus.troubles and worst.health.score < WELL:
         yield f"        no finding; {sanitized('; '.join(worst.health.reasons))}"
     for change in bus.changes[:TROUBLES]:

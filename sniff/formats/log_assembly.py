@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
+from dissectors.checksums import crc16_modbus
 from dissectors.frame import Chunk
 from dissectors.line import MS, LineSettings
 from sniff.formats.log_clock import DAY, Stamp
@@ -57,6 +58,8 @@ class Assembly:
         self._squeezed = False
         self._row = b""
         self._goes_on = False
+        self._family = ""  # of what is held
+        self._again = ""  # the label of what is held, where it may come again with more behind
         self._is_repeated = False  # whether the rows below tell what others told
         self._whole: Callable[[bytes], bytes] | None = None
         self.completed = 0
@@ -74,11 +77,16 @@ class Assembly:
             yield from self._between_rows(line, text)
         elif line.kind is Kind.OCTETS:
             yield from self._take_octets(line)
+        elif line.role is Role.AGAIN:
+            self._again = self._family
         elif (line.kind is Kind.SHAPE and line.role is Role.HEADING) or (
             line.kind is Kind.TEXT and (line.stamp is not None or line.way)
         ):
-            yield from self._flush()
+            if not self._again:
+                yield from self._flush()
             self._head(line)
+        elif self._again:
+            return
         elif line.kind is Kind.EMPTY and not self._plan.octetwise:
             yield from self._flush()
 
@@ -119,11 +127,15 @@ class Assembly:
             return
         if line.cut:
             self.was = Kind.STRANGE
-        if self._joins(line):
+        if self._again and line.family == self._again and line.octets.startswith(bytes(self._held)):
+            self._begin(line, line.way)
+        elif self._joins(line):
             self._held += line.octets
         else:
             yield from self._flush()
             self._begin(line, line.way)
+        self._family = line.family
+        self._again = line.family if line.family in self._plan.growing else ""
         self._goes_on = line.goes_on
         self._recent = (self._recent + line.octets)[-WINDOW:]
         for way, octets in line.more:
@@ -140,6 +152,9 @@ class Assembly:
             return False
         if self._goes_on:
             return line.stamp is None and line.bare
+        if line.stamp is not None and line.way and self._stamp is not None and line.stamp.tick < COARSE:
+            same = (line.stamp.time, line.way, line.family) == (self._stamp.time, self._way, self._family)
+            return same and crc16_modbus(bytes(self._held)) != 0  # what one read brought in two pieces
         if self._plan.octetwise and len(line.octets) == 1:
             return line.stamp is None and line.way == self._way
         if not line.bare or line.stamp is not None:
@@ -173,7 +188,8 @@ class Assembly:
             if 0 < self._expected - offset < 2 and self._held:
                 del self._held[-1:]  # an odd octet was filled up to a word
             return
-        if offset != self._expected or (offset == 0 and self._held) or line.stamp is not None:
+        goes_on = offset == self._expected and offset > 0 and self._is_at_once(line.stamp)
+        if not goes_on and (offset != self._expected or (offset == 0 and self._held) or line.stamp is not None):
             yield from self._flush()
             self._expected = offset
         if not self._held:
@@ -187,6 +203,11 @@ class Assembly:
         if len(self._held) >= LONGEST:
             yield from self._flush()
             self._glued = True
+
+    def _is_at_once(self, stamp: Stamp | None) -> bool:
+        """Whether a row came with the first of its block: a tool that stamps each row of one message."""
+        first = self._stamp
+        return bool(self._held) and stamp is not None and first is not None and abs(stamp.time - first.time) < COARSE
 
     def _between_rows(self, line: Line, text: str) -> Iterator[Chunk]:
         if text.strip() == "*":

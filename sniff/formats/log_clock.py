@@ -98,6 +98,11 @@ def _named(match: re.Match[str], _order: Order | None) -> int:
     return int(Decimal(match["number"]) * _unit(match))
 
 
+def _tai(match: re.Match[str], _order: Order | None) -> int:
+    """A label of daemontools: seconds of TAI from 2**62 on, 10 ahead of the system's, and ns."""
+    return (int(match["tai"], 16) - (1 << 62) - 10) * NS_PER_S + int(match["nano"], 16)
+
+
 def _unit(match: re.Match[str]) -> int:
     """ns that the number of a named time counts: as its name says, or its size; parts of a second where it has any."""
     said = match["unit"] or match["unit_behind"]
@@ -127,6 +132,8 @@ CLOCKS: tuple[Clock, ...] = (
     Clock("time of day", _clock(_TIME), _of_day, daily=True),
     Clock("time of day behind a label", re.compile(
               r"(?<=[G-Zg-z]:)(?P<clock>\d{1,2}:\d{2}:\d{2}[.,]\d{3,6})(?!\d)"), _of_day, daily=True),
+    Clock("TAI64N", _clock(r"@(?P<tai>4[0-9a-f]{15})(?P<nano>[0-3][0-9a-f]{7})(?![0-9a-f])"), _tai, dated=True,
+          first=True),
     Clock("ms since the epoch", _clock(r"(?P<number>1\d{12})(?=[\s:;,\])|])"), _scaled(MS), dated=True, first=True),
     Clock("minutes and seconds", _clock(r"(?P<clock>(?P<m>\d{1,3}):(?P<s>\d{2}\.\d{1,6}))(?![\d:])"),
           _minutes, first=True),
@@ -180,6 +187,8 @@ def stamp_of(line: str, times: Times = AS_WRITTEN) -> Stamp | None:
 def _tick(match: re.Match[str]) -> int:
     """ns: the place of the last digit."""
     found = match.groupdict()
+    if "nano" in found:
+        return 1
     text = found.get("clock") or found.get("dashed") or found.get("number") or ""
     unit = NS_PER_S
     if "unit_behind" in found:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from sniff.formats.log_clock import Stamp, stamp_of
-from sniff.formats.log_octets import PAIRS_ONLY, Run, number_in, numbers_in, octets_in
+from sniff.formats.log_octets import PAIRS_ONLY, Run, number_in, numbers_in, octets_in, whole_in
 from sniff.formats.log_shapes import COLOURS, REMARK, STAMP, WAYS, Role, shape_of
 from sniff.formats.log_times import AS_WRITTEN, Times
 
@@ -29,7 +29,7 @@ _NUMBERED = re.compile(r"\s*#\d+[\s:.)]")
 """A line with its number, which is no remark."""
 _SPACES = re.compile(r"\s{4,}")
 _WORD = re.compile(r"[A-Za-z]{2,}")
-_DIGITS = re.compile(r"\d+")
+_DIGITS = re.compile(r"(?<![0-9A-Za-z])(?:0[xX])?(?:[0-9A-Fa-f]*\d[0-9A-Fa-f]*)(?![0-9A-Za-z])|\d+")
 _WORDS = re.compile(r"[A-Za-z]{3,}")
 _HEXLIKE = re.compile(r"(?<![0-9A-Za-z])(?<!\d\.)(?:0x)?[0-9A-Fa-f]{2}(?![0-9A-Za-z]|\.\d)")
 _ROW = re.compile(
@@ -165,6 +165,8 @@ _NUMERAL = re.compile(r"[0-9A-Fa-f]*\d[0-9A-Fa-f]*")
 
 def _general(text: str, stamp: Stamp | None, base: int) -> Line:
     run = octets_in(text, base)
+    if run is not None and base == PAIRS_ONLY:
+        run = whole_in(text, run)
     if run is None:
         kind = Kind.STRANGE if _looks(text) else Kind.TEXT
         return Line(kind, stamp, _way(text) if kind is Kind.TEXT else "")

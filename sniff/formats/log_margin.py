@@ -32,8 +32,9 @@ _NAMES = re.compile(
 )
 """Addresses of hosts and network cards, and identities, before octets of the same line."""
 _RUN = re.compile(
-    r"(?<![0-9A-Za-z_#.,:])(?P<ahead>\d{1,4})?(?(ahead)[ \t]+)(?P<run>[0-9A-Fa-f]{2}(?:[ ][0-9A-Fa-f]{2}){2,})"
-    r"(?:[ ](?P<behind>\d{1,3})(?=\s+[^\W\d_]{3,}|\s*$))?(?![0-9A-Za-z])"
+    r"(?<![0-9A-Za-z_#.,:])(?P<ahead>\d{1,4})?(?(ahead)(?:[ \t]+|[;,|]))"
+    r"(?P<run>[0-9A-Fa-f]{2}(?:(?P<sign>[ ;,\t|])[0-9A-Fa-f]{2})(?:(?P=sign)[0-9A-Fa-f]{2})+)"
+    r"(?:(?P=sign)(?P<behind>\d{1,3})(?=\s+[^\W\d_]{3,}|\s*$))?(?![0-9A-Za-z])"
 )
 
 
@@ -173,7 +174,7 @@ def _counted(text: str) -> tuple[int, int, bool] | None:
     match = _RUN.search(text)
     if match is None:
         return None
-    octets = len(match["run"].split())
+    octets = (len(match["run"]) + 1) // 3
     for begin, end, said, before, there in _candidates(match, octets):
         if said is not None and int(said) == there:
             return begin, end, before

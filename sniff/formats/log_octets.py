@@ -10,6 +10,9 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+from dissectors.checksums import crc16_modbus
+from sniff.formats.log_shapes import WAYS
+
 SURELY = 4
 """Octets in a run that are no number of the line, no time and no length."""
 
@@ -197,6 +200,8 @@ SPELLINGS: tuple[Spelling, ...] = (
     Spelling("pairs joined by _", _H2, "_", _HEX, 3),
     Spelling("decimals in brackets", r"[^\s()\[\]]{0,4}\(\d{3}\)", r"[ \t]{0,2}", _by(r"\((\d{3})\)", 10), 2,
              before=r"(?:(?<=\s)|^)", after=""),
+    Spelling("three decimals in brackets", r"\[\d{3}\]", r"[ ,]?", _by(r"\[(\d{3})\]", 10), 3, before="", after=""),
+    Spelling("digits behind 16#", r"16#[0-9A-Fa-f]{1,2}", r"[ ]?[,;]?[ ]?", _by(r"16#([0-9A-Fa-f]{1,2})", 16), 2),
     Spelling("digits and h", rf"{_H2}[hH]", _SEPARATOR, _by(rf"({_H2})[hH]", 16), 2),
     Spelling("character codes", r"#\d{1,3}", "", _codes, SURELY, before=r"(?<![0-9A-Za-z_])"),
     Spelling("digits after a sign", rf"[$%&#]{_H2}", r"[ ,;]{0,2}", _HEX, 2, before=r"(?<![0-9A-Za-z_])"),
@@ -241,6 +246,26 @@ def octets_in(line: str, base: int = PAIRS_ONLY) -> Run | None:
     text = line[run.begin : run.end]
     wordy = not any(sign.isdigit() for sign in text) and len(set(run.octets)) > 1
     return replace(run, wordy=True) if wordy else run
+
+
+def whole_in(line: str, run: Run) -> Run:
+    """The run with the pairs that stand apart from it on its line, between names or signs, where they are a message of
+    Modbus together with its check, and it alone is none: `addr:01 func:03 data:00 06 crc:39 84`.
+    """
+    if len(run.octets) < 2 or not crc16_modbus(run.octets):
+        return run
+    begin, pairs = run.begin, list(_APART.finditer(line))
+    while pairs and pairs[0].end() <= run.begin and not _NAMED_BY.search(line[: pairs[0].start()]):
+        pairs.pop(0)  # of a time, a number
+    octets = bytes(int(pair[0], 16) for pair in pairs)
+    if len(octets) <= len(run.octets) or len(octets) < SURELY or crc16_modbus(octets) or run.octets not in octets:
+        return run
+    begin, end = pairs[0].start(), pairs[-1].end()
+    return Run(begin, end, octets, run.spelling)
+
+
+_APART = re.compile(r"(?<![0-9A-Za-z_.])[0-9A-Fa-f]{2}(?![0-9A-Za-z_.])")
+_NAMED_BY = re.compile(r"[A-Za-z]\w*[ ]?[:=][ ]?$")
 
 
 def numbers_in(line: str) -> tuple[str, ...]:
@@ -381,19 +406,27 @@ def _words(line: str) -> Run | None:
             continue  # pairs, of which one was cut
         if _DATE.fullmatch(match[0]):
             continue
-        alone = match.end() == len(line.rstrip())
-        before = line[match.start() - 1] if match.start() else ""
-        enough = _enough(before, line[match.end() : match.end() + 1], alone)
+        enough = _enough(line, match.start(), match.end())
         if len(digits) >= enough and (best is None or len(digits) > 2 * len(best.octets)):
             best = Run(match.start(), match.end(), bytes.fromhex(digits), "digits without space")
     return best
 
 
-def _enough(before: str, behind: str, alone: bool) -> int:
-    """Digits without space that are octets and no number; fewer where they stand alone at the end, or in quotes."""
+_CLOSING = " \t\"'`)]}>,;"
+_WAY_AHEAD = re.compile(rf"(?:{WAYS.pattern})[\s:,;=|>\]\"'-]{{1,4}}$", re.IGNORECASE)
+_AS_FAR = 24
+
+
+def _enough(line: str, begin: int, end: int) -> int:
+    """Digits without space that are octets and no number; fewer where they stand alone at the end, in quotes, or where
+    a direction stands before what only closing signs are behind."""
+    before, rest = line[begin - 1 : begin], line[end:]
+    alone = not rest.strip()
     if before in ("x", "X"):  # a shorter one is an address
         return 10 if alone else 18
-    if before in _QUOTES and behind == before:
+    if before in _QUOTES and rest[:1] == before and before:
+        return 8
+    if not rest.strip(_CLOSING) and _WAY_AHEAD.search(line[max(0, begin - _AS_FAR) : begin]) is not None:
         return 8
     if not alone:
         return 12

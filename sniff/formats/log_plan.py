@@ -32,6 +32,7 @@ _REPEATS = 0.6
 _ROWS_LEAST = 0.7
 _NUMBERED = 0.6
 _MOSTLY = 0.8
+_GROWN = 0.2
 _TELLING = 3
 _BACK = 0.2
 _FIXED_LEAST = 3  # lines of one width, before they are taken for the width of a table
@@ -46,7 +47,8 @@ class Plan:
     offsets, whose ends say nothing; None where a line is a frame, or part of one that a tool got at once. `octetwise`:
     an octet a line. `bit_samples`: samples of a bit, of a logic analyser; 0 where there are none.
     `spellings`: how octets are written. `margin`, `times`: what is no part of the lines, how their times are read.
-    `heads`: those above rows that repeat others. `labelled`: whether lines with octets have a label; `lower`: whether
+    `heads`: those above rows that repeat others. `growing`: labels whose lines tell what was heard so far, so that the
+    next has the same with more behind. `labelled`: whether lines with octets have a label; `lower`: whether
     their digits are small letters.
     """
 
@@ -64,6 +66,7 @@ class Plan:
     labelled: bool = False
     lower: bool = False
     heads: frozenset[str] = frozenset()
+    growing: frozenset[str] = frozenset()
 
     def line(self, text: str) -> Line:
         """A line taken apart as this log writes it."""
@@ -200,9 +203,23 @@ def _of_labels(lines: Sequence[Line], base: int) -> Plan | None:
     return Plan(
         _name(data, lines), base, None, roles, main in directed, _width(data), octetwise,
         _bit_samples([line.samples for line in data if line.samples is not None]),
-        frozenset(line.spelling for line in data),
+        frozenset(line.spelling for line in data), growing=_growing(data),
         labelled=main != "", lower=2 * sum(line.lower for line in data) > len(data),
     )  # fmt: skip
+
+
+def _growing(data: Sequence[Line]) -> frozenset[str]:
+    """Labels whose lines are the begin of the next one again and again: a buffer, each time more came."""
+    grown, many = Counter[str](), Counter(line.family for line in data)
+    for line, after in pairwise(data):
+        alike = (line.family, line.way) == (after.family, after.way) and len(line.octets) > 1
+        grown[line.family] += alike and _goes_on(line.octets, after.octets)
+    return frozenset(name for name in many if grown[name] >= _FIXED_LEAST and grown[name] >= _GROWN * many[name])
+
+
+def _goes_on(octets: bytes, after: bytes) -> bool:
+    """Whether the octets that follow are the same with more behind."""
+    return len(after) > len(octets) and after.startswith(octets)
 
 
 def _are_headed(lines: Sequence[Line]) -> bool:

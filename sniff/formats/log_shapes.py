@@ -24,6 +24,7 @@ class Role(Enum):
     SAME = "same"  # repeats octets that another line of the log tells
     HEADING = "heading"  # says time or direction of the octets below
     NOTHING = "nothing"  # belongs to the log, and tells no octets
+    AGAIN = "again"  # what was told last comes again, with more behind
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,6 +96,7 @@ SHAPES: tuple[Shape, ...] = (
     _shape("libmodbus", r"^(?:Waiting for|ERROR |Request for slave|Opening |Bytes flushed|Connecting|The responding)",
            Role.NOTHING),
     _shape("libmodbus", r"^(?:[\[<][0-9A-F]{2}[\]>]){3,}"),
+    _shape("pymodbus", r"\bFrame - (?:\[.*\] )?not ready\b", Role.AGAIN),
     _shape("pymodbus", r"\b(?P<way>send|recv|SEND|RECV):\s+0x"),
     _shape("modbus_tk", r"(?P<way>->|<-)\s*\d{1,3}-\d{1,3}-\d{1,3}"),
     _shape("jpnevulator", rf"^\s*{_S}: \S+$", Role.HEADING),

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -61,13 +61,14 @@ def add_mark(path: str | Path, time: int, text: str | None, bus: str = "") -> No
 
 
 def marks_beside(path: str | Path, bus: str = "") -> list[LineEvent]:
-    """Marks of a bus in the file beside a capture, in order of time; what is no mark is passed over."""
+    """Marks of a bus in the file beside a capture, and which moments have none any more, in order of time; what is no
+    mark is passed over."""
     try:
         with mark_file(path).open("rb") as stream:
             lines = stream.read(LARGEST).decode("utf-8", "replace").splitlines()
     except OSError:
         return []
-    found: dict[int, str] = {}
+    found: dict[int, str | None] = {}
     for line in lines:
         try:
             record = json.loads(line)
@@ -79,14 +80,50 @@ def marks_beside(path: str | Path, bus: str = "") -> list[LineEvent]:
         if record.get("bus", bus) != bus:
             continue
         if record.get("gone"):
-            found.pop(time, None)
+            found[time] = None  # which may be a mark that the capture holds itself
         elif isinstance(record.get("text"), str):
             found[time] = record["text"][:LONGEST]
-    return [LineEvent(time, LineEventKind.MARK, text) for time, text in sorted(found.items())]
+    return [mark_event(time, text) for time, text in sorted(found.items())]
+
+
+def mark_event(time: int, text: str | None) -> LineEvent:
+    """A mark of a moment (ns), or that it has none any more (None)."""
+    return LineEvent(time, LineEventKind.UNMARK if text is None else LineEventKind.MARK, text or "")
+
+
+class MarksBeside:
+    """The marks beside a capture while one looks at it: others may write some meanwhile."""
+
+    def __init__(self, path: str | Path, bus: str = "") -> None:
+        self._path = path
+        self._bus = bus
+        self._looked: tuple[int, int] | None = None  # time and size of the file when it was read
+        self._known: dict[int, LineEvent] = {}
+
+    def changes(self) -> list[LineEvent]:
+        """What was marked, and which marks were taken away, since the last time; first, all that stands there."""
+        try:
+            stat = mark_file(self._path).stat()
+            looked = stat.st_mtime_ns, stat.st_size
+        except OSError:
+            looked = None
+        if looked == self._looked:
+            return []
+        self._looked = looked
+        before, self._known = self._known, {one.time: one for one in marks_beside(self._path, self._bus)}
+        now = self._known
+        gone = [mark_event(time, None) for time in before if time not in now]
+        return gone + [one for time, one in now.items() if before.get(time) != one]
+
+    def add(self, time: int, text: str | None) -> None:
+        """Write a mark, or that the one of that moment is taken away; whoever does it knows it. Raises OSError."""
+        add_mark(self._path, time, text, self._bus)
+        self._known[time] = mark_event(time, text[:LONGEST] if text is not None else None)
 
 
 class MarkedCapture:
-    """A capture with the marks beside it among its events. Everything else is the capture's own."""
+    """A capture with the marks beside it among its events. Everything else is the capture's own. What stands
+    beside it of a moment that its own marks are about comes last, for it is later than they are."""
 
     def __init__(self, capture: Capture, marks: Sequence[LineEvent]) -> None:
         self._capture = capture
@@ -106,22 +143,38 @@ class MarkedCapture:
 
     def items(self) -> Iterator[Item]:
         """Chunks and events, marks before what is not earlier."""
-        waiting = list(self._marks)
+        waiting, own, last = self._waiting(), list[LineEvent](), 0
         for item in self._capture.items():
             while waiting and waiting[0].time <= item.time:
                 yield waiting.pop(0)
             yield item
+            last = item.time
+            if isinstance(item, LineEvent) and item.kind is LineEventKind.MARK:
+                own.append(item)
         yield from waiting
+        yield from self._later_than(own, last)
 
     def blocks(self) -> Iterator[Block | LineEvent]:
         """The same as columns; a mark stands before the block that holds its moment, which is all that it needs."""
-        waiting = list(self._marks)
+        waiting, own, last = self._waiting(), list[LineEvent](), 0
         for block in self._capture.blocks():
             last = block.time if isinstance(block, LineEvent) else int(block.reads.times[-1])
             while waiting and waiting[0].time <= last:
                 yield waiting.pop(0)
             yield block
+            if isinstance(block, LineEvent) and block.kind is LineEventKind.MARK:
+                own.append(block)
         yield from waiting
+        yield from self._later_than(own, last)
+
+    def _waiting(self) -> list[LineEvent]:
+        return [one for one in self._marks if one.kind is LineEventKind.MARK]
+
+    def _later_than(self, own: Sequence[LineEvent], last: int) -> list[LineEvent]:
+        """What is said of these marks of the capture since; `last`: when it ends."""
+        moments = {mark.moment for mark in own}
+        said = [one for one in self._marks if one.time in moments]
+        return [replace(one, time=max(one.time, last), count=max(one.time, last) - one.time) for one in said]
 
     def completeness(self) -> Completeness:
         """As the capture's."""

@@ -352,12 +352,12 @@ class Joiner:
         else:
             yield from batch.chunks()
 
-    def follows(self, sequence: int, batch: Batch) -> bool:
-        """Take a /raw message whose entries are chunks as they are, with nothing before or between them; False, and it
-        is not taken, for any other."""
+    def follows(self, sequence: int, count: int) -> bool:
+        """Take `count` entries of /raw messages that follow one another, chunks as they are, with nothing before or
+        between them; False, and they are not taken, for any others."""
         if self._order or self._events or self._told or (self.next is not None and self._number(sequence) != self.next):
             return False
-        self._hole(sequence, batch)
+        self.next = self._number(sequence) + count
         return True
 
     def skip(self, sequence: int, batch: Batch) -> None:

@@ -7,46 +7,54 @@ import numpy as np
 from dissectors.columns import Reads
 from sniff.engine.blocks import BLOCK_OCTETS, BLOCK_READS, plain_reads
 from sniff.recording.batch import Batch
+from sniff.recording.batch_run import BatchRun
 
 _LATEST = (1 << 63) - (1 << 32)
 """ns; a batch that starts before it has no time over 64 bits."""
+_MOST_RUN = 2 * BLOCK_OCTETS
+"""Octets of a run, with times and sizes: about what a chunk of a recording holds."""
 
 
 class CleanBatches:
     """Collects batches that follow one another."""
 
     def __init__(self) -> None:
-        self._batches: list[Batch] = []
+        self._runs: list[BatchRun] = []
         self._count = self._octets = 0
 
     def __bool__(self) -> bool:
-        return bool(self._batches)
+        return bool(self._runs)
 
     @staticmethod
     def takes(batch: Batch) -> bool:
         """Whether a batch is no larger than a block may be (a foreign one can be)."""
         return batch.count <= BLOCK_READS and len(batch.data) <= BLOCK_OCTETS and batch.start < _LATEST
 
-    def fits(self, batch: Batch) -> bool:
-        """Whether what is collected stays within a block with one more batch."""
-        return self._count + batch.count <= BLOCK_READS and self._octets + len(batch.data) <= BLOCK_OCTETS
+    @staticmethod
+    def takes_run(run: BatchRun) -> bool:
+        """The same of all batches of a run together."""
+        return run.entries <= BLOCK_READS and run.size <= _MOST_RUN and max(run.starts) < _LATEST
 
-    def add(self, batch: Batch) -> None:
+    def fits(self, run: BatchRun) -> bool:
+        """Whether what is collected stays within a block with one more run."""
+        return self._count + run.entries <= BLOCK_READS and self._octets + run.size <= BLOCK_OCTETS
+
+    def add(self, run: BatchRun) -> None:
         """Take the next."""
-        self._batches.append(batch)
-        self._count += batch.count
-        self._octets += len(batch.data)
+        self._runs.append(run)
+        self._count += run.entries
+        self._octets += run.size
 
     def take(self) -> Reads:
         """All entries but empty ones (a foreign file's); nothing is collected any more."""
-        batches = self._batches
-        self._batches = []
+        runs = self._runs
+        self._runs = []
         self._count = self._octets = 0
-        starts = np.array([batch.start for batch in batches], np.int64)
-        counts = np.array([batch.count for batch in batches], np.int64)
-        steps = np.frombuffer(b"".join([batch.steps for batch in batches]), "<u4")
-        lengths = np.frombuffer(b"".join([batch.sizes for batch in batches]), "<u2").astype(np.int64)
-        octets = np.frombuffer(b"".join([batch.octets for batch in batches]), np.uint8)
+        starts = np.array([start for run in runs for start in run.starts], np.int64)
+        counts = np.array([count for run in runs for count in run.counts], np.int64)
+        steps = np.frombuffer(b"".join([run.steps for run in runs]), "<u4")
+        lengths = np.frombuffer(b"".join([run.sizes for run in runs]), "<u2").astype(np.int64)
+        octets = np.frombuffer(b"".join([run.octets for run in runs]), np.uint8)
         times = np.repeat(starts, counts)
         times += steps
         if not lengths.all():

@@ -57,26 +57,33 @@ class MessagePass:
 
     def messages(self) -> Iterator[tuple[str, Head, bytes]]:
         """Topic, head and data of all messages that can be read."""
+        for held in self.holds():
+            yield from self.messages_in(held)
+
+    def holds(self) -> Iterator[bytes | tuple[int, bytes]]:
+        """What holds messages: unpacked chunks, and records by opcode that stand alone, in the order of the file."""
         for record in self._records:
             if record.body is None:
                 self.jumped = self.jumped or record.opcode == scan.CHUNK
-                continue
-            if record.opcode == scan.CHUNK:
+            elif record.opcode != scan.CHUNK:
+                yield record.opcode, record.body
+            else:
                 octets = scan.unpack_chunk(record.body)
                 if isinstance(octets, str):
                     self.report.problem(f"chunk at octet {record.offset}: {octets}", len(record.body))
-                    continue
-                inner = scan.inner_records(octets)
-            else:
-                inner = iter([(record.opcode, record.body)])
-            for opcode, body in inner:
-                if opcode == scan.MESSAGE and len(body) >= scan.MESSAGE_HEAD.size:
-                    head: Head = scan.MESSAGE_HEAD.unpack_from(body)
-                    channel = self.channels.get(head[0])
-                    if channel is not None:
-                        yield channel.topic, head, body[scan.MESSAGE_HEAD.size :]
-                elif opcode in (scan.CHANNEL, scan.SCHEMA):
-                    self._define(opcode, body)
+                else:
+                    yield octets
+
+    def messages_in(self, held: bytes | tuple[int, bytes]) -> Iterator[tuple[str, Head, bytes]]:
+        """Topic, head and data of the messages in one of `holds`."""
+        for opcode, body in scan.inner_records(held) if isinstance(held, bytes) else iter([held]):
+            if opcode == scan.MESSAGE and len(body) >= scan.MESSAGE_HEAD.size:
+                head: Head = scan.MESSAGE_HEAD.unpack_from(body)
+                channel = self.channels.get(head[0])
+                if channel is not None:
+                    yield channel.topic, head, body[scan.MESSAGE_HEAD.size :]
+            elif opcode in (scan.CHANNEL, scan.SCHEMA):
+                self._define(opcode, body)
 
     def batch(self, head: Head, data: bytes) -> Batch | None:
         """A message of /raw; None, and reported, when its sizes contradict each other."""

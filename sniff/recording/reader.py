@@ -18,7 +18,7 @@ from typing import BinaryIO, cast
 import numpy as np
 
 from dissectors.columns import Reads
-from sniff.engine.blocks import Block, blocks_of, plain_reads
+from sniff.engine.blocks import BLOCK_OCTETS, Block, blocks_of, plain_reads
 from sniff.engine.capture import CaptureError
 from sniff.engine.session import Completeness, Item, LineEvent, LineEventKind, Session, SettingsChange, settings_change
 from sniff.formats.files import explain, open_capture
@@ -26,6 +26,7 @@ from sniff.formats.several_buses import SeveralBuses
 from sniff.formats.text import iso
 from sniff.recording import scan
 from sniff.recording.batch import Batch, Joiner, line_event
+from sniff.recording.batch_run import BatchRun, run_of
 from sniff.recording.clean_batches import CleanBatches
 from sniff.recording.frames import METADATA, SCHEMA, FrameBatch
 from sniff.recording.messages import Head, MessagePass
@@ -144,15 +145,22 @@ class McapCapture:
         clean = CleanBatches()
         with self._pass(since) as one:
             try:
-                for head, batch in self.batches_of(one, joiner):
+                for piece in self._runs_of(one, joiner, columns and since is None):
+                    if isinstance(piece, BatchRun):
+                        if not clean.fits(piece) and clean:
+                            yield clean.take()
+                        clean.add(piece)
+                        continue
+                    head, batch = piece
                     if one.jumped:
                         joiner.next, one.jumped = None, False
                     if since is not None and head[2] < since:
                         joiner.skip(head[1], batch)
-                    elif columns and clean.takes(batch) and joiner.follows(head[1], batch):
-                        if not clean.fits(batch):
+                    elif columns and clean.takes(batch) and joiner.follows(head[1], batch.count):
+                        run = BatchRun.alone(batch)
+                        if not clean.fits(run) and clean:
                             yield clean.take()
-                        clean.add(batch)
+                        clean.add(run)
                     else:
                         if clean:
                             yield clean.take()
@@ -221,11 +229,30 @@ class McapCapture:
 
     def batches_of(self, one: MessagePass, joiner: Joiner) -> Iterator[tuple[Head, Batch]]:
         """Batches of a pass; what is on /line goes to the joiner."""
-        for topic, head, data in one.messages():
+        for held in one.holds():
+            yield from self._batches_in(held, one, joiner)
+
+    def _batches_in(
+        self, held: bytes | tuple[int, bytes], one: MessagePass, joiner: Joiner
+    ) -> Iterator[tuple[Head, Batch]]:
+        for topic, head, data in one.messages_in(held):
             if topic == self._line_topic:
                 joiner.line(head[2], data)
             elif topic == self._raw_topic and (batch := one.batch(head, data)) is not None:
                 yield head, batch
+
+    def _runs_of(self, one: MessagePass, joiner: Joiner, together: bool) -> Iterator[BatchRun | tuple[Head, Batch]]:
+        """The same with all batches of a chunk `together`, where that is plain."""
+        others = frozenset((self._line_topic,))
+        for held in one.holds():
+            run = None
+            if together and isinstance(held, bytes) and len(held) <= BLOCK_OCTETS * 4:
+                run = run_of(held, one.channels, self._raw_topic, others)
+            if run is not None and CleanBatches.takes_run(run) and joiner.follows(run.sequence, run.entries):
+                one.last = run.last
+                yield run
+            else:
+                yield from self._batches_in(held, one, joiner)
 
     @contextmanager
     def _pass(self, since: int | None = None) -> Iterator[MessagePass]:

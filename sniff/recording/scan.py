@@ -313,3 +313,5 @@ def inner_records(octets: bytes) -> Iterator[tuple[int, bytes]]:
 
 MESSAGE_HEAD = struct.Struct("<HIQQ")
 """Channel, sequence, log time, publish time; the data follow."""
+RECORD_HEAD = _RECORD
+"""Opcode and length of the content, which follows."""

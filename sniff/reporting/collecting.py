@@ -74,6 +74,7 @@ def collect(
         survey(read, session, model, timeline, told, trends, reference=reference)
     else:
         survey(read, session, model, reference=reference)
+    complete = capture.completeness()  # before it is read again, which need not go to its end
     summary, findings, healths = model.summary, model.findings(), model.health()
     if wanted is not None:
         summary = Summary(session.line)
@@ -85,7 +86,6 @@ def collect(
         for node in summary.nodes.present()
     )
     found = _found(findings, _words(read, session, dissector, findings, reference), session, dissector)
-    complete = capture.completeness()
     load = summary.load
     return Numbers(
         source=source,

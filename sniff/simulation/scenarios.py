@@ -71,7 +71,7 @@ def scenario(name: str, seed: int = 0, faults: bool = True, line: LineSettings |
         seed=seed,
         gap=bus.gap(Timing(line)),
         devices=bus.devices,
-        text=bus.text,
+        text="; ".join(said for said in (bus.text, bus.misbehaving if faults else "") if said),
     )
 
 

@@ -11,6 +11,7 @@ from typing import ClassVar
 
 from textual.binding import Binding, BindingType
 from textual.events import Event, InputEvent
+from textual.filter import DimFilter
 from textual.screen import Screen
 from textual.timer import Timer
 
@@ -34,6 +35,7 @@ from sniff.tui.screens import SCREENS, STYLED, Entry, load
 from sniff.tui.screens.base import ViewScreen
 from sniff.tui.seats import BusLine, Seat
 from sniff.tui.site_meter import SiteMeter
+from sniff.tui.themes import DARK, DARK_SIXTEEN, DIM, LIGHT, LIGHT_SIXTEEN, THEMES
 from sniff.tui.view_state import Viewing
 
 POLL_SECONDS = 0.1
@@ -45,7 +47,6 @@ CALM_SECONDS = 0.2
 """How long what is not on the screen waits after a key: who holds one down must not feel it."""
 SURE_SECONDS = 4.0
 """How long a first `q` during a recording waits for the second."""
-THEMES = ("textual-dark", "textual-light")
 PATH = 8
 """Screens that `q` can walk back over."""
 
@@ -83,6 +84,7 @@ class SnifferApp(Analyzer):
             raise ValueError(f"screen {start_screen!r}: expected one of {', '.join(entry.name for entry in SCREENS)}")
         self.DEFAULT_MODE = start_screen  # type: ignore[misc]  # textual reads it from the instance
         super().__init__()
+        self._take_themes()
         feeds = feed if isinstance(feed, Sequence) else [feed]
         self.seats = [Seat.of(each, start_screen) for each in feeds]
         self.here = 0  # which of them is shown
@@ -97,6 +99,15 @@ class SnifferApp(Analyzer):
         self.is_alone = False  # whether this process is for nothing else
         self._asked_to_quit = 0.0
         self._pressed = 0.0  # when the last key was
+
+    def _take_themes(self) -> None:
+        for theme in THEMES:
+            self.register_theme(theme)
+        self.ansi_theme_dark, self.ansi_theme_light = DARK_SIXTEEN, LIGHT_SIXTEEN
+        for one in self._filters:
+            if isinstance(one, DimFilter):
+                one.dim_factor = DIM
+        self.theme = DARK.name
 
     def _make(self, entry: Entry) -> Screen[None]:
         made: Screen[None] = load(entry)()
@@ -369,7 +380,7 @@ class SnifferApp(Analyzer):
 
     def action_theme(self) -> None:
         """Dark or light."""
-        self.theme = THEMES[1] if self.theme == THEMES[0] else THEMES[0]
+        self.theme = LIGHT.name if self.theme == DARK.name else DARK.name
 
     def action_help(self) -> None:
         """All keys that work here."""

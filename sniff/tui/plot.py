@@ -32,6 +32,7 @@ class HistoryPlot(Vertical):
     HistoryPlot { height: 11; width: 100%; }
     HistoryPlot > PlotWidget, HistoryPlot > Sparkline { height: 1fr; }
     HistoryPlot > Static { height: 1; padding: 0 1; color: $text-muted; }
+    HistoryPlot > PlotWidget > .plot--tick { color: $foreground; text-style: none; }
     """
 
     def __init__(self, *, id: str | None = None) -> None:
@@ -69,6 +70,7 @@ class HistoryPlot(Vertical):
         assert isinstance(canvas, PlotWidget)
         canvas.margin_top, canvas.margin_bottom = 1, 2  # no titles on the axes
         canvas.clear()
+        canvas.visible = not few  # axes of nothing would say something
         if few:
             return
         newest = history[-1][0]

@@ -34,6 +34,7 @@ def octets_of(path: Path) -> int:
         return 0
 
 
+@pytest.mark.timeout(900)  # a thousand reads of a log
 @pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(CAPTURES)))
 def test_cut_everywhere(path: Path, tmp_path: Path) -> None:
     whole = path.read_bytes()

@@ -32,6 +32,7 @@ from tests.faults.hearing import (
     stepping,
     swapped,
 )
+from tests.faults.late_cases import FURTHER_LATE_CASES, LATE_CASES
 from tests.faults.line_cases import LINE_CASES
 from tests.faults.line_rule_cases import LINE_RULE_CASES
 from tests.faults.modbus_cases import MODBUS_CASES
@@ -214,7 +215,8 @@ CASES: tuple[Case, ...] = (  # of each a capture is kept in captures/findings
     *RING_CASES,
     *PROFIBUS_CASES,
     *LINE_RULE_CASES,
+    *LATE_CASES,
 )
 
-FURTHER_CASES: tuple[Case, ...] = (*MODBUS_CASES, *N2_CASES, *LINE_CASES, *MSTP_CASES)
+FURTHER_CASES: tuple[Case, ...] = (*MODBUS_CASES, *N2_CASES, *LINE_CASES, *MSTP_CASES, *FURTHER_LATE_CASES)
 """What is the same each time, time patterns, tokens. Written from the true cause; no captures are kept of them."""

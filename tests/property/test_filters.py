@@ -15,7 +15,7 @@ from sniff.engine.column_join import SettledRows
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import Session
 from sniff.engine.verdict_join import JudgedRow
-from sniff.filter import Scope, compile_filter
+from sniff.filter import FilterError, Scope, compile_filter
 from sniff.filter.choosing import chosen
 from sniff.filter.fields import COLUMN_TYPES, column_type, types_of
 from sniff.formats import read
@@ -142,7 +142,12 @@ def test_columns_accept_what_rows_accept(name: str, data: st.DataObject) -> None
     session, rows, columns = capture_of(name)
     text = data.draw(filters(name))
     scope = Scope(session.started)
-    by_rows, by_columns = (compile_filter(text, dissector_for(session), scope, others=True) for _ in range(2))
+    try:
+        by_rows, by_columns = (compile_filter(text, dissector_for(session), scope, others=True) for _ in range(2))
+    except FilterError as error:
+        if ", never " in str(error) or " fits " in str(error):  # which a test of its own is about
+            return
+        raise
     expected = [item.row.no for item in rows if by_rows(item.row, item.transaction)]
     found = [place + some.table.first for some in columns for place in chosen(some, by_columns)]
     assert found == expected, text

@@ -19,6 +19,7 @@ from sniff.analysis.sanitizing import sanitized
 from sniff.analysis.site_rules import SITE_RULES
 from sniff.tui.analyzer import analyzer
 from sniff.tui.columns import fit
+from sniff.tui.hanging import hanging
 from sniff.tui.screens.searching import SearchScreen
 from sniff.tui.still_judging import still_judging
 from sniff.tui.tables import StationTable
@@ -37,6 +38,10 @@ OTHERS = 32
 LEAST_SEEN = 30
 ROOMY = 110
 """Width from which there is a column for when it was seen last."""
+LABEL, SIDES = 7, 3
+"""Cells of a label below the table, and of what stands at both sides of its lines."""
+TALL = 40
+"""Height from which frames that show a finding stand below each other, with what they say."""
 
 
 class FindingsScreen(SearchScreen):
@@ -167,30 +172,41 @@ class FindingsScreen(SearchScreen):
         title = self._titles.get(finding.code, "")
         text.append(sanitized(f"{finding.subject}: {title}" if title else finding.subject), style="bold")
         text.append(f"  {finding.code}\n", style="dim")
-        text.append(sanitized(finding.seen) + "\n")
+        text.append("seen   ", style="dim").append(sanitized(finding.seen) + "\n")
         if finding.means:
             text.append("means  ", style="dim").append(sanitized(finding.means) + "\n")
         text.rstrip()
-        words.update(text)
-        advice.update(f"next   {sanitized(finding.next)}" if finding.next else "")
+        words.update(self._hanging(text))
+        advice.update(self._hanging(Text(f"next   {sanitized(finding.next)}" if finding.next else "")))
         advice.display = bool(finding.next)
-        places.update(self._places(finding))
+        places.update(self._hanging(self._places(finding)))
+
+    def _hanging(self, text: Text) -> Text:
+        return hanging(text, self._width - SIDES, LABEL)
 
     def _places(self, finding: Finding) -> Text:
         text = Text()
         if finding.cause is not None:
-            text.append("comes from  ", style="dim").append(sanitized(" ".join(reversed(finding.cause))) + "\n")
-        if finding.evidence:
-            text.append("frames  ", style="dim")
-            text.append(", ".join(self._place(no) for no in finding.evidence[:EVIDENCE]))
-            text.append(" …" if len(finding.evidence) > EVIDENCE else "").append(
-                "  enter, e, E go there\n", style="dim"
-            )
+            text.append("from   ", style="dim").append(sanitized(" ".join(reversed(finding.cause))) + "\n")
         span = (
             clock(finding.first) if finding.first == finding.last else f"{clock(finding.first)} … {clock(finding.last)}"
         )
-        text.append("seen  ", style="dim").append(span)
+        text.append("when   ", style="dim").append(span)
+        if finding.evidence:
+            text.append("\nframes ", style="dim").append_text(self._frames(finding.evidence))
         return text
+
+    def _frames(self, evidence: tuple[int, ...]) -> Text:
+        more = " …" if len(evidence) > EVIDENCE else ""
+        if self.size.height < TALL:
+            said = Text(", ".join(self._place(no) for no in evidence[:EVIDENCE]) + more)
+            return said.append("  enter, e, E go there", style="dim")
+        said = Text().append("enter, e, E go there", style="dim")
+        for no in evidence[:EVIDENCE]:
+            row = self.store.by_no(no)
+            what = "" if row is None else f"  {sanitized(self.store.text(row))}"
+            said.append("\n" + " " * LABEL + fit(self._place(no) + what, self._width - SIDES - LABEL).rstrip())
+        return said.append(f"\n{' ' * LABEL}and {len(evidence) - EVIDENCE} more" if more else "")
 
     def _place(self, no: int) -> str:
         row = self.store.by_no(no)

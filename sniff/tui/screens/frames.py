@@ -28,7 +28,6 @@ from sniff.tui.index import Known
 from sniff.tui.linelist import LineList
 from sniff.tui.marks import MarksScreen
 from sniff.tui.prompt import Prompt
-from sniff.tui.saving import save, why_not
 from sniff.tui.screens.listing import ListingScreen
 from sniff.tui.times import date_and_clock
 
@@ -273,9 +272,13 @@ class FramesScreen(ListingScreen):
 
     def action_save(self) -> None:
         """Ask where to save what is shown."""
+        from sniff.tui.saving import why_not  # writers of captures: not before somebody writes
+
         self.query_one(Prompt).ask("save", "", "x.mcap  x.pcapng  x.cap.txt  x.csv  x.json  x.txt", why_not)
 
     def _save(self, path: str) -> None:
+        from sniff.tui.saving import save
+
         index = self.lines.index
         try:
             count = save(self.store, (index[place] for place in range(len(index))), path)

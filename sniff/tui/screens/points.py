@@ -32,6 +32,9 @@ FRESH = 2 * NS_PER_S
 TREND = 12
 """Values of the small chart."""
 
+STEADY = "─"
+"""A value that stays what it was."""
+
 WORDS, LEAST_WORDS = 26, 16
 """Cells of a value, where there is room and where there is little."""
 OTHERS = 39
@@ -40,13 +43,13 @@ MARKS = {Quality.UNCERTAIN: "?", Quality.BAD: "!"}
 
 
 def trend(values: Sequence[float]) -> str:
-    """A chart between the least and the most of the values; flat in the middle when they are all the same."""
+    """A chart between the least and the most of the values; a thin line when they are all the same."""
     values = values[-TREND:]
     if len(values) < 2:
         return ""
     low, high = min(values), max(values)
     if low == high:
-        return BARS[4] * len(values)
+        return STEADY * len(values)
     steps = len(BARS) - 2
     return "".join(BARS[1 + round((value - low) / (high - low) * steps)] for value in values)
 
@@ -67,6 +70,8 @@ def shown_value(value: Value, room: int = WORDS) -> str:
 
 NARROW: tuple[str, ...] = ("", "stn", "point", "value", "age", "n", "every ms")
 WIDE: tuple[str, ...] = (*NARROW, "±", "low", "high", "trend", "what it is")
+LEFT = {"", "point", "trend", "what it is"}
+"""Columns that are no numbers."""
 FROM = 110
 """Width from which on all columns are shown."""
 
@@ -154,7 +159,7 @@ class PointsScreen(TableScreen):
         table = self.query_one(StationTable)
         table.clear(columns=True)
         for title in columns:
-            table.add_column(Text(title), key=title or "mark")
+            table.add_column(Text(title, justify="left" if title in LEFT else "right"), key=title or "mark")
         self._drawn = None
 
     def draw(self) -> None:

@@ -9,13 +9,13 @@ from textual import events
 from textual.app import ComposeResult
 from textual.widgets import DataTable, Static
 
-from dissectors.line import MS
+from dissectors.line import MS, NS_PER_S
 from dissectors.words import milliseconds
 from sniff.analysis.poll import Poll
 from sniff.analysis.poll_words import asked, changes, told
 from sniff.analysis.sanitizing import sanitized
 from sniff.tui.analyzer import analyzer
-from sniff.tui.charts import sparkline
+from sniff.tui.charts import round_up, sparkline
 from sniff.tui.screens.tabling import TableScreen
 from sniff.tui.still_judging import still_judging
 from sniff.tui.tables import StationTable
@@ -29,6 +29,9 @@ WIDE = 110
 
 CHART = 60
 """Characters of the chart of one entry."""
+
+SMALL = 40
+"""Characters of the chart in a line."""
 
 Cell = Callable[[Poll], str]
 
@@ -54,6 +57,17 @@ MORE: tuple[tuple[str, Cell], ...] = (
     ("rep.", lambda poll: _count(poll.repeats)),
     ("p95 ms", lambda poll: _time(poll.latency.quantile(0.95))),
 )
+MOST: tuple[tuple[str, Cell], ...] = (
+    *MORE[:-1],
+    ("p50 ms", lambda poll: _time(poll.latency.quantile(0.5))),
+    MORE[-1],
+    ("max ms", lambda poll: _time(poll.latency.most)),
+    ("first", lambda poll: clock(poll.first or 0)[:8]),
+    ("last", lambda poll: clock(poll.last or 0)[:8]),
+)
+"""Columns of the widest screens, which have a chart too."""
+WIDEST = 160
+OFTEN = "how often"
 TROUBLE = {"none", "exc.", "late", "dam."}
 """Columns where anything is worth a look: such cells get a "!"."""
 
@@ -86,7 +100,9 @@ class PollsScreen(TableScreen):
         ("none  exc.", "requests without answer, and refused"),
         ("late  dam.", "answers that came too late, and damaged ones"),
         ("rep.", "requests that were repeats"),
-        ("p95 ms", "response time: 95 of 100 are shorter"),
+        ("p50 p95 max ms", "response time: half are shorter, 95 of 100 are, the longest"),
+        ("first  last", "when it was asked first and last"),
+        (OFTEN, "requests over the time from the first request of all to the last; the highest bar is its own most"),
     )
     CSS_PATH = "polls.tcss"
 
@@ -96,6 +112,7 @@ class PollsScreen(TableScreen):
         self._shown: dict[str, Poll] = {}
         self._hidden = 0
         self._columns: tuple[tuple[str, Cell], ...] = ()
+        self._charts: dict[str, tuple[tuple[int, ...], str]] = {}  # what each was drawn of, and the chart
 
     def compose_view(self) -> ComposeResult:
         """The table, and more about the entry under the cursor."""
@@ -113,7 +130,7 @@ class PollsScreen(TableScreen):
         self._drawn = None
 
     def _lay_out(self, width: int) -> None:
-        columns = (*NARROW, *MORE) if width >= WIDE else NARROW
+        columns = (*NARROW, *(MOST if width >= WIDEST else MORE)) if width >= WIDE else NARROW
         if columns == self._columns:
             return
         self._columns = columns
@@ -123,6 +140,8 @@ class PollsScreen(TableScreen):
         table.add_column(Text("asks"), key="asks")
         for title, _ in columns:
             table.add_column(Text(title, justify="right"), key=title)
+        if width >= WIDEST:
+            table.add_column(Text(OFTEN), key=OFTEN)
         self._drawn = None
 
     def draw(self) -> None:
@@ -137,18 +156,39 @@ class PollsScreen(TableScreen):
         held.sort(key=ORDERS[self.order][1])
         self._hidden = max(0, len(held) - SHOWN)
         self._shown = {_key(poll): poll for poll in held[:SHOWN]}
-        self.query_one(StationTable).fill((key, self._cells(poll)) for key, poll in self._shown.items())
+        span = self._span()
+        self.query_one(StationTable).fill((key, self._cells(key, poll, span)) for key, poll in self._shown.items())
         self._describe()
 
     def _asks(self, poll: Poll, room: int = 0) -> str:
         said = asked(poll, self.store.model.devices, room)
         return said or poll.key.kind
 
-    def _cells(self, poll: Poll) -> list[Text]:
-        room = max(20, self.app.size.width - (44 if self._columns == NARROW else 78))
+    def _span(self) -> tuple[int, int]:
+        """When anything was asked first, ns, and how long a character of a chart lasts."""
+        begin = min((one.first for one in self.store.polls if one.first is not None), default=0)
+        end = max((one.last for one in self.store.polls if one.last is not None), default=0)
+        return begin, int(max(1.0, round_up((end - begin) / NS_PER_S / SMALL)) * NS_PER_S)
+
+    def _cells(self, key: str, poll: Poll, span: tuple[int, int]) -> list[Text]:
+        is_widest = len(self._columns) > len((*NARROW, *MORE))
+        room = max(20, self.app.size.width - (44 if self._columns == NARROW else 118 + SMALL if is_widest else 78))
         said = sanitized(self._asks(poll, room))
         said = said if len(said) <= room else said[: room - 1] + "…"
-        return [Text(_who(poll), justify="right"), Text(said), *(_cell(title, of(poll)) for title, of in self._columns)]
+        cells = [
+            Text(_who(poll), justify="right"),
+            Text(said),
+            *(_cell(title, of(poll)) for title, of in self._columns),
+        ]
+        return [*cells, Text(self._small(key, poll, span))] if is_widest else cells
+
+    def _small(self, key: str, poll: Poll, span: tuple[int, int]) -> str:
+        """The chart of a line, which is only drawn anew where something came."""
+        state = poll.asked + poll.repeats, *span
+        drawn = self._charts.get(key)
+        if drawn is None or drawn[0] != state:
+            self._charts[key] = drawn = state, _over_time(poll, *span)
+        return drawn[1]
 
     def _describe(self) -> None:
         poll, open_end = self._here(), still_judging(analyzer(self).status, self.store)
@@ -164,13 +204,15 @@ class PollsScreen(TableScreen):
         said = asked(poll, self.store.model.devices)
         words += [said] if said else []
         counts = f"{poll.answered} of {poll.asked + poll.repeats} answered"
+        if key.station is None and not poll.answered:  # nobody answers what is for all
+            counts = f"said {poll.asked + poll.repeats} times" if poll.asked + poll.repeats > 1 else "said once"
         words.append(counts + (f", {poll.repeats} were repeats" if poll.repeats else ""))
         if poll.latency.count:
             low, high = poll.latency.quantile(0.5), poll.latency.most
             words.append(f"answers after {milliseconds(low or 0)}, at most {milliseconds(high or 0)}")
         first, last = poll.first or 0, poll.last or 0
         words.append(f"{clock(first)} … {clock(last)}" if first != last else clock(first))
-        begin = min((one.first for one in self.store.polls if one.first is not None), default=0)
+        begin, _ = self._span()
         end = max((one.last for one in self.store.polls if one.last is not None), default=0)
         turned = told(changes(poll, begin, end), lambda time: clock(time)[:8])
         words += [turned] if turned else []
@@ -216,6 +258,16 @@ def _cell(title: str, text: str) -> Text:
     if title in TROUBLE and text != "·":
         return Text(f"!{text}", style="bold", justify="right")
     return Text(text, justify="right")
+
+
+def _over_time(poll: Poll, begin: int, step: int) -> str:
+    """How many requests in each `step` ns from `begin` on."""
+    step = max(step, poll.slices.width)
+    sums: dict[int, int] = {}
+    for place, count in poll.slices.counts.items():
+        at = max(0, place * poll.slices.width - begin) // step
+        sums[at] = sums.get(at, 0) + count
+    return sparkline([sums.get(at, 0) for at in range(max(sums, default=-1) + 1)], max(sums.values(), default=0))
 
 
 def _chart(poll: Poll) -> str:

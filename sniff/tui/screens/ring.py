@@ -14,6 +14,7 @@ from textual.widgets import DataTable, Static
 
 from dissectors.token_ring import Cell, TokenRing
 from sniff.tui.analyzer import analyzer
+from sniff.tui.hanging import hanging
 from sniff.tui.ring_picture import ring_picture, share_bars
 from sniff.tui.screens.searching import SearchScreen
 from sniff.tui.still_judging import still_judging
@@ -49,6 +50,8 @@ ROOMY = 280
 """Width from which all columns are shown, with their titles in full."""
 BESIDE = 160
 """Width from which the ring stands beside the table, else above it."""
+INDENT, SIDES = 2, 3
+"""Cells by which a long sentence goes on further in, and of what stands at both sides."""
 TROUBLE = {"retries", "repeats", "lost", "claims", "damaged"}
 LOOPS = ("loop p50 ms", "rotation p50 ms")
 
@@ -118,9 +121,8 @@ class RingScreen(SearchScreen):
         rows = shown.rows(ring)
         self._fill(shown.headings, rows)
         self.query_one("#picture", Static).update("\n".join(self._picture(shown, ring, rows)))
-        words.update(
-            "\n".join((*([open_end] if open_end else []), *shown.sentences(ring), "", "?: what the titles mean"))
-        )
+        said = (*([open_end] if open_end else []), *shown.sentences(ring), "", "?: what the titles mean")
+        words.update(hanging(Text("\n".join(said)), self.app.size.width - SIDES, INDENT))
 
     def _fill(self, headings: Sequence[str], rows: list[tuple[Cell, ...]]) -> None:
         roomy = self.app.size.width >= ROOMY

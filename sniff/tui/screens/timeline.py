@@ -17,6 +17,7 @@ from sniff.tui.analyzer import analyzer
 from sniff.tui.charts import round_up
 from sniff.tui.exchanges import Exchanges
 from sniff.tui.screens.base import ViewScreen
+from sniff.tui.themes import BENEATH, CHOSEN
 from sniff.tui.timeline_picture import LABEL, Chart, Row, axis, draw_charts, draw_rows
 from sniff.tui.times import clock
 
@@ -147,10 +148,10 @@ class TimelineScreen(ViewScreen):
         text = Text(no_wrap=True)
 
         def paint(place: int, style: str) -> str:
-            if place == at:
-                return "reverse"
             begin = made[place].begin
-            return f"{style} on blue" if chosen is not None and chosen[0] <= begin < chosen[1] else style
+            if place == at:
+                return f"{style} on {BENEATH}"
+            return f"{style} on {CHOSEN}" if chosen is not None and chosen[0] <= begin < chosen[1] else style
 
         rows = self._rows(len(made), zoom)
         charts = self._charts(made, zoom)
@@ -172,20 +173,15 @@ class TimelineScreen(ViewScreen):
         peak = max((column.load for column in made), default=0.0)
         load = next((step for step in LOADS if peak <= step), 1.0)
         median, most = self._exchanges.latencies(self._begin, len(made), zoom, (0.5, 0.95))
-        slowest = round_up(max((value for value in most if value is not None), default=0.0))
         charts = [
-            Chart("load", [column.load for column in made], load, f"{load:.0%}", 3, "color(67)"),
-            _counted("frames", [column.frames for column in made], 2, "color(103)"),
+            Chart("load", [column.load for column in made], load, f"{load:.0%}", 3, "blue"),
+            _counted("frames", [column.frames for column in made], 2, "magenta"),
             _counted("errors", [column.failed for column in made], 2, "bold red"),
             _counted("damaged", [column.damaged for column in made], 0, "red"),
             _counted("noise", [column.noise for column in made], 0, "yellow"),
         ]
         if any(value is not None for value in most):
-            said = f"{slowest:g} ms"
-            charts += [
-                Chart("p95", most, slowest, said, 3, "cyan"),
-                Chart("p50", median, slowest, said, 2, "cyan"),
-            ]
+            charts += [_timed("p95", most, 3), _timed("p50", median, 2)]
         return charts
 
     def _rows(self, width: int, zoom: int) -> list[Row]:
@@ -316,6 +312,12 @@ class TimelineScreen(ViewScreen):
 def _counted(name: str, values: list[int], weight: int, style: str = "") -> Chart:
     top = max(values, default=0)
     return Chart(name, values, float(top), str(top), weight, style)
+
+
+def _timed(name: str, values: list[float | None], weight: int) -> Chart:
+    """Times in ms; the axis ends at a round number of its own: half of the answers may be far from the slowest."""
+    top = round_up(max((value for value in values if value is not None), default=0.0))
+    return Chart(name, values, top, f"{top:g} ms" if top < 1000 else f"{top / 1000:g} s", weight, "cyan")
 
 
 class _Chart(Static, can_focus=True):

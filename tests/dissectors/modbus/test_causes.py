@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import pytest
 
+from dissectors.chances import at_least
 from dissectors.findings import Severity
 from dissectors.frame import Flaw
-from dissectors.modbus.damage_shares import chance
 from dissectors.modbus.garbage import Garbage, slower_by, whole_runs
 from dissectors.modbus.header import peek_rtu
 from dissectors.modbus.rules import RULES
@@ -182,11 +182,11 @@ def test_who_has_more_than_its_share_is_blamed(bus):
 
 
 def test_chance_is_the_tail_of_a_binomial():
-    assert chance(0, 10, 0.3) == 1
-    assert chance(3, 3, 0.5) == pytest.approx(0.125)
-    assert chance(1, 2, 0.5) == pytest.approx(0.75)
-    assert chance(300, 500, 0.5) < 1e-5
-    assert chance(5, 5, 1.0) == 1
+    assert at_least(0, 10, 0.3) == 1
+    assert at_least(3, 3, 0.5) == pytest.approx(0.125)
+    assert at_least(1, 2, 0.5) == pytest.approx(0.75)
+    assert at_least(300, 500, 0.5) < 1e-5
+    assert at_least(5, 5, 1.0) == 1
 
 
 def test_a_search_for_stations_is_one_fact(bus):

@@ -6,9 +6,11 @@ import pytest
 
 from dissectors.frame import Check, Chunk, Damage, Event, FoundBy, Frame, Noise, Place, Reason, Role
 from dissectors.line import Timing
-from dissectors.n2 import N2, N2Framer, fields, interpret, packet, peek, text
+from dissectors.meaning import Meaning
+from dissectors.n2 import N2, N2Framer, fields, interpret, packet, peek, readings, text
 from dissectors.n2.framing import SILENCE, judge
 from dissectors.n2.interpretation import change_records, guessed_time
+from dissectors.n2.text import meant
 
 MS = 1_000_000
 TIMING = Timing()
@@ -267,7 +269,7 @@ def test_an_answer_with_its_command(digimat_frames):
     read = [interpret(frame_of(q), frame_of(a)) for q, a in pairs]
     assert [r.value for r in read] == [72.5, 72.5, 72.5, 72.5, -12.25, 0, 64, 192, 7, 21.0, 21.0, 55.5, 1, None, None]
     assert [r.station for r in read[:4]] == [1, 16, 99, 255]
-    assert read[0].text == "A → 72.5 (0042910000: status 00h in front, tentative)"
+    assert read[0].text == "A → 72.5 (0042910000: status 00h in front, no bit set, tentative)"
     assert read[-1].error == "N11 undefined or reserved field"
     assert [r.written for r in read] == [False] * 9 + [True] * 4 + [False] * 2
 
@@ -285,10 +287,33 @@ def test_guesses_are_marked_and_stand_beside_the_characters():
     assert "tentative" in state.text
     changes = interpret(frame_of(b">0104C5\r"), frame_of(b"A301004248000086\r"))
     assert changes.value is None
-    assert changes.text == "A → (3010042480000: AO 1 = 50 status 00h, tentative)"
+    assert changes.text == "A → (3010042480000: AO 1 = 50; no other status bit set, tentative)"
     time = b"010020260301153000"
     expected = "1 ← synchronise time 20260301153000 (2026-03-01 15:30:00?, tentative)"
     assert line(b">%s%02X\r" % (time, sum(time) & 0xFF)) == expected
+
+
+@pytest.mark.parametrize(
+    ("request_", "answer", "said", "told"),
+    [
+        (b">01120A0297\r", b"A4064\r", "1 → BI 10 on (status 40h, tentative) — A 40", [(1, "on", "40h")]),
+        (b">01120A0297\r", b"A0161\r", "1 → BI 10 off (status 01h, tentative) — A 01", [(0, "off", "01h")]),
+        (
+            b">0104C5\r",
+            b"A1018041A0000020340%02X\r" % (sum(b"1018041A0000020340") & 0xFF),
+            "1 → AI 1 = 20 status 80h; BI 3 on; no other status bit set (tentative) — A 1018041A0000020340",
+            [(20.0, "", "80h"), (1, "on", "40h")],
+        ),
+    ],
+)
+def test_every_point_says_its_state_and_status(request_, answer, said, told):
+    asked, got = frame_of(request_), frame_of(answer)
+    meaning = Meaning(1, None, readings(asked, got), "", asked)
+    assert meant(got, peek(got), Role.RESPONSE, meaning) == said
+    assert [(one.value, one.words, one.beside[0][0][7:]) for one in readings(asked, got)] == told
+    for one, span in zip(readings(asked, got), N2.spans(got, readings(asked, got)), strict=True):
+        assert span is not None
+        assert one.beside[0][0][7:9].encode() in got.octets[slice(*span)]
 
 
 def test_change_records_need_one_reading_that_uses_up_all():

@@ -130,8 +130,8 @@ def test_an_n2_answer_is_read_with_its_command() -> None:
     _, named = read(path, F510)
     _, bare = read(path, Devices())
     assert named[5].startswith("1 → motor rated voltage 460 V — AI 2 = 460 ")
-    assert bare[5].startswith("1 → AI 2 = 460 (status 00h in front, tentative) — A 00")
-    assert bare[3].startswith("1 → AI 1 = 1750 status 00h; AI 2 = 460 status 00h; ")
+    assert bare[5].startswith("1 → AI 2 = 460 (status 00h in front, no bit set, tentative) — A 00")
+    assert bare[3].startswith("1 → AI 1 = 1750; AI 2 = 460; ")
 
 
 @pytest.mark.parametrize("name", ["object-named-otherwise"])

@@ -248,3 +248,24 @@ def test_a_function_that_the_manual_does_not_list_is_noted() -> None:
     assert (found.code, found.severity) == ("PR009", Severity.NOTE)
     assert found.seen == "asked with function 04 (hex); its manual lists 03 06 08 10"
     assert not judged(("010325200001", "0103020000"))
+
+
+@pytest.mark.parametrize(
+    ("station", "profile", "codes"),
+    [
+        (248, "teco-e510", []),
+        (254, "teco-e510", []),
+        (255, "teco-e510", ["PR012"]),
+        (251, "automationdirect-acn", ["PR012"]),
+        (250, "automationdirect-acn", []),
+        (248, None, ["MB205"]),
+    ],
+)
+def test_a_device_has_the_numbers_of_its_manual(station: int, profile: str | None, codes: list[str]) -> None:
+    devices = None if profile is None else Devices(default=packaged(profile))
+    session = bus.SESSION
+    judging = Judging(session, dissector_for(session), devices)
+    at = f"{station:02X}"
+    for output in bus.run(bus.chunks((f"{at}03 2520 0001", f"{at}03 02 0005")), session):
+        judging.add(output)
+    assert [one.code for one in judging.findings() if one.code in ("PR012", "MB205")] == codes

@@ -7,10 +7,11 @@ from functools import partial
 
 import pytest
 
+from dissectors.chances import at_least
 from dissectors.findings import Finding, Severity
 from dissectors.frame import Place
 from dissectors.simulated_faults import BitFlips, Break, MarkParity, NoiseInGaps
-from sniff.analysis.shares import at_least, only_struck, standing_out
+from sniff.analysis.shares import only_struck, standing_out
 from sniff.simulation.tap import EXACT, FTDI, UART, TapModel
 from tests.faults.buses import modbus, mstp, n2
 from tests.faults.case import Case

@@ -67,3 +67,22 @@ def test_only_what_is_directly_before_a_late_frame_is_taken_back() -> None:
     _hear(late, slack=90_000_000, rounds=3)
     said = [{one.code: one.count for one in line.findings() if one.code.startswith("LN20")} for line in (kept, late)]
     assert said[0] == said[1]
+
+
+@pytest.mark.parametrize("cut", [2, 3, 6, 7])
+def test_pieces_that_together_are_a_good_frame_are_no_stray_octets(cut: int) -> None:
+    frame, second = bytes.fromhex("01 03 00 00 00 01 84 0A"), 1_000_000_000
+
+    def heard(end: bytes) -> LineFindings:
+        line = _line()
+        for no in range(0, 60, 3):
+            time = no * second
+            line.see(Row(no, Frame("modbus-rtu", frame, time, time, Check.GOOD, FoundBy.GAP), None, None))
+            for place, piece in enumerate((frame[:cut], end), 1):
+                at = time + place * second
+                line.see(Row(no + place, Noise(piece, at, at, Place.BETWEEN, Reason.NO_FRAME), None, None))
+        return line
+
+    strays = "LN203"
+    assert strays not in {one.code for one in heard(frame[cut:]).findings()}
+    assert strays in {one.code for one in heard(bytes(len(frame) - cut)).findings()}

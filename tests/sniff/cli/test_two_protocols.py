@@ -9,6 +9,7 @@ import pytest
 
 from sniff.cli import main
 
+CAPTURES = Path(__file__).parents[3] / "captures"
 READ = "01 03 00 00 00 02 C4 0B", "01 03 04 00 06 00 05 DA 31"
 TOKENS = "55 FF 00 01 02 00 00 40", "55 FF 00 03 04 00 00 04", "55 FF 00 05 06 00 00 C8"
 
@@ -55,5 +56,33 @@ def test_filters_know_both(wanted: str, many: int, log: Path, capsys: pytest.Cap
     assert len(listed(capsys, log, "-Y", wanted)) == many
 
 
+@pytest.mark.parametrize("more", [("-p", "modbus-rtu"), ("-p", "modbus-rtu", "--reference"), ("--reference",)])
+def test_whoever_names_the_first(more: tuple[str, ...], log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert listed(capsys, log, *more) == listed(capsys, log)
+
+
 def test_the_first_alone(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert {row["proto"] for row in listed(capsys, log, "-p", "modbus-rtu")} == {"modbus-rtu", None}
+    rows = listed(capsys, log, "-Y", 'proto == "modbus-rtu"')
+    assert {row["proto"] for row in rows} == {"modbus-rtu"}
+
+
+def second(capsys: pytest.CaptureFixture[str], path: Path, *more: str) -> object:
+    """What `info` says of a second protocol."""
+    assert main(["info", "--json", str(path), *more]) == 0
+    return json.loads(capsys.readouterr().out)["second_protocol"]
+
+
+def test_where_the_file_names_the_first(log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    said = tmp_path / "said.cap.txt"
+    assert main(["convert", str(log), str(said)]) == 0
+    assert "# protocol: modbus-rtu" in said.read_text()
+    capsys.readouterr()
+    told = second(capsys, said)
+    assert told == second(capsys, said, "--reference") == {"protocol": "mstp", "frames": 9}
+    assert sum(row["proto"] == "mstp" for row in listed(capsys, said)) == 9
+    assert second(capsys, said, "-p", "mstp") == {"protocol": "modbus-rtu", "frames": 16}
+
+
+@pytest.mark.parametrize("name", ["rtu-noisy-ftdi", "ascii-usual-faults", "n2-usual-faults", "mstp-usual-faults"])
+def test_none_is_invented(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert second(capsys, CAPTURES / f"{name}.cap.txt") is None

@@ -44,9 +44,9 @@ def test_what_goes_with_each_type(one: Dissector) -> None:
         value = value_of(type)
         right = [name, f"!{name}", f"{name} == {value}", f"{name} in {{{value}}}", f"not {name} in {{{value}}}"]
         if type.kind in (Kind.NUMBER, Kind.STATION, Kind.DURATION, Kind.TIME):
-            right += [f"{name} > {VALUES[type.kind]}", f"{name} in {{{VALUES[type.kind]}..{VALUES[type.kind]}}}"]
+            right += [f"{name} >= {VALUES[type.kind]}", f"{name} in {{{VALUES[type.kind]}..{VALUES[type.kind]}}}"]
         if type.kind in (Kind.TEXT, Kind.OCTETS):
-            right += [f'{name} matches "1"', f"len({name}) > 1", f"{name}[0:1]"]
+            right += [f'{name} matches "."', f"len({name}) > 1", f"{name}[0:1]"]
         for text in right:
             compile_filter(text, dissector, Scope(), others=True)
         for word in type.words:

@@ -108,7 +108,6 @@ NOISE = Row(8, Noise(b"\x00\x00", 2, 3, Place.BETWEEN, Reason.NO_FRAME))
         ("frame.time_relative >= 0", True),
         ("frame.time_delta", False),
         ("test", True),
-        ("modbus-rtu", False),
         ("noise_before && marks", True),  # a name alone asks whether it is there, also for 0
         ("noise_before > 0 || marks > 0", False),
         ("noise", False),

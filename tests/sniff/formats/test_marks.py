@@ -111,6 +111,49 @@ def test_a_recording_holds_marks_that_came_later(capture: Path, tmp_path: Path) 
     assert rows_of(target) == {4: "what was that?"}
 
 
+def test_a_mark_that_a_recording_holds_is_taken_away_beside_it(capture: Path, tmp_path: Path) -> None:
+    held, begins, target = read(capture), starts(capture), tmp_path / "night.mcap"
+    with create_of_items(target, held.session) as writer:
+        last = 0
+        for item in held.items():
+            writer.write(item)
+            last = item.time
+        for place in (3, 5):
+            writer.write(LineEvent(last, LineEventKind.MARK, f"row {place + 1}", last - begins[place]))
+    feed = FileFeed(str(target), opened := read(target), opened.session)
+    feed.mark(begins[3], None)
+    assert rows_of(target) == rows_of(target, reference=True) == {6: "row 6"}
+    feed.mark(begins[3], "after all")
+    assert rows_of(target) == {4: "after all", 6: "row 6"}
+
+
+@pytest.mark.parametrize("follows", [False, True])
+def test_marks_that_others_write_meanwhile_are_seen(capture: Path, follows: bool) -> None:
+    add_mark(capture, 5, "there already")
+    opened = read(capture)
+    feed: FileFeed | LiveFeed = FileFeed(str(capture), opened, opened.session)
+    if follows:
+        model = BusModel(opened.session, dissector_for(opened.session))
+        live: Any = SimpleNamespace(session=opened.session, dissector=model.dissector, model=model, ear=None)
+        live.poll_tables = list
+        feed = LiveFeed(live, follows=str(capture))
+    while feed.poll() or feed.work():
+        pass
+
+    def said() -> list[tuple[int, str]]:
+        return [(one.time, one.text) for one in feed.store.line_events if one.is_mark]
+
+    assert said() == [(5, "there already")]
+    feed.mark(9, "mine")
+    add_mark(capture, 7, "theirs")
+    assert feed.poll()
+    assert not feed.poll()
+    assert said() == [(5, "there already"), (9, "mine"), (7, "theirs")]
+    mark_file(capture).unlink()
+    assert feed.poll()
+    assert said()[3:] == [(5, ""), (7, ""), (9, "")]
+
+
 def test_marks_travel_through_pcapng(capture: Path, tmp_path: Path) -> None:
     begins = starts(capture)
     add_mark(capture, begins[6], "look at this")

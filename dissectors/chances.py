@@ -1,0 +1,25 @@
+"""Chances: how likely it is that so much of what falls anywhere falls on one. Pure."""
+
+from __future__ import annotations
+
+from math import erfc, exp, lgamma, log, log1p, sqrt
+
+_EXACT_MOST = 400
+
+
+def at_least(count: int, of: int, share: float) -> float:
+    """How likely `count` or more of `of` fall on who has that share (0 … 1): the upper tail of the binomial.
+
+    Exact up to 400, by the normal law beyond. 1.0 where it is sure.
+    """
+    if count <= 0 or share >= 1:
+        return 1.0
+    if share <= 0:
+        return 0.0
+    if of > _EXACT_MOST:
+        return erfc((count - 0.5 - of * share) / sqrt(2 * of * share * (1 - share))) / 2
+    whole, hit, missed = lgamma(of + 1), log(share), log1p(-share)
+    terms = (
+        exp(whole - lgamma(k + 1) - lgamma(of - k + 1) + k * hit + (of - k) * missed) for k in range(count, of + 1)
+    )
+    return min(1.0, sum(terms))

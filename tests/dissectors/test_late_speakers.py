@@ -1,0 +1,60 @@
+"""Late speakers: damage that stands while an answer is overdue is told of who is late, noise everywhere of nobody."""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+
+from dissectors.late_speakers import MASTER, Due, Heard, LateSpeaker, LateSpeakers, late_speakers
+
+MS = 1_000_000
+WAIT = 200 * MS
+
+
+def _heard(rate_then: float, rate_elsewhere: float, *, answers: int = 5, octets: bytes = b"") -> list[LateSpeaker]:
+    """A master that waits for station 9 in vain, then asks stations 1 to 4 five times each; how often it is damaged."""
+    late, dice, now = LateSpeakers(), random.Random(7), 0
+    whole = dict.fromkeys(("station 1", "station 2", "station 3", "station 4", MASTER), 0)
+    for _ in range(60):
+        late.unanswered(9, Due(b"\x09"), now, now + 8 * MS, WAIT)
+        whole[MASTER] += 1
+        now += WAIT
+        for turn in range(20):
+            station = 1 + turn % 4
+            is_struck = dice.random() < (rate_then if not turn else rate_elsewhere)
+            if is_struck:
+                late.damaged_answer(station, f"station {station}", octets, now, 1, 2, is_longer=False)
+            else:
+                late.answered(station, f"station {station}", now)
+                whole[f"station {station}"] += 1
+            whole[MASTER] += 1
+            now += 60 * MS
+    return list(late_speakers(late, whole, {9: Heard(answers, 0, 60)}))
+
+
+@pytest.mark.parametrize("then", [0.5, 1.0])
+def test_damage_that_stands_only_while_an_answer_is_overdue_is_the_late_ones(then: float) -> None:
+    (found,) = _heard(then, 0.0)
+    assert (found.station, found.hit, found.is_sure) == (9, {"station 1"}, True)
+
+
+@pytest.mark.parametrize("rate", [0.02, 0.2, 0.6])
+def test_damage_that_stands_anywhere_is_nobodys_late_answer(rate: float) -> None:
+    assert not _heard(rate, rate)
+
+
+def test_who_never_answers_is_believed_to_speak_only_where_its_address_shows_it() -> None:
+    late = LateSpeakers()
+    for turn in range(20):  # whoever is struck is never heard elsewhere
+        late.unanswered(9, Due(b"\x09"), turn * 300 * MS, turn * 300 * MS + MS, WAIT)
+        late.damaged_answer(1, "station 1", b"\x01\x03", turn * 300 * MS + WAIT, 1, is_longer=False)
+    whole = {MASTER: 40}
+    assert not list(late_speakers(late, whole, {9: Heard(0, 0, 20)}))
+    (maybe,) = late_speakers(late, whole, {9: Heard(3, 0, 20)})
+    assert not maybe.is_sure
+    for turn in range(20, 60):
+        late.unanswered(9, Due(b"\x09"), turn * 300 * MS, turn * 300 * MS + MS, WAIT)
+        late.damaged_answer(1, "station 1", b"\x09\x03", turn * 300 * MS + WAIT, 1, is_longer=False)
+    (sure,) = late_speakers(late, whole, {9: Heard(0, 0, 60)})
+    assert sure.is_sure

@@ -1,0 +1,63 @@
+"""Cases of the matrix: a station that answers when its master has given up, into what others send. Whoever is hit is
+innocent: only the late one may be named."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from sniff.simulation.tap import CH340, FTDI, UART, TapModel
+from tests.faults.case import Case, Said
+from tests.faults.workbench import N2, Modbus, by_turns, follower, usual_requests, usual_stations
+
+MS = 1_000_000
+
+_FOUR = (1, 2, 3, 4)
+_late = (Said(("station 2",), ("MB106", "N2014")),)
+_late_or_unasked = (Said(("station 2",), ("N2014", "N2011")),)
+
+
+def _bus(delay: int, *, quantity: int = 24, retries: int = 1, pause: int = 25, is_ascii: bool = False) -> Modbus:
+    """Station 2 answers after `delay` ms; the master waits 200 ms."""
+    return Modbus(
+        (*usual_requests(_FOUR, quantity), *usual_requests((1, 3, 4), 4)),
+        usual_stations(_FOUR, is_ascii=is_ascii, unit_2=delay * MS),
+        retries=retries,
+        pause=pause * MS,
+        is_ascii=is_ascii,
+    )
+
+
+def _n2(delay: int, pause: int) -> N2:
+    """Drive 2 answers after `delay` ms; the master waits 200 ms."""
+    return N2(
+        partial(by_turns, 1, 2, 3, 4, count=2),
+        {
+            f"drive {unit}": partial(follower, unit, (delay if unit == 2 else 10 + unit) * MS, few=True)
+            for unit in (1, 2, 3, 4)
+        },
+        pause=pause * MS,
+        timeout=200 * MS,
+    )
+
+
+def _case(name: str, bus: Modbus | N2, tap: TapModel | None = None) -> Case:
+    made = partial(Case, name, bus, _late, seeds=1, struck=("bus",))
+    return made() if tap is None else made(tap=tap)
+
+
+LATE_CASES: tuple[Case, ...] = (
+    _case("RTU answers into the next station, no repeats", _bus(240, retries=0)),
+    _case("N2 answers into the next station", _n2(250, 15)),
+)
+
+FURTHER_LATE_CASES: tuple[Case, ...] = (
+    _case("RTU answers into its own repeat", _bus(205, pause=5)),
+    _case("RTU answers into the next station", _bus(232)),
+    Case("N2 answers into the next station, FTDI", _n2(225, 30), _late_or_unasked, FTDI, seeds=1, struck=("bus",)),
+    _case("RTU answers one request late", _bus(228, retries=2, pause=5)),
+    _case("RTU answers into the next station, FTDI", _bus(236), FTDI),
+    _case("RTU answers into the next station, CH340", _bus(232), CH340),
+    _case("RTU answers into the next station, UART", _bus(232), UART),
+    _case("RTU long answers into the next station", _bus(222, quantity=100)),
+    _case("ASCII answers into the next station", _bus(240, is_ascii=True, quantity=12)),
+)
