@@ -15,7 +15,7 @@ from dissectors.frame import Chunk
 from dissectors.profiles import Devices
 from sniff.analysis.sanitizing import sanitized
 from sniff.bus.capture_writer import create
-from sniff.bus.offline import Source
+from sniff.bus.offline import ReadSource
 from sniff.cli import UNREADABLE, USAGE, Failure
 from sniff.cli.progress import Watched
 from sniff.devices import noted_devices
@@ -42,7 +42,7 @@ def add_output(parser: argparse.ArgumentParser) -> None:
 def write(
     args: argparse.Namespace,
     session: Session,
-    source: Source,
+    source: ReadSource,
     sources: Sequence[str],
     options: Mapping[str, str] | None = None,
     with_frames: bool = False,
@@ -175,7 +175,7 @@ def _write_items(
             taker.close()
 
 
-def with_comments(capture: Source) -> Source:
+def with_comments(capture: ReadSource) -> ReadSource:
     """What is to be written, with what people wrote into it where it can tell (a text capture)."""
     comments = getattr(capture, "comments", None)
     if comments is None or next(comments(), None) is None:

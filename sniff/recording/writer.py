@@ -64,7 +64,7 @@ def create(path: str | Path, session: Session) -> McapWriter:
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class PartPlace:
     """Where in a recording a part stands: its number, and what the parts before it held of each bus (number of the
     first read, octets)."""
 
@@ -78,7 +78,7 @@ class Place:
         return [{"first_chunk": first, "octets_before": octets} for first, octets in pairs]
 
 
-def create_part(path: str | Path, sessions: Sequence[Session], place: Place) -> McapWriter:
+def create_part(path: str | Path, sessions: Sequence[Session], place: PartPlace) -> McapWriter:
     """The same for a part of a recording, of one bus or of several. Raises CaptureError."""
     return McapWriter(NewFile(Path(path)), *sessions, place=place)
 
@@ -86,9 +86,9 @@ def create_part(path: str | Path, sessions: Sequence[Session], place: Place) -> 
 class McapWriter:
     """Writes a capture that is already there. An empty chunk says nothing and is not written."""
 
-    def __init__(self, file: NewFile, *sessions: Session, place: Place | None = None) -> None:
+    def __init__(self, file: NewFile, *sessions: Session, place: PartPlace | None = None) -> None:
         self._file = file
-        place = place or Place(1, (0,) * len(sessions), (0,) * len(sessions))
+        place = place or PartPlace(1, (0,) * len(sessions), (0,) * len(sessions))
         self._batchers = [Batcher(first) for first in place.first_chunks]
         self._part = PartFile(file.stream, sessions, place.number, place.before())
         self._sequences: dict[str, int] = {}
