@@ -202,7 +202,7 @@ class Items:
 
 def _is_recording(writer: object) -> bool:
     """Whether it takes what is derived."""
-    from sniff.recording.writer import McapWriter
+    from sniff.recording.mcap_writer import McapWriter
 
     return isinstance(writer, McapWriter)
 
@@ -214,8 +214,8 @@ class _Frames:
 
     def __init__(self, writer: object, session: Session) -> None:
         from sniff.recording.frames import SCHEMA, FrameLog
+        from sniff.recording.mcap_writer import McapWriter
         from sniff.recording.topics import FRAMES
-        from sniff.recording.writer import McapWriter
 
         assert isinstance(writer, McapWriter)
         self._writer = writer
@@ -253,7 +253,7 @@ class _Topics:
 
     def __init__(self, writer: object, session: Session, devices: Devices, with_values: bool) -> None:
         from sniff.bus.offline_topics import OfflineTopics
-        from sniff.recording.writer import McapWriter
+        from sniff.recording.mcap_writer import McapWriter
 
         assert isinstance(writer, McapWriter)
         self._writer = writer
@@ -288,7 +288,7 @@ class _Values:
     def __init__(self, writer: object, session: Session, devices: Devices) -> None:
         from sniff.analysis.points import PointReader
         from sniff.bus.value_topics import ValueChannels
-        from sniff.recording.writer import McapWriter
+        from sniff.recording.mcap_writer import McapWriter
 
         assert isinstance(writer, McapWriter)
         self._writer = writer

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sniff.engine.session import Completeness, LineEvent
+from sniff.recording.mcap_writer import PartPlace, create_part
 from sniff.recording.reader import McapCapture, buses_of
-from sniff.recording.writer import PartPlace, create_part
 
 if TYPE_CHECKING:
     from sniff.engine.blocks import Block
