@@ -19,7 +19,7 @@ from dissectors.profiles import Devices
 from sniff import devices as profiles
 from sniff.analysis.points import PointReader
 from sniff.analysis.told_protocol import detected
-from sniff.bus.columns import Column, Columns, Form, TableColumns
+from sniff.bus.columns import Column, ColumnForm, Columns, TableColumns
 from sniff.bus.sample_row import COLUMNS, sample_row
 from sniff.engine.bulk import tables
 from sniff.engine.capture import Capture, CaptureError
@@ -136,11 +136,11 @@ def _column(kind: Kind, cells: Sequence[Any]) -> Column:
     if kind is Kind.TEXT:
         numbers: dict[str, int] = {}
         places = [0 if cell is None else numbers.setdefault(cell, len(numbers)) for cell in kept]
-        return Column(Form.TEXT, np.array(places, np.int32), hole, tuple(numbers))
+        return Column(ColumnForm.TEXT, np.array(places, np.int32), hole, tuple(numbers))
     form, of = {
-        Kind.TIME: (Form.TIME, np.int64),
-        Kind.INTEGER: (Form.INTEGER, np.int64),
-        Kind.NUMBER: (Form.NUMBER, np.float64),
+        Kind.TIME: (ColumnForm.TIME, np.int64),
+        Kind.INTEGER: (ColumnForm.INTEGER, np.int64),
+        Kind.NUMBER: (ColumnForm.NUMBER, np.float64),
     }[kind]
     return Column(form, np.array([0 if cell is None else cell for cell in kept], of), hole)
 
@@ -161,9 +161,9 @@ def _polars(columns: Columns, octets: dict[str, Sequence[bytes]]) -> Any:
         made = pl.Series(name, column.values)
         if column.missing is not None:
             made = pl.select(pl.when(pl.Series(~column.missing)).then(made).alias(name)).to_series()
-        if column.form is Form.TIME:
+        if column.form is ColumnForm.TIME:
             return made.cast(pl.Datetime("ns", "UTC"))
-        if column.form is Form.TEXT:
+        if column.form is ColumnForm.TEXT:
             texts = pl.Series(name, column.texts or [""], dtype=pl.Categorical)
             return texts.gather(made.cast(pl.UInt32))
         return made
@@ -177,16 +177,16 @@ def _pandas(columns: Columns, octets: dict[str, Sequence[bytes]]) -> Any:
 
     def series(column: Column) -> Any:
         missing = column.missing if column.missing is not None else np.zeros(len(column.values), bool)
-        if column.form is Form.TEXT:
+        if column.form is ColumnForm.TEXT:
             return pd.Categorical.from_codes(np.where(missing, -1, column.values), list(column.texts))
-        if column.form is Form.TIME:
+        if column.form is ColumnForm.TIME:
             return pd.DatetimeIndex(column.values.view("M8[ns]"), tz="UTC")
         if column.missing is None:
             return column.values
         array = {
-            Form.INTEGER: pd.arrays.IntegerArray,
-            Form.NUMBER: pd.arrays.FloatingArray,
-            Form.TRUTH: pd.arrays.BooleanArray,
+            ColumnForm.INTEGER: pd.arrays.IntegerArray,
+            ColumnForm.NUMBER: pd.arrays.FloatingArray,
+            ColumnForm.TRUTH: pd.arrays.BooleanArray,
         }
         return array[column.form](column.values, missing)
 

@@ -13,7 +13,7 @@ from typing import Any
 
 from dissectors.bacnet import layout as notation
 from dissectors.bacnet import tags as tagging
-from dissectors.bacnet.layout import Field
+from dissectors.bacnet.layout import LayoutField
 from dissectors.bacnet.property_types import BY_OBJECT, PROPERTY_TYPES
 from dissectors.bacnet.tags import Tag
 from dissectors.bacnet.values import (
@@ -109,7 +109,7 @@ class _Scope:
         if self.names is not None:
             self.names.tags.setdefault(tag.start, text)
 
-    def note(self, field: Field, value: Any) -> None:
+    def note(self, field: LayoutField, value: Any) -> None:
         if isinstance(value, ObjectId) and field.name != "initiating-device-identifier":
             self.object = value
         elif isinstance(value, Enumerated) and field.type == "PropertyIdentifier":
@@ -151,7 +151,7 @@ def decode(layout: str | None, octets: bytes, names: Outline | None = None) -> D
 
 
 def _sequence(
-    fields: Sequence[Field], tags: Sequence[Tag], at: int, scope: _Scope, depth: int
+    fields: Sequence[LayoutField], tags: Sequence[Tag], at: int, scope: _Scope, depth: int
 ) -> tuple[list[tuple[str, Any]], int]:
     entries: list[tuple[str, Any]] = []
     for field in fields:
@@ -169,7 +169,7 @@ def _sequence(
     return entries, at
 
 
-def _fits(field: Field, tags: Sequence[Tag], at: int) -> bool:
+def _fits(field: LayoutField, tags: Sequence[Tag], at: int) -> bool:
     if field.tag is None and (field.item is not None or field.type == "Any"):
         return True
     if at >= len(tags):
@@ -192,7 +192,7 @@ def _fits(field: Field, tags: Sequence[Tag], at: int) -> bool:
     return not parts
 
 
-def _field(field: Field, tags: Sequence[Tag], at: int, scope: _Scope, depth: int) -> tuple[Any, int]:
+def _field(field: LayoutField, tags: Sequence[Tag], at: int, scope: _Scope, depth: int) -> tuple[Any, int]:
     if depth > _DEPTH_MAX:
         raise _Misfit(f"{field.name} is nested too deep")
     if field.tag is None:
@@ -257,7 +257,7 @@ def _in_place(type_name: str, tags: Sequence[Tag], at: int, scope: _Scope, depth
     return record, after
 
 
-def _named(field: Field, value: Any) -> str:
+def _named(field: LayoutField, value: Any) -> str:
     """A part with its value, an enumeration with its number too, as Wireshark has it."""
     shown = show_part(field.name, value)
     is_named = isinstance(value, Enumerated) and shown != str(value.value) and not shown.endswith(str(value.value))
@@ -337,7 +337,7 @@ def encode(layout: str, values: Mapping[str, Any] | ConstructedValue) -> bytes:
     return tagging.write(_encode_sequence(notation.parse(layout), values))
 
 
-def _encode_sequence(fields: Sequence[Field], values: Mapping[str, Any] | ConstructedValue) -> list[Tag]:
+def _encode_sequence(fields: Sequence[LayoutField], values: Mapping[str, Any] | ConstructedValue) -> list[Tag]:
     given = dict(values.entries) if isinstance(values, ConstructedValue) else dict(values)
     tags: list[Tag] = []
     for field in fields:
@@ -351,7 +351,7 @@ def _encode_sequence(fields: Sequence[Field], values: Mapping[str, Any] | Constr
     return tags
 
 
-def _encode_field(field: Field, value: Any) -> list[Tag]:
+def _encode_field(field: LayoutField, value: Any) -> list[Tag]:
     if field.tag is None:
         return _encode_in_place(field.type, value)
     if base(field.type) is not None:

@@ -1,4 +1,4 @@
-"""One exchange that the tracker holds open, and what identifies it."""
+"""Exchanges that the tracker holds open, and what identifies them."""
 
 from __future__ import annotations
 

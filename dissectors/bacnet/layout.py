@@ -20,7 +20,7 @@ _FIELD = re.compile(r"(?:\[(?P<tag>\d+)\])?(?P<optional>\?)?\s*(?P<name>[a-z0-9-
 
 
 @dataclass(frozen=True, slots=True)
-class Field:
+class LayoutField:
     """One parameter of a sequence, or one alternative of a choice."""
 
     name: str
@@ -35,7 +35,7 @@ class Field:
 
 
 @cache
-def parse(layout: str) -> tuple[Field, ...]:
+def parse(layout: str) -> tuple[LayoutField, ...]:
     """The fields of a layout. Raises ValueError when it is not in the notation."""
     fields = []
     for part in layout.split(", ") if layout else ():
@@ -43,17 +43,19 @@ def parse(layout: str) -> tuple[Field, ...]:
         if match is None:
             raise ValueError(f"layout {part!r}: expected [TAG]? NAME TYPE")
         tag = match["tag"]
-        fields.append(Field(match["name"], match["type"], None if tag is None else int(tag), bool(match["optional"])))
+        fields.append(
+            LayoutField(match["name"], match["type"], None if tag is None else int(tag), bool(match["optional"]))
+        )
     return tuple(fields)
 
 
-def sequence(type_name: str) -> tuple[Field, ...] | None:
+def sequence(type_name: str) -> tuple[LayoutField, ...] | None:
     """The fields of a sequence type, None for other types."""
     layout = SEQUENCES.get(type_name)
     return None if layout is None else parse(layout)
 
 
-def choice(type_name: str) -> tuple[Field, ...] | None:
+def choice(type_name: str) -> tuple[LayoutField, ...] | None:
     """The alternatives of a choice type, None for other types."""
     layout = CHOICES.get(type_name)
     return None if layout is None else parse(layout)

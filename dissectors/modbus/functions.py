@@ -27,7 +27,7 @@ from dissectors.modbus.shapes import Shape, shape_of
 
 
 @dataclass(frozen=True, slots=True)
-class Form:
+class DirectionForm:
     """One direction of a function: how long its frame is, and how well formed a complete one looks."""
 
     length: Length
@@ -45,14 +45,14 @@ class Function:
     code: int
     name: str
     short: str
-    request: Form
-    response: Form
+    request: DirectionForm
+    response: DirectionForm
     writes: bool = False
     echoes: bool = False
 
 
-def _form(message: Message) -> Form:
-    return Form(length_of(message), shape_of(message))
+def _form(message: Message) -> DirectionForm:
+    return DirectionForm(length_of(message), shape_of(message))
 
 
 FUNCTIONS: Final[Mapping[int, Function]] = {

@@ -25,7 +25,7 @@ from dissectors.modbus.functions import (
 )
 from dissectors.modbus.layout import MESSAGES
 from dissectors.modbus.lengths import MAX_FRAME, MORE, NEVER, most_of
-from dissectors.modbus.notation import CHECK, HEAD, Means, Message, Place, counted, fixed_length
+from dissectors.modbus.notation import CHECK, HEAD, FieldPlace, Means, Message, counted, fixed_length
 from dissectors.modbus.notation import places as places_of
 from dissectors.modbus.shapes import held, told
 
@@ -246,7 +246,7 @@ def _among(numbers: Numbers, values: Collection[int]) -> Masks:
     return np.isin(numbers, tuple(values))
 
 
-def _number(octets: Octets, places: Times, place: Place) -> Numbers:
+def _number(octets: Octets, places: Times, place: FieldPlace) -> Numbers:
     return _word(octets, places, place.at) if place.field.size == 2 else octets[places + place.at].astype(np.int32)
 
 

@@ -12,9 +12,9 @@ from typing import Final
 from dissectors.modbus.notation import (
     CHECK,
     Counted,
+    FieldPlace,
     Means,
     Message,
-    Place,
     counted,
     first,
     fixed_length,
@@ -129,5 +129,5 @@ def _walked(message: Message) -> Length:
     return length
 
 
-def _head_of(groups: Place) -> int:
+def _head_of(groups: FieldPlace) -> int:
     return sum(each.size for each in groups.field.group if not each.is_list)

@@ -105,7 +105,7 @@ class Messages:
     repeats: int = 0
 
 
-class Place(NamedTuple):
+class FieldPlace(NamedTuple):
     """A field and where it stands: `at` octets from the unit."""
 
     at: int
@@ -117,10 +117,10 @@ class Counted:
     """What a byte count counts. `beside`: octets of single fields between it and the list `items`. `quantity`: the
     field that tells the number of items, where one does."""
 
-    count: Place
+    count: FieldPlace
     beside: int
     items: Field
-    quantity: Place | None
+    quantity: FieldPlace | None
 
     @property
     def start(self) -> int:
@@ -167,21 +167,21 @@ class Group(NamedTuple):
         return self.size
 
 
-def places(message: Message) -> tuple[Place, ...]:
+def places(message: Message) -> tuple[FieldPlace, ...]:
     """The fields that always stand at the same place; the list that fills the rest is the last of them."""
     found, at = [], HEAD
     for each in message:
-        found.append(Place(at, each))
+        found.append(FieldPlace(at, each))
         at += each.size
     return tuple(found)
 
 
-def first(message: Message, means: Means) -> Place | None:
+def first(message: Message, means: Means) -> FieldPlace | None:
     """The first field that means that."""
     return next((place for place in places(message) if place.field.means is means), None)
 
 
-def last(message: Message, means: Means) -> Place | None:
+def last(message: Message, means: Means) -> FieldPlace | None:
     """The last field that means that: of a message that reads and writes, what is written."""
     return next((place for place in reversed(places(message)) if place.field.means is means), None)
 

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from typing import Final, NamedTuple
 
 from dissectors.modbus.layout import MESSAGES
-from dissectors.modbus.notation import Field, Means, Message, Messages, Place, counted, first
+from dissectors.modbus.notation import Field, FieldPlace, Means, Message, Messages, counted, first
 
 
 class Number(NamedTuple):
@@ -44,7 +44,7 @@ def _range(message: Message, writes: bool) -> Range | None:
     return Range(address, quantity, single) if address or quantity else None
 
 
-def _plain(place: Place | None) -> Number | None:
+def _plain(place: FieldPlace | None) -> Number | None:
     return None if place is None else Number(place.at, place.field.size)
 
 

@@ -11,7 +11,7 @@ from math import log2
 from typing import Final, NamedTuple
 
 from dissectors.modbus.lengths import MAX_FRAME, Octets
-from dissectors.modbus.notation import CHECK, Counted, Group, Means, Message, Place, counted, places
+from dissectors.modbus.notation import CHECK, Counted, FieldPlace, Group, Means, Message, counted, places
 
 Shape = Callable[[Octets, int, int], int]
 """(octets, start, length) → bits: how rarely random octets look so well formed (0 … 12), negative when they break
@@ -58,7 +58,7 @@ def told(message: Message) -> tuple[int, int]:
     return (bits if rules else 0), IMPLAUSIBLE * min(2, sum(rule.asks for rule in rules))
 
 
-def held(message: Message) -> tuple[tuple[Place, Collection[int]], ...]:
+def held(message: Message) -> tuple[tuple[FieldPlace, Collection[int]], ...]:
     """The fields that are held to some values, and these values."""
     count = counted(message)
     end = count.count.at if count is not None else MAX_FRAME  # the byte count itself holds a quantity behind it
@@ -128,7 +128,7 @@ def _all_held(holds: list[Test], bits: int, penalty: int) -> Shape:
     return shape
 
 
-def _among(place: Place, values: Collection[int]) -> ShapeRule:
+def _among(place: FieldPlace, values: Collection[int]) -> ShapeRule:
     """The field has one of these values."""
     at, size = place.at, place.field.size
     listed = values if isinstance(values, range) else frozenset(values)
@@ -149,7 +149,7 @@ def _among(place: Place, values: Collection[int]) -> ShapeRule:
     return ShapeRule(word_within if isinstance(values, range) else word_listed, bits)
 
 
-def _agreeing(count: Counted, quantity: Place) -> ShapeRule:
+def _agreeing(count: Counted, quantity: FieldPlace) -> ShapeRule:
     """The byte count is what so many items take, and the single fields before them."""
     at, size, beside, of = count.count.at, count.count.field.size, count.beside, quantity.at
     bits = count.items.bits

@@ -120,7 +120,7 @@ def parse_diagnosis(data: bytes) -> Diagnosis | None:
 
 
 @dataclass(frozen=True, slots=True)
-class Block:
+class DiagnosisBlock:
     """A block of extended diagnosis: octets [begin, end) of those behind the standard ones, and what they say.
 
     `module`, `channel`, `error`: of a channel's. `is_cut`: it is longer than what is there.
@@ -141,9 +141,9 @@ def blocks(octets: bytes) -> tuple[str, ...]:
     return tuple(block.words for block in parse_blocks(octets))
 
 
-def parse_blocks(octets: bytes) -> tuple[Block, ...]:
+def parse_blocks(octets: bytes) -> tuple[DiagnosisBlock, ...]:
     """Blocks of extended diagnosis; total."""
-    found: list[Block] = []
+    found: list[DiagnosisBlock] = []
     at = 0
     while at < len(octets):
         header = octets[at]
@@ -155,14 +155,14 @@ def parse_blocks(octets: bytes) -> tuple[Block, ...]:
     return tuple(found)
 
 
-def _block(kind: int, low: int, octets: bytes, at: int, is_cut: bool) -> Block:
+def _block(kind: int, low: int, octets: bytes, at: int, is_cut: bool) -> DiagnosisBlock:
     end, cut = at + len(octets), " (cut off)" if is_cut else ""
     if kind == 2:
         return _channel(octets, at)
     if kind == 3:
-        return Block(at, end, "revision", f"revision {low}")
+        return DiagnosisBlock(at, end, "revision", f"revision {low}")
     title, words = ("modules", _modules(octets[1:])) if kind else ("device", _device(octets[1:]))
-    return Block(at, end, title, words + cut, is_cut=is_cut)
+    return DiagnosisBlock(at, end, title, words + cut, is_cut=is_cut)
 
 
 def _device(content: bytes) -> str:
@@ -177,11 +177,11 @@ def _modules(content: bytes) -> str:
     return f"modules with a diagnosis: {', '.join(faulty)}" if faulty else "no module with a diagnosis"
 
 
-def _channel(block: bytes, at: int) -> Block:
+def _channel(block: bytes, at: int) -> DiagnosisBlock:
     if len(block) < 3:
-        return Block(at, at + len(block), "channel", f"channel: cut off ({block.hex(' ')})", is_cut=True)
+        return DiagnosisBlock(at, at + len(block), "channel", f"channel: cut off ({block.hex(' ')})", is_cut=True)
     direction, channel = _DIRECTIONS[block[1] >> 6], block[1] & 0x3F
     code = block[2] & 0x1F
     error = _ERRORS.get(code, f"error {code}" if code < 16 else f"maker's error {code}")
     words = f"module {block[0] & 0x3F}, {direction}channel {channel} ({_CHANNEL_TYPES[block[2] >> 5]}): {error}"
-    return Block(at, at + 3, "channel", words, block[0] & 0x3F, channel, error)
+    return DiagnosisBlock(at, at + 3, "channel", words, block[0] & 0x3F, channel, error)

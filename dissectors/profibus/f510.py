@@ -1,4 +1,4 @@
-"""What a TECO F510 tells and takes by its PROFIBUS card: sixteen words each way (manual, 1.3.6 and 1.3.7)."""
+"""Outputs to a TECO F510 and its inputs by its PROFIBUS card: sixteen words each way (manual, 1.3.6 and 1.3.7)."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ from dissectors.frame import Event, Frame, Header, Role
 from dissectors.line import NS_PER_S, Timing
 from dissectors.profibus.configuration import parse_configuration
 from dissectors.profibus.diagnosis import CONFIGURATION_FAULT, PARAMETER_FAULT
-from dissectors.profibus.record import Record, joined
+from dissectors.profibus.record import RequestsRecord, joined
 from dissectors.profibus.ring import Ring
 from dissectors.profibus.rules import RULES, usual_tsdr
 from dissectors.profibus.slave_watch import SlaveView
@@ -42,7 +42,7 @@ class ProfibusFindings:
         self._usual, self._tolerance = timing.line.bits(usual_tsdr(timing.line.baud)), timing.line.bits(_TOLERANCE)
         self._most: Callable[[int], int | None] | None = None
         self._limits: dict[int, int] = {}
-        self.records: dict[int, Record] = defaultdict(Record)
+        self.records: dict[int, RequestsRecord] = defaultdict(RequestsRecord)
         self._noted: dict[tuple[Notice, int], Tally] = defaultdict(Tally)
         self._diagnosed: dict[int, dict[str, Tally]] = defaultdict(lambda: defaultdict(Tally))
         self._damaged = Tally()
@@ -133,7 +133,7 @@ class ProfibusFindings:
         yield from self._of_damage()
         yield from self._of_masters()
 
-    def _of_exchanges(self, who: Subject, record: Record) -> Iterator[Finding]:
+    def _of_exchanges(self, who: Subject, record: RequestsRecord) -> Iterator[Finding]:
         silent, total = record.unanswered, record.requests
         if silent.count and not record.answers and silent.count >= _LEAST:
             grave = Severity.ERROR if record.fresh >= _LEAST_FRESH else Severity.NOTE

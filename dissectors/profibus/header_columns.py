@@ -1,4 +1,4 @@
-"""What `peek` says of many good telegrams at once.
+"""Headers of many good telegrams at once, as `peek` gives each.
 
 Role, kind, function, access point and refusal depend on a few octets at the begin of a telegram: the same are asked
 once. Telegrams with unusual address extensions, and those whose data tell the service (connections of DP-V1), are

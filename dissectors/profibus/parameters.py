@@ -1,4 +1,4 @@
-"""What a master gives to a slave: Set_Prm, Global_Control, Set_Slave_Add (IEC 61158-6-3; notes of pyprofibus)."""
+"""Parameters from a master to a slave: Set_Prm, Global_Control, Set_Slave_Add (IEC 61158-6-3; notes of pyprofibus)."""
 
 from __future__ import annotations
 

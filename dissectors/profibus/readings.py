@@ -1,4 +1,4 @@
-"""What exchanges tell: the words of cyclic inputs and outputs, high octet first.
+"""Readings of exchanges: the words of cyclic inputs and outputs, high octet first.
 
 `space` is "dp-input" or "dp-output", `address` the word, from 0. Data of an odd number of octets are told octet by
 octet ("dp-input-octet"): only configuration and GSD say what they are. A diagnosis tells "dp-ident" 0.

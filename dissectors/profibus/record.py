@@ -1,4 +1,4 @@
-"""What is gathered of one station for the rules."""
+"""Record of one station, gathered for the rules."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _LISTENED = frozenset((Verdict.ANSWERED, Verdict.RETRY, Verdict.EXCEPTION, Verdi
 
 
 @dataclass(slots=True)
-class Record:
+class RequestsRecord:
     """Requests to a station and what became of them.
 
     `repeats`: of all kinds; `worst`: in a row, at most. `repeated`: those of requests that were answered well here.

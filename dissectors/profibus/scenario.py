@@ -8,7 +8,7 @@ from functools import partial
 from dissectors.frame import Place
 from dissectors.line import MS, LineSettings
 from dissectors.profibus.f510 import RUN, drive, outputs
-from dissectors.profibus.simulated_master import Job, Master, Ring
+from dissectors.profibus.simulated_master import Job, Master, RingBehaviour
 from dissectors.profibus.simulated_slave import Slave
 from dissectors.simulated import Party, SimulatedBus
 from dissectors.simulated_faults import BitFlips, LostResponse, NoiseInGaps
@@ -32,7 +32,7 @@ def _parties(line: LineSettings, faults: bool) -> list[Party]:
     jobs = [Job(5, outputs=partial(running, 45.0)), Job(6, outputs=partial(running, 30.0))]
     if faults:
         jobs.append(Job(9))
-    ring = Ring(cycle=max(20 * MS, 400 * line.char))
+    ring = RingBehaviour(cycle=max(20 * MS, 400 * line.char))
     controller = Master(1, line, jobs, others=(2,), ring=ring)
     second = Master(2, line, [Job(12, 0x80C8, b"\x11\x20", valve, user=b"")], others=(1,), ring=ring)
     trouble: Callable[[int], bytes] = line_break if faults else no_trouble

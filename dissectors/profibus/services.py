@@ -1,4 +1,4 @@
-"""What a telegram is for: the DP service by its service access points (IEC 61158-5-3; notes of pyprofibus)."""
+"""DP services: what a telegram is for, by its service access points (IEC 61158-5-3; notes of pyprofibus)."""
 
 from __future__ import annotations
 

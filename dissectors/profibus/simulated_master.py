@@ -87,7 +87,7 @@ class _Waiting:
 
 
 @dataclass(frozen=True, slots=True)
-class Ring:
+class RingBehaviour:
     """How a master behaves in its ring.
 
     `slot`: bit times that it waits for an answer. `highest`: address up to which GAP is polled. `gap_every`: rounds
@@ -132,12 +132,12 @@ class Master:
         line: LineSettings,
         jobs: Sequence[Job],
         others: Sequence[int] = (),
-        ring: Ring | None = None,
+        ring: RingBehaviour | None = None,
     ) -> None:
         self.address = address
         self._line = line
         self._jobs = list(jobs)
-        self._ring = ring or Ring()
+        self._ring = ring or RingBehaviour()
         self._others = sorted(others)
         above = [one for one in self._others if one > address]
         self._life = _Life((above or self._others or [address])[0])

@@ -1,4 +1,4 @@
-"""What a simulated station makes of a burst: the good telegrams in it, in order."""
+"""Good telegrams in a burst, in order, as a simulated station hears them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How each slave came up and fell back, with times: its state machine as the bus shows it."""
+"""State machine of each slave as the bus shows it: how it came up and fell back, with times."""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ class ProfileError(ValueError):
     """A profile that cannot be used; the message names file, key and what was expected."""
 
 
-class Table:
+class CheckedTable:
     """One table of a document. `path`: where it is ("modbus.register[3]"), empty for the document itself."""
 
     def __init__(self, origin: str, path: str, data: Mapping[str, Any]) -> None:
@@ -54,7 +54,7 @@ class Table:
         return value
 
     def choice(self, key: str, known: Iterable[str], default: str) -> str:
-        """One of some words."""
+        """The text under a key, one of the words that are known there."""
         value, words = self.text(key, default), tuple(known)
         if value not in words:
             raise self.error(key, f"{value!r}: expected one of {', '.join(words)}")
@@ -90,18 +90,18 @@ class Table:
             found[number] = value
         return found
 
-    def tables_by_number(self, key: str) -> dict[int, Table]:
+    def tables_by_number(self, key: str) -> dict[int, CheckedTable]:
         """A table of tables by number; empty when absent."""
         found = {}
         for number, value in self.numbered(key).items():
             if not isinstance(value, dict):
                 raise self.error(f"{key}.{number}", f"expected a table, not {value!r}")
-            found[number] = Table(self.origin, f"{self.path}.{key}.{number}", value)
+            found[number] = CheckedTable(self.origin, f"{self.path}.{key}.{number}", value)
         return found
 
-    def with_usual(self, **values: Any) -> Table:
+    def with_usual(self, **values: Any) -> CheckedTable:
         """The same table with values for keys that it does not have."""
-        return Table(self.origin, self.path, {**values, **self.data})
+        return CheckedTable(self.origin, self.path, {**values, **self.data})
 
     def words(self, key: str) -> dict[int, str]:
         """A table of texts by number; empty when absent."""
@@ -130,21 +130,21 @@ class Table:
             raise self.error(key, "has a number twice")
         return tuple(found)
 
-    def table(self, key: str) -> Table:
+    def table(self, key: str) -> CheckedTable:
         """A table in this one, empty when absent."""
         value = self._value(key, {})
         if not isinstance(value, dict):
             raise self.error(key, f"expected a table, not {value!r}")
-        return Table(self.origin, f"{self.path}.{key}" if self.path else key, value)
+        return CheckedTable(self.origin, f"{self.path}.{key}" if self.path else key, value)
 
-    def tables(self, key: str) -> Iterator[Table]:
+    def tables(self, key: str) -> Iterator[CheckedTable]:
         """The tables of an array [[key]]."""
         value = self._value(key, [])
         if not isinstance(value, list) or not all(isinstance(item, dict) for item in value):
             raise self.error(key, f"expected tables [[{key}]]")
         prefix = f"{self.path}.{key}" if self.path else key
         for number, item in enumerate(value, 1):
-            yield Table(self.origin, f"{prefix}[{number}]", item)
+            yield CheckedTable(self.origin, f"{prefix}[{number}]", item)
 
     def finish(self) -> None:
         """Complain of the first key that nobody asked for."""

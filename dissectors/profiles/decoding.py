@@ -12,7 +12,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
-from dissectors.profiles.model import Entry, Kind, Profile, Role
+from dissectors.profiles.model import Entry, EntryRole, Kind, Profile
 from dissectors.readings import Origin, Reading
 
 MOST_WORDS = 128
@@ -106,7 +106,7 @@ def phrase(value: Value) -> str:
     entry = value.entry
     if entry is None:
         return f"{value.name} {value.text}"
-    if entry.role is Role.COMMAND and entry.bits:
+    if entry.role is EntryRole.COMMAND and entry.bits:
         return value.text
     if value.words == f"no {entry.title}":
         return value.words  # which says what of

@@ -50,7 +50,7 @@ class Access(Enum):
         return self is not Access.READ
 
 
-class Role(Enum):
+class EntryRole(Enum):
     """What an entry is for, where that matters to a rule."""
 
     VALUE = "value"
@@ -71,11 +71,11 @@ class Bit:
     name: str
     on: str
     off: str = ""
-    role: Role = Role.VALUE
+    role: EntryRole = EntryRole.VALUE
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class BitField:
     """Several bits of a register that are one number: bits `low` … `high`, `states` its values in words.
 
     `roles`: those of its values that say that the device has a fault, or warns.
@@ -85,7 +85,7 @@ class Part:
     high: int
     name: str
     states: Mapping[int, str]
-    roles: Mapping[int, Role] = field(default_factory=dict)
+    roles: Mapping[int, EntryRole] = field(default_factory=dict)
 
     def of(self, raw: int) -> int:
         """The number that these bits make."""
@@ -121,7 +121,7 @@ class Entry:
     low: float | None = None
     high: float | None = None
     access: Access = Access.BOTH
-    role: Role = Role.VALUE
+    role: EntryRole = EntryRole.VALUE
     reserved: bool = False
     states: Mapping[int, str] = field(default_factory=dict)
     states_from: str = ""
@@ -131,7 +131,7 @@ class Entry:
     version: bool = False
     default: float | None = None
     bits: tuple[Bit, ...] = ()
-    parts: tuple[Part, ...] = ()
+    parts: tuple[BitField, ...] = ()
     doubt: str = ""
 
     @property

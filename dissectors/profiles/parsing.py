@@ -8,8 +8,8 @@ from dataclasses import replace
 from typing import Any
 
 from dissectors.line import MS
-from dissectors.profiles.checked import ProfileError, Table
-from dissectors.profiles.model import Access, Bit, Entry, Kind, Limits, Part, Profile, Role, Sign
+from dissectors.profiles.checked import CheckedTable, ProfileError
+from dissectors.profiles.model import Access, Bit, BitField, Entry, EntryRole, Kind, Limits, Profile, Sign
 
 REGISTER_TABLES = ("holding", "input")
 BIT_TABLES = ("coil", "discrete")
@@ -19,7 +19,7 @@ _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.+-]*")
 
 def parse(data: Mapping[str, Any], origin: str) -> Profile:
     """The profile of a document; `origin` is what errors call the file. Raises ProfileError."""
-    top = Table(origin, "", data)
+    top = CheckedTable(origin, "", data)
     name = _name(top, "name")
     modbus, n2, bacnet = top.table("modbus"), top.table("n2"), top.table("bacnet")
     profibus = top.table("profibus")
@@ -57,7 +57,7 @@ def parse(data: Mapping[str, Any], origin: str) -> Profile:
 # --- Modbus ----------------------------------------------------------------------------------------------------------
 
 
-def _modbus(modbus: Table) -> tuple[list[Entry], tuple[str, ...]]:
+def _modbus(modbus: CheckedTable) -> tuple[list[Entry], tuple[str, ...]]:
     """Registers first, then the parameters that no register describes; and the parameters without a register."""
     offset = modbus.whole("address-offset", 0)
     tables = modbus.texts("tables", ("holding",))
@@ -79,7 +79,7 @@ def _modbus(modbus: Table) -> tuple[list[Entry], tuple[str, ...]]:
     return entries, tuple(absent)
 
 
-def _register(table: Table, space: str, offset: int, modbus: Table) -> Entry:
+def _register(table: CheckedTable, space: str, offset: int, modbus: CheckedTable) -> Entry:
     address = table.whole("address")
     wire = address + offset
     if not 0 <= wire <= 0xFFFF:
@@ -87,7 +87,7 @@ def _register(table: Table, space: str, offset: int, modbus: Table) -> Entry:
     return _entry(table, space, wire, f"{address:04X}h", modbus)
 
 
-def _reserved(modbus: Table) -> tuple[tuple[int, int], ...]:
+def _reserved(modbus: CheckedTable) -> tuple[tuple[int, int], ...]:
     """Spans [first, last] of registers that nobody may write, as on the wire."""
     offset, spans = modbus.whole("address-offset", 0), []
     for table in modbus.tables("reserved"):
@@ -99,7 +99,9 @@ def _reserved(modbus: Table) -> tuple[tuple[int, int], ...]:
     return tuple(spans)
 
 
-def _parameters(table: Table, offset: int, tables: tuple[str, ...], modbus: Table) -> tuple[list[Entry], list[str]]:
+def _parameters(
+    table: CheckedTable, offset: int, tables: tuple[str, ...], modbus: CheckedTable
+) -> tuple[list[Entry], list[str]]:
     """A group of parameters whose register is `base` plus the parameter's number."""
     prefix, base, digits = table.text("prefix"), table.whole("base"), table.whole("digits", 2)
     title = table.text("title", "parameter")
@@ -132,21 +134,21 @@ def _parameters(table: Table, offset: int, tables: tuple[str, ...], modbus: Tabl
 # --- objects ---------------------------------------------------------------------------------------------------------
 
 
-def _n2_place(table: Table) -> tuple[str, int]:
+def _n2_place(table: CheckedTable) -> tuple[str, int]:
     space, _, number = table.text("object").partition(" ")
     if space not in N2_REGIONS or not number.isdigit() or int(number) > 255:
         raise table.error("object", f'expected "AI 1": one of {", ".join(N2_REGIONS)} and 0 … 255')
     return space, int(number)
 
 
-def _bacnet_place(table: Table) -> tuple[str, int]:
+def _bacnet_place(table: CheckedTable) -> tuple[str, int]:
     space, _, number = table.text("object").partition(" ")
     if not re.fullmatch(r"[a-z][a-z-]*", space) or not number.isdigit() or int(number) > 0x3FFFFF:
         raise table.error("object", 'expected "analog-input 0": object type and instance')
     return space, int(number)
 
 
-def _word_place(table: Table) -> tuple[str, int, str]:
+def _word_place(table: CheckedTable) -> tuple[str, int, str]:
     """ "input 3" → the table of cyclic words, the place in it, and what people call it."""
     told = table.text("word")
     direction, _, number = told.partition(" ")
@@ -155,7 +157,7 @@ def _word_place(table: Table) -> tuple[str, int, str]:
     return f"dp-{direction}", int(number), told
 
 
-def _object(table: Table, place: tuple[str, int], n2: bool = False) -> Entry:
+def _object(table: CheckedTable, place: tuple[str, int], n2: bool = False) -> Entry:
     space, address = place
     binary = space in ("BI", "BO") or space.startswith("binary-")
     return _entry(table, space, address, f"{space} {address}", None, Kind.BIT if binary else Kind.REAL)
@@ -164,7 +166,14 @@ def _object(table: Table, place: tuple[str, int], n2: bool = False) -> Entry:
 # --- what registers and objects share --------------------------------------------------------------------------------
 
 
-def _entry(table: Table, space: str, address: int, number: str, modbus: Table | None, usual: Kind = Kind.U16) -> Entry:
+def _entry(
+    table: CheckedTable,
+    space: str,
+    address: int,
+    number: str,
+    modbus: CheckedTable | None,
+    usual: Kind = Kind.U16,
+) -> Entry:
     orders = ("high-first", "low-first")
     word_order = modbus.choice("word-order", orders, "high-first") if modbus else "high-first"
     octet_order = modbus.choice("octet-order", orders, "high-first") if modbus else "high-first"
@@ -191,7 +200,7 @@ def _entry(table: Table, space: str, address: int, number: str, modbus: Table | 
         low=low,
         high=high,
         access=Access(table.choice("access", [access.value for access in Access], "rw")),
-        role=Role(table.choice("role", [role.value for role in Role], "value")),
+        role=EntryRole(table.choice("role", [role.value for role in EntryRole], "value")),
         reserved=reserved,
         states=states,
         reserved_codes=frozenset(empty),
@@ -208,20 +217,22 @@ def _entry(table: Table, space: str, address: int, number: str, modbus: Table | 
     return entry
 
 
-def _bits(table: Table) -> tuple[Bit, ...]:
+def _bits(table: CheckedTable) -> tuple[Bit, ...]:
     roles = _roles(table, "bits")
     bits = tuple(_bit(table, number, value) for number, value in sorted(table.numbered("bits").items()))
     if unnamed := set(roles) - {bit.number for bit in bits}:
         raise table.error(f"{roles[min(unnamed)].value}-bits", f"bit {min(unnamed)} has no name in bits")
-    return tuple(replace(bit, role=roles.get(bit.number, Role.VALUE)) for bit in bits)
+    return tuple(replace(bit, role=roles.get(bit.number, EntryRole.VALUE)) for bit in bits)
 
 
-def _roles(table: Table, what: str) -> dict[int, Role]:
+def _roles(table: CheckedTable, what: str) -> dict[int, EntryRole]:
     """Bits or states that say that the device has a fault, or warns: `fault-bits`, `alarm-states` …"""
-    return {number: role for role in (Role.FAULT, Role.ALARM) for number in table.numbers(f"{role.value}-{what}")}
+    return {
+        number: role for role in (EntryRole.FAULT, EntryRole.ALARM) for number in table.numbers(f"{role.value}-{what}")
+    }
 
 
-def _bit(table: Table, number: int, value: Any) -> Bit:
+def _bit(table: CheckedTable, number: int, value: Any) -> Bit:
     """ "S1" (named and said so), or ["run", "run", "stop"]: name, words for 1, words for 0."""
     if not 0 <= number <= 31:
         raise table.error(f"bits.{number}", "expected a bit number 0 … 31")
@@ -233,12 +244,12 @@ def _bit(table: Table, number: int, value: Any) -> Bit:
     raise table.error(f"bits.{number}", f'expected "name" or ["name", "on", "off"], not {value!r}')
 
 
-def _part(table: Table) -> Part:
+def _part(table: CheckedTable) -> BitField:
     low, high = table.pair("bits")
     if low is None or high is None or not 0 <= low <= high <= 31:
         raise table.error("bits", "expected [lowest, highest] within 0 … 31")
     states = table.words("states")
-    part = Part(int(low), int(high), _name(table, "name"), states, _roles(table, "states"))
+    part = BitField(int(low), int(high), _name(table, "name"), states, _roles(table, "states"))
     table.finish()
     return part
 
@@ -280,7 +291,7 @@ def _like(entry: Entry, other: Entry) -> Entry:
 # --- the rest of a profile -------------------------------------------------------------------------------------------
 
 
-def _limits(table: Table) -> Limits:
+def _limits(table: CheckedTable) -> Limits:
     frame = table.whole("frame") if "frame" in table else None
     response = table.number("response-ms") if "response-ms" in table else None
     if (frame is not None and frame < 1) or (response is not None and response <= 0):
@@ -301,7 +312,7 @@ def _limits(table: Table) -> Limits:
     )
 
 
-def _sign(table: Table, modbus: Table) -> Sign:
+def _sign(table: CheckedTable, modbus: CheckedTable) -> Sign:
     if "register" in table:
         space, address = "holding", table.whole("register") + modbus.whole("address-offset", 0)
     else:
@@ -315,11 +326,11 @@ def _sign(table: Table, modbus: Table) -> Sign:
     return sign
 
 
-def _properties(table: Table) -> dict[str, tuple[str, ...]]:
+def _properties(table: CheckedTable) -> dict[str, tuple[str, ...]]:
     return {key: table.texts(key) for key in table.data}
 
 
-def _constants(table: Table) -> dict[str, str | int]:
+def _constants(table: CheckedTable) -> dict[str, str | int]:
     return {key: table.whole(key) if isinstance(value, int) else table.text(key) for key, value in table.data.items()}
 
 
@@ -350,7 +361,7 @@ def is_name(text: str) -> bool:
     return _NAME.fullmatch(text) is not None
 
 
-def _name(table: Table, key: str) -> str:
+def _name(table: CheckedTable, key: str) -> str:
     name = table.text(key)
     if not is_name(name):
         raise table.error(key, f"{name!r}: expected letters, digits, dots and hyphens")
@@ -361,7 +372,7 @@ def _slug(words: str) -> str:
     return re.sub(r"[^a-z0-9]+", "-", words.lower()).strip("-") or "bit"
 
 
-def _whole(table: Table, key: str, value: Any) -> int:
+def _whole(table: CheckedTable, key: str, value: Any) -> int:
     if not isinstance(value, int) or isinstance(value, bool):
         raise table.error(key, f"expected a whole number, not {value!r}")
     return value

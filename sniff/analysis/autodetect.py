@@ -111,7 +111,7 @@ class Candidature:
         )
 
 
-class Evidence:
+class CandidateEvidence:
     """One stay at one candidate: all protocols side by side."""
 
     def __init__(self, line: LineSettings, protocols: Sequence[str], latency: int) -> None:
@@ -254,10 +254,10 @@ class Detecting:
     _hinted: list[LineSettings] = field(default_factory=list)
     _was_hinted: set[LineSettings] = field(default_factory=set)
     _refused: set[LineSettings] = field(default_factory=set)
-    _evidence: Evidence = field(init=False)
+    _evidence: CandidateEvidence = field(init=False)
 
     def __post_init__(self) -> None:
-        self._evidence = Evidence(self.lines[0], self.protocols, self.latency)
+        self._evidence = CandidateEvidence(self.lines[0], self.protocols, self.latency)
 
     @property
     def wanted(self) -> LineSettings:
@@ -265,7 +265,7 @@ class Detecting:
         return self._evidence.line
 
     @property
-    def current(self) -> Evidence:
+    def current(self) -> CandidateEvidence:
         """What the present candidate has shown."""
         return self._evidence
 
@@ -334,7 +334,7 @@ class Detecting:
         line = self._hinted.pop() if self._hinted else self._following()
         while line in self._refused and len(self._refused) < len(self.lines):
             line = self._following()
-        self._evidence = Evidence(line, self.protocols, self.latency)
+        self._evidence = CandidateEvidence(line, self.protocols, self.latency)
 
     def _following(self) -> LineSettings:
         self._index += 1

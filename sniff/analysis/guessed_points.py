@@ -13,8 +13,8 @@ from dissectors.profiles import Devices
 from dissectors.profiles.decoding import plain_name
 from dissectors.profiles.model import Kind
 from sniff.analysis.points import Key, Point, PointTable, station_name
-from sniff.analysis.register_guess import RegisterGuess, Sure, Use, guessed, read_as
-from sniff.analysis.register_series import WORD_SPACES, Block, RegisterSeries, covering
+from sniff.analysis.register_guess import GuessSureness, RegisterGuess, Use, guessed, read_as
+from sniff.analysis.register_series import WORD_SPACES, RegisterSeries, RegisterStretch, covering
 
 if TYPE_CHECKING:
     from sniff.analysis.point_columns import TableSamples
@@ -26,7 +26,7 @@ _USES = {
     Use.SETTING: "set point",
     Use.BITS: "bits",
 }
-_SURE = {Sure.SURE: "sure", Sure.LIKELY: "likely", Sure.OPEN: "open"}
+_SURE = {GuessSureness.SURE: "sure", GuessSureness.LIKELY: "likely", GuessSureness.OPEN: "open"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +65,7 @@ class Guessing:
                 found[key] = told
         return found
 
-    def _undescribed(self) -> Iterable[Block]:
+    def _undescribed(self) -> Iterable[RegisterStretch]:
         return (block for block in self.series.blocks() if self.devices.at(block.device) is None)
 
 
@@ -104,7 +104,7 @@ def guess_of(point: Point, series: RegisterSeries, points: PointTable) -> Guesse
     return None
 
 
-def history(guess: RegisterGuess, blocks: Iterable[Block]) -> tuple[tuple[int, float], ...]:
+def history(guess: RegisterGuess, blocks: Iterable[RegisterStretch]) -> tuple[tuple[int, float], ...]:
     """Times, ns, and values, as the question that was asked most often tells them."""
     width = guess.kind.registers
     whole = [

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from dissectors import registry
 from dissectors.frame import Chunk
 from dissectors.line import LineSettings
-from sniff.analysis.autodetect import COVERED_LEAST, FOUND_FRAMES, LIKELY_BITS, Candidature, Evidence
+from sniff.analysis.autodetect import COVERED_LEAST, FOUND_FRAMES, LIKELY_BITS, CandidateEvidence, Candidature
 from sniff.analysis.slower_bus import slower_by
 
 SAMPLE_OCTETS = 3000
@@ -85,9 +85,9 @@ def _as_protocol(found: Candidature, how: str, means: str, settle: str) -> Fit:
     return Fit(f"{how} as {found.protocol} with good checks ({checks})", means, settle)
 
 
-def _evidence(sample: Sequence[Chunk], line: LineSettings, latency: int) -> Evidence:
+def _evidence(sample: Sequence[Chunk], line: LineSettings, latency: int) -> CandidateEvidence:
     """All protocols over the sample."""
-    evidence = Evidence(line, registry.names(), latency)
+    evidence = CandidateEvidence(line, registry.names(), latency)
     for chunk in sample:
         evidence.feed(chunk)
     if sample:
@@ -95,7 +95,7 @@ def _evidence(sample: Sequence[Chunk], line: LineSettings, latency: int) -> Evid
     return evidence
 
 
-def _convincing(evidence: Evidence) -> Candidature | None:
+def _convincing(evidence: CandidateEvidence) -> Candidature | None:
     reading = evidence.best()
     enough = reading.frames >= FOUND_FRAMES and reading.covered >= COVERED_LEAST and reading.bits >= LIKELY_BITS
     return reading if enough else None

@@ -12,7 +12,7 @@ from dissectors.histogram import Histogram
 from dissectors.profiles.decoding import Quality, Value, plain_name
 from dissectors.reading_columns import HOWS
 from dissectors.readings import Origin, Reading
-from sniff.analysis.points import HISTORY, Key, PointTable, Run, Sample, station_name
+from sniff.analysis.points import HISTORY, Key, PointTable, Sample, SampleRun, station_name
 
 _WRITE = HOWS.index(Origin.WRITE)
 
@@ -142,7 +142,7 @@ class _Run:
         every = Histogram()
         every.add_many(np.diff(times))
         written = int(np.count_nonzero(plain.how[places] == _WRITE))
-        seen = Run(len(places), every, float(raws.min()), float(raws.max()), written)
+        seen = SampleRun(len(places), every, float(raws.min()), float(raws.max()), written)
         table.add_run(self.key, last, first, changed, history, seen)
 
 

@@ -84,7 +84,7 @@ class Remembered:
 
 
 @dataclass(frozen=True, slots=True)
-class Exchange:
+class ValuedExchange:
     """A transaction whose values count. `response`: None where none was to come."""
 
     transaction: Transaction
@@ -120,7 +120,7 @@ class PointReader:
         asked = self.asked.get(row.placement.tx) if row.placement is not None else None
         return meaning_of(self.dissector, self.devices, row, asked.frame if asked is not None else None)
 
-    def _exchanges(self, output: Output) -> Iterator[Exchange]:
+    def _exchanges(self, output: Output) -> Iterator[ValuedExchange]:
         if self._readings is None:
             return
         for row in output.rows:
@@ -133,7 +133,7 @@ class PointReader:
         while len(self.frames) > MOST_OPEN:
             self.frames.popitem(last=False)
 
-    def _exchange(self, transaction: Transaction) -> Exchange | None:
+    def _exchange(self, transaction: Transaction) -> ValuedExchange | None:
         """The frames of a transaction that tells something."""
         request = self._take(transaction.request)
         response = self._take(transaction.response)
@@ -147,9 +147,9 @@ class PointReader:
         if request is None:
             return None
         if verdict in ALONE:
-            return Exchange(transaction, request, None)
+            return ValuedExchange(transaction, request, None)
         if response is not None and (verdict in WHOLE or verdict is Verdict.LATE):
-            return Exchange(transaction, request, response)
+            return ValuedExchange(transaction, request, response)
         return None
 
     def ask(self, tx: int, request: Remembered) -> None:
@@ -158,7 +158,7 @@ class PointReader:
         if len(self.asked) > MOST_ASKED:
             self.asked.popitem(last=False)
 
-    def samples(self, exchange: Exchange) -> Iterator[Sample]:
+    def samples(self, exchange: ValuedExchange) -> Iterator[Sample]:
         """What an exchange tells."""
         request, response = exchange.request, exchange.response
         readings = self._readings(request.frame, response.frame if response else None) if self._readings else ()
@@ -213,7 +213,7 @@ def meaning_of(dissector: Dissector, devices: Devices, row: Row, request: Frame 
     return Meaning(station, profile, readings, words, request, asked)
 
 
-class Run(NamedTuple):
+class SampleRun(NamedTuple):
     """Samples of one point that follow one another, as in `Point`."""
 
     samples: int
@@ -358,7 +358,7 @@ class PointTable:
         first: tuple[float, int],
         changed: int | None,
         history: Iterable[tuple[int, float]],
-        seen: Run,
+        seen: SampleRun,
     ) -> None:
         """Take samples of one point, numbers all, of which `last` is the last. `first`: value and time of the
         first; `changed`: ns, of the last that was another one than the one before it among them, None where none was;

@@ -7,9 +7,13 @@ from collections.abc import Iterable, Sequence
 
 from dissectors.profiles.decoding import plain_name
 from dissectors.profiles.model import Kind
-from sniff.analysis.register_guess import RegisterGuess, Sure, Use
+from sniff.analysis.register_guess import GuessSureness, RegisterGuess, Use
 
-_HOW = {Sure.SURE: "sure", Sure.LIKELY: "likely", Sure.OPEN: "open: other readings fit as well"}
+_HOW = {
+    GuessSureness.SURE: "sure",
+    GuessSureness.LIKELY: "likely",
+    GuessSureness.OPEN: "open: other readings fit as well",
+}
 _USES = {
     Use.CONSTANT: "never changed",
     Use.SENSOR: "moves up and down",
@@ -70,7 +74,7 @@ def _register(family: str, guess: RegisterGuess, of_table: bool) -> list[str]:
         lines.append('octet-order = "low-first"')
     if guess.use is not Use.SETTING:
         lines.append('access = "r"')
-    if guess.sure is not Sure.SURE:
+    if guess.sure is not GuessSureness.SURE:
         lines.append(f"doubt = {_quoted('guessed from a capture')}")
     return lines
 

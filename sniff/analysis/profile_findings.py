@@ -13,8 +13,7 @@ from dissectors.findings import Finding, Rule, Severity, Tally
 from dissectors.frame import Event, Frame, Header, Role
 from dissectors.line import Timing
 from dissectors.manifest import Dissector
-from dissectors.profiles import Devices, Entry, Profile
-from dissectors.profiles import Role as EntryRole
+from dissectors.profiles import Devices, Entry, EntryRole, Profile
 from dissectors.profiles.decoding import Value, bit_words, decode, in_range, number, plain_name, state_words
 from dissectors.profiles.properties import due_property
 from dissectors.readings import Origin, Reading

@@ -26,7 +26,7 @@ Place = tuple[str, int, str]
 
 
 @dataclass(slots=True)
-class Heard:
+class HeardPlaces:
     """What a station answered (place → newest reading), and what it refused to give."""
 
     station: int
@@ -49,7 +49,7 @@ class Guessing:
 
     def __init__(self, dissector: Dissector) -> None:
         self.protocol = dissector.name
-        self.heard: dict[int, Heard] = {}
+        self.heard: dict[int, HeardPlaces] = {}
         self._reader = PointReader(dissector)
         self._asked: dict[int, tuple[str, int]] = {}
 
@@ -79,11 +79,11 @@ class Guessing:
             found = (guess(self.heard[station], profile) for profile in candidates)
             yield from sorted((one for one in found if one.score >= LEAST), key=lambda one: -one.score)
 
-    def _of(self, station: int) -> Heard:
-        return self.heard.setdefault(station, Heard(station))
+    def _of(self, station: int) -> HeardPlaces:
+        return self.heard.setdefault(station, HeardPlaces(station))
 
 
-def guess(heard: Heard, profile: Profile) -> Guess:
+def guess(heard: HeardPlaces, profile: Profile) -> Guess:
     """How well a profile fits what a station answered.
 
     The share of answered places that the profile knows, lowered by values out of its range, by places that it should
@@ -125,7 +125,7 @@ def guess(heard: Heard, profile: Profile) -> Guess:
     return Guess(heard.station, profile, weight / total if total else 0.0, ", ".join(words))
 
 
-def _check(sign: Sign, heard: Heard) -> bool | None:
+def _check(sign: Sign, heard: HeardPlaces) -> bool | None:
     """Whether a sign was seen and right; None when it was not seen. A device object may have any instance."""
     for (space, address, part), reading in heard.answered.items():
         here = space == sign.space and part == sign.part and (address == sign.address or space == "device")

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dissectors.profiles.model import Kind
-from sniff.analysis.register_series import Block, Words
+from sniff.analysis.register_series import RegisterStretch, Words
 
 Floats = npt.NDArray[np.float64]
 Wide = npt.NDArray[np.int64]
@@ -31,7 +31,7 @@ _WILD = 0x6000  # a word that spans so much, without order, is the low part of s
 _NEAR = 0x1000  # so close to zero, on both sides of it: a sign
 
 
-class Sure(IntEnum):
+class GuessSureness(IntEnum):
     """How far a guess goes."""
 
     OPEN = 0  # other readings fit as well
@@ -61,7 +61,7 @@ class RegisterGuess:
     swapped: bool
     little: bool
     use: Use
-    sure: Sure
+    sure: GuessSureness
     low: float
     high: float
     answers: int
@@ -79,7 +79,7 @@ _ORDERS = (_Order(False, False), _Order(True, False), _Order(True, True), _Order
 """The usual ones first: as the protocol has it, words swapped, all octets swapped, octets swapped in words."""
 
 
-def guessed(blocks: Iterable[Block], written: set[tuple[int, str, int]]) -> Iterator[RegisterGuess]:
+def guessed(blocks: Iterable[RegisterStretch], written: set[tuple[int, str, int]]) -> Iterator[RegisterGuess]:
     """A guess for each register that was read, the surest of all blocks that it is in; by device, table, register.
 
     Blocks that overlap may be read in ways that exclude each other. Then none of these is sure, and what the one that
@@ -104,16 +104,19 @@ def _undisputed(found: Sequence[RegisterGuess]) -> list[RegisterGuess]:
     """The guesses, none of them sure that shares a register with another sure one of another reading."""
     readings: dict[_Place, set[tuple[int, Kind, bool, bool]]] = {}
     for one in found:
-        for place in _places(one) if one.sure is Sure.SURE else ():
+        for place in _places(one) if one.sure is GuessSureness.SURE else ():
             readings.setdefault(place, set()).add((one.address, one.kind, one.swapped, one.little))
     disputed = {place for place, ways in readings.items() if len(ways) > 1}
     return [
-        replace(one, sure=Sure.LIKELY) if one.sure is Sure.SURE and disputed & {*_places(one)} else one for one in found
+        replace(one, sure=GuessSureness.LIKELY)
+        if one.sure is GuessSureness.SURE and disputed & {*_places(one)}
+        else one
+        for one in found
     ]
 
 
 def _left_over(
-    blocks: Iterable[Block], taken: Mapping[_Place, RegisterGuess], written: set[tuple[int, str, int]]
+    blocks: Iterable[RegisterStretch], taken: Mapping[_Place, RegisterGuess], written: set[tuple[int, str, int]]
 ) -> Iterator[RegisterGuess]:
     """Registers whose guess gave way to one of another block, each by itself, as the block asked most often has it."""
     done: set[_Place] = set()
@@ -125,10 +128,10 @@ def _left_over(
             done.add(place)
             words, seconds = block.words, np.array(block.times, np.int64) / 1e9
             guess = _guess(block, words, seconds, at, _one(words[:, at]), written)
-            yield replace(guess, sure=min(guess.sure, Sure.LIKELY))
+            yield replace(guess, sure=min(guess.sure, GuessSureness.LIKELY))
 
 
-def _of_block(block: Block, written: set[tuple[int, str, int]]) -> list[RegisterGuess]:
+def _of_block(block: RegisterStretch, written: set[tuple[int, str, int]]) -> list[RegisterGuess]:
     """The registers of one block, wide values in one order: a device has one.
 
     In another order and one register further on, the low word of a value and the high word of the next make numbers
@@ -139,7 +142,9 @@ def _of_block(block: Block, written: set[tuple[int, str, int]]) -> list[Register
     ranked = sorted(by_order, key=lambda one: _rank(block, words, one[0]))
     best, second = ranked[0][0], ranked[1][0]
     if _rank(block, words, best) == _rank(block, words, second) and best != second:
-        best = [replace(one, sure=min(one.sure, Sure.LIKELY)) if one.kind.registers > 1 else one for one in best]
+        best = [
+            replace(one, sure=min(one.sure, GuessSureness.LIKELY)) if one.kind.registers > 1 else one for one in best
+        ]
     return _as_neighbours(block, words, seconds, _may_be_wider(best), written)
 
 
@@ -150,20 +155,20 @@ def _may_be_wider(found: Sequence[RegisterGuess]) -> list[RegisterGuess]:
     told = []
     for one in found:
         above = (one.address + 2, one.address + 3) if one.swapped else (one.address - 2, one.address - 1)
-        is_half = one.kind in (Kind.U32, Kind.S32) and one.sure is Sure.SURE and still.issuperset(above)
-        told.append(replace(one, sure=Sure.LIKELY) if is_half else one)
+        is_half = one.kind in (Kind.U32, Kind.S32) and one.sure is GuessSureness.SURE and still.issuperset(above)
+        told.append(replace(one, sure=GuessSureness.LIKELY) if is_half else one)
     return told
 
 
-def _rank(block: Block, words: Words, found: Sequence[RegisterGuess]) -> tuple[int, int]:
+def _rank(block: RegisterStretch, words: Words, found: Sequence[RegisterGuess]) -> tuple[int, int]:
     """The better the smaller: single words that are no number, then registers that are read surely."""
     singles = [one.address - block.first for one in found if one.kind.registers == 1]
-    surely = sum(one.kind.registers for one in found if one.kind.registers > 1 and one.sure is Sure.SURE)
+    surely = sum(one.kind.registers for one in found if one.kind.registers > 1 and one.sure is GuessSureness.SURE)
     return sum(_is_wild(words[:, at]) for at in singles), -surely
 
 
 def _in_order(
-    block: Block, words: Words, seconds: Floats, order: _Order, written: set[tuple[int, str, int]]
+    block: RegisterStretch, words: Words, seconds: Floats, order: _Order, written: set[tuple[int, str, int]]
 ) -> list[RegisterGuess]:
     found: list[RegisterGuess] = []
     at = 0
@@ -175,7 +180,7 @@ def _in_order(
 
 
 def _at(
-    block: Block, words: Words, seconds: Floats, at: int, order: _Order, written: set[tuple[int, str, int]]
+    block: RegisterStretch, words: Words, seconds: Floats, at: int, order: _Order, written: set[tuple[int, str, int]]
 ) -> RegisterGuess:
     """The best reading that begins at a register of a block."""
     for width, judge in ((4, _four), (2, _two)):
@@ -191,14 +196,19 @@ class _Reading:
     kind: Kind
     order: _Order
     use: Use
-    sure: Sure
+    sure: GuessSureness
 
 
 _PLAIN = _ORDERS[0]
 
 
 def _guess(
-    block: Block, words: Words, seconds: Floats, at: int, reading: _Reading, written: set[tuple[int, str, int]]
+    block: RegisterStretch,
+    words: Words,
+    seconds: Floats,
+    at: int,
+    reading: _Reading,
+    written: set[tuple[int, str, int]],
 ) -> RegisterGuess:
     values = read_as(
         words[:, at : at + reading.kind.registers], reading.kind, reading.order.swapped, reading.order.little
@@ -242,19 +252,21 @@ def read_as(words: Words, kind: Kind, swapped: bool, little: bool) -> Floats:
 def _one(column: Words) -> _Reading:
     distinct = np.unique(column)
     if len(distinct) == 1:
-        return _Reading(Kind.U16, _PLAIN, Use.CONSTANT, Sure.OPEN)
+        return _Reading(Kind.U16, _PLAIN, Use.CONSTANT, GuessSureness.OPEN)
     signed = column.view(np.int16).astype(np.int64)
     steps, signed_steps = np.abs(np.diff(column.astype(np.int64))), np.abs(np.diff(signed))
     below, above = bool((signed < 0).any()), bool((signed >= 0).any())
     if below and above and signed_steps.max() < _NEAR <= steps.max():
-        return _Reading(Kind.S16, _PLAIN, Use.SENSOR, Sure.SURE if len(distinct) >= ENOUGH else Sure.LIKELY)
+        return _Reading(
+            Kind.S16, _PLAIN, Use.SENSOR, GuessSureness.SURE if len(distinct) >= ENOUGH else GuessSureness.LIKELY
+        )
     if below and not above and signed.min() > -_NEAR:
-        return _Reading(Kind.S16, _PLAIN, Use.SENSOR, Sure.LIKELY)
+        return _Reading(Kind.S16, _PLAIN, Use.SENSOR, GuessSureness.LIKELY)
     if _is_bits(column):
-        return _Reading(Kind.U16, _PLAIN, Use.BITS, Sure.LIKELY)
+        return _Reading(Kind.U16, _PLAIN, Use.BITS, GuessSureness.LIKELY)
     use = Use.COUNTER if _counts(column.astype(np.int64)) else Use.SENSOR
     is_open = len(distinct) < ENOUGH or _may_be_decimal(column)
-    return _Reading(Kind.U16, _PLAIN, use, Sure.OPEN if is_open else Sure.LIKELY)
+    return _Reading(Kind.U16, _PLAIN, use, GuessSureness.OPEN if is_open else GuessSureness.LIKELY)
 
 
 def _two(pair: Words, order: _Order) -> _Reading | None:
@@ -273,7 +285,7 @@ def _four(quad: Words, order: _Order) -> _Reading | None:
         return None  # the lower half of a number of 64 bits would not be a usual number each time
     wild = _is_wild(words[:, 3]) and _is_wild(words[:, 2]) and _float_exponents(words[:, 0], 0x3F50, 0x41A0)
     if wild and _usual(read_as(quad, Kind.F64, order.swapped, order.little)):
-        return _Reading(Kind.F64, order, Use.SENSOR, Sure.SURE)
+        return _Reading(Kind.F64, order, Use.SENSOR, GuessSureness.SURE)
     return None
 
 
@@ -283,7 +295,7 @@ def _ordered(words: Words, order: _Order) -> Words:
     return words[:, ::-1] if order.swapped else words
 
 
-def _float_fits(pair: Words, order: _Order) -> Sure | None:
+def _float_fits(pair: Words, order: _Order) -> GuessSureness | None:
     """How surely two registers are a float in an order; None where they are not."""
     ordered = _ordered(pair, order)
     high, low = ordered[:, 0], ordered[:, 1]
@@ -295,10 +307,10 @@ def _float_fits(pair: Words, order: _Order) -> Sure | None:
     if distinct < 3:
         return None
     if _counts(whole.astype(np.int64)):  # a number of 32 bits that counts fits as well, but one so large is rare
-        return Sure.LIKELY if len(np.unique(high)) > 1 else None
+        return GuessSureness.LIKELY if len(np.unique(high)) > 1 else None
     if _is_wild(low) and distinct >= ENOUGH and not _is_wild(high):
-        return Sure.SURE
-    return Sure.LIKELY if len(np.unique(low)) >= 3 else None
+        return GuessSureness.SURE
+    return GuessSureness.LIKELY if len(np.unique(low)) >= 3 else None
 
 
 def _sign_fits(pair: Words, order: _Order) -> _Reading | None:
@@ -310,7 +322,7 @@ def _sign_fits(pair: Words, order: _Order) -> _Reading | None:
     if not changes or not (high == np.where(low >= 0x8000, 0xFFFF, 0)).all():
         return None
     enough = changes >= ENOUGH and len(np.unique(low)) >= ENOUGH
-    return _Reading(Kind.S32, order, Use.SENSOR, Sure.SURE if enough else Sure.LIKELY)
+    return _Reading(Kind.S32, order, Use.SENSOR, GuessSureness.SURE if enough else GuessSureness.LIKELY)
 
 
 def _count_fits(pair: Words, order: _Order) -> _Reading | None:
@@ -326,10 +338,12 @@ def _count_fits(pair: Words, order: _Order) -> _Reading | None:
         small = bool(steps.max() < 0x8000)  # what the words would do together is less than what the low one does alone
         if small and bool((np.abs(np.diff(low))[moved] > 0x8000).all()):
             use = Use.COUNTER if _counts(whole) else Use.SENSOR
-            return _Reading(Kind.U32, order, use, Sure.LIKELY if _may_be_decimal(ordered) else Sure.SURE)
+            return _Reading(
+                Kind.U32, order, use, GuessSureness.LIKELY if _may_be_decimal(ordered) else GuessSureness.SURE
+            )
         return None
     if 0 < high[0] < 0x1000 and _counts(whole) and not order.little:
-        return _Reading(Kind.U32, order, Use.COUNTER, Sure.LIKELY)
+        return _Reading(Kind.U32, order, Use.COUNTER, GuessSureness.LIKELY)
     return None
 
 
@@ -387,13 +401,19 @@ def _is_text(pair: Words) -> bool:
 
 
 def _as_neighbours(
-    block: Block, words: Words, seconds: Floats, found: Sequence[RegisterGuess], written: set[tuple[int, str, int]]
+    block: RegisterStretch,
+    words: Words,
+    seconds: Floats,
+    found: Sequence[RegisterGuess],
+    written: set[tuple[int, str, int]],
 ) -> list[RegisterGuess]:
     """Where the values of a block are of two registers in one order, pairs that are open are likely so too."""
-    sure = [one for one in found if one.sure is Sure.SURE and one.kind.registers == 2]
+    sure = [one for one in found if one.sure is GuessSureness.SURE and one.kind.registers == 2]
     orders = {(one.swapped, one.little) for one in sure}
     odd = {one.address & 1 for one in sure}
-    singles = [one for one in found if one.kind.registers == 1 and one.sure > Sure.OPEN and one.use is not Use.COUNTER]
+    singles = [
+        one for one in found if one.kind.registers == 1 and one.sure > GuessSureness.OPEN and one.use is not Use.COUNTER
+    ]
     if len(sure) < 2 or len(orders) != 1 or len(odd) != 1:
         return list(found)
     swapped, little = next(iter(orders))
@@ -431,8 +451,8 @@ def _pair_like(pair: Words, order: _Order) -> _Reading | None:
     high = _ordered(pair, order)[:, 0]
     if _usual(values) and _float_exponents(high[high != 0], 0x3A80, 0x4CC0):
         use = Use.CONSTANT if len(np.unique(values)) == 1 else Use.SENSOR
-        return _Reading(Kind.F32, order, use, Sure.LIKELY)
+        return _Reading(Kind.F32, order, use, GuessSureness.LIKELY)
     whole = read_as(pair, Kind.U32, order.swapped, order.little).astype(np.int64)
     if high[0] < 0x1000 and (high == high[0]).all() and _counts(whole):
-        return _Reading(Kind.U32, order, Use.COUNTER, Sure.LIKELY)
+        return _Reading(Kind.U32, order, Use.COUNTER, GuessSureness.LIKELY)
     return None

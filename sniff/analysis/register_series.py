@@ -36,7 +36,7 @@ Words = npt.NDArray[np.uint16]
 
 
 @dataclass(slots=True)
-class Block:
+class RegisterStretch:
     """One stretch of registers, as one question asks for it again and again.
 
     `device`, `space`, `first`, `width`: whose, and which registers, as on the wire. `times`: ns; `rows`: the words of
@@ -88,7 +88,7 @@ class RegisterSeries:
     """
 
     def __init__(self) -> None:
-        self._blocks: dict[tuple[int, str, int, int], Block] = {}
+        self._blocks: dict[tuple[int, str, int, int], RegisterStretch] = {}
         self.written: set[tuple[int, str, int]] = set()
         self.objects: dict[int, set[str]] = {}
 
@@ -161,7 +161,7 @@ class RegisterSeries:
                 at = by_block[ends[number - 1] if number else 0 : ends[number]]
                 block.add_many(words.time[at], (words.raw[at[:, None] + np.arange(width)] & 0xFFFF).astype(np.uint16))
 
-    def blocks(self) -> Iterator[Block]:
+    def blocks(self) -> Iterator[RegisterStretch]:
         """All blocks, by device, table and register."""
         return (self._blocks[key] for key in sorted(self._blocks))
 
@@ -174,10 +174,10 @@ class RegisterSeries:
             return
         block.add(first.time, tuple((sample.value.reading.raw or 0) & 0xFFFF for sample in run))
 
-    def _block(self, key: tuple[int, str, int, int]) -> Block | None:
+    def _block(self, key: tuple[int, str, int, int]) -> RegisterStretch | None:
         block = self._blocks.get(key)
         if block is None and len(self._blocks) < MOST_BLOCKS:
-            block = self._blocks[key] = Block(*key)
+            block = self._blocks[key] = RegisterStretch(*key)
         return block
 
 
@@ -226,7 +226,7 @@ def _together(plain: PlainSamples, words: Sequence[tuple[int, Sample]]) -> Plain
     return replace(plain, **sorted_ones, spaces=spaces)
 
 
-def covering(blocks: Iterable[Block]) -> list[Block]:
+def covering(blocks: Iterable[RegisterStretch]) -> list[RegisterStretch]:
     """Blocks that hold every register of all of them, those first that were answered most; none whose registers are
     all in two others already, so that their number is bounded by that of the registers."""
     covered: dict[tuple[int, str, int], int] = {}

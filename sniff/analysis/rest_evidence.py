@@ -1,4 +1,4 @@
-"""What no frame of a protocol holds, asked for another protocol: two on one bus. Pure, bounded."""
+"""Evidence of a second protocol on one bus, in the octets that no frame of the first holds. Pure, bounded."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dissectors import registry
 from dissectors.frame import Chunk
 from dissectors.line import NS_PER_S, LineSettings
-from sniff.analysis.autodetect import Evidence
+from sniff.analysis.autodetect import CandidateEvidence
 from sniff.engine.session import Session
 
 SECOND_FRAMES = 2
@@ -21,7 +21,7 @@ def second_in(rest: Sequence[Chunk], session: Session, others: Sequence[str]) ->
     found: list[tuple[float, str, int]] = []
     for name in others if rest else ():
         line = LineSettings.parse(registry.get(name).default_line) if session.line_is_assumed else session.line
-        evidence = Evidence(line, (name,), session.adapter.latency)
+        evidence = CandidateEvidence(line, (name,), session.adapter.latency)
         for chunk in rest:
             evidence.feed(chunk)
         evidence.advance(rest[-1].time + 10 * NS_PER_S)

@@ -1,5 +1,5 @@
-"""What is kept of a bus so that it can be held against others on the same clock. Bounded: the first frames and the
-losses of its port. An observer."""
+"""An observer that keeps of a bus what is held against others on the same clock: its first frames, and the losses of
+its port. Bounded."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _ANSWERED = VERDICTS.index(Verdict.ANSWERED)
 
 
 @dataclass(frozen=True, slots=True)
-class Heard:
+class HeardFrames:
     """Good frames that ask or answer, in the order of the wire. `start`, `end`: ns. `key`: equal for equal octets.
     `asks`: a request, else an answer."""
 
@@ -43,7 +43,7 @@ class Heard:
 
 
 @dataclass(frozen=True, slots=True)
-class Exchanges:
+class AnsweredExchanges:
     """Answered requests, in the order of closing. `asked`, `answered`: ns, ends of the request and of the answer;
     `start`, `back`: their begins. `wanted`: equal for requests of one kind, address and number, whomever they ask.
     """
@@ -66,8 +66,8 @@ class SiteEar:
         self.unplugged: list[int] = []
         self._frames = 0
         self._was_there = False
-        self._heard: list[Heard] = []
-        self._exchanges: list[Exchanges] = []
+        self._heard: list[HeardFrames] = []
+        self._exchanges: list[AnsweredExchanges] = []
         self._open: dict[int, tuple[int, int, int]] = {}  # row of a request: start, end, what it wants
 
     def add(self, output: Output) -> None:
@@ -97,7 +97,7 @@ class SiteEar:
         if len(places):
             octets, edges = gathered(table.octets, frames.offset[places], lengths[places])
             key = fingerprints(octets, edges, lengths[places])
-            self._heard.append(Heard(frames.start[places], frames.end[places], key, role[places] == _REQUEST))
+            self._heard.append(HeardFrames(frames.start[places], frames.end[places], key, role[places] == _REQUEST))
         self._exchange(table, places[role[places] == _REQUEST])
 
     def _exchange(self, table: Table, requests: Times) -> None:
@@ -116,7 +116,7 @@ class SiteEar:
         if rows:
             station, start, end, want, back_at, done = zip(*rows, strict=True)
             self._exchanges.append(
-                Exchanges(
+                AnsweredExchanges(
                     np.array(station, np.int16),
                     np.array(start, np.int64),
                     np.array(end, np.int64),
@@ -129,13 +129,13 @@ class SiteEar:
         if len(self._open) > 64:
             self._open = {row: one for row, one in self._open.items() if row >= newest - 64}
 
-    def heard(self) -> Heard:
+    def heard(self) -> HeardFrames:
         """The first frames."""
-        return _joined(Heard, self._heard)
+        return _joined(HeardFrames, self._heard)
 
-    def exchanges(self) -> Exchanges:
+    def exchanges(self) -> AnsweredExchanges:
         """The first answered requests."""
-        return _joined(Exchanges, self._exchanges)
+        return _joined(AnsweredExchanges, self._exchanges)
 
 
 def _wanted(table: Table, places: Times) -> Keys:

@@ -1,4 +1,4 @@
-"""What several buses on one clock say together. Pure: values of each bus in, findings about the site out.
+"""Findings about a site, whose buses are on one clock. Pure: values of each bus in, findings about the site out.
 
 A finding needs what chance cannot explain: moments that agree for every bus, delays that vary less than the traffic
 itself does. Two plants that are built alike run the same programme and are still not in step.
@@ -17,7 +17,7 @@ from dissectors.findings import Finding, as_consequence, counted, found
 from dissectors.line import MS, NS_PER_S
 from dissectors.subject import About, Subject
 from dissectors.words import milliseconds
-from sniff.analysis.site_ear import Exchanges, Heard, Keys, SiteEar
+from sniff.analysis.site_ear import AnsweredExchanges, HeardFrames, Keys, SiteEar
 from sniff.analysis.site_rules import SITE
 from sniff.analysis.site_rules import SITE_RULES as RULES
 from sniff.analysis.time_patterns import Stop
@@ -195,7 +195,7 @@ def _lag_words(lag: int) -> str:
     return f"{milliseconds(abs(lag))} {'later' if lag >= 0 else 'before'}"
 
 
-def _lag(asked: Heard, others: Heard, doubt: int) -> int | None:
+def _lag(asked: HeardFrames, others: HeardFrames, doubt: int) -> int | None:
     """The time after which requests come on the other bus, too; None where they do not, or are not in step."""
     delays, share = _delays(asked, others)
     if share < SHARE or _delays(others, asked)[1] < SHARE:
@@ -208,7 +208,7 @@ def _lag(asked: Heard, others: Heard, doubt: int) -> int | None:
     return middle if _matched(asked, others, middle, max(doubt, high - low)) >= SHARE else None
 
 
-def _delays(one: Heard, other: Heard) -> tuple[Times, float]:
+def _delays(one: HeardFrames, other: HeardFrames) -> tuple[Times, float]:
     """For each frame the way to the nearest of the same octets, ns, and the share of those that have one in reach."""
     before, after = _neighbours(one.key, one.start, other.key, other.start)
     best = np.full(len(one), 2 * REACH, np.int64)
@@ -243,14 +243,14 @@ def _neighbours(keys: Keys, times: Times, others: Keys, when: Times) -> tuple[Ti
     return found[0], found[1]
 
 
-def _matched(one: Heard, other: Heard, lag: int, doubt: int) -> float:
+def _matched(one: HeardFrames, other: HeardFrames, lag: int, doubt: int) -> float:
     """The share of frames that come on the other bus after that time."""
     moved = replace(one, start=one.start + lag)
     delays, share = _delays(moved, other)
     return share * float((np.abs(delays) <= doubt + MS).mean()) if len(delays) else 0.0
 
 
-def _common(one: Heard, other: Heard) -> tuple[Heard, Heard]:
+def _common(one: HeardFrames, other: HeardFrames) -> tuple[HeardFrames, HeardFrames]:
     """What both heard while the other listened, too."""
     if not len(one) or not len(other):
         return one, other
@@ -258,16 +258,16 @@ def _common(one: Heard, other: Heard) -> tuple[Heard, Heard]:
     return tuple(_some(each, (each.start >= begin) & (each.end <= end)) for each in (one, other))  # type: ignore[return-value]
 
 
-def _requests(heard: Heard) -> Heard:
+def _requests(heard: HeardFrames) -> HeardFrames:
     return _some(heard, heard.asks)
 
 
-def _answers(heard: Heard) -> Heard:
+def _answers(heard: HeardFrames) -> HeardFrames:
     return _some(heard, ~heard.asks)
 
 
-def _some(heard: Heard, which: Masks) -> Heard:
-    return Heard(heard.start[which], heard.end[which], heard.key[which], heard.asks[which])
+def _some(heard: HeardFrames, which: Masks) -> HeardFrames:
+    return HeardFrames(heard.start[which], heard.end[which], heard.key[which], heard.asks[which])
 
 
 # -- handed on ---------------------------------------------------------------------------------------------------------
@@ -291,7 +291,7 @@ def _forwarded(front: SiteBus, back: SiteBus) -> Iterator[Finding]:
         yield _gateway(front, back, ours, theirs, handed, places, int(station))
 
 
-def _nested(ours: Exchanges, theirs: Exchanges, doubt: int) -> Times:
+def _nested(ours: AnsweredExchanges, theirs: AnsweredExchanges, doubt: int) -> Times:
     """For each exchange the place of one on the other bus that wants the same and lies within it; -1 for none."""
     _, after = _neighbours(ours.wanted, ours.asked - doubt, theirs.wanted, theirs.start)
     done = theirs.answered[np.maximum(after, 0)]
@@ -300,7 +300,13 @@ def _nested(ours: Exchanges, theirs: Exchanges, doubt: int) -> Times:
 
 
 def _gateway(
-    front: SiteBus, back: SiteBus, ours: Exchanges, theirs: Exchanges, handed: Masks, places: Times, station: int
+    front: SiteBus,
+    back: SiteBus,
+    ours: AnsweredExchanges,
+    theirs: AnsweredExchanges,
+    handed: Masks,
+    places: Times,
+    station: int,
 ) -> Finding:
     whole = ours.back[handed] - ours.asked[handed]
     inside = theirs.answered[places] - theirs.start[places]

@@ -18,7 +18,7 @@ from dissectors.reading_columns import HOWS, ReadingColumns
 from dissectors.readings import Origin
 from dissectors.tracker import Verdict
 from sniff.analysis.point_columns import PlainSamples, TableSamples, no_samples
-from sniff.analysis.points import ALONE, MOST_ASKED, MOST_OPEN, WHOLE, Exchange, Remembered, Sample
+from sniff.analysis.points import ALONE, MOST_ASKED, MOST_OPEN, WHOLE, Remembered, Sample, ValuedExchange
 from sniff.engine.table import Table, rows_at
 
 if TYPE_CHECKING:
@@ -129,7 +129,7 @@ class _Work:
         reader, closed = self._reader, self._table.transactions
         asked = np.flatnonzero(self._request.there)
         begin, found = 0, []
-        exchanges: list[tuple[int, Exchange]] = []
+        exchanges: list[tuple[int, ValuedExchange]] = []
         lates = set(places[late[places]].tolist())
         frames = self._frames(places)
         for place in places.tolist():
@@ -147,7 +147,7 @@ class _Work:
             if request is None or (response is None and not _ALONE[closed.verdict[place]]):
                 continue
             exchanges.append(
-                (place, Exchange(transaction, request, None if _ALONE[closed.verdict[place]] else response))
+                (place, ValuedExchange(transaction, request, None if _ALONE[closed.verdict[place]] else response))
             )
         self._remember(asked[begin:])
         for place, exchange in exchanges:

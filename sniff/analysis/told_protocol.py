@@ -25,8 +25,8 @@ from sniff.analysis.autodetect import (
     COVERED_LEAST,
     FOUND_BITS,
     FOUND_FRAMES,
+    CandidateEvidence,
     Candidature,
-    Evidence,
     sureness,
 )
 from sniff.analysis.rest_evidence import second_in
@@ -114,7 +114,7 @@ def _readings(session: Session, protocols: Sequence[Dissector]) -> list[Candidat
     readings = []
     for dissector in protocols:
         line = LineSettings.parse(dissector.default_line) if session.line_is_assumed else session.line
-        evidence = Evidence(line, (dissector.name,), session.adapter.latency)
+        evidence = CandidateEvidence(line, (dissector.name,), session.adapter.latency)
         for chunk in session.sample:
             evidence.feed(chunk)
         evidence.advance(session.sample[-1].time + 10 * NS_PER_S)

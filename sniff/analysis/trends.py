@@ -15,7 +15,7 @@ from dissectors.profiles import Devices
 from dissectors.profiles.decoding import plain_name
 from sniff.analysis.guessed_points import history, told
 from sniff.analysis.points import Key, PointReader, Sample, station_name
-from sniff.analysis.register_guess import Sure, Use, guessed
+from sniff.analysis.register_guess import GuessSureness, Use, guessed
 from sniff.analysis.register_series import WORD_SPACES, RegisterSeries, covering
 
 if TYPE_CHECKING:
@@ -120,7 +120,7 @@ class Trends:
     def _guesses(self) -> Iterator[Trend]:
         blocks = covering(self._series.blocks())
         for guess in guessed(blocks, self._series.written):
-            if guess.use in (Use.SENSOR, Use.COUNTER, Use.SETTING) and guess.sure > Sure.OPEN:
+            if guess.use in (Use.SENSOR, Use.COUNTER, Use.SETTING) and guess.sure > GuessSureness.OPEN:
                 seen = history(guess, [one for one in blocks if (one.device, one.space) == (guess.device, guess.space)])
                 times, values = [time for time, _ in seen], [value for _, value in seen]
                 yield Trend(

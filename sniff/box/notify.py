@@ -1,4 +1,4 @@
-"""What a service tells systemd: one datagram a word, to the socket that the environment names.
+"""Notifications of a service to systemd: one datagram a word, to the socket that the environment names.
 
 Source: sd_notify(3), sd_watchdog_enabled(3): NOTIFY_SOCKET is a path, or a name of the abstract namespace where it
 begins with "@"; WATCHDOG_USEC is the time after which a silent service is restarted, for the process WATCHDOG_PID.

@@ -1,4 +1,4 @@
-"""What earlier runs left behind: a capture that still runs, parts that a power cut left open, files half written."""
+"""Leftovers of earlier runs: a capture that still runs, parts that a power cut left open, files half written."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether a capture really goes on, as its watchdog is told. Pure.
+"""The watchdog's question: does a capture really go on? Pure.
 
 It does as long as it says something at all, and what it hears gets into the file, or it says why it does not. A full
 disk is said: starting anew would make no room. A disk or a thread that hangs is not: then starting anew is all that is

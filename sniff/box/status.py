@@ -1,4 +1,4 @@
-"""How a box stands: values that cross to whoever asks as JSON. Pure.
+"""The status of a box: values that cross to whoever asks as JSON. Pure.
 
 Times are ns since the epoch by the wall clock as it is now, also of what happened before the clock was set.
 """

@@ -1,4 +1,4 @@
-"""What befell one bus since the box was started, whatever captures came and went meanwhile. Pure.
+"""The record of one bus since the box was started, whatever captures came and went meanwhile. Pure.
 
 Times that come in are on the clock of the capture that runs; `shift` puts them on the wall clock.
 """

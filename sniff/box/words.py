@@ -1,4 +1,4 @@
-"""How a box stands, in words for a terminal. Pure; whatever came from a wire or a configuration is made plain."""
+"""The status of a box in words for a terminal. Pure; whatever came from a wire or a configuration is made plain."""
 
 from __future__ import annotations
 

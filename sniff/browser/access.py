@@ -1,4 +1,4 @@
-"""Who may look: viewers of this machine; others with a token. Pure.
+"""Access to the browser's page: viewers of this machine; others with a token. Pure.
 
 A page of somebody else's, open in the same browser, can send requests here, too: so the name by which the server is
 called must be its own (else a name that is made to point here would do), and a connection for the screen must come from

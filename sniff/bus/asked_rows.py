@@ -1,4 +1,4 @@
-"""What the frames of a capture tell of points, and what is said of them, for a filter that asks for that."""
+"""Rows with the points and findings of their frames, for a filter that asks for them."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from dissectors.profiles import Devices
 from sniff.analysis.points import MOST_OPEN, PointReader
 from sniff.analysis.table_points import samples_of
 from sniff.analysis.wording import describe
-from sniff.bus.offline import Source, survey
+from sniff.bus.offline import ReadSource, survey
 from sniff.engine.capture import CaptureError
 from sniff.engine.engine import Output, Row
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.observer import Observer
 from sniff.engine.session import LineEvent, Session
 from sniff.engine.table import Table
-from sniff.filter.scope import Told
+from sniff.filter.scope import ToldPoint
 from sniff.filter.told import TYPES, told
 
 Fields = Mapping[str, int | float | str]
@@ -38,7 +38,7 @@ class PointsTold:
         self._reader = reader
         self._names = None if set(names) & TYPES.keys() else frozenset(names)
         self._most = most
-        self._told: dict[int, list[Told]] = {}
+        self._told: dict[int, list[ToldPoint]] = {}
         self._rows: Times | None = None
 
     def add_table(self, table: Table) -> None:
@@ -62,7 +62,7 @@ class PointsTold:
     def add_line_event(self, event: LineEvent) -> None:
         """Says nothing of points."""
 
-    def of(self, no: int) -> Sequence[Told]:
+    def of(self, no: int) -> Sequence[ToldPoint]:
         """The values that a row carries."""
         return self._told.get(no, ())
 
@@ -76,7 +76,7 @@ class PointsTold:
         return masks
 
 
-def points_told(capture: Source, session: Session, devices: Devices, names: Collection[str]) -> PointsTold:
+def points_told(capture: ReadSource, session: Session, devices: Devices, names: Collection[str]) -> PointsTold:
     """Of a whole capture, the points of these names; of a damaged one as far as it can be read."""
     points = PointsTold(PointReader(dissector_for(session), devices), names)
     _survey(capture, session, points)
@@ -123,7 +123,7 @@ class Meant(Generic[Kept]):
         return self._kept.get(row.no)
 
 
-def lines_said(capture: Source, session: Session, devices: Devices) -> Callable[[Row], str]:
+def lines_said(capture: ReadSource, session: Session, devices: Devices) -> Callable[[Row], str]:
     """The lines of a whole capture, with what frames mean to their devices; of a damaged one as far as it can be
     read."""
     dissector = dissector_for(session)
@@ -148,13 +148,13 @@ def answers_told(dissector: Dissector, names: Collection[str], most: int | None 
     return Meant(dissector, Devices(), fields, most)
 
 
-def fields_answered(capture: Source, session: Session, names: Collection[str]) -> Callable[[Row], Fields]:
+def fields_answered(capture: ReadSource, session: Session, names: Collection[str]) -> Callable[[Row], Fields]:
     """The same of a whole capture."""
     told = answers_told(dissector_for(session), names)
     _survey(capture, session, told)
     return lambda row: told.of(row) or {}
 
 
-def _survey(capture: Source, session: Session, observer: Observer) -> None:
+def _survey(capture: ReadSource, session: Session, observer: Observer) -> None:
     with contextlib.suppress(CaptureError):  # who shows the rows says so
         survey(capture, session, observer)

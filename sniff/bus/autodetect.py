@@ -25,7 +25,7 @@ POLL = 0.1
 
 
 @dataclass(frozen=True, slots=True)
-class Progress:
+class SearchProgress:
     """What the search is at. `seconds`: since its start; `octets`: heard with the present settings."""
 
     line: LineSettings
@@ -59,7 +59,7 @@ class Search:
         self,
         timeout: float,
         stopped: Callable[[], bool] = lambda: False,
-        show: Callable[[Progress], None] = lambda _: None,
+        show: Callable[[SearchProgress], None] = lambda _: None,
     ) -> Outcome:
         """Search until found, for `timeout` s of the capture's clock, until `stopped` says so or the capture ends."""
         while self.detecting.found is None and self.ended is None and not stopped():
@@ -90,11 +90,11 @@ class Search:
         return without_line(outcome) if self._lineless and not self._line_known else outcome
 
     @property
-    def progress(self) -> Progress:
+    def progress(self) -> SearchProgress:
         """Where it stands."""
         current = self.detecting.current
         seconds = 0.0 if self._began is None else (self._now - self._began) / NS_PER_S
-        return Progress(current.line, seconds, current.octets, current.best().frames)
+        return SearchProgress(current.line, seconds, current.octets, current.best().frames)
 
     def _take(self, item: Chunk | LineEvent) -> None:
         change = settings_change(item)

@@ -23,7 +23,7 @@ Values = npt.NDArray[Any]
 SEARCHING, NOISE = "searching", "noise"
 
 
-class Form(Enum):
+class ColumnForm(Enum):
     """What a column holds. `TEXT`: few different texts, by number. `TIME`: ns since the epoch."""
 
     INTEGER = "integer"
@@ -40,7 +40,7 @@ class Column:
     `texts`: of a TEXT column, whose values are places in it.
     """
 
-    form: Form
+    form: ColumnForm
     values: Values
     missing: Masks | None = None
     texts: tuple[str, ...] = ()
@@ -53,7 +53,7 @@ Columns = Mapping[str, Column]
 class _Growing:
     """A column that takes one part after the other."""
 
-    form: Form
+    form: ColumnForm
     parts: list[Values] = field(default_factory=list)
     holes: list[Masks] = field(default_factory=list)
     numbers: dict[str, int] = field(default_factory=dict)
@@ -70,54 +70,54 @@ class _Growing:
 
 
 _NUMPY = {
-    Form.INTEGER: np.int64,
-    Form.NUMBER: np.float64,
-    Form.TRUTH: np.bool_,
-    Form.TEXT: np.int32,
-    Form.TIME: np.int64,
+    ColumnForm.INTEGER: np.int64,
+    ColumnForm.NUMBER: np.float64,
+    ColumnForm.TRUTH: np.bool_,
+    ColumnForm.TEXT: np.int32,
+    ColumnForm.TIME: np.int64,
 }
 
 FRAMES = {
-    "no": Form.INTEGER,
-    "t": Form.TIME,
-    "start_ns": Form.INTEGER,
-    "end_ns": Form.INTEGER,
-    "proto": Form.TEXT,
-    "src": Form.INTEGER,
-    "dst": Form.INTEGER,
-    "role": Form.TEXT,
-    "kind": Form.TEXT,
-    "func": Form.INTEGER,
-    "register": Form.INTEGER,
-    "count": Form.INTEGER,
-    "ok": Form.TRUTH,
-    "error": Form.TEXT,
-    "found": Form.TEXT,
-    "damage": Form.TEXT,
-    "noise_before": Form.INTEGER,
-    "len": Form.INTEGER,
-    "tx": Form.INTEGER,
-    "verdict": Form.TEXT,
-    "latency_ms": Form.NUMBER,
+    "no": ColumnForm.INTEGER,
+    "t": ColumnForm.TIME,
+    "start_ns": ColumnForm.INTEGER,
+    "end_ns": ColumnForm.INTEGER,
+    "proto": ColumnForm.TEXT,
+    "src": ColumnForm.INTEGER,
+    "dst": ColumnForm.INTEGER,
+    "role": ColumnForm.TEXT,
+    "kind": ColumnForm.TEXT,
+    "func": ColumnForm.INTEGER,
+    "register": ColumnForm.INTEGER,
+    "count": ColumnForm.INTEGER,
+    "ok": ColumnForm.TRUTH,
+    "error": ColumnForm.TEXT,
+    "found": ColumnForm.TEXT,
+    "damage": ColumnForm.TEXT,
+    "noise_before": ColumnForm.INTEGER,
+    "len": ColumnForm.INTEGER,
+    "tx": ColumnForm.INTEGER,
+    "verdict": ColumnForm.TEXT,
+    "latency_ms": ColumnForm.NUMBER,
 }
 """Columns of frames, in their order. `t` and `start_ns` are the same instant; `noise_before`, `len`: octets."""
 
 TRANSACTIONS = {
-    "tx": Form.INTEGER,
-    "station": Form.INTEGER,
-    "kind": Form.TEXT,
-    "request": Form.INTEGER,
-    "response": Form.INTEGER,
-    "verdict": Form.TEXT,
-    "t": Form.TIME,
-    "start_ns": Form.INTEGER,
-    "end_ns": Form.INTEGER,
-    "latency_ms": Form.NUMBER,
-    "latency_low_ms": Form.NUMBER,
-    "latency_high_ms": Form.NUMBER,
-    "attempt": Form.INTEGER,
-    "of": Form.INTEGER,
-    "error": Form.TEXT,
+    "tx": ColumnForm.INTEGER,
+    "station": ColumnForm.INTEGER,
+    "kind": ColumnForm.TEXT,
+    "request": ColumnForm.INTEGER,
+    "response": ColumnForm.INTEGER,
+    "verdict": ColumnForm.TEXT,
+    "t": ColumnForm.TIME,
+    "start_ns": ColumnForm.INTEGER,
+    "end_ns": ColumnForm.INTEGER,
+    "latency_ms": ColumnForm.NUMBER,
+    "latency_low_ms": ColumnForm.NUMBER,
+    "latency_high_ms": ColumnForm.NUMBER,
+    "attempt": ColumnForm.INTEGER,
+    "of": ColumnForm.INTEGER,
+    "error": ColumnForm.TEXT,
 }
 """Columns of transactions, in their order. `request`, `response`: numbers of frames; `of`: another transaction."""
 

@@ -21,7 +21,7 @@ from dissectors.profiles import Devices
 from sniff.analysis.autodetect import Detecting
 from sniff.analysis.points import PointReader, Sample
 from sniff.analysis.site_ear import SiteEar
-from sniff.bus.autodetect import Progress, Search
+from sniff.bus.autodetect import Search, SearchProgress
 from sniff.bus.derived_topics import NODES_A_SECOND, NODES_AT_ONCE, BusChannels, DerivedMessage
 from sniff.bus.model import BusModel
 from sniff.bus.recorded_values import RecordedValues
@@ -155,7 +155,7 @@ class LiveBus:
         return tuple(one for one in found if one.code != NOTHING_HEARD)
 
     @property
-    def searching(self) -> Progress | None:
+    def searching(self) -> SearchProgress | None:
         """What a search is at; None when there is none (any more)."""
         return self.search.progress if self.search is not None and self.engine.searching else None
 

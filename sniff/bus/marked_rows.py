@@ -1,4 +1,4 @@
-"""Which rows the marks of a capture are about: a mark says a moment, and may come long after it."""
+"""Rows that the marks of a capture are about: a mark says a moment, and may come long after it."""
 
 from __future__ import annotations
 

@@ -40,7 +40,7 @@ def outputs(items: Iterable[Item], session: Session) -> Iterator[Output | LineEv
     yield engine.close()
 
 
-class Source(Protocol):
+class ReadSource(Protocol):
     """Reads, one by one and in blocks."""
 
     def items(self) -> Iterator[Item]:
@@ -52,7 +52,7 @@ class Source(Protocol):
         ...
 
 
-def survey(capture: Source, session: Session, *observers: Observer, reference: bool = False) -> None:
+def survey(capture: ReadSource, session: Session, *observers: Observer, reference: bool = False) -> None:
     """Hand a whole capture to observers, many rows at a time where they take them so. `reference`: one by one, for
     comparison; the same comes of it. Raises CaptureError as the capture does, when all before the damage was handed
     on."""
@@ -92,7 +92,7 @@ def settled(
 
 
 def settled_in_bulk(
-    capture: Source, session: Session, devices: Devices | None = None, wanted: Wanted | None = None
+    capture: ReadSource, session: Session, devices: Devices | None = None, wanted: Wanted | None = None
 ) -> Iterator[JudgedRow]:
     """The same as `settled`, by way of tables: rows that a filter leaves out never become objects, unless something
     is to be said of devices."""
@@ -133,14 +133,14 @@ class _Spoken:
         yield from self._settling.flush()
 
 
-def settled_columns(capture: Source, session: Session) -> Iterator[SettledRows]:
+def settled_columns(capture: ReadSource, session: Session) -> Iterator[SettledRows]:
     """All rows of `settled`, as columns. Raises CaptureError as `settled` does."""
     from sniff.engine.column_join import ColumnJoin
 
     return _joined(capture, session, ColumnJoin())
 
 
-def _joined(capture: Source, session: Session, joining: _Joining[Given]) -> Iterator[Given]:
+def _joined(capture: ReadSource, session: Session, joining: _Joining[Given]) -> Iterator[Given]:
     """What a join gives of all tables of a capture; raises what the capture does, when all before it was given."""
     from sniff.engine.bulk import tables
 

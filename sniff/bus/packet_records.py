@@ -13,7 +13,7 @@ from sniff.engine.follow_settings import engine_for
 from sniff.engine.session import Item, LineEvent, LineEventKind, Session
 from sniff.engine.verdict_join import JudgedRow, VerdictJoin
 from sniff.formats.linktypes import LINK_TYPES, RTAC, RTAC_ERRORS, USER1, rtac_record
-from sniff.formats.records import Record
+from sniff.formats.records import PacketRecord
 
 
 class RecordMaker:
@@ -39,23 +39,23 @@ class RecordMaker:
         self.marks: Mapping[int, str] = marks or {}
         self._settling = VerdictJoin()
 
-    def add(self, item: Item) -> Iterator[Record]:
+    def add(self, item: Item) -> Iterator[PacketRecord]:
         """Take one item; give the records that it completes."""
         yield from self._settled(self.engine.take(item))
         if isinstance(item, LineEvent) and self.link_type == RTAC and item.kind is LineEventKind.DROPPED:
-            yield Record(item.time, RTAC, rtac_record(item.time - self.session.started, 5, b""))
+            yield PacketRecord(item.time, RTAC, rtac_record(item.time - self.session.started, 5, b""))
 
-    def advance(self, now: int) -> Iterator[Record]:
+    def advance(self, now: int) -> Iterator[PacketRecord]:
         """Say that no read returned up to `now` (ns)."""
         yield from self._settled(self.engine.advance(now))
 
-    def close(self) -> Iterator[Record]:
+    def close(self) -> Iterator[PacketRecord]:
         """Give the records still held."""
         yield from self._settled(self.engine.close())
         for item in self._settling.flush():
             yield from self._records(item)
 
-    def _settled(self, output: Output) -> Iterator[Record]:
+    def _settled(self, output: Output) -> Iterator[PacketRecord]:
         if self.live:
             for row in output.rows:
                 yield from self._records(JudgedRow(row, None))
@@ -63,7 +63,7 @@ class RecordMaker:
         for item in self._settling.add(output):
             yield from self._records(item)
 
-    def _records(self, item: JudgedRow) -> Iterator[Record]:
+    def _records(self, item: JudgedRow) -> Iterator[PacketRecord]:
         row = item.row
         event = row.event
         time = event.end
@@ -71,17 +71,17 @@ class RecordMaker:
             for mark in event.marks:
                 for error, number in RTAC_ERRORS.items():
                     if error in mark.error:
-                        yield Record(time, RTAC, rtac_record(time - self.session.started, number, b""))
+                        yield PacketRecord(time, RTAC, rtac_record(time - self.session.started, number, b""))
         comment = self._comment(item)
         if not isinstance(event, Frame) or not _readable(event):
-            yield Record(time, USER1, event.octets, comment, searched=row.searched, mark=self.marks.get(row.no))
+            yield PacketRecord(time, USER1, event.octets, comment, searched=row.searched, mark=self.marks.get(row.no))
             return
         header, placement = row.header, row.placement
         assert header is not None
         role = placement.role if placement is not None else header.role
         station = header.destination if header.destination is not None else header.source
         data = LINK_TYPES[self.link_type].write(event, role, station, time - self.session.started)
-        yield Record(time, self.link_type, data, comment, not event.ok, mark=self.marks.get(row.no))
+        yield PacketRecord(time, self.link_type, data, comment, not event.ok, mark=self.marks.get(row.no))
 
     def _comment(self, item: JudgedRow) -> str:
         row, transaction = item.row, item.transaction

@@ -21,7 +21,7 @@ from dissectors.frame import Chunk, Frame, Noise, Place, Reason
 from dissectors.line import NS_PER_S, Timing
 from dissectors.manifest import Dissector
 from sniff.analysis.rest_evidence import second_in
-from sniff.bus.offline import Source, outputs
+from sniff.bus.offline import ReadSource, outputs
 from sniff.engine.capture import CaptureError
 from sniff.engine.engine import Engine, Output, Row
 from sniff.engine.follow_settings import dissector_for
@@ -44,7 +44,7 @@ Judged = tuple[JudgedRow, Dissector]
 # -- whether there is one ----------------------------------------------------------------------------------------
 
 
-def with_second(capture: Source, session: Session, reference: bool = False) -> Session:
+def with_second(capture: ReadSource, session: Session, reference: bool = False) -> Session:
     """The session with the second protocol of a bus by name (SECOND_NOTE), where octets that the first leaves prove
     one. Reads the begin of the capture; `reference`: row by row, for comparison."""
     if SECOND_NOTE in session.notes:
@@ -62,7 +62,7 @@ def _second_in(left: Sequence[Row], session: Session) -> str | None:
     return None if found is None else found[0]
 
 
-def _left_at_first(capture: Source, session: Session, reference: bool) -> list[Row]:
+def _left_at_first(capture: ReadSource, session: Session, reference: bool) -> list[Row]:
     """What the first protocol leaves of the begin of a capture."""
     left: list[Row] = []
     octets = seen = 0
@@ -82,7 +82,7 @@ def _left_at_first(capture: Source, session: Session, reference: bool) -> list[R
     return left
 
 
-def _left_of_tables(capture: Source, session: Session) -> Iterator[tuple[int, Iterable[Row]]]:
+def _left_of_tables(capture: ReadSource, session: Session) -> Iterator[tuple[int, Iterable[Row]]]:
     from sniff.engine.bulk import tables
 
     for table in tables(capture.blocks(), session):
@@ -90,7 +90,7 @@ def _left_of_tables(capture: Source, session: Session) -> Iterator[tuple[int, It
             yield len(table.octets), _left_rows(table)
 
 
-def _left_by_reference(capture: Source, session: Session) -> Iterator[tuple[int, Iterable[Row]]]:
+def _left_by_reference(capture: ReadSource, session: Session) -> Iterator[tuple[int, Iterable[Row]]]:
     for output in outputs(capture.items(), session):
         if isinstance(output, Output):
             yield sum(len(row.event.octets) for row in output.rows), filter(_is_left, output.rows)

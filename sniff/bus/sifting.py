@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from dissectors.findings import Finding
 from dissectors.frame import Chunk
-from sniff.bus.offline import Source, settled_columns
+from sniff.bus.offline import ReadSource, settled_columns
 from sniff.engine.engine import Output, Row
 from sniff.engine.observer import Observer
 from sniff.engine.session import Item, LineEvent, Session
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 class _Events:
     """A capture whose line events are kept aside as they pass."""
 
-    def __init__(self, capture: Source) -> None:
+    def __init__(self, capture: ReadSource) -> None:
         self._capture = capture
         self.passed: list[LineEvent] = []
 
@@ -50,7 +50,7 @@ class _Events:
         return passed
 
 
-def sift(capture: Source, session: Session, wanted: Filter, *observers: Observer, every_row: bool = False) -> None:
+def sift(capture: ReadSource, session: Session, wanted: Filter, *observers: Observer, every_row: bool = False) -> None:
     """Hand on what a filter accepts of a capture: rows, exchanges with an accepted row, all line events. `every_row`:
     all rows, for those who need both ends of an exchange, and only the exchanges that are accepted. Raises CaptureError
     as the capture does."""
@@ -107,7 +107,7 @@ def _rows(some: SettledRows, places: Iterable[int]) -> Iterator[Row]:
         yield from rows_at(some.table, listed[begin : begin + AT_ONCE])
 
 
-def accepted(capture: Source, session: Session, wanted: Filter, among: Iterable[int]) -> set[int]:
+def accepted(capture: ReadSource, session: Session, wanted: Filter, among: Iterable[int]) -> set[int]:
     """Those of some row numbers that a filter accepts."""
     asked, found = set(among), set[int]()
     for some in settled_columns(capture, session) if asked else ():
@@ -117,7 +117,7 @@ def accepted(capture: Source, session: Session, wanted: Filter, among: Iterable[
 
 
 def shown_findings(
-    capture: Source, session: Session, wanted: Filter, findings: tuple[Finding, ...]
+    capture: ReadSource, session: Session, wanted: Filter, findings: tuple[Finding, ...]
 ) -> tuple[Finding, ...]:
     """Findings with a row among their evidence that a filter accepts."""
     if wanted.root is None:
@@ -132,7 +132,7 @@ class Sifted:
     What an adapter held back is not known of such a read any more: the times are those that were worked out.
     """
 
-    def __init__(self, capture: Source, session: Session, wanted: Filter) -> None:
+    def __init__(self, capture: ReadSource, session: Session, wanted: Filter) -> None:
         self._capture, self._session, self._wanted = capture, session, wanted
 
     def items(self) -> Iterator[Item]:

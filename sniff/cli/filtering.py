@@ -17,7 +17,7 @@ from dissectors.manifest import Dissector
 from dissectors.profiles import Devices
 from dissectors.tracker import Transaction
 from sniff.analysis.sanitizing import sanitized
-from sniff.bus.offline import Source, survey
+from sniff.bus.offline import ReadSource, survey
 from sniff.cli import USAGE, Failure, arguments
 from sniff.cli.progress import Watched
 from sniff.cli.tables import safe_cell
@@ -53,7 +53,9 @@ def add_help_fields(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def filter_of(args: argparse.Namespace, capture: Source, session: Session, devices: Devices | None = None) -> Filter:
+def filter_of(
+    args: argparse.Namespace, capture: ReadSource, session: Session, devices: Devices | None = None
+) -> Filter:
     """What -Y says, for a capture; ends with exit code 2 where it cannot be read, or asks for what frames of this
     protocol cannot have. Of several captures, one at least must have it."""
     dissector = dissector_for(session)
@@ -82,7 +84,7 @@ def of_second(args: argparse.Namespace, session: Session, name: str) -> Filter |
         return None
 
 
-def _compiled(text: str, capture: Source, session: Session, scope: Scope) -> Filter:
+def _compiled(text: str, capture: ReadSource, session: Session, scope: Scope) -> Filter:
     """The filter with all that it asks for beside the rows: findings, values of points, lines with devices in them."""
     dissector = dissector_for(session)
     wanted = compile_filter(text, dissector, scope)
@@ -107,7 +109,7 @@ def _compiled(text: str, capture: Source, session: Session, scope: Scope) -> Fil
 
 def surveyed(
     args: argparse.Namespace,
-    capture: Source,
+    capture: ReadSource,
     session: Session,
     *observers: Observer,
     every_row: bool = False,
@@ -124,7 +126,7 @@ def surveyed(
     sift(Watched(capture), session, filter_of(args, capture, session, devices), *observers, every_row=every_row)
 
 
-def sifted(args: argparse.Namespace, capture: Capture, session: Session, devices: Devices | None = None) -> Source:
+def sifted(args: argparse.Namespace, capture: Capture, session: Session, devices: Devices | None = None) -> ReadSource:
     """The octets of the rows that -Y accepts; the capture itself without it."""
     if not args.filter:
         return capture
@@ -148,7 +150,7 @@ def shown_findings(
     return shown(capture, session, filter_of(args, capture, session, devices), findings)
 
 
-def _evidence(capture: Source, session: Session, devices: Devices) -> dict[int, frozenset[str]]:
+def _evidence(capture: ReadSource, session: Session, devices: Devices) -> dict[int, frozenset[str]]:
     """Codes of the findings that each row is evidence of."""
     from sniff.analysis.judging import Judging
 

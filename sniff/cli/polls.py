@@ -10,7 +10,7 @@ from sniff.analysis.poll import Poll
 from sniff.analysis.poll_words import asked, changes, told
 from sniff.analysis.polls import Polls
 from sniff.analysis.wording import station_word
-from sniff.bus.offline import Source, survey
+from sniff.bus.offline import ReadSource, survey
 from sniff.bus.row_words import iso
 from sniff.cli import arguments, tables
 from sniff.cli.tables import Cell
@@ -39,7 +39,7 @@ _SELDOM = ("from", "exceptions", "late", "damaged", "repeats", "changed")
 """Columns that a person need not see when there is nothing in them."""
 
 
-def show(args: argparse.Namespace, source: Source, session: Session) -> None:
+def show(args: argparse.Namespace, source: ReadSource, session: Session) -> None:
     """Print the programme of a capture."""
     devices = arguments.noted_devices(args, session)
     polls = Polls(dissector_for(session))

@@ -254,7 +254,7 @@ def _guess(args: argparse.Namespace) -> int:
 
 def _draft(args: argparse.Namespace) -> int:
     from sniff.analysis.profile_draft import drafted
-    from sniff.analysis.register_guess import Sure, guessed
+    from sniff.analysis.register_guess import GuessSureness, guessed
     from sniff.analysis.register_series import RegisterSeries
 
     if args.write is not None:
@@ -281,7 +281,7 @@ def _draft(args: argparse.Namespace) -> int:
     document = drafted(args.name, next(iter(families)), list(protocols), chosen)
     register_maps.write_document(args, document)
     if args.write is not None:
-        sure = sum(one.sure is Sure.SURE for one in chosen)
+        sure = sum(one.sure is GuessSureness.SURE for one in chosen)
         print(
             f"sniff485: {len(chosen)} values drafted to {sanitized(args.write)}, {sure} of them sure", file=sys.stderr
         )

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, TextIO, TypeVar
 
-from sniff.bus.offline import Source
+from sniff.bus.offline import ReadSource
 from sniff.engine.session import Item, LineEvent
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ class Watched:
 
     def __init__(
         self,
-        capture: Source,
+        capture: ReadSource,
         stream: TextIO | None = None,
         clock: Callable[[], float] = time.monotonic,
         prints: bool = False,
@@ -36,7 +36,7 @@ class Watched:
         self._clock = clock
 
     @property
-    def wrapped(self) -> Source:
+    def wrapped(self) -> ReadSource:
         """The capture."""
         return self._capture
 

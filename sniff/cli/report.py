@@ -17,7 +17,7 @@ from sniff.cli.progress import Watched
 from sniff.engine.capture import Capture
 from sniff.formats.table import suffixes
 from sniff.reporting.collecting import collect
-from sniff.reporting.numbers import Numbers
+from sniff.reporting.numbers import CaptureNumbers
 
 LIBRARIES = ("jinja2", "matplotlib")
 
@@ -79,7 +79,7 @@ def default_place(file: str) -> Path:
     return path.with_name(name) if os.access(path.parent, os.W_OK) else Path(name)
 
 
-def _numbers(path: str, capture: Capture, args: argparse.Namespace) -> Numbers:
+def _numbers(path: str, capture: Capture, args: argparse.Namespace) -> CaptureNumbers:
     session = arguments.settings_of(args, capture.session, path)
     devices = arguments.noted_devices(args, session)
     wanted = filtering.filter_of(args, capture, session, devices) if args.filter else None

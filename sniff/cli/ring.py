@@ -6,13 +6,13 @@ import argparse
 from typing import Any
 
 from dissectors.token_ring import StationTable, TokenRing
-from sniff.bus.offline import Source, survey
+from sniff.bus.offline import ReadSource, survey
 from sniff.bus.watched_ring import WatchedRing
 from sniff.cli import tables
 from sniff.engine.session import Session
 
 
-def ring_of(source: Source, session: Session, shown: TokenRing, reference: bool = False) -> Any:
+def ring_of(source: ReadSource, session: Session, shown: TokenRing, reference: bool = False) -> Any:
     """The ring that a capture shows. `reference`: row by row, for comparison."""
     watched = WatchedRing(shown.observer(session.timing))
     survey(source, session, watched, reference=reference)
@@ -20,7 +20,7 @@ def ring_of(source: Source, session: Session, shown: TokenRing, reference: bool 
 
 
 def show_stations(
-    source: Source, session: Session, shown: TokenRing, table: StationTable, args: argparse.Namespace
+    source: ReadSource, session: Session, shown: TokenRing, table: StationTable, args: argparse.Namespace
 ) -> int:
     """Print the stations that do not pass the token. Raises CaptureError as the source does."""
     ring = ring_of(source, session, shown, args.reference)
@@ -28,7 +28,7 @@ def show_stations(
     return 0
 
 
-def show(source: Source, session: Session, shown: TokenRing, style: str, reference: bool) -> int:
+def show(source: ReadSource, session: Session, shown: TokenRing, style: str, reference: bool) -> int:
     """Print the ring; the sentences only as text. `reference`: see `survey`. Raises CaptureError as the source does."""
     write(ring_of(source, session, shown, reference), shown, style)
     return 0

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from dissectors import registry
 from dissectors.line import LineSettings
 from sniff.analysis.autodetect import Detecting, Ending, Outcome, candidates
-from sniff.bus.autodetect import Progress, Search
+from sniff.bus.autodetect import Search, SearchProgress
 from sniff.bus.live import LiveBus
 from sniff.capture.link import CaptureLink
 from sniff.cli import INTERRUPTED, PORT_TROUBLE, Failure
@@ -79,7 +79,7 @@ class Meter:
         self._last: LineSettings | None = None
         self._live = sys.stderr.isatty()
 
-    def show(self, progress: Progress) -> None:
+    def show(self, progress: SearchProgress) -> None:
         """Say it, where it is news."""
         if self._live:
             text = (

@@ -15,7 +15,7 @@ from dissectors.frame import Chunk
 from dissectors.profiles import Devices
 from sniff.analysis.sanitizing import sanitized
 from sniff.bus.capture_writer import create
-from sniff.bus.offline import Source
+from sniff.bus.offline import ReadSource
 from sniff.cli import UNREADABLE, USAGE, Failure
 from sniff.cli.progress import Watched
 from sniff.devices import noted_devices
@@ -42,7 +42,7 @@ def add_output(parser: argparse.ArgumentParser) -> None:
 def write(
     args: argparse.Namespace,
     session: Session,
-    source: Source,
+    source: ReadSource,
     sources: Sequence[str],
     options: Mapping[str, str] | None = None,
     with_frames: bool = False,
@@ -175,7 +175,7 @@ def _write_items(
             taker.close()
 
 
-def with_comments(capture: Source) -> Source:
+def with_comments(capture: ReadSource) -> ReadSource:
     """What is to be written, with what people wrote into it where it can tell (a text capture)."""
     comments = getattr(capture, "comments", None)
     if comments is None or next(comments(), None) is None:
@@ -202,7 +202,7 @@ class Items:
 
 def _is_recording(writer: object) -> bool:
     """Whether it takes what is derived."""
-    from sniff.recording.writer import McapWriter
+    from sniff.recording.mcap_writer import McapWriter
 
     return isinstance(writer, McapWriter)
 
@@ -214,8 +214,8 @@ class _Frames:
 
     def __init__(self, writer: object, session: Session) -> None:
         from sniff.recording.frames import SCHEMA, FrameLog
+        from sniff.recording.mcap_writer import McapWriter
         from sniff.recording.topics import FRAMES
-        from sniff.recording.writer import McapWriter
 
         assert isinstance(writer, McapWriter)
         self._writer = writer
@@ -253,7 +253,7 @@ class _Topics:
 
     def __init__(self, writer: object, session: Session, devices: Devices, with_values: bool) -> None:
         from sniff.bus.offline_topics import OfflineTopics
-        from sniff.recording.writer import McapWriter
+        from sniff.recording.mcap_writer import McapWriter
 
         assert isinstance(writer, McapWriter)
         self._writer = writer
@@ -288,7 +288,7 @@ class _Values:
     def __init__(self, writer: object, session: Session, devices: Devices) -> None:
         from sniff.analysis.points import PointReader
         from sniff.bus.value_topics import ValueChannels
-        from sniff.recording.writer import McapWriter
+        from sniff.recording.mcap_writer import McapWriter
 
         assert isinstance(writer, McapWriter)
         self._writer = writer

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from dissectors.findings import Finding
 from dissectors.line import NS_PER_S
 from sniff.analysis.judging import Judging
-from sniff.bus.offline import Source, survey
+from sniff.bus.offline import ReadSource, survey
 from sniff.devices import noted_devices
 from sniff.engine.engine import Output, Row
 from sniff.engine.follow_settings import dissector_for
@@ -54,7 +54,7 @@ def parse_time(text: str, session: Session) -> int:
     return int(whole) * NS_PER_S + moment.microsecond * 1000
 
 
-def of_frames(capture: Source, session: Session, text: str, reference: bool = False) -> Stretch:
+def of_frames(capture: ReadSource, session: Session, text: str, reference: bool = False) -> Stretch:
     """The stretch of the frames "12-40", "12-", "-40" or "12", by their numbers in `show`. Raises ValueError.
     `reference`: row by row, for comparison."""
     match = _FRAMES.fullmatch(text.strip())
@@ -118,7 +118,7 @@ class _Times:
         """Nothing of it is kept."""
 
 
-def around_finding(capture: Source, session: Session, code: str, reference: bool = False) -> Stretch:
+def around_finding(capture: ReadSource, session: Session, code: str, reference: bool = False) -> Stretch:
     """The stretch from the first to the last evidence of the first finding with that code. Raises ValueError.
     `reference`: row by row, for comparison."""
     judging = Judging(session, dissector_for(session), noted_devices(session))
@@ -139,7 +139,7 @@ def around_finding(capture: Source, session: Session, code: str, reference: bool
 class CutOut:
     """A stretch of a capture. `char`: ns an octet."""
 
-    def __init__(self, capture: Source, stretch: Stretch, char: int) -> None:
+    def __init__(self, capture: ReadSource, stretch: Stretch, char: int) -> None:
         self._capture = capture
         self._stretch = stretch
         self._char = char

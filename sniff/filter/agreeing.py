@@ -1,4 +1,4 @@
-"""Whether what stands beside each other in a filter goes together: types, ranges, words. Pure."""
+"""Type check of a filter: operands that cannot go together by type, range or word are refused. Pure."""
 
 from __future__ import annotations
 

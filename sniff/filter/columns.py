@@ -1,4 +1,4 @@
-"""What tables hold of the names of a filter, and what tests say of many rows at once. Pure.
+"""Columns of the names of a filter, and masks: a test of many rows at once. Pure.
 
 A column speaks of plain rows only; what is odd in a table is asked row by row.
 """

@@ -44,7 +44,7 @@ from sniff.filter.expressions import NUMERIC, Expression
 from sniff.filter.grammar import parse
 from sniff.filter.literals import Instant, value_of
 from sniff.filter.naming import Names
-from sniff.filter.plan import Filter, Leaf, Node, Opposite, joined
+from sniff.filter.plan import Filter, Leaf, Opposite, TestNode, joined
 from sniff.filter.scope import Scope
 from sniff.filter.syntax import (
     Among,
@@ -105,7 +105,7 @@ class _Compiler:
         self.values = Values(names)
         self.points = pointing.Points(names)
 
-    def test(self, parsed: Test) -> Node:
+    def test(self, parsed: Test) -> TestNode:
         """What asks that."""
         if isinstance(parsed, Joined):
             return self._joined(parsed)
@@ -124,13 +124,13 @@ class _Compiler:
             return self._contains(parsed)
         return self._matches(parsed)
 
-    def _joined(self, parsed: Joined) -> Node:
+    def _joined(self, parsed: Joined) -> TestNode:
         one, rest = self.points.together(parsed)
         parts = [self.test(part) for part in rest]
         parts += [] if one is None else [one]
         return parts[0] if len(parts) == 1 else joined(parsed.operator, parts)
 
-    def _present(self, value: Value) -> Node:
+    def _present(self, value: Value) -> TestNode:
         if isinstance(value, Word):
             layer = self.names.layer(value)
             if layer is not None:
@@ -149,7 +149,7 @@ class _Compiler:
 
     # comparisons
 
-    def _compared(self, parsed: Compared) -> Node:
+    def _compared(self, parsed: Compared) -> TestNode:
         left, right = self.values.field_or_none(parsed.left), self.values.field_or_none(parsed.right)
         operator, quantifier = parsed.operator, parsed.quantifier
         if left is None and right is None:
@@ -189,7 +189,7 @@ class _Compiler:
 
     def _both_fields(
         self, left: Expression, operator: str, right: Expression, every: bool, words: str, column: int
-    ) -> Node:
+    ) -> TestNode:
         check_alike(left, right, column)
         compare, wanted = COMPARE[operator], all if every else any
         get_left, get_right = left.get, right.get
@@ -204,10 +204,10 @@ class _Compiler:
         fixed = False if left.nowhere or right.nowhere else None
         return Leaf(ask, columns, words, left.of_closing or right.of_closing, fixed)
 
-    def _among(self, parsed: Among) -> Node:
+    def _among(self, parsed: Among) -> TestNode:
         left = self.values.field_of(parsed.value)
         tests: list[Any] = []
-        others: list[Node] = []
+        others: list[TestNode] = []
         elsewhere = 0
         for low, high in parsed.items:
             if high is not None:
@@ -253,7 +253,7 @@ class _Compiler:
 
     # searches
 
-    def _contains(self, parsed: Contains) -> Node:
+    def _contains(self, parsed: Contains) -> TestNode:
         left = self._searched(parsed, "contains")
         part = parsed.part
         if not isinstance(part, Word | Quoted):
@@ -283,7 +283,7 @@ class _Compiler:
             )
         return left
 
-    def _matches(self, parsed: Matches) -> Node:
+    def _matches(self, parsed: Matches) -> TestNode:
         left = self._searched(parsed, "matches")
         if not isinstance(parsed.pattern, Word | Quoted):
             raise FilterError("matches is followed by a regular expression", parsed.pattern.column)

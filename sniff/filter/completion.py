@@ -1,4 +1,4 @@
-"""What may come next in a filter that is being typed: fields, then operators, then values. Pure."""
+"""Completion of a filter that is being typed: fields, then operators, then values. Pure."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is wrong with a filter, and where."""
+"""Errors of a filter: what is wrong, and where."""
 
 from __future__ import annotations
 

@@ -196,7 +196,7 @@ Answered = Callable[[Row], Mapping[str, int | float | str]]
 """What an answer says that only its request tells."""
 
 
-class Decoded:
+class DecodedFields:
     """The fields of a frame; those of the last one are remembered, for several tests may ask for them."""
 
     def __init__(self, dissector: Dissector, answered: Answered | None = None) -> None:
@@ -215,7 +215,7 @@ class Decoded:
         return self._last[1]
 
 
-def of_protocol(name: str, type: FieldType, decoded: Decoded) -> Getter:
+def of_protocol(name: str, type: FieldType, decoded: DecodedFields) -> Getter:
     """A field in the form of its type."""
     read = _READ.get(type.kind, _as_it_is)
 

@@ -1,4 +1,4 @@
-"""What is written in a filter, as a value of the type that it is compared with. Pure."""
+"""Literals of a filter: the value of the type that they are compared with. Pure."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ from sniff.filter.comparing import With
 from sniff.filter.errors import FilterError, OfOthers, nearest
 from sniff.filter.expressions import Expression
 from sniff.filter.literals import number_of
-from sniff.filter.plan import Begins, Leaf, Node, joined
+from sniff.filter.plan import Begins, Leaf, TestNode, joined
 from sniff.filter.scope import Scope
 from sniff.filter.syntax import Quoted, Value, Word
 
@@ -42,7 +42,7 @@ class Names:
         self.by_request: set[str] = set()
         self.begins: Begins | None = None
         self.elsewhere: list[Elsewhere] = []
-        self._decoded: dict[str, fields.Decoded] = {}
+        self._decoded: dict[str, fields.DecodedFields] = {}
         self._types: dict[str, FieldType | None] = {}
         self._points: set[str] = set()
 
@@ -114,11 +114,11 @@ class Names:
         assert get is not None
         return Expression(name, type, get, columns, closing, name in fields.SPELLED, name)
 
-    def decoded(self) -> fields.Decoded:
+    def decoded(self) -> fields.DecodedFields:
         """The fields of frames of this protocol."""
         made = self._decoded.get(self.dissector.name)
         if made is None:
-            made = self._decoded[self.dissector.name] = fields.Decoded(self.dissector, self._answered)
+            made = self._decoded[self.dissector.name] = fields.DecodedFields(self.dissector, self._answered)
         return made
 
     def _answered(self, row: Row) -> Mapping[str, int | float | str]:
@@ -138,7 +138,7 @@ class Names:
             columns = octet_of_frames(type.octet, type.mask, self.dissector.name)
         return Expression(name, type, fields.of_protocol(name, type, self.decoded()), columns, field=name)
 
-    def layer(self, word: Word) -> Node | None:
+    def layer(self, word: Word) -> TestNode | None:
         """A protocol by its name, or what frames of one carry; None for any other name."""
         name = fields.ALIASES.get(word.text, word.text)
         if self.type(name) is not None:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from sniff.filter.columns import Closed
 
 
-class Node(Protocol):
+class TestNode(Protocol):
     """A test of rows."""
 
     def test(self, row: Row, transaction: Transaction | None) -> bool:
@@ -86,7 +86,7 @@ class Leaf:
 class Opposite:
     """Not that."""
 
-    inner: Node
+    inner: TestNode
 
     def test(self, row: Row, transaction: Transaction | None) -> bool:
         """Ask the row."""
@@ -126,7 +126,7 @@ class Several:
     """Tests joined; the cheap ones first. `operator`: "&&", "||", "^^"."""
 
     operator: str
-    parts: Sequence[Node]
+    parts: Sequence[TestNode]
 
     def test(self, row: Row, transaction: Transaction | None) -> bool:
         """Ask the row."""
@@ -187,7 +187,7 @@ class Several:
             yield from part.lines(f"{indent}  ")
 
 
-def joined(operator: str, parts: Sequence[Node]) -> Node:
+def joined(operator: str, parts: Sequence[TestNode]) -> TestNode:
     """Parts that columns answer come first: where they decide, no row is decoded."""
     ordered = sorted(parts, key=lambda part: not part.in_columns)
     return Several(operator, ordered)
@@ -238,7 +238,7 @@ class Filter:
     `Scope.answered` must know. `begins`: kept where it asks for the time since the row before."""
 
     text: str
-    root: Node | None = None
+    root: TestNode | None = None
     names: frozenset[str] = frozenset()
     begins: Begins | None = None
     points: frozenset[str] = frozenset()

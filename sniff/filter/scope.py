@@ -1,4 +1,4 @@
-"""What a filter may know beside the row: when the capture began, who is who, what was found."""
+"""The scope of a filter, which it may ask beside the row: when the capture began, who is who, what was found."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from dissectors.columns import Masks
 
 
-class Told(NamedTuple):
+class ToldPoint(NamedTuple):
     """One value of a frame: the name of its point, what it is, its unit, and that in words."""
 
     name: str
@@ -38,7 +38,7 @@ class Scope:
     names: Mapping[str, int] = field(default_factory=dict)
     findings: Mapping[int, frozenset[str]] | None = None
     begin_of: Callable[[int], int | None] | None = None
-    told: Callable[[int], Sequence[Told]] | None = None
+    told: Callable[[int], Sequence[ToldPoint]] | None = None
     telling: Callable[[int, int], Masks] | None = None
     says: Callable[[Row], str] | None = None
     answered: Callable[[Row], Mapping[str, int | float | str]] | None = None

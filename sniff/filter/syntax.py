@@ -1,4 +1,4 @@
-"""What a filter is made of, as it was written. `column`: where it stands, from 0. Pure."""
+"""Syntax tree of a filter, as it was written. `column`: where it stands, from 0. Pure."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ from sniff.filter.errors import FilterError, nearest
 from sniff.filter.expressions import Expression
 from sniff.filter.literals import number_of
 from sniff.filter.plan import Leaf
-from sniff.filter.scope import Scope, Told
+from sniff.filter.scope import Scope, ToldPoint
 from sniff.filter.syntax import Quoted, Word
 
 if TYPE_CHECKING:
@@ -41,9 +41,9 @@ _PLAIN = re.compile(r"[A-Za-z][\w-]*/\d+(?:/.+)?")
 _NUMBER_AND_UNIT = re.compile(r"(?P<number>[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?)\s*(?P<unit>[^\d\s].*)")
 
 
-def told(value: Decoded) -> Told:
+def told(value: Decoded) -> ToldPoint:
     """A decoded value, as filters see it."""
-    return Told(value.name, value.value, value.unit, value.words)
+    return ToldPoint(value.name, value.value, value.unit, value.words)
 
 
 @dataclass(slots=True)
@@ -126,7 +126,7 @@ def expression(name: str, type: FieldType, scope: Scope) -> Expression:
     return Expression(name, type, get, columns if scope.telling is not None else None, field=name, told=True)
 
 
-def _nothing(no: int) -> Sequence[Told]:
+def _nothing(no: int) -> Sequence[ToldPoint]:
     return ()
 
 
@@ -144,7 +144,7 @@ def masks_of(scope: Scope) -> Callable[[Table, Closed | None], tuple[Masks, Mask
 
 # --- tests of one value ---------------------------------------------------------------------------------------------
 
-Accepts = Callable[[Told], bool]
+Accepts = Callable[[ToldPoint], bool]
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,7 +174,7 @@ def together(tests: Iterable[ToldTest], refused: Iterable[ToldTest], words: str)
     """One value that all tests accept, and none of `refused`."""
     wanted, unwanted = tuple(tests), tuple(refused)
 
-    def accepts(one: Told) -> bool:
+    def accepts(one: ToldPoint) -> bool:
         return all(test.accepts(one) for test in wanted) and not any(test.accepts(one) for test in unwanted)
 
     return ToldTest(_all, accepts, True, words)
@@ -186,7 +186,7 @@ def either(tests: Iterable[ToldTest], words: str) -> ToldTest:
     return ToldTest(_all, lambda one: any(test.accepts(one) for test in wanted), True, words)
 
 
-def _all(one: Told) -> bool:
+def _all(one: ToldPoint) -> bool:
     return True
 
 
@@ -201,7 +201,7 @@ def _meant(name: str) -> Accepts:
     return _all if name == VALUE else lambda one: one.name == name
 
 
-def _text(one: Told) -> str:
+def _text(one: ToldPoint) -> str:
     return one.value if isinstance(one.value, str) else one.words or f"{one.value:g}"
 
 
@@ -218,13 +218,13 @@ def of_value(name: str, make: Callable[[int | float], Callable[[Any], bool]], wa
     assert wanted.number is not None
     test, unit = make(wanted.number), wanted.unit
 
-    def accepts(one: Told) -> bool:
+    def accepts(one: ToldPoint) -> bool:
         return not isinstance(one.value, str) and (not unit or one.unit == unit) and test(one.value)
 
     return ToldTest(_meant(name), accepts, name == VALUE, words)
 
 
-def _says(one: Told, text: str) -> bool:
+def _says(one: ToldPoint, text: str) -> bool:
     said = one.value if isinstance(one.value, str) else one.words
     return (plain_word(said) or said) == text
 

@@ -37,7 +37,7 @@ MOST = 400
 """Days whose pairs are looked at; of more, so many evenly spread."""
 
 
-class Sure(Enum):
+class DriftSureness(Enum):
     """How sure a drift is, by the chance of seeing as much without one."""
 
     SURE = "sure"  # at most 1 in 100
@@ -59,9 +59,15 @@ class Drift:
     medians: tuple[tuple[str, int], ...]
 
     @property
-    def sure(self) -> Sure:
+    def sure(self) -> DriftSureness:
         """In one word."""
-        return Sure.SURE if self.chance <= 0.01 else Sure.LIKELY if self.chance <= 0.05 else Sure.UNSURE
+        return (
+            DriftSureness.SURE
+            if self.chance <= 0.01
+            else DriftSureness.LIKELY
+            if self.chance <= 0.05
+            else DriftSureness.UNSURE
+        )
 
     def is_told(self, latency: int) -> bool:
         """Whether it is large enough to be told, and more than the adapters may have added (`latency`, ns)."""

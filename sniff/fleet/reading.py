@@ -55,7 +55,7 @@ def _read(task: Task, capture: Capture) -> Iterator[BusDay]:
     sources = tuple(file.path for file in task.files)
     parts = by_day.parts
     if not parts and (task.window is None or notes):
-        parts = {_day(session.started): Part(session)}
+        parts = {_day(session.started): DayObservers(session)}
     for day, part in parts.items():
         yield BusDay(
             task.site,
@@ -76,7 +76,7 @@ def _read(task: Task, capture: Capture) -> Iterator[BusDay]:
         )
 
 
-class Part:
+class DayObservers:
     """The observers of one day."""
 
     def __init__(self, session: Session) -> None:
@@ -99,7 +99,7 @@ class ByDay:
     that count are those that began in it; what closes without a row goes with the row before it."""
 
     def __init__(self, session: Session, window: Window | None = None) -> None:
-        self.parts: dict[str, Part] = {}
+        self.parts: dict[str, DayObservers] = {}
         self._session = session
         self._begin = window.begin if window is not None and window.begin is not None else -FAR
         self._end = window.end if window is not None and window.end is not None else FAR
@@ -131,13 +131,13 @@ class ByDay:
         if self._begin <= event.time < self._end:
             self._part(event.time).add_line_event(event)
 
-    def _part(self, time: int) -> Part:
+    def _part(self, time: int) -> DayObservers:
         day = _day(time)
         if day not in self.parts:
-            self.parts[day] = Part(self._session)
+            self.parts[day] = DayObservers(self._session)
         return self.parts[day]
 
-    def _last_part(self, step: Callable[[Part], None]) -> None:
+    def _last_part(self, step: Callable[[DayObservers], None]) -> None:
         if self.parts:
             step(next(reversed(self.parts.values())))
 

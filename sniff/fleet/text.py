@@ -9,7 +9,7 @@ from dissectors.words import milliseconds
 from sniff.analysis.sanitizing import sanitized
 from sniff.fleet.answer import Answer, Bus, Change, Day, Fresh, StationChange, Trouble
 from sniff.fleet.bus_day import NO_DATE
-from sniff.fleet.drift import Drift, Sure
+from sniff.fleet.drift import Drift, DriftSureness
 
 SHOWN = 12
 """Buses that are told in full; the others are counted."""
@@ -139,7 +139,7 @@ def sure_words(drift: Drift) -> str:
     """How sure a drift is: "sure: 1 in 1000 by chance"."""
     if drift.chance > CHANCE:
         return "no drift"
-    if drift.sure is Sure.UNSURE and len(drift.medians) < 5:
+    if drift.sure is DriftSureness.UNSURE and len(drift.medians) < 5:
         return f"{len(drift.medians)} days: too few to be sure"
     return f"{drift.sure.value}: 1 in {1 / max(drift.chance, 1e-6):.0f} by chance"
 

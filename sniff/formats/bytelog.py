@@ -35,7 +35,7 @@ from sniff.formats.log_lines import Kind, pieces
 from sniff.formats.log_margin import plain_signs
 from sniff.formats.log_plan import LOOKED_AT, LOOKED_AT_CHARACTERS, Plan, plan_of
 from sniff.formats.log_shapes import REMARK
-from sniff.formats.octet_table import Table, delimiter_of, heading_of
+from sniff.formats.octet_table import TableLayout, delimiter_of, heading_of
 from sniff.formats.records import FOREIGN_LATENCY, foreign_session
 
 if TYPE_CHECKING:
@@ -228,7 +228,7 @@ class _Counts:
         self.first = self.first or number
 
 
-def _heading(lines: list[str]) -> tuple[int, Table] | None:
+def _heading(lines: list[str]) -> tuple[int, TableLayout] | None:
     """The line with the headings of a table and what it says; remarks may stand before it."""
     for number, line in enumerate(map(plain_signs, lines[:20])):
         if not line.strip() or line.lstrip().startswith(REMARK):

@@ -1,4 +1,4 @@
-"""What a file is that has no magic octets at its begin: text, a text capture, octets as they were heard. Pure."""
+"""Kind of a file without magic octets at its begin: text, a text capture, octets as they were heard. Pure."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a pcap record holds, by link type: how a frame is written into it and read out of it. Pure.
+"""Link types of pcap records: how a frame is written into it and read out of it. Pure.
 
 165  A link type of a protocol's own: the frame as it is; Wireshark reads it without set-up.
 147  User 0: the bare frame; Wireshark needs a DLT_USER entry.
@@ -35,7 +35,7 @@ CLIENT_HOST = 254
 
 
 @dataclass(frozen=True, slots=True)
-class Decoded:
+class DecodedRecord:
     """What was in a record. `protocol` is None when the record does not say; `event` is an RTAC line error's name."""
 
     octets: bytes
@@ -48,25 +48,25 @@ class LinkType:
     """One link type: how to write (None where we only read) and read a record."""
 
     number: int
-    read: Callable[[bytes], Decoded | None]
+    read: Callable[[bytes], DecodedRecord | None]
     write: Callable[[Frame, Role, int | None, int], bytes]
 
 
-def _plain(octets: bytes) -> Decoded:
-    return Decoded(octets)
+def _plain(octets: bytes) -> DecodedRecord:
+    return DecodedRecord(octets)
 
 
 def _write_plain(frame: Frame, _role: Role, _station: int | None, _time: int) -> bytes:
     return frame.octets
 
 
-def _read_rtac(record: bytes) -> Decoded | None:
+def _read_rtac(record: bytes) -> DecodedRecord | None:
     if len(record) < RTAC_HEADER.size:
         return None
     event = record[8]
     if event in RTAC_ERROR_NAMES:
-        return Decoded(record[RTAC_HEADER.size :], protocol_of(RTAC), RTAC_ERROR_NAMES[event])
-    return Decoded(record[RTAC_HEADER.size :], protocol_of(RTAC), "dropped" if event == RTAC_LOST else "")
+        return DecodedRecord(record[RTAC_HEADER.size :], protocol_of(RTAC), RTAC_ERROR_NAMES[event])
+    return DecodedRecord(record[RTAC_HEADER.size :], protocol_of(RTAC), "dropped" if event == RTAC_LOST else "")
 
 
 def rtac_record(time: int, event: int, octets: bytes) -> bytes:
@@ -79,14 +79,14 @@ def _write_rtac(frame: Frame, role: Role, _station: int | None, time: int) -> by
     return rtac_record(time, RTAC_RX_START if role is Role.RESPONSE else RTAC_TX_START, frame.octets)
 
 
-def _read_exported(record: bytes) -> Decoded | None:
+def _read_exported(record: bytes) -> DecodedRecord | None:
     name, at = "", 0
     while at + 4 <= len(record):
         tag, length = struct.unpack_from(">HH", record, at)
         at += 4
         if tag == TAG_END:
             protocol = _by_pdu_name().get(name)
-            return Decoded(record[at:], protocol) if protocol is not None else None
+            return DecodedRecord(record[at:], protocol) if protocol is not None else None
         if tag == TAG_NAME:
             name = record[at : at + length].split(b"\0")[0].decode("ascii", "replace")
         at += length

@@ -23,7 +23,7 @@ from sniff.formats.records import foreign_session
 from sniff.formats.several_buses import one_or_several
 from sniff.formats.uart import LONGEST, Characters, Decoder
 from sniff.formats.uart_finding import SAMPLE, decoded, find, second_stop
-from sniff.formats.wave_buses import Heard, WaveBus, buses
+from sniff.formats.wave_buses import HeardChannel, WaveBus, buses
 from sniff.formats.waves import Edges, WaveFile
 
 if TYPE_CHECKING:
@@ -73,7 +73,7 @@ def read(file: WaveFile) -> list[LogicCapture]:
             others.append(f"{name} {'never changes' if not len(edges) else f'has {len(edges)} edges or more'}")
             continue
         common = edges[edges <= is_all]
-        heard.append(Heard(channel, name, uart, decoded(uart, common, level)))
+        heard.append(HeardChannel(channel, name, uart, decoded(uart, common, level)))
     heard = [one for one in heard if len(one.sample)]
     if not heard:
         raise CaptureError(

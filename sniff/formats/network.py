@@ -1,4 +1,4 @@
-"""What a packet of a network carries: its addresses, ports and payload, as far as captures of gateways need them. Pure.
+"""Headers of network packets: addresses, ports and payload, as far as captures of gateways need them. Pure.
 
 Ethernet with VLAN tags, Linux cooked, raw IP and loopback; IPv4 (no fragments), IPv6 without extension headers; TCP,
 UDP; LLC with SNAP.

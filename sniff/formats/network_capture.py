@@ -20,7 +20,7 @@ from sniff.engine.capture import Capture, CaptureError
 from sniff.engine.session import Adapter, Completeness, Item, LineEvent, LineEventKind, Session
 from sniff.formats import telnet
 from sniff.formats.network import NETWORK, Address, Segment, Snap, carried, shown
-from sniff.formats.records import FOREIGN_LATENCY, Record, foreign_session
+from sniff.formats.records import FOREIGN_LATENCY, PacketRecord, foreign_session
 from sniff.formats.several_buses import one_or_several
 from sniff.formats.tcp_stream import TcpStream
 
@@ -43,7 +43,7 @@ class RecordFile(Protocol):
 
     path: Path
 
-    def records(self) -> Iterator[Record]:
+    def records(self) -> Iterator[PacketRecord]:
         """All records, as far as the file is whole. Raises CaptureError."""
         ...
 
@@ -142,7 +142,7 @@ def _by_datagram() -> dict[str, bytes]:
 
 
 def _datagram_reader(protocol: str) -> Reader:
-    def items(records: Iterator[Record]) -> Iterator[Item]:
+    def items(records: Iterator[PacketRecord]) -> Iterator[Item]:
         begin = _by_datagram()[protocol]
         for record in records:
             segment = carried(record.link_type, record.data) if record.link_type in NETWORK else None
@@ -304,11 +304,11 @@ class _Both:
                 yield Chunk(time, one)
 
 
-Reader = Callable[[Iterator[Record]], Iterator[Item]]
+Reader = Callable[[Iterator[PacketRecord]], Iterator[Item]]
 
 
 def _talk_reader(key: Key, talk: _Talk) -> Reader:
-    def items(records: Iterator[Record]) -> Iterator[Item]:
+    def items(records: Iterator[PacketRecord]) -> Iterator[Item]:
         both, time = _Both(talk.is_telnet), talk.first
         for record in records:
             segment = carried(record.link_type, record.data) if record.link_type in NETWORK else None
@@ -321,7 +321,7 @@ def _talk_reader(key: Key, talk: _Talk) -> Reader:
 
 
 def _snap_reader(kind: bytes) -> Reader:
-    def items(records: Iterator[Record]) -> Iterator[Item]:
+    def items(records: Iterator[PacketRecord]) -> Iterator[Item]:
         held = next(file for one in registry.usable() if (file := one.packet_file) is not None and file.snap == kind)
         for record in records:
             found = carried(record.link_type, record.data) if record.link_type in NETWORK else None

@@ -86,7 +86,7 @@ _WORDS_OF_CHARACTERS = {"comma": ",", "' '": " ", "\\t": "\t", "\\r": "\r", "\\n
 
 
 @dataclass(frozen=True, slots=True)
-class Table:
+class TableLayout:
     """Where things stand in a row; None where there is no such column."""
 
     octet: int
@@ -160,7 +160,7 @@ def delimiter_of(heading: str) -> str:
     return max(_DELIMITERS, key=heading.count)
 
 
-def heading_of(heading: str, delimiter: str, rows: Sequence[str]) -> Table | None:
+def heading_of(heading: str, delimiter: str, rows: Sequence[str]) -> TableLayout | None:
     """The columns that a heading names; None when octets or times are not among them. `rows`: the next lines, which
     tell how octets are written.
     """
@@ -206,7 +206,7 @@ def heading_of(heading: str, delimiter: str, rows: Sequence[str]) -> Table | Non
     told = [[one for one in cell[octet:] if one] if tail else [cell[octet]] for cell in data]
     read = spelling_of([one for cell in told for one in cell])
     unit, times = _times_of([cell[when] for cell in data], [_length(cell, read) for cell in told], units[when])
-    return Table(
+    return TableLayout(
         octet, read, delimiter, begin, end, place(DURATION), unit, kind, (*errors, *named), times, tail
     )  # fmt: skip
 

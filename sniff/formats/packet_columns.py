@@ -23,7 +23,7 @@ from sniff.formats.linktypes import (
     protocol_of,
 )
 from sniff.formats.linktypes import RTAC_ERROR_NAMES as RTAC_ERRORS
-from sniff.formats.records import Record, items_of
+from sniff.formats.records import PacketRecord, items_of
 
 if TYPE_CHECKING:
     from dissectors.columns import Masks, Octets, Times
@@ -51,10 +51,12 @@ class Packets:
     def __len__(self) -> int:
         return len(self.begins)
 
-    def record(self, index: int) -> Record:
+    def record(self, index: int) -> PacketRecord:
         """One of them."""
         begin = int(self.begins[index])
-        return Record(int(self.times[index]), self.link_type, self.window[begin : begin + int(self.lengths[index])])
+        return PacketRecord(
+            int(self.times[index]), self.link_type, self.window[begin : begin + int(self.lengths[index])]
+        )
 
 
 def pieces_of(packets: Packets, protocol: str) -> Generator[Item | Reads, None, int]:

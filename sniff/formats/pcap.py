@@ -18,7 +18,7 @@ from sniff.formats.files import NewFile, open_capture
 from sniff.formats.linktypes import LINK_TYPES, OWN, USER1, USERS
 from sniff.formats.linktypes import protocol_of as protocol_of_link
 from sniff.formats.network import NETWORK
-from sniff.formats.records import Record, foreign_session, items_of, protocol_of
+from sniff.formats.records import PacketRecord, foreign_session, items_of, protocol_of
 
 if TYPE_CHECKING:
     from dissectors.columns import Reads
@@ -79,7 +79,7 @@ class PcapCapture:
         """What the records are."""
         return self._link_type
 
-    def records(self) -> Iterator[Record]:
+    def records(self) -> Iterator[PacketRecord]:
         """All records, as far as the file is whole. Raises CaptureError."""
         with open_capture(self.path) as stream:
             stream.seek(FILE_HEADER)
@@ -122,7 +122,7 @@ class PcapCapture:
             for record in self._records(stream):  # of what is cut or damaged
                 yield from items_of(record, protocol)
 
-    def _records(self, stream: BinaryIO) -> Iterator[Record]:
+    def _records(self, stream: BinaryIO) -> Iterator[PacketRecord]:
         self._complete = Completeness(True)
         layout = struct.Struct(self._order + "IIII")
         while header := stream.read(RECORD_HEADER):
@@ -138,7 +138,7 @@ class PcapCapture:
             if len(data) < kept:
                 self._complete = Completeness(False, f"cut inside a record at octet {at}: {len(data)} of {kept} octets")
                 return
-            yield Record(seconds * 1_000_000_000 + ticks * self._tick, self._link_type, data)
+            yield PacketRecord(seconds * 1_000_000_000 + ticks * self._tick, self._link_type, data)
 
 
 def create(path: Path, session: Session, link_type: int, live: bool = False, microseconds: bool = False) -> PcapWriter:
@@ -162,7 +162,7 @@ class PcapWriter:
         magic = 0xA1B2C3D4 if microseconds else 0xA1B23C4D
         self._file.write(struct.pack("<IHHiIII", magic, 2, 4, 0, 0, LONGEST, link_type))
 
-    def put(self, records: Iterable[Record]) -> None:
+    def put(self, records: Iterable[PacketRecord]) -> None:
         """Add records."""
         for record in records:
             self._put(record)
@@ -182,7 +182,7 @@ class PcapWriter:
         """Give the file up."""
         self._file.discard()
 
-    def _put(self, record: Record) -> None:
+    def _put(self, record: PacketRecord) -> None:
         if record.link_type == USER1:
             self._left_out += len(record.data)
             return

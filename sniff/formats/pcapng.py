@@ -20,7 +20,7 @@ from sniff.formats.files import NewFile, open_capture
 from sniff.formats.linktypes import LINK_TYPES, USER1
 from sniff.formats.network import NETWORK
 from sniff.formats.pcapng_interface import Interface
-from sniff.formats.records import Record, SearchMarks, foreign_session, items_of, protocol_of
+from sniff.formats.records import PacketRecord, SearchMarks, foreign_session, items_of, protocol_of
 
 if TYPE_CHECKING:
     from dissectors.columns import Reads
@@ -72,7 +72,7 @@ class PcapngCapture:
             protocol = protocol_of(first) if first is not None else None
             self.session = foreign_session(str(path), protocol, first.time if first is not None else 0, "pcapng")
 
-    def _first(self, stream: BinaryIO) -> Record | None:
+    def _first(self, stream: BinaryIO) -> PacketRecord | None:
         start = stream.read(12)
         if start[:4] != SECTION.to_bytes(4, "little"):
             raise CaptureError(f"{self.path}: not a pcapng file (it begins with {start[:4].hex(' ') or 'nothing'})")
@@ -94,7 +94,7 @@ class PcapngCapture:
         """Whether what it holds first, and at all in a short file, is a network's."""
         return self._of_network > 0 and self._is_without_frames
 
-    def records(self) -> Iterator[Record]:
+    def records(self) -> Iterator[PacketRecord]:
         """All records, as far as the file is whole. Raises CaptureError."""
         with open_capture(self.path) as stream:
             yield from self._records(stream)
@@ -118,7 +118,7 @@ class PcapngCapture:
         """Whether the last block was whole, as far as `items` has read."""
         return self._complete
 
-    def _items(self, record: Record, marks: SearchMarks) -> Iterator[Item]:
+    def _items(self, record: PacketRecord, marks: SearchMarks) -> Iterator[Item]:
         found = False
         yield from marks.before(record)
         said = self._written(record)
@@ -129,7 +129,7 @@ class PcapngCapture:
             yield item
         self._other += not found
 
-    def _written(self, record: Record) -> str | None:
+    def _written(self, record: PacketRecord) -> str | None:
         """What a person wrote about a packet: in a file of another program every comment is somebody's."""
         return record.mark if record.mark is not None or self._metadata else record.comment or None
 
@@ -189,7 +189,7 @@ class PcapngCapture:
             else:
                 self._other += yield from pieces_of(some, self.session.protocol)
 
-    def _records(self, stream: BinaryIO) -> Iterator[Record]:
+    def _records(self, stream: BinaryIO) -> Iterator[PacketRecord]:
         self._complete = Completeness(True)
         interfaces: list[Interface] = []
         for order, kind, body in self._blocks(stream):
@@ -197,7 +197,7 @@ class PcapngCapture:
             if record is not None:
                 yield record
 
-    def _record(self, order: str, kind: int, body: bytes, interfaces: list[Interface]) -> Record | None:
+    def _record(self, order: str, kind: int, body: bytes, interfaces: list[Interface]) -> PacketRecord | None:
         """The record in a block; what others say of the section is taken."""
         if kind == SECTION:
             interfaces.clear()
@@ -258,11 +258,11 @@ def _interface(order: str, body: bytes) -> Interface:
     return Interface(struct.unpack_from(order + "H", body)[0], resolution, offset)
 
 
-def _packet(order: str, kind: int, body: bytes, interfaces: list[Interface]) -> Record | None:
+def _packet(order: str, kind: int, body: bytes, interfaces: list[Interface]) -> PacketRecord | None:
     if kind == SIMPLE:
         if len(body) < 4 or not interfaces:
             return None
-        return Record(0, interfaces[0].link_type, body[4 : 4 + struct.unpack_from(order + "I", body)[0]])
+        return PacketRecord(0, interfaces[0].link_type, body[4 : 4 + struct.unpack_from(order + "I", body)[0]])
     if len(body) < 20:
         return None
     number, high, low, kept, _ = struct.unpack_from(order + "IIIII", body)
@@ -286,7 +286,7 @@ def _packet(order: str, kind: int, body: bytes, interfaces: list[Interface]) -> 
                 comment = text
         elif code == OPT_FLAGS and len(value) == 4:
             crc_error = bool(struct.unpack(order + "I", value)[0] & CRC_ERROR_FLAG)
-    return Record(time, interface.link_type, body[20 : 20 + kept], comment, crc_error, searched, mark)
+    return PacketRecord(time, interface.link_type, body[20 : 20 + kept], comment, crc_error, searched, mark)
 
 
 def _line(text: str) -> LineSettings | None:
@@ -332,7 +332,7 @@ class PcapngWriter:
             self._block(INTERFACE, described + _option(OPT_TSRESOL, b"\x09") + _option(OPT_END))
         self._flush()
 
-    def put(self, records: Iterable[Record]) -> None:
+    def put(self, records: Iterable[PacketRecord]) -> None:
         """Add records."""
         for record in records:
             self._packet(record)
@@ -350,7 +350,7 @@ class PcapngWriter:
         if self._live:
             self._file.stream.flush()
 
-    def _packet(self, record: Record) -> None:
+    def _packet(self, record: PacketRecord) -> None:
         time, size = max(0, record.time), len(record.data)
         number = 1 if record.link_type == USER1 else 0
         options = _option(OPT_FLAGS, struct.pack("<I", CRC_ERROR_FLAG)) if record.crc_error else b""

@@ -35,7 +35,7 @@ FOREIGN_LATENCY = 20_000_000
 
 
 @dataclass(frozen=True, slots=True)
-class Record:
+class PacketRecord:
     """One packet of a packet file: `time` ns since the epoch, `comment` "" when none, `crc_error` as flagged.
 
     `searched`: line settings that a search listened with when these octets were heard; None outside a search. `mark`:
@@ -56,7 +56,7 @@ class FrameFile(Protocol):
 
     losses: list[str]
 
-    def put(self, records: Iterable[Record]) -> None:
+    def put(self, records: Iterable[PacketRecord]) -> None:
         """Add records, in order of time."""
         ...
 
@@ -94,7 +94,7 @@ class SearchMarks:
         """Whether the record before belonged to a search: the next one has something before it, or is of it too."""
         return self._with is not None
 
-    def before(self, record: Record) -> Iterator[LineEvent]:
+    def before(self, record: PacketRecord) -> Iterator[LineEvent]:
         """What happened before a record."""
         searched = record.searched
         if searched == self._with:
@@ -109,7 +109,7 @@ class SearchMarks:
         self._with = searched
 
 
-def items_of(record: Record, protocol: str) -> Iterator[Item]:
+def items_of(record: PacketRecord, protocol: str) -> Iterator[Item]:
     """The chunk and line events that a record stands for; nothing when it is of another protocol."""
     kind = LINK_TYPES.get(record.link_type)
     decoded = kind.read(record.data) if kind is not None else None
@@ -124,7 +124,7 @@ def items_of(record: Record, protocol: str) -> Iterator[Item]:
         yield Chunk(record.time, decoded.octets)
 
 
-def protocol_of(record: Record) -> str | None:
+def protocol_of(record: PacketRecord) -> str | None:
     """The protocol that a record's link type (or its own tag) names; None when neither does."""
     kind = LINK_TYPES.get(record.link_type)
     if kind is None:

@@ -68,7 +68,7 @@ _DUMPS = (".bin", ".raw", ".dat", ".dump")
 # fmt: off
 BUILT_IN: tuple[Format, ...] = (
     Format("MCAP recording", (".mcap",), _MCAP, reader="sniff.recording.reader:read",
-           items_writer="sniff.recording.writer:create"),
+           items_writer="sniff.recording.mcap_writer:create"),
     Format("pcapng", (".pcapng",), _PCAPNG, reader="sniff.formats.pcapng:read",
            frames_writer="sniff.formats.pcapng:create"),
     Format("pcap", (".pcap", ".cap"), _PCAP, reader="sniff.formats.pcap:read",

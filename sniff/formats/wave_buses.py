@@ -1,4 +1,4 @@
-"""Which channels of a logic analyser belong to one bus. Pure.
+"""Buses among the channels of a logic analyser. Pure.
 
 | two channels | one bus |
 |---|---|
@@ -31,7 +31,7 @@ _SIDES = (("rx", "tx"), ("rxd", "txd"), ("ro", "di"), ("in", "out"))
 
 
 @dataclass(slots=True)
-class Heard:
+class HeardChannel:
     """A channel that holds characters; those of a sample."""
 
     channel: int
@@ -44,7 +44,7 @@ class Heard:
 class WaveBus:
     """Channels of one bus. `sides`: read and joined; `same`: names of those that add nothing."""
 
-    sides: list[Heard]
+    sides: list[HeardChannel]
     same: list[str] = field(default_factory=list)
 
     @property
@@ -60,7 +60,7 @@ class WaveBus:
         return said + (f"; the same on {', '.join(self.same)}" if self.same else "")
 
 
-def buses(heard: Sequence[Heard]) -> list[WaveBus]:
+def buses(heard: Sequence[HeardChannel]) -> list[WaveBus]:
     """The buses, that with most characters first."""
     found: list[WaveBus] = []
     for one in sorted(heard, key=lambda one: -len(one.sample)):
@@ -78,7 +78,7 @@ def buses(heard: Sequence[Heard]) -> list[WaveBus]:
     return found
 
 
-def _is_held(less: Heard, more: Heard) -> bool:
+def _is_held(less: HeardChannel, more: HeardChannel) -> bool:
     """Whether the second holds the characters of the first."""
     mine, other = less.sample, more.sample
     if not len(other):
@@ -89,7 +89,7 @@ def _is_held(less: Heard, more: Heard) -> bool:
     return float(is_same.mean()) >= HELD_LEAST
 
 
-def _are_sides(one: Heard, other: Heard) -> bool:
+def _are_sides(one: HeardChannel, other: HeardChannel) -> bool:
     """Whether they talk in turn, as the two ends of one conversation do."""
     if one.uart.line != other.uart.line:
         return False
@@ -109,7 +109,7 @@ def _at_once(some: Characters, others: Characters) -> Times:
     return found
 
 
-def _chance(one: Heard, other: Heard) -> float:
+def _chance(one: HeardChannel, other: HeardChannel) -> float:
     """How likely two lines that know nothing of each other never talk at once."""
     few, many = sorted((_talks(one), _talks(other)), key=lambda talks: len(talks[0]))
     begin = min(int(few[0][0]), int(many[0][0]))
@@ -119,7 +119,7 @@ def _chance(one: Heard, other: Heard) -> float:
     return math.exp(len(few[0]) * math.log1p(-share))
 
 
-def _talks(one: Heard) -> tuple[Times, Times]:
+def _talks(one: HeardChannel) -> tuple[Times, Times]:
     """Begins and ends of stretches of talk."""
     starts, ends = one.sample.starts, one.sample.ends
     cut = np.flatnonzero(starts[1:] - ends[:-1] > _SILENCE * one.uart.char)

@@ -1,4 +1,4 @@
-"""What every file of a logic analyser comes to: channels with a level that changes at times. Pure.
+"""Logic waves, which every file of a logic analyser comes to: channels with a level that changes at times. Pure.
 
 A reader of such files gives a `WaveFile`; what its channels say is found by `logic_capture.py`.
 """

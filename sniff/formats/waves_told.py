@@ -1,4 +1,4 @@
-"""Which kind of logic analyser's file it is, told by its first octets. Pure."""
+"""Kind of a logic analyser's file, told by its first octets. Pure."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""What tells others while a bus is listened to: listeners that may fall behind, and that nothing waits for."""
+"""Outlets, which tell others while a bus is listened to: listeners that may fall behind, and that nothing waits for."""

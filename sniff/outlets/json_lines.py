@@ -1,4 +1,4 @@
-"""What outlets are told as JSON Lines: one object each, its type in the key `record`. Pure.
+"""JSON Lines of what outlets are told: one object each, its type in the key `record`. Pure.
 
 Keys and their order are a promise. Characters that a terminal obeys are escaped, as JSON may.
 """

@@ -1,4 +1,4 @@
-"""What outlets are told in InfluxDB's line protocol. Pure.
+"""InfluxDB's line protocol of what outlets are told. Pure.
 
 Source: the line protocol reference of InfluxDB 2: measurement, tags, fields, time in ns. In measurements commas and
 spaces are escaped, in tags and names of fields the equals sign too, in texts quotes and backslashes. A line end would

@@ -1,4 +1,4 @@
-"""What a broker is told: topics and payloads of values, numbers, findings and availability, and what Home Assistant
+"""Messages to a broker: topics and payloads of values, numbers, findings and availability, and what Home Assistant
 wants to know to show them. Pure.
 
     PREFIX/status                         online, offline (also by the broker, when we are gone)   retained

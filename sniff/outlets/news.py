@@ -1,4 +1,4 @@
-"""What is new about the findings of a bus since the last look: appeared, became graver, is over. Pure."""
+"""Changes of the findings of a bus since the last look: appeared, became graver, is over. Pure."""
 
 from __future__ import annotations
 

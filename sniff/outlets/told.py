@@ -1,4 +1,4 @@
-"""What outlets are told: values, numbers of a bus and of its stations, findings, what happens to the line. Pure."""
+"""Records that outlets are told: values, numbers of a bus and its stations, findings, events of the line. Pure."""
 
 from __future__ import annotations
 

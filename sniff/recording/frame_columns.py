@@ -12,7 +12,7 @@ import numpy.typing as npt
 from dissectors.columns import NONE
 from sniff.engine.engine import Row
 from sniff.engine.table import Table
-from sniff.recording.frames import EVENTS, MARKS, TRANSACTIONS, Column, event_values, message_of, number_of
+from sniff.recording.frames import EVENTS, MARKS, TRANSACTIONS, ColumnLayout, event_values, message_of, number_of
 
 AT_ONCE = 1000
 """Rows of a message, about: those of a table are dealt out evenly, so that none holds only what was left over."""
@@ -43,7 +43,7 @@ def messages(table: Table, offset: int) -> Iterator[tuple[int, int, bytes]]:
         yield *_span(table, begin, end, first, last), message
 
 
-def _renumbered(columns: Iterable[tuple[Column, Values]], texts: list[str]) -> dict[str, int]:
+def _renumbered(columns: Iterable[tuple[ColumnLayout, Values]], texts: list[str]) -> dict[str, int]:
     """Change the numbers of texts, in place, to those of a message that holds only the texts that it needs."""
     told = [values for column, values in columns if column.kind == "text"]
     used = np.unique(np.concatenate(told))
@@ -147,7 +147,7 @@ def _text_numbers(texts: tuple[str, ...], strings: dict[str, int]) -> Values:
     return numbers
 
 
-def _packed(column: Column, values: Values) -> Values:
+def _packed(column: ColumnLayout, values: Values) -> Values:
     """Values as they lie in a message."""
     if column.kind == "optional":
         values = np.where(values == NONE, column.least, values.astype(np.int64))

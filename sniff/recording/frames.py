@@ -32,7 +32,7 @@ METADATA = {"program": __version__}
 
 
 @dataclass(frozen=True, slots=True)
-class Column:
+class ColumnLayout:
     """`form`: numpy's, little-endian. `kind`: an enum (its members by place, from 1; 0 is None), "text" (place in
     the string table, from 1; 0 is None), "number", or "optional": a number whose smallest value is None."""
 
@@ -52,56 +52,56 @@ class Column:
 
 
 EVENTS = (
-    Column("no", "<u8"),
-    Column("offset", "<u8"),  # of its first octet in the stream of all octets
-    Column("length", "<u4"),
-    Column("start", "<i8"),
-    Column("end", "<i8"),
-    Column("slack", "<i8"),
-    Column("protocol", "<u2", "text"),  # None for noise
-    Column("check", "<u1", Check),
-    Column("found", "<u1", FoundBy),
-    Column("damage", "<u1", Damage),
-    Column("expected", "<i4", "optional"),
-    Column("skipped", "<u4"),
-    Column("flags", "<u2", "text"),  # with spaces between
-    Column("place", "<u1", Place),  # None for frames
-    Column("reason", "<u1", Reason),
-    Column("source", "<i4", "optional"),  # the header's, from here
-    Column("destination", "<i4", "optional"),
-    Column("role", "<u1", Role),
-    Column("kind", "<u2", "text"),
-    Column("function", "<i4", "optional"),
-    Column("address", "<i8", "optional"),
-    Column("count", "<i8", "optional"),
-    Column("ok", "<u1"),
-    Column("error", "<u2", "text"),
-    Column("tx", "<u8"),  # the placement's, from here; 0 without one
-    Column("placed_role", "<u1", Role),
-    Column("placed_source", "<i4", "optional"),
-    Column("placed_destination", "<i4", "optional"),
-    Column("searched", "<u2", "text"),  # settings with which a search heard it; None for everything else
+    ColumnLayout("no", "<u8"),
+    ColumnLayout("offset", "<u8"),  # of its first octet in the stream of all octets
+    ColumnLayout("length", "<u4"),
+    ColumnLayout("start", "<i8"),
+    ColumnLayout("end", "<i8"),
+    ColumnLayout("slack", "<i8"),
+    ColumnLayout("protocol", "<u2", "text"),  # None for noise
+    ColumnLayout("check", "<u1", Check),
+    ColumnLayout("found", "<u1", FoundBy),
+    ColumnLayout("damage", "<u1", Damage),
+    ColumnLayout("expected", "<i4", "optional"),
+    ColumnLayout("skipped", "<u4"),
+    ColumnLayout("flags", "<u2", "text"),  # with spaces between
+    ColumnLayout("place", "<u1", Place),  # None for frames
+    ColumnLayout("reason", "<u1", Reason),
+    ColumnLayout("source", "<i4", "optional"),  # the header's, from here
+    ColumnLayout("destination", "<i4", "optional"),
+    ColumnLayout("role", "<u1", Role),
+    ColumnLayout("kind", "<u2", "text"),
+    ColumnLayout("function", "<i4", "optional"),
+    ColumnLayout("address", "<i8", "optional"),
+    ColumnLayout("count", "<i8", "optional"),
+    ColumnLayout("ok", "<u1"),
+    ColumnLayout("error", "<u2", "text"),
+    ColumnLayout("tx", "<u8"),  # the placement's, from here; 0 without one
+    ColumnLayout("placed_role", "<u1", Role),
+    ColumnLayout("placed_source", "<i4", "optional"),
+    ColumnLayout("placed_destination", "<i4", "optional"),
+    ColumnLayout("searched", "<u2", "text"),  # settings with which a search heard it; None for everything else
 )
 MARKS = (
-    Column("event", "<u4"),  # place in EVENTS
-    Column("offset", "<u4"),  # from the event's first octet
-    Column("error", "<u1"),  # LineError's bits
+    ColumnLayout("event", "<u4"),  # place in EVENTS
+    ColumnLayout("offset", "<u4"),  # from the event's first octet
+    ColumnLayout("error", "<u1"),  # LineError's bits
 )
 TRANSACTIONS = (
-    Column("id", "<u8"),
-    Column("station", "<i4", "optional"),
-    Column("kind", "<u2", "text"),
-    Column("request", "<i8", "optional"),
-    Column("response", "<i8", "optional"),
-    Column("verdict", "<u1", Verdict),
-    Column("start", "<i8"),
-    Column("end", "<i8"),
-    Column("latency", "<i8", "optional"),
-    Column("latency_low", "<i8", "optional"),
-    Column("latency_high", "<i8", "optional"),
-    Column("attempt", "<u4"),
-    Column("of", "<i8", "optional"),
-    Column("error", "<u2", "text"),
+    ColumnLayout("id", "<u8"),
+    ColumnLayout("station", "<i4", "optional"),
+    ColumnLayout("kind", "<u2", "text"),
+    ColumnLayout("request", "<i8", "optional"),
+    ColumnLayout("response", "<i8", "optional"),
+    ColumnLayout("verdict", "<u1", Verdict),
+    ColumnLayout("start", "<i8"),
+    ColumnLayout("end", "<i8"),
+    ColumnLayout("latency", "<i8", "optional"),
+    ColumnLayout("latency_low", "<i8", "optional"),
+    ColumnLayout("latency_high", "<i8", "optional"),
+    ColumnLayout("attempt", "<u4"),
+    ColumnLayout("of", "<i8", "optional"),
+    ColumnLayout("error", "<u2", "text"),
 )
 TABLES = {"events": EVENTS, "marks": MARKS, "transactions": TRANSACTIONS}
 
@@ -165,7 +165,7 @@ def encode(rows: Sequence[Row], transactions: Sequence[Transaction], offset: int
     for row in rows:
         events.append(event_values(row, offset))
         offset += len(row.event.octets)
-    tables: tuple[tuple[tuple[Column, ...], list[tuple[Any, ...]]], ...] = (
+    tables: tuple[tuple[tuple[ColumnLayout, ...], list[tuple[Any, ...]]], ...] = (
         (EVENTS, events),
         (MARKS, [(at, mark.offset, mark.error.value) for at, row in enumerate(rows) for mark in row.event.marks]),
         (TRANSACTIONS, [_transaction_values(transaction) for transaction in transactions]),
@@ -174,7 +174,7 @@ def encode(rows: Sequence[Row], transactions: Sequence[Transaction], offset: int
 
 
 def message_of(
-    tables: Iterable[tuple[tuple[Column, ...], Sequence[npt.NDArray[Any]]]], strings: Mapping[str, int]
+    tables: Iterable[tuple[tuple[ColumnLayout, ...], Sequence[npt.NDArray[Any]]]], strings: Mapping[str, int]
 ) -> bytes:
     """A message of the three tables, each with its columns packed, and the texts that they refer to, by number."""
     packed = [values for _, values in tables]
@@ -211,7 +211,7 @@ def _transaction_values(one: Transaction) -> tuple[Any, ...]:
 
 
 def _pack(
-    columns: Sequence[Column], rows: Sequence[tuple[Any, ...]], strings: dict[str, int]
+    columns: Sequence[ColumnLayout], rows: Sequence[tuple[Any, ...]], strings: dict[str, int]
 ) -> list[npt.NDArray[Any]]:
     import numpy as np
 
@@ -222,7 +222,7 @@ def _pack(
     ]
 
 
-def number_of(column: Column, value: Any, strings: dict[str, int]) -> int:
+def number_of(column: ColumnLayout, value: Any, strings: dict[str, int]) -> int:
     """A value as it lies in a column; a new text gets a number."""
     if value is None:
         return column.least
@@ -305,13 +305,15 @@ class FrameBatch:
             marks.setdefault(values["event"], []).append(Mark(values["offset"], LineError(values["error"] & 15)))
         return marks
 
-    def _values(self, columns: Sequence[Column], table: dict[str, npt.NDArray[np.generic]]) -> Iterator[dict[str, Any]]:
+    def _values(
+        self, columns: Sequence[ColumnLayout], table: dict[str, npt.NDArray[np.generic]]
+    ) -> Iterator[dict[str, Any]]:
         readers = [self._column(column, table[column.name].tolist()) for column in columns]
         names = [column.name for column in columns]
         for values in zip(*readers, strict=True):
             yield dict(zip(names, values, strict=True))
 
-    def _column(self, column: Column, numbers: list[int]) -> list[Any]:
+    def _column(self, column: ColumnLayout, numbers: list[int]) -> list[Any]:
         if column.kind == "text":
             texts = [None, *self.strings]
             return [texts[number] for number in numbers]
@@ -323,7 +325,7 @@ class FrameBatch:
         return list(numbers)
 
 
-def _highest(column: Column, strings: int) -> int:
+def _highest(column: ColumnLayout, strings: int) -> int:
     if column.kind == "text":
         return strings
     return column.most if isinstance(column.kind, str) else len(column.kind)

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sniff.engine.session import Completeness, LineEvent
+from sniff.recording.mcap_writer import PartPlace, create_part
 from sniff.recording.reader import McapCapture, buses_of
-from sniff.recording.writer import Place, create_part
 
 if TYPE_CHECKING:
     from sniff.engine.blocks import Block
@@ -34,7 +34,7 @@ def recover(source: str | Path, target: str | Path) -> Completeness:
         sessions = [replace(one, notes={**one.notes, RECOVERED: found.text}) for one in sessions]
     first = buses[0]
     firsts, before = (tuple(getattr(one, name) for one in buses) for name in ("first_chunk", "octets_before"))
-    with create_part(target, sessions, Place(first.part, firsts, before)) as writer:
+    with create_part(target, sessions, PartPlace(first.part, firsts, before)) as writer:
         for _, bus, piece in _by_time(buses):
             if isinstance(piece, LineEvent):
                 writer.write(piece, bus)

@@ -1,10 +1,10 @@
-"""Writing MCAP: `create` for a conversion, `Recorder` for a live bus.
+"""The recorder of a live bus: writes MCAP and never waits for the disk.
 
-A recorder never waits for the disk: the capture's thread only collects octets; another thread packs, writes and
-rotates, and one more syncs. Loss is bounded in time by the caller's `tick`: a chunk is in the file within 1 s and on
-the disk within 10 s. When the disk does not take it, `trouble` says so in words, `behind` for how long, up to
-`writer_thread.MOST_WAITING` octets wait in memory, and what comes after that is counted in `lost_octets` and, where
-it is missing, in the file. Nothing is raised into the capture but a file that cannot be created at the start.
+The capture's thread only collects octets; another thread packs, writes and rotates, and one more syncs. Loss is bounded
+in time by the caller's `tick`: a chunk is in the file within 1 s and on the disk within 10 s. When the disk does not
+take it, `trouble` says so in words, `behind` for how long, up to `writer_thread.MOST_WAITING` octets wait in memory,
+and what comes after that is counted in `lost_octets` and, where it is missing, in the file. Nothing is raised into the
+capture but a file that cannot be created at the start.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from __future__ import annotations
 import threading
 from collections import deque
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,24 +20,20 @@ from dissectors.frame import Chunk
 from dissectors.line import NS_PER_S
 from sniff.engine.session import (
     UNKNOWABLE,
-    Item,
     LineEvent,
     LineEventKind,
     Session,
     SettingsChange,
     settings_change,
 )
-from sniff.formats.files import NewFile, explain
 from sniff.recording import writer_thread
 from sniff.recording.batch import Batcher, Message, loss_message, stamp
-from sniff.recording.block_batches import add_block
-from sniff.recording.part import PartFile
 from sniff.recording.rotation import Rotation
 from sniff.recording.topics import LINE, RAW
 from sniff.recording.writer_thread import CHECK, CLOSE, SYNC, Changed, Flush, Keeper, WriteBatch
 
 if TYPE_CHECKING:
-    from sniff.engine.blocks import Block
+    pass
 
 FLUSH_AFTER = 900_000_000
 """ns that something may wait before it is written: with a tick when it is `due`, all is in the file within 1 s."""
@@ -53,107 +49,6 @@ MOST_FLUSHES = 4096
 
 SYNC_PATIENCE = 1.0
 """Seconds that closing waits for the last sync: the system has the octets by then."""
-
-
-# -- converting ------------------------------------------------------------------------------------------------
-
-
-def create(path: str | Path, session: Session) -> McapWriter:
-    """Create an MCAP capture; it takes its name when it is closed. Raises CaptureError."""
-    return McapWriter(NewFile(Path(path)), session)
-
-
-@dataclass(frozen=True, slots=True)
-class Place:
-    """Where in a recording a part stands: its number, and what the parts before it held of each bus (number of the
-    first read, octets)."""
-
-    number: int = 1
-    first_chunks: tuple[int, ...] = (0,)
-    octets_before: tuple[int, ...] = (0,)
-
-    def before(self) -> list[dict[str, int]]:
-        """As `PartFile` takes it."""
-        pairs = zip(self.first_chunks, self.octets_before, strict=True)
-        return [{"first_chunk": first, "octets_before": octets} for first, octets in pairs]
-
-
-def create_part(path: str | Path, sessions: Sequence[Session], place: Place) -> McapWriter:
-    """The same for a part of a recording, of one bus or of several. Raises CaptureError."""
-    return McapWriter(NewFile(Path(path)), *sessions, place=place)
-
-
-class McapWriter:
-    """Writes a capture that is already there. An empty chunk says nothing and is not written."""
-
-    def __init__(self, file: NewFile, *sessions: Session, place: Place | None = None) -> None:
-        self._file = file
-        place = place or Place(1, (0,) * len(sessions), (0,) * len(sessions))
-        self._batchers = [Batcher(first) for first in place.first_chunks]
-        self._part = PartFile(file.stream, sessions, place.number, place.before())
-        self._sequences: dict[str, int] = {}
-
-    def derived(
-        self,
-        topic: str,
-        schema_name: str,
-        log_time: int,
-        publish_time: int,
-        data: bytes,
-        metadata: Mapping[str, str] | None = None,
-    ) -> None:
-        """Add a result of the engine; arguments as `Recorder.derived` takes them. Raises CaptureError."""
-        if topic in (RAW, LINE):
-            return
-        sequence = self._sequences.get(topic, 0)
-        self._sequences[topic] = (sequence + 1) % (1 << 32)
-        self._part.add(Message(topic, stamp(log_time), stamp(publish_time), sequence, data), schema_name, metadata)
-
-    def write(self, item: Item, bus: int = 0) -> None:
-        """Add a chunk or line event. Raises CaptureError."""
-        if isinstance(item, LineEvent):
-            self._batchers[bus].add_event(item)
-        else:
-            self._add(self._batchers[bus].add(item), bus)
-
-    def write_block(self, block: Block, bus: int = 0) -> None:
-        """Add reads; the same file as one after the other. Raises CaptureError."""
-        for messages in add_block(self._batchers[bus], block):
-            self._add(messages, bus)
-
-    def close(self) -> None:
-        """Finish the file and give it its name; again is harmless. Raises CaptureError."""
-        if self._file.stream.closed:
-            return
-        for bus, batcher in enumerate(self._batchers):
-            self._add(batcher.close(), bus)
-        try:
-            self._part.finish()
-        except OSError as error:
-            self._file.discard()
-            raise explain(self._file.path, error) from None
-        self._file.close()
-
-    def _add(self, messages: list[Message], bus: int = 0) -> None:
-        for message in messages:
-            self._part.add(message, bus=bus)
-        if self._part.waiting > 1 << 20:
-            try:
-                self._part.flush()
-            except OSError as error:
-                raise explain(self._file.path, error) from None
-
-    def __enter__(self) -> McapWriter:
-        return self
-
-    def __exit__(self, kind: object, *exc: object) -> None:
-        if kind is None:
-            self.close()
-        else:
-            self._file.discard()
-
-
-# -- recording -------------------------------------------------------------------------------------------------
 
 
 class SharedFile:

@@ -20,7 +20,7 @@ from sniff.analysis.summary import Summary, ranked
 from sniff.analysis.trends import Trend, Trends
 from sniff.analysis.wording import describe
 from sniff.bus.model import BusModel
-from sniff.bus.offline import Source, outputs, survey
+from sniff.bus.offline import ReadSource, outputs, survey
 from sniff.bus.sifting import shown_findings, sift
 from sniff.engine.capture import Capture
 from sniff.engine.engine import Output, Row
@@ -30,14 +30,14 @@ from sniff.filter import Filter
 from sniff.formats.text import iso
 from sniff.reporting.happenings import Happenings
 from sniff.reporting.numbers import (
+    CaptureNumbers,
     Distribution,
-    Evidence,
+    EvidenceRow,
     FindingRow,
     Measurement,
-    Numbers,
     RingNumbers,
     Score,
-    Station,
+    StationNumbers,
     TimePart,
     ValueTrend,
     seconds_since,
@@ -55,10 +55,10 @@ def collect(
     capture: Capture,
     session: Session,
     devices: Devices,
-    watched: Source | None = None,
+    watched: ReadSource | None = None,
     reference: bool = False,
     wanted: Filter | None = None,
-) -> Numbers:
+) -> CaptureNumbers:
     """Read a capture to its end. `session`: with the settings to use; `watched`: the same capture, whose reading is
     told; `reference`: row by row, for comparison. `wanted`: numbers are of what a filter accepts; the bus is judged
     whole, and of what was found that is told which shows such a row. Raises CaptureError."""
@@ -87,7 +87,7 @@ def collect(
     )
     found = _found(findings, _words(read, session, dissector, findings, reference), session, dissector)
     load = summary.load
-    return Numbers(
+    return CaptureNumbers(
         source=source,
         title=dissector.title,
         verdict=verdict(health, found, stations, summary),
@@ -125,7 +125,7 @@ def _value(trend: Trend, session: Session) -> ValueTrend:
 
 
 def verdict(
-    health: Health | None, findings: tuple[FindingRow, ...], stations: tuple[Station, ...], summary: Summary
+    health: Health | None, findings: tuple[FindingRow, ...], stations: tuple[StationNumbers, ...], summary: Summary
 ) -> str:
     """The whole capture in a sentence or two."""
     if health is None and summary.searched:
@@ -163,12 +163,12 @@ def _subject(finding: FindingRow) -> str:
     return f"{finding.subject}: {finding.title}" if finding.title else f"{finding.subject}: {finding.seen}"
 
 
-def _station(node: Node, kinds: Counter[str], health: Health | None) -> Station:
+def _station(node: Node, kinds: Counter[str], health: Health | None) -> StationNumbers:
     trouble = dict(kinds.most_common())
     if node.damaged:
         trouble["damaged frame"] = node.damaged
     failed = sum(node.verdicts[verdict] for verdict in (Verdict.NO_RESPONSE, Verdict.LATE, Verdict.DAMAGED_ANSWER))
-    return Station(
+    return StationNumbers(
         address=node.address,
         sent=node.sent,
         received=node.received,
@@ -205,7 +205,7 @@ def _parts(timeline: Timeline, session: Session) -> tuple[TimePart, ...]:
 
 
 def _words(
-    capture: Source, session: Session, dissector: Dissector, findings: tuple[Finding, ...], reference: bool
+    capture: ReadSource, session: Session, dissector: Dissector, findings: tuple[Finding, ...], reference: bool
 ) -> dict[int, tuple[float, str]]:
     """Time and text of the rows that findings show."""
     wanted = {no for finding in findings for no in _shown(finding)}
@@ -217,7 +217,7 @@ def _words(
     return words
 
 
-def _rows(capture: Source, session: Session, wanted: set[int], reference: bool) -> Iterator[Row]:
+def _rows(capture: ReadSource, session: Session, wanted: set[int], reference: bool) -> Iterator[Row]:
     """The rows with these numbers; what follows the last of them is not read."""
     last = max(wanted)
     if reference:
@@ -252,7 +252,7 @@ def _found(
             seen=finding.seen,
             means=finding.means,
             next=finding.next,
-            evidence=tuple(Evidence(no, *words.get(no, (None, ""))) for no in _shown(finding)),
+            evidence=tuple(EvidenceRow(no, *words.get(no, (None, ""))) for no in _shown(finding)),
             under=under,
         )
         for finding, under in under_causes(findings)

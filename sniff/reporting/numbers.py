@@ -25,7 +25,7 @@ class Score:
 
 
 @dataclass(frozen=True, slots=True)
-class Evidence:
+class EvidenceRow:
     """A row that a finding rests on: its number, when, and what it says."""
 
     no: int
@@ -47,7 +47,7 @@ class FindingRow:
     seen: str
     means: str
     next: str
-    evidence: tuple[Evidence, ...]
+    evidence: tuple[EvidenceRow, ...]
     under: bool = False
 
 
@@ -85,7 +85,7 @@ def _ms(value: int | None) -> float | None:
 
 
 @dataclass(frozen=True, slots=True)
-class Station:
+class StationNumbers:
     """One station: frames from and to it, what became of requests to it, how long it took."""
 
     address: int
@@ -165,7 +165,7 @@ class ValueTrend:
 
 
 @dataclass(frozen=True, slots=True)
-class Numbers:
+class CaptureNumbers:
     """Everything about one capture. `first`, `last`: ISO 8601, None without octets; `part`: s of a part of the time."""
 
     source: str
@@ -183,7 +183,7 @@ class Numbers:
     damaged: int
     load: float
     findings: tuple[FindingRow, ...]
-    stations: tuple[Station, ...]
+    stations: tuple[StationNumbers, ...]
     polled_only: tuple[int, ...]
     kinds: Mapping[str, int]
     verdicts: Mapping[str, int]

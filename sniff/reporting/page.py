@@ -12,7 +12,7 @@ from dissectors.tracker import Verdict
 from dissectors.words import bare_milliseconds
 from sniff.analysis.sanitizing import sanitized
 from sniff.analysis.wording import station_word
-from sniff.reporting.numbers import Numbers
+from sniff.reporting.numbers import CaptureNumbers
 from sniff.reporting.pictures import pictures
 
 TEMPLATE = "page.html.jinja"
@@ -32,7 +32,7 @@ TROUBLE_MOST = 12
 """Kinds of trouble that get a column of their own."""
 
 
-def page(reports: Sequence[Numbers]) -> str:
+def page(reports: Sequence[CaptureNumbers]) -> str:
     """The page of one capture or several. Raises ImportError without jinja2 or matplotlib."""
     from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup
@@ -62,7 +62,7 @@ def page(reports: Sequence[Numbers]) -> str:
     return template.render(sections=sections)
 
 
-def _matrix(report: Numbers) -> dict[str, Any]:
+def _matrix(report: CaptureNumbers) -> dict[str, Any]:
     """Stations × kinds of trouble, the most frequent kinds first, the rest in one column; only stations with any."""
     totals: dict[str, int] = {}
     for station in report.stations:

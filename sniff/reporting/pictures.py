@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from sniff.analysis.wording import station_word
-from sniff.reporting.numbers import CLASSES, Numbers, RingNumbers, Station, TimePart, ValueTrend
+from sniff.reporting.numbers import CLASSES, CaptureNumbers, RingNumbers, StationNumbers, TimePart, ValueTrend
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,7 +30,7 @@ TROUBLE: tuple[tuple[str, str, str, str], ...] = (
 """Field of a TimePart, its name for people, colour and hatching."""
 
 
-def pictures(numbers: Numbers, prefix: str) -> dict[str, str]:
+def pictures(numbers: CaptureNumbers, prefix: str) -> dict[str, str]:
     """SVG by name: "timeline", "responses", "ring", "values", each only where there is something to draw.
 
     `prefix`: makes the ids in them unique on the page. Raises ImportError without matplotlib.
@@ -137,7 +137,7 @@ def _width_words(width: float) -> str:
     return f"{width:g} s" if width < 120 else f"{width / 60:.3g} min"
 
 
-def _responses(stations: Sequence[Station], latency: float, word: str) -> Figure:
+def _responses(stations: Sequence[StationNumbers], latency: float, word: str) -> Figure:
     """A distribution a station on one logarithmic axis, with marks at the median, 95% and the longest."""
     shown = sorted(stations, key=lambda station: -station.response.count)[:STATIONS_SHOWN]
     shown.sort(key=lambda station: station.address)

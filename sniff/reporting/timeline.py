@@ -22,7 +22,7 @@ FAILED = frozenset((Verdict.NO_RESPONSE, Verdict.LATE, Verdict.DAMAGED_ANSWER, V
 
 
 @dataclass(slots=True)
-class Part:
+class TimelinePart:
     """One part of the time. `busy`: ns with octets on the wire; `noise`: octets; the others are counts."""
 
     busy: int = 0
@@ -32,9 +32,9 @@ class Part:
     exceptions: int = 0
     line_errors: int = 0
 
-    def plus(self, other: Part) -> Part:
+    def plus(self, other: TimelinePart) -> TimelinePart:
         """Both together."""
-        return Part(
+        return TimelinePart(
             self.busy + other.busy,
             self.damaged + other.damaged,
             self.noise + other.noise,
@@ -51,7 +51,7 @@ class Timeline:
 
     char: int
     width: int = FIRST_WIDTH
-    parts: dict[int, Part] = field(default_factory=dict)
+    parts: dict[int, TimelinePart] = field(default_factory=dict)
 
     @property
     def origin(self) -> int | None:
@@ -134,11 +134,11 @@ class Timeline:
                 whole._put(number * one.width // whole.width, part)
         return whole
 
-    def listed(self) -> list[Part]:
+    def listed(self) -> list[TimelinePart]:
         """All parts from the first to the last, empty ones too."""
         if not self.parts:
             return []
-        return [self.parts.get(number, Part()) for number in range(min(self.parts), max(self.parts) + 1)]
+        return [self.parts.get(number, TimelinePart()) for number in range(min(self.parts), max(self.parts) + 1)]
 
     def _spread(self, start: int, end: int) -> None:
         while start < end:
@@ -147,16 +147,16 @@ class Timeline:
             part.busy += edge - start
             start = edge
 
-    def _part(self, time: int) -> Part:
+    def _part(self, time: int) -> TimelinePart:
         """The part that holds a time."""
         number = time // self.width
         part = self.parts.get(number)
-        return self._put(number, Part()) if part is None else part
+        return self._put(number, TimelinePart()) if part is None else part
 
-    def _put(self, number: int, part: Part) -> Part:
+    def _put(self, number: int, part: TimelinePart) -> TimelinePart:
         """Count a part as one of ours; the part of ours that holds it by then."""
         time = number * self.width
-        self.parts[number] = self.parts.get(number, Part()).plus(part)
+        self.parts[number] = self.parts.get(number, TimelinePart()).plus(part)
         while max(self.parts) - min(self.parts) >= MOST_PARTS:
             self._widen(self.width * 2)
         return self.parts[time // self.width]
@@ -169,4 +169,4 @@ class Timeline:
         self.parts = {}
         for number, part in before.items():
             at = number // times
-            self.parts[at] = self.parts.get(at, Part()).plus(part)
+            self.parts[at] = self.parts.get(at, TimelinePart()).plus(part)

@@ -22,7 +22,7 @@ PATIENCE = 0.05
 """Seconds between two looks for a listener."""
 
 
-class Source(Protocol):
+class ReplaySource(Protocol):
     """What is played."""
 
     def items(self) -> Iterator[Item]:
@@ -41,7 +41,7 @@ class Replay:
     def __init__(self, path: Path, speed: float = 1.0) -> None:
         if not speed > 0:
             raise ValueError(f"speed {speed}: expected more than 0")
-        self.capture: Source = read(path)
+        self.capture: ReplaySource = read(path)
         self.speed = speed
         self.sent = 0
         self.error = ""
@@ -78,10 +78,10 @@ class Replay:
         except Exception as error:  # in a thread nobody else would hear of it
             self.error = str(error)
 
-    def _play(self, capture: Source) -> None:
+    def _play(self, capture: ReplaySource) -> None:
         raise NotImplementedError
 
-    def _paced(self, capture: Source) -> Iterator[bytes]:
+    def _paced(self, capture: ReplaySource) -> Iterator[bytes]:
         """The octets of each chunk when it is due; ends early when stopped."""
         began, first = time.monotonic(), None
         for item in capture.items():
@@ -116,7 +116,7 @@ class PtyReplay(Replay):
             os.close(self._master)
             self._master = -1
 
-    def _play(self, capture: Source) -> None:
+    def _play(self, capture: ReplaySource) -> None:
         import select
 
         poller = select.poll()
@@ -142,7 +142,7 @@ class TcpReplay(Replay):
         super().close()
         self._server.close()
 
-    def _play(self, capture: Source) -> None:
+    def _play(self, capture: ReplaySource) -> None:
         client = self._accept()
         if client is None:
             return

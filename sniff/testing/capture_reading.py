@@ -1,4 +1,4 @@
-"""One capture read whole: what a test asks about it."""
+"""A capture read whole, with all that a test asks about it."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""When the exchanges of a store began, of which station they were, how they ended and how long the answers took:
-as columns, so that a picture of any stretch of a million of them is counted in some milliseconds.
+"""Columns of the exchanges of a store: when they began, of which station, how they ended and how long the answers
+took, so that a picture of any stretch of a million of them is counted in some milliseconds.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Where to go: a row number or a time, as people type it. Pure."""
+"""Targets of `go to`: a row number or a time, as people type it. Pure."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which of ten million numbered things are shown: found bit by bit. Pure.
+"""Index of the numbered things that are shown, out of ten million, found bit by bit. Pure.
 
 The things are numbered first … last without holes; both bounds only move up. Without a test every number is shown and
 nothing is stored. With a test the numbers that pass are found in small steps, outwards from an anchor (where the user

@@ -1,4 +1,4 @@
-"""One bus as the application follows it: its feed, how the user looks at it, what was said of it."""
+"""A seat: one bus as the application follows it: its feed, how the user looks at it, what was said of it."""
 
 from __future__ import annotations
 

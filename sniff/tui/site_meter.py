@@ -1,4 +1,4 @@
-"""What the buses that are followed say together, looked at while somebody reads the findings."""
+"""Findings of all buses that are followed together, looked at while somebody reads the findings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What stands on screens that show what the rules and the readers of values made of a file, while they are not done."""
+"""Notice on screens of findings and values while the rules and the readers of values are not done with a file."""
 
 from __future__ import annotations
 

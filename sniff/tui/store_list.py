@@ -1,4 +1,4 @@
-"""What the lists of frames and of transactions share: the store, the layout of columns, and how time is counted."""
+"""Base of the lists of frames and of transactions: the store, the layout of columns, and how time is counted."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How the user looks at the rows: what all screens share. Touches the store's rows, never the capture."""
+"""State of the view, shared by all screens: how the user looks at the rows. Touches the store's rows, no capture."""
 
 from __future__ import annotations
 

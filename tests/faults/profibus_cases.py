@@ -9,7 +9,7 @@ from functools import partial
 from dissectors.frame import Place
 from dissectors.line import LineSettings
 from dissectors.profibus.f510 import RUN, drive, outputs
-from dissectors.profibus.simulated_master import Job, Master, Ring
+from dissectors.profibus.simulated_master import Job, Master, RingBehaviour
 from dissectors.profibus.simulated_slave import Slave
 from dissectors.profibus.telegram import SC, SD2, Telegram, parse, telegram
 from dissectors.simulated import Send, Station
@@ -25,7 +25,7 @@ from tests.faults.stations import Dies, Wrapped
 LINE = LineSettings.parse("187500,8E1")
 S = 1_000 * MS
 VALVE = b"\x11\x20"
-RING = Ring(cycle=40 * MS)
+RING = RingBehaviour(cycle=40 * MS)
 
 
 def running(now: int) -> bytes:
@@ -44,7 +44,7 @@ def profibus(
     absent: Sequence[int] = (),
     change: dict[str, Change] | None = None,
     slave: Callable[[], Station] | None = None,
-    ring: Ring = RING,
+    ring: RingBehaviour = RING,
     also_second: Sequence[int] = (),
     rogue: bool = False,
     also: dict[str, Callable[[], Station]] | None = None,
@@ -66,7 +66,7 @@ def _parties(
     absent: tuple[int, ...],
     change: dict[str, Change],
     slave: Callable[[], Station] | None,
-    ring: Ring,
+    ring: RingBehaviour,
     also_second: tuple[int, ...],
     added: dict[str, Callable[[], Station]],
     others: tuple[int, ...],

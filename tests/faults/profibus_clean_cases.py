@@ -7,7 +7,7 @@ from dataclasses import replace
 from functools import partial
 
 from dissectors.profibus.f510 import drive
-from dissectors.profibus.simulated_master import Master, Ring
+from dissectors.profibus.simulated_master import Master, RingBehaviour
 from dissectors.profibus.simulated_slave import Slave
 from dissectors.simulated import Station
 from sniff.simulation.tap import CH340, EXACT, FTDI, FTDI_LOW_LATENCY, OCTETS, UART
@@ -16,7 +16,7 @@ from tests.faults.hearing import busy_host, hidden_latency
 from tests.faults.profibus_cases import LINE, RING, profibus
 from tests.faults.profibus_stations import LooksOnce, ReadsAlong, Uneven, from_the_middle
 
-_TOOL = Ring(cycle=60_000_000, is_class_1=False)
+_TOOL = RingBehaviour(cycle=60_000_000, is_class_1=False)
 _SYNC, _FREEZE, _UNSYNC, _UNFREEZE = 0x20, 0x08, 0x10, 0x04
 
 

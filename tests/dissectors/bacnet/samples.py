@@ -99,7 +99,7 @@ class _Maker:
         assert fields is not None, type_name
         return self.record(fields, type_name, depth)
 
-    def record(self, fields: tuple[layout.Field, ...], type_name: str | None, depth: int = 0) -> ConstructedValue:
+    def record(self, fields: tuple[layout.LayoutField, ...], type_name: str | None, depth: int = 0) -> ConstructedValue:
         entries = []
         for field in fields:
             if field.optional and (depth >= 4 or self._rng.random() >= 0.6):
@@ -116,14 +116,14 @@ def parameters_of(kind: int, choice: int, seed: int, *, complete: bool = False) 
     """Random parameters of a service; `complete`: with all optional ones of the first level."""
     fields = layout.parse(LAYOUTS[kind][choice])
     if complete:
-        fields = tuple(layout.Field(f.name, f.type, f.tag, False) for f in fields)
+        fields = tuple(layout.LayoutField(f.name, f.type, f.tag, False) for f in fields)
     if (kind, choice) == (1, 7):  # one of two: an object or a name; both limits or none
         fields = tuple(f for n, f in enumerate(fields) if n == 2 + seed % 2 or (n < 2 and seed % 3 == 0))
-        fields = tuple(layout.Field(f.name, f.type, f.tag, False) for f in fields)
+        fields = tuple(layout.LayoutField(f.name, f.type, f.tag, False) for f in fields)
     if (kind, choice) == (5, 30):  # one of two
-        fields = (layout.Field(fields[seed % 2].name, fields[seed % 2].type, fields[seed % 2].tag, False),)
+        fields = (layout.LayoutField(fields[seed % 2].name, fields[seed % 2].type, fields[seed % 2].tag, False),)
     if (kind, choice) == (1, 8):
-        fields = tuple(layout.Field(f.name, f.type, f.tag, False) for f in fields) if seed % 2 else ()
+        fields = tuple(layout.LayoutField(f.name, f.type, f.tag, False) for f in fields) if seed % 2 else ()
     return _Maker(Random(seed)).record(fields, None)
 
 

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import dissectors.profiles
-from dissectors.profiles import Access, Kind, Limits, Profile, ProfileError, Role, parse, parse_text
+from dissectors.profiles import Access, EntryRole, Kind, Limits, Profile, ProfileError, parse, parse_text
 
 HEAD = 'name = "pump"\ntitle = "A pump"\nprotocols = ["modbus-rtu"]\n'
 
@@ -132,7 +132,7 @@ states-from = "fault"
         (0, "run", "run", "stop"),
         (5, "low-flow", "Low Flow", ""),
     ]
-    assert (command.role, fault.role) == (Role.COMMAND, Role.FAULT)
+    assert (command.role, fault.role) == (EntryRole.COMMAND, EntryRole.FAULT)
     assert (fault.states, fault.reserved_codes) == ({0: "no fault", 16: "dry"}, {2, 4, 5, 6})
     assert last.states == fault.states
     assert fault.parts[0].of(0xFF1F) == 1

@@ -17,10 +17,10 @@ from sniff.analysis.autodetect import (
     DWELL,
     FOUND_BITS,
     FOUND_FRAMES,
+    CandidateEvidence,
     Candidature,
     Detecting,
     Ending,
-    Evidence,
     bits_of,
     candidates,
 )
@@ -200,15 +200,15 @@ def test_a_slow_bus_keeps_its_candidate_and_rounds_grow_longer() -> None:
 
 def test_rows_of_zeros_and_line_errors_are_left_at_once() -> None:
     line = LineSettings.parse("9600,8N1")
-    zeros = Evidence(line, ("modbus-rtu",), 0)
+    zeros = CandidateEvidence(line, ("modbus-rtu",), 0)
     zeros.feed(Chunk(1, bytes([0, 0xFF, 0x80, 0xFE, 0, 0xF8] * 5)))
     assert zeros.wrong
-    errors = Evidence(line, ("modbus-rtu",), 0)
+    errors = CandidateEvidence(line, ("modbus-rtu",), 0)
     errors.feed(
         Chunk(1, bytes(range(0x41, 0x5F)), tuple(Mark(offset, LineError.FRAMING) for offset in range(0, 30, 2)))
     )
     assert errors.wrong
-    plain = Evidence(line, ("modbus-rtu",), 0)
+    plain = CandidateEvidence(line, ("modbus-rtu",), 0)
     plain.feed(Chunk(1, bytes(range(0x41, 0x5F))))
     assert not plain.wrong
 

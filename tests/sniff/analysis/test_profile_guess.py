@@ -12,7 +12,7 @@ from dissectors.bacnet.f510 import f510
 from dissectors.bacnet.readings import readings
 from dissectors.frame import Check, FoundBy, Frame
 from dissectors.profiles import packaged
-from sniff.analysis.profile_guess import Guess, Guessing, Heard, guess
+from sniff.analysis.profile_guess import Guess, Guessing, HeardPlaces, guess
 from sniff.bus.offline import outputs
 from sniff.engine.engine import Output
 from sniff.engine.follow_settings import dissector_for
@@ -82,7 +82,7 @@ def test_n2_and_mstp_stations() -> None:
 
 def test_a_device_as_its_manual_has_it_fits_wholly() -> None:
     profile = next(profile for profile in PROFILES if profile.name == "teco-f510")
-    drive, heard = f510(510), Heard(5)
+    drive, heard = f510(510), HeardPlaces(5)
     for name in profile.constants:
         request = confirmed(1, 12, {"object-identifier": "device,510", "property-identifier": name})
         answer = drive.answer(1, request)

@@ -13,8 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dissectors.profiles.model import Kind
-from sniff.analysis.register_guess import RegisterGuess, Sure, Use, guessed
-from sniff.analysis.register_series import Block, RegisterSeries, covering
+from sniff.analysis.register_guess import GuessSureness, RegisterGuess, Use, guessed
+from sniff.analysis.register_series import RegisterSeries, RegisterStretch, covering
 from sniff.bus.offline import survey
 from sniff.engine.follow_settings import dissector_for
 from sniff.formats import read
@@ -41,7 +41,14 @@ def counter(dice: random.Random, answers: int, begin: int, most: int) -> list[fl
 
 
 def words_of(kind: Kind, value: float, swapped: bool, little: bool) -> tuple[int, ...]:
-    form = {Kind.F32: ">f", Kind.F64: ">d", Kind.U32: ">I", Kind.U16: ">H", Kind.S16: ">h", Kind.S32: ">i"}[kind]
+    form = {
+        Kind.F32: ">f",
+        Kind.F64: ">d",
+        Kind.U32: ">I",
+        Kind.U16: ">H",
+        Kind.S16: ">h",
+        Kind.S32: ">i",
+    }[kind]
     packed = struct.pack(form, value if form[1] in "fd" else int(value))
     words = list(struct.unpack(f">{len(packed) // 2}H", packed))
     if little:
@@ -69,10 +76,10 @@ METER: list[tuple[Kind, Series]] = [
 
 def block_of(
     dice: random.Random, layout: list[tuple[Kind, Series]], swapped: bool, little: bool, answers: int
-) -> Block:
+) -> RegisterStretch:
     columns = [(kind, make(dice, answers)) for kind, make in layout]
     width = sum(kind.registers for kind, _ in columns)
-    block = Block(1, "holding", 100, width)
+    block = RegisterStretch(1, "holding", 100, width)
     for at in range(answers):
         row = [word for kind, values in columns for word in words_of(kind, values[at], swapped, little)]
         block.add(at * SECOND, tuple(row))
@@ -91,7 +98,7 @@ def judged(found: list[RegisterGuess], layout: list[tuple[Kind, Series]], order:
             same = same and (guess.swapped, guess.little) == order
         right += same * kind.registers
         overlapping = [by_address[place] for place in range(at, at + kind.registers) if place in by_address]
-        wrong += sum(one.sure is Sure.SURE and not (one is guess and same) for one in overlapping)
+        wrong += sum(one.sure is GuessSureness.SURE and not (one is guess and same) for one in overlapping)
         at += kind.registers
     return right, wrong
 
@@ -108,21 +115,21 @@ def test_most_registers_of_a_meter_are_read_rightly_and_none_surely_wrong(order:
         block = block_of(dice, layout, *order, 300)
         found = list(guessed([block], set()))
         good, wrong = judged(found, layout, order)
-        assert not wrong, [one for one in found if one.sure is Sure.SURE]
+        assert not wrong, [one for one in found if one.sure is GuessSureness.SURE]
         right += good
         total += block.width
     assert right >= 0.9 * total, f"{right} of {total}"
 
 
 def test_what_is_constant_is_left_open() -> None:
-    block = Block(1, "input", 0, 4)
+    block = RegisterStretch(1, "input", 0, 4)
     for at in range(100):
         block.add(at * SECOND, (0x4366, 0, 7, 0))
-    assert {(guess.sure, guess.use) for guess in guessed([block], set())} == {(Sure.OPEN, Use.CONSTANT)}
+    assert {(guess.sure, guess.use) for guess in guessed([block], set())} == {(GuessSureness.OPEN, Use.CONSTANT)}
 
 
 def test_what_a_master_writes_is_a_setting() -> None:
-    block = Block(3, "holding", 9, 1)
+    block = RegisterStretch(3, "holding", 9, 1)
     for at in range(50):
         block.add(at * SECOND, (3000 + at % 4,))
     (guess,) = guessed([block], {(3, "holding", 9)})
@@ -131,7 +138,7 @@ def test_what_a_master_writes_is_a_setting() -> None:
 
 @given(st.lists(st.lists(st.integers(0, 0xFFFF), min_size=5, max_size=5).map(tuple), min_size=1, max_size=40))
 def test_any_words_give_a_guess_for_every_register(rows: list[tuple[int, ...]]) -> None:
-    block = Block(1, "holding", 0, 5)
+    block = RegisterStretch(1, "holding", 0, 5)
     for at, row in enumerate(rows):
         block.add(at, row)
     found = list(guessed([block], set()))
@@ -145,7 +152,7 @@ def test_overlapping_questions_lose_no_register_and_dispute_nothing_surely(cut: 
     layout = [one for one in METER if one[0] is Kind.F32][:2]
     whole = block_of(dice, layout, True, False, 300)
     begin, end = cut
-    part = Block(1, "holding", 100 + begin, end - begin)
+    part = RegisterStretch(1, "holding", 100 + begin, end - begin)
     for time, row in zip(whole.times, whole.rows, strict=True):
         part.add(time, row[begin:end])
     found = list(guessed([whole, part], set()))
@@ -158,11 +165,11 @@ def test_sure_guesses_that_exclude_each_other_are_both_likely() -> None:
     dice = random.Random(4)
     one = block_of(dice, [(Kind.F32, METER[0][1])] * 2, True, False, 300)
     other = block_of(dice, [(Kind.F32, METER[0][1])] * 2, True, False, 200)
-    shifted = Block(1, "holding", 101, 4, other.times, other.rows, other.count)
+    shifted = RegisterStretch(1, "holding", 101, 4, other.times, other.rows, other.count)
     alone = [list(guessed([block], set())) for block in (one, shifted)]
-    assert all(guess.sure is Sure.SURE for found in alone for guess in found)
+    assert all(guess.sure is GuessSureness.SURE for found in alone for guess in found)
     both = list(guessed([one, shifted], set()))
-    assert all(guess.sure < Sure.SURE for guess in both)
+    assert all(guess.sure < GuessSureness.SURE for guess in both)
     assert [guess.address + step for guess in both for step in range(guess.kind.registers)] == list(range(100, 105))
 
 
@@ -175,7 +182,7 @@ blocks_that_overlap = st.lists(
 def test_every_register_of_all_blocks_has_one_guess(shapes: list[tuple[int, int, int]]) -> None:
     blocks = []
     for first, width, seed in shapes:
-        dice, block = random.Random(seed), Block(1, "holding", first, width)
+        dice, block = random.Random(seed), RegisterStretch(1, "holding", first, width)
         for at in range(20):
             block.add(at, tuple(dice.randrange(0x10000) for _ in range(width)))
         blocks.append(block)
@@ -198,7 +205,7 @@ def test_series_of_tables_are_those_of_rows(name: str) -> None:
 
 @given(st.lists(st.integers(0, 700), max_size=5))
 def test_many_answers_are_thinned_as_one_by_one(parts: list[int]) -> None:
-    one, many = Block(1, "holding", 0, 1), Block(1, "holding", 0, 1)
+    one, many = RegisterStretch(1, "holding", 0, 1), RegisterStretch(1, "holding", 0, 1)
     at = 0
     for part in parts:
         times = np.arange(at, at + part, dtype=np.int64)
@@ -210,7 +217,7 @@ def test_many_answers_are_thinned_as_one_by_one(parts: list[int]) -> None:
 
 
 def test_blocks_that_cover_all_registers_are_few() -> None:
-    blocks = [Block(1, "holding", first, width) for first in range(40) for width in range(1, 9)]
+    blocks = [RegisterStretch(1, "holding", first, width) for first in range(40) for width in range(1, 9)]
     for block in blocks:
         block.add(0, (0,) * block.width)
     kept = covering(blocks)

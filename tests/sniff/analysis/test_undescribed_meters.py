@@ -11,10 +11,18 @@ from dataclasses import dataclass
 import pytest
 
 from dissectors.profiles.model import Kind
-from sniff.analysis.register_guess import RegisterGuess, Sure, guessed
-from sniff.analysis.register_series import Block
+from sniff.analysis.register_guess import GuessSureness, RegisterGuess, guessed
+from sniff.analysis.register_series import RegisterStretch
 
-FORMS = {Kind.F32: ">f", Kind.F64: ">d", Kind.U32: ">I", Kind.S32: ">i", Kind.U64: ">Q", Kind.U16: ">H", Kind.S16: ">h"}
+FORMS = {
+    Kind.F32: ">f",
+    Kind.F64: ">d",
+    Kind.U32: ">I",
+    Kind.S32: ">i",
+    Kind.U64: ">Q",
+    Kind.U16: ">H",
+    Kind.S16: ">h",
+}
 ORDERS = ((False, False), (True, False), (True, True), (False, True))
 SEEDS = range(4)
 ANSWERS = 200
@@ -67,10 +75,10 @@ def words_of(held: Held, swapped: bool, little: bool) -> list[int]:
     return [int.from_bytes(word, "little" if little else "big") for word in (words[::-1] if swapped else words)]
 
 
-def meter(seed: int, swapped: bool, little: bool) -> tuple[dict[int, Held], Block]:
+def meter(seed: int, swapped: bool, little: bool) -> tuple[dict[int, Held], RegisterStretch]:
     """Where its values are, and what was heard."""
     places: dict[int, Held] = {}
-    block = Block(1, "input", 0, 0)
+    block = RegisterStretch(1, "input", 0, 0)
     for turn, shown in enumerate(values(random.Random(seed))):
         words: list[int] = []
         for held in shown:
@@ -94,8 +102,8 @@ def test_what_is_sure_is_right_and_most_is_right(swapped: bool, little: bool) ->
         found = {guess.address: guess for guess in guessed([block], set())}
         for guess in found.values():
             held = places.get(guess.address)
-            assert guess.sure is not Sure.SURE or (held is not None and held.is_told), guess
-            assert guess.sure is not Sure.SURE or is_right(guess, held, swapped, little), guess
+            assert guess.sure is not GuessSureness.SURE or (held is not None and held.is_told), guess
+            assert guess.sure is not GuessSureness.SURE or is_right(guess, held, swapped, little), guess
         for address, held in places.items():
             if held.is_told:
                 counts[address in found and is_right(found[address], held, swapped, little)] += 1

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 from collections.abc import Sequence
+from importlib.util import find_spec
 
 import pytest
 
@@ -12,10 +13,7 @@ from sniff.assistant.answers import MOST_CHARACTERS, MOST_OF_A_TEXT, answer, har
 from sniff.assistant.asking import Asking, Refused, Said
 from sniff.assistant.captures import Captures
 
-pytest.importorskip("mcp")
-from mcp.server.mcpserver.exceptions import ToolError
-
-from sniff.assistant.server import server
+pytestmark = pytest.mark.skipif(find_spec("mcp") is None, reason="needs mcp")  # importing it takes a second
 
 
 class Scripted(Asking):
@@ -32,6 +30,8 @@ class Scripted(Asking):
 
 def call(lines: list[str], tool: str, **arguments: object) -> tuple[str, list[list[str]]]:
     asking = Scripted(lines)
+    from sniff.assistant.server import server
+
     made = server(Captures(["/data/night.mcap"]), asking)
     given = asyncio.run(made.call_tool(tool, arguments))
     return str(given.content[0].text), asking.asked  # type: ignore[union-attr]
@@ -76,6 +76,8 @@ def test_frames_go_on_behind_the_last() -> None:
 
 @pytest.mark.parametrize("device", ["3=/etc/passwd", "3=../x", "x.toml", "3=a.toml", "--help"])
 def test_profiles_are_named_and_never_files(device: str) -> None:
+    from mcp.server.mcpserver.exceptions import ToolError
+
     with pytest.raises(ToolError, match="expected ADDRESS=PROFILE"):
         call([], "points", devices=[device])
 

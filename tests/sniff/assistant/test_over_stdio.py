@@ -6,21 +6,24 @@ import asyncio
 import json
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-pytest.importorskip("mcp")
-from mcp import Client, StdioServerParameters
-
 from sniff.cli import main
 
-pytestmark = pytest.mark.timeout(400)  # processes of their own, on a machine that may be busy
+pytestmark = [
+    pytest.mark.skipif(find_spec("mcp") is None, reason="needs mcp"),  # importing it takes a second
+    pytest.mark.timeout(400),  # processes of their own, on a machine that may be busy
+]
 CAPTURE = Path(__file__).parents[3] / "captures" / "rtu-usual-faults.cap.txt"
 
 
 async def _conversation() -> dict[str, Any]:
+    from mcp import Client, StdioServerParameters
+
     heard: dict[str, Any] = {}
     command = StdioServerParameters(command=sys.executable, args=["-m", "sniff", "mcp", str(CAPTURE)])
     async with Client(command) as client:

@@ -12,7 +12,7 @@ from sniff.analysis.judging import all_rules
 from sniff.engine.session import LineEvent, Session
 from sniff.fleet.answer import Answer
 from sniff.fleet.bus_day import Archive
-from sniff.recording.writer import create
+from sniff.recording.mcap_writer import create
 from sniff.simulation.tap import TapModel
 from tests.faults.case import Case, Said
 from tests.faults.cases import CASES

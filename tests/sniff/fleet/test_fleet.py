@@ -30,7 +30,7 @@ from sniff.fleet import index as index_module
 from sniff.fleet.answer import Answer, Change, Fresh, answer, marks
 from sniff.fleet.archive import FileState, Task, files_below, tasks_of
 from sniff.fleet.bus_day import Archive, BusDay, Judged, empty_summary
-from sniff.fleet.drift import Sure
+from sniff.fleet.drift import DriftSureness
 from sniff.fleet.html import page as html_page
 from sniff.fleet.index import Index
 from sniff.fleet.reading import read_task
@@ -270,7 +270,7 @@ def test_stations_that_come_and_go(days: list[BusDay]) -> None:
 
 def test_a_station_that_slows_down_is_told_with_how_sure(days: list[BusDay]) -> None:
     day = next(one for one in days if one.protocol == "modbus-rtu" and one.health().bus.score == 100)
-    for times, sure in (([10, 10, 20], Sure.UNSURE), ([10, 12, 14, 17, 20, 22, 25], Sure.SURE)):
+    for times, sure in (([10, 10, 20], DriftSureness.UNSURE), ([10, 12, 14, 17, 20, 22, 25], DriftSureness.SURE)):
         made = [replace(slowed(day, each), day=f"2026-03-{at:02}") for at, each in enumerate(times, 1)]
         (bus,) = answer(whole(made)).buses
         assert {(one.change, one.drift and one.drift.sure) for one in bus.changes} == {(Change.SLOWER, sure)}
@@ -279,7 +279,7 @@ def test_a_station_that_slows_down_is_told_with_how_sure(days: list[BusDay]) -> 
     steady = [replace(slowed(day, 10 + at % 2), day=f"2026-03-{at:02}") for at in range(1, 20)]
     (bus,) = answer(whole(steady)).buses
     assert bus.changes == ()
-    assert {one.sure for one in bus.drifts} == {Sure.UNSURE}
+    assert {one.sure for one in bus.drifts} == {DriftSureness.UNSURE}
 
 
 def test_buses_that_record_nothing(days: list[BusDay]) -> None:

@@ -23,7 +23,7 @@ from sniff.engine.session import Adapter, LineEvent, Session, SettingsChange, se
 from sniff.formats import read
 from sniff.formats.linktypes import USER1
 from sniff.formats.pcapng import PcapngWriter
-from sniff.formats.records import Record
+from sniff.formats.records import PacketRecord
 from sniff.formats.text import parse
 from tests.sniff.formats.written_anew import write_anew
 
@@ -232,7 +232,7 @@ def test_what_a_search_heard_is_told_by_a_value_and_not_by_the_words_of_a_commen
     path, words = tmp_path / "x.pcapng", "10 octets heard while searching for the settings, with 4800,8N1"
     tried = LineSettings.parse("4800,8N1")
     with contextlib.closing(PcapngWriter(path, session, 147)) as writer:
-        writer.put([Record(1000, USER1, b"ab", words, searched=tried), Record(2000, USER1, b"cd", words)])
+        writer.put([PacketRecord(1000, USER1, b"ab", words, searched=tried), PacketRecord(2000, USER1, b"cd", words)])
     items = list(read(path).items())
     assert [settings_change(item) for item in items if isinstance(item, LineEvent)] == [
         SettingsChange(tried, searching=True),

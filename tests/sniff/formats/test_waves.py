@@ -22,6 +22,7 @@ from sniff.formats.several_buses import SeveralBuses, chosen
 from sniff.formats.uart import Decoder, Uart
 from sniff.formats.uart_finding import decoded, find
 from tests.captures_shared import CAPTURES
+from tests.seeds import IS_SEARCH
 from tests.sniff.formats.waves_made import as_binary, as_csv, as_sigrok, as_vcd, edges_of
 from tests.sniff.formats.written_anew import write_anew
 
@@ -238,8 +239,9 @@ def test_a_file_that_is_cut_or_damaged_is_read_or_refused(tmp_path: Path, kind: 
     path, _ = _made(tmp_path, kind)
     whole = path.read_bytes()
     some = random.Random(7)
-    broken = [whole[:cut] for cut in range(0, len(whole), max(1, len(whole) // 50))]
-    for _ in range(50):
+    many = 50 if IS_SEARCH else 20
+    broken = [whole[:cut] for cut in range(0, len(whole), max(1, len(whole) // many))]
+    for _ in range(many):
         mutated = bytearray(whole)
         for _ in range(some.choice((1, 1, 3, 30))):
             mutated[some.randrange(len(mutated))] = some.randrange(256)

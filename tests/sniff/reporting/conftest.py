@@ -11,13 +11,13 @@ from dissectors.checksums import crc16_modbus
 from dissectors.profiles import Devices
 from sniff.formats import read
 from sniff.reporting.collecting import collect
-from sniff.reporting.numbers import Numbers
+from sniff.reporting.numbers import CaptureNumbers
 from tests.sniff.reporting.page_reading import SCRIPT
 
 
 @pytest.fixture
-def numbers_of() -> Callable[[Path], Numbers]:
-    def make(path: Path) -> Numbers:
+def numbers_of() -> Callable[[Path], CaptureNumbers]:
+    def make(path: Path) -> CaptureNumbers:
         capture = read(path)
         return collect(path.name, capture, capture.session, Devices())
 

@@ -9,14 +9,14 @@ from pathlib import Path
 
 import pytest
 
-from sniff.reporting.numbers import CLASSES, Numbers
+from sniff.reporting.numbers import CLASSES, CaptureNumbers
 from tests.sniff.reporting.page_reading import CAPTURES
 
 EACH = ("rtu-usual-faults", "n2-usual-faults", "mstp-usual-faults", "ascii-noisy-ftdi")
 
 
 @pytest.mark.parametrize("name", EACH)
-def test_the_parts_add_up(name: str, numbers_of: Callable[[Path], Numbers]) -> None:
+def test_the_parts_add_up(name: str, numbers_of: Callable[[Path], CaptureNumbers]) -> None:
     numbers = numbers_of(CAPTURES / f"{name}.cap.txt")
     assert sum(part.noise for part in numbers.timeline) == numbers.noise_octets
     assert sum(part.damaged for part in numbers.timeline) == numbers.damaged
@@ -28,7 +28,7 @@ def test_the_parts_add_up(name: str, numbers_of: Callable[[Path], Numbers]) -> N
     assert (numbers.ring is not None) == name.startswith("mstp")
 
 
-def test_the_verdict_names_what_fails(numbers_of: Callable[[Path], Numbers]) -> None:
+def test_the_verdict_names_what_fails(numbers_of: Callable[[Path], CaptureNumbers]) -> None:
     numbers = numbers_of(CAPTURES / "rtu-usual-faults.cap.txt")
     assert "station 4" in numbers.verdict
     assert numbers.findings[0].severity == "error"
@@ -39,14 +39,14 @@ def test_the_verdict_names_what_fails(numbers_of: Callable[[Path], Numbers]) -> 
     assert four.health.score == 0
 
 
-def test_a_clean_bus_is_in_good_order(numbers_of: Callable[[Path], Numbers]) -> None:
+def test_a_clean_bus_is_in_good_order(numbers_of: Callable[[Path], CaptureNumbers]) -> None:
     numbers = numbers_of(CAPTURES / "n2-clean.cap.txt")
     assert numbers.verdict == "The bus is in good order."
     assert numbers.health is not None
     assert numbers.health.score == 100
 
 
-def test_silence_and_rubbish_are_told_apart(tmp_path: Path, numbers_of: Callable[[Path], Numbers]) -> None:
+def test_silence_and_rubbish_are_told_apart(tmp_path: Path, numbers_of: Callable[[Path], CaptureNumbers]) -> None:
     head = "#!sniff-capture 1\n# line: 9600,8N1\n# protocol: mstp\n# start: 2026-03-01T10:00:00Z\n"
     silent, rubbish = tmp_path / "silent.cap.txt", tmp_path / "rubbish.cap.txt"
     silent.write_text(head)
@@ -56,13 +56,13 @@ def test_silence_and_rubbish_are_told_apart(tmp_path: Path, numbers_of: Callable
     assert "not one frame" in numbers_of(rubbish).verdict
 
 
-def test_what_the_adapter_cannot_tell_is_said(tmp_path: Path, numbers_of: Callable[[Path], Numbers]) -> None:
+def test_what_the_adapter_cannot_tell_is_said(tmp_path: Path, numbers_of: Callable[[Path], CaptureNumbers]) -> None:
     limits = " ".join(numbers_of(CAPTURES / "ascii-noisy-ftdi.cap.txt").measurement.limits)
     assert "17.5 ms" in limits
     assert "one flag covers a whole packet" in limits
 
 
-def test_json_holds_the_same_and_is_json(poll_capture: Path, numbers_of: Callable[[Path], Numbers]) -> None:
+def test_json_holds_the_same_and_is_json(poll_capture: Path, numbers_of: Callable[[Path], CaptureNumbers]) -> None:
     numbers = numbers_of(poll_capture)
     again = json.loads(json.dumps(numbers.to_json(), allow_nan=False))
     assert again["frames"] == numbers.frames

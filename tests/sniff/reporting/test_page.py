@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from sniff.cli import main
-from sniff.reporting.numbers import Numbers
+from sniff.reporting.numbers import CaptureNumbers
 from tests.sniff.reporting.page_reading import CAPTURES, SCRIPT, Page
 
 pytest.importorskip("matplotlib", reason="needs sniff485[report]")
@@ -31,7 +31,7 @@ def made(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactor
     return request.param, out
 
 
-def test_the_verdict_comes_first(made: tuple[str, Path], numbers_of: Callable[[Path], Numbers]) -> None:
+def test_the_verdict_comes_first(made: tuple[str, Path], numbers_of: Callable[[Path], CaptureNumbers]) -> None:
     name, out = made
     text = Page(out.read_text("utf-8")).text
     numbers = numbers_of(CAPTURES / f"{name}.cap.txt")
@@ -172,7 +172,7 @@ def test_without_its_libraries_it_says_what_to_install(absent: str, tmp_path: Pa
 
 
 @pytest.mark.skipif(not Path(CHROMIUM).exists(), reason="no Chromium here")
-def test_a_browser_shows_it_without_errors(tmp_path: Path, numbers_of: Callable[[Path], Numbers]) -> None:
+def test_a_browser_shows_it_without_errors(tmp_path: Path, numbers_of: Callable[[Path], CaptureNumbers]) -> None:
     """The ring's page: it has every section that there is."""
     capture, out = CAPTURES / "mstp-usual-faults.cap.txt", tmp_path / "page.html"
     assert main(["report", str(capture), "-o", str(out)]) == 0
@@ -201,7 +201,9 @@ def test_each_protocol_has_its_word_for_a_place_on_the_bus(made: tuple[str, Path
     assert "damaged-answer" not in text
 
 
-def test_a_row_of_many_words_keeps_its_begin_and_what_is_wrong_with_it(numbers_of: Callable[[Path], Numbers]) -> None:
+def test_a_row_of_many_words_keeps_its_begin_and_what_is_wrong_with_it(
+    numbers_of: Callable[[Path], CaptureNumbers],
+) -> None:
     found = numbers_of(CAPTURES / "findings" / "n2-two-masters.cap.txt").findings
     rows = [evidence.text for finding in found for evidence in finding.evidence]
     cut = [text for text in rows if " … " in text]
