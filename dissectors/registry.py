@@ -10,10 +10,14 @@ import sys
 from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from importlib import import_module
-from importlib.metadata import EntryPoint, entry_points
+from typing import TYPE_CHECKING
 
+from dissectors.installed import entry_points
 from dissectors.manifest import Dissector
 from dissectors.plugin_guard import guarded
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
 
 GROUP = "sniff485.dissectors"
 

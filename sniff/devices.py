@@ -15,13 +15,17 @@ import re
 import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+from dissectors.installed import entry_points
 from dissectors.profiles import Devices, Profile, ProfileError, packaged, parse_text
 from dissectors.profiles.packaged import SUFFIX, names
 from sniff.config import nearest
 from sniff.engine.session import DEVICES_NOTE, Session
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
 
 GROUP = "sniff485.profiles"
 FOLDER = "profiles"

@@ -21,6 +21,9 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "suite"))
 os.environ["LANGUAGE"] = "C"
 """Else argparse looks for files of translations at each of its words: most of what a command of some frames costs."""
 
+os.environ["TEXTUAL_ANIMATIONS"] = "none"
+"""What is scrolled to is there at once: nothing is drawn on the way, and no test waits for it."""
+
 END_TO_END = Path(__file__).parent / "e2e"
 
 

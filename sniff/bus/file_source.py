@@ -18,6 +18,7 @@ from typing import Any
 
 from dissectors.profiles import Devices
 from sniff.analysis.site_ear import SiteEar
+from sniff.bus.closings_ahead import look_ahead
 from sniff.bus.feed import FeedStatus
 from sniff.bus.prepared import Prepared, prepare
 from sniff.bus.row_source import rows_that_fit
@@ -27,6 +28,7 @@ from sniff.engine.blocks import in_pieces
 from sniff.engine.bulk import tables
 from sniff.engine.capture import Capture, CaptureError
 from sniff.engine.follow_settings import dissector_for
+from sniff.engine.packed_table import PackedTable
 from sniff.engine.session import LineEvent, Session
 from sniff.formats.files import watched
 from sniff.formats.mark_file import MarksBeside, mark_event, mark_file, place_of
@@ -163,12 +165,19 @@ class FileFeed:
     def _read(self, session: Session) -> Iterator[Piece | BaseException | None]:
         """All that is in the file; last why it ends, None where all is well."""
         try:
+            before: PackedTable | None = None
             for item in tables(in_pieces(self.capture.blocks(), FIRST_READS, READS), session):
                 if isinstance(item, LineEvent):
                     yield item
                     continue
                 self._foreign.add_table(item)
-                yield prepare(item, pack=len(item) >= PACKED_ROWS)
+                prepared = prepare(item, pack=len(item) >= PACKED_ROWS)
+                if before is not None:
+                    look_ahead(before, prepared.packed)
+                before = prepared.packed
+                yield prepared
+            if before is not None:
+                look_ahead(before, None)
             complete = self.capture.completeness()
             yield None if complete.whole else CaptureError(complete.text)
         except Exception as error:  # of the thread: whoever polls raises it

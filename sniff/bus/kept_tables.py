@@ -37,12 +37,12 @@ class Part:
     `first`: number of its first row, or of the row to come where it has none. `closed_first`: number of its first
     closing. `begin`: of its first row, ns. `ids`: least and greatest of its transactions' ids; `rows_closed`: the last
     row that they name. `placed_ids`: least and greatest of the transactions that its rows belong to.
-    `remembered`: what became of its rows, by name, and the tables that told it; kept once a filter has asked.
+    `remembered`: what became of its rows, by name, and the tables that told it (`closings_ahead.py`).
     """
 
     def __init__(self, whole: Table | PackedTable, first: int, closed_first: int) -> None:
         self.whole = whole
-        self.remembered: dict[str, tuple[list[Table | PackedTable], Values]] = {}
+        self.remembered = whole.remembered if isinstance(whole, PackedTable) else {}
         self.first, self.rows = first, len(whole)
         self.closed_first = closed_first
         if isinstance(whole, PackedTable):

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import operator
 from collections import OrderedDict
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 import numpy.typing as npt
 
+from sniff.bus.closings_ahead import WIDEST, became
 from sniff.bus.kept_tables import KeptTables, Part
-from sniff.engine.closings import Closings
 from sniff.engine.packed_table import PackedTable
 from sniff.filter import Filter
 
@@ -25,14 +24,13 @@ HELD = 4
 """Parts of which the answer is remembered."""
 FARTHEST = 8
 """Parts that the closings of one part are looked for in; what lies farther off is doubtful."""
-WIDEST = 1 << 22
 
 States = npt.NDArray[np.uint8]
 Values = npt.NDArray[Any]
 
 
 class _Remembering:
-    """What became of the rows of a part, as narrow as it is; the part remembers it for other filters."""
+    """What became of the rows of a part; the part remembers it for other filters."""
 
     def __init__(self, part: Part, closing: list[Part]) -> None:
         self._part, self._closing = part, closing
@@ -40,27 +38,17 @@ class _Remembering:
     @property
     def verdict(self) -> Values:
         """As of closings."""
-        return self._column("verdict", np.int8)
+        return became(self._part, self._closing, "verdict")
 
     @property
     def latency(self) -> Values:
         """As of closings."""
-        return self._column("latency", np.int32)
+        return became(self._part, self._closing, "latency")
 
     @property
     def attempt(self) -> Values:
         """As of closings."""
-        return self._column("attempt", np.int16)
-
-    def _column(self, name: str, form: type[np.integer[Any]]) -> Values:
-        part, told = self._part, [one.whole for one in self._closing]
-        known = part.remembered.get(name)
-        if known is not None and len(known[0]) == len(told) and all(map(operator.is_, known[0], told)):
-            return known[1]
-        closings = Closings(*part.ranks(), *part.placed_ids, [one.closed_column for one in self._closing], form)
-        values: Values = getattr(closings, name)
-        part.remembered[name] = told, values
-        return values
+        return became(self._part, self._closing, "attempt")
 
 
 class RowMasks:

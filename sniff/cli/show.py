@@ -88,7 +88,7 @@ def _show_all(args: argparse.Namespace, table: ParquetWriter | None) -> int:
         spoken = devices if named or (devices and (not args.table or "text" in args.names)) else None
         ours = filtering.FieldCells(args.names, session, devices)
         second = session.notes.get(SECOND_NOTE, "")
-        if second in registry.names():
+        if second and second in registry.names():
             accepted = ours.noting(wanted), filtering.of_second(args, session, second)
             rows_of_both = of_both(_settled(args, capture, session, spoken, None), session, second, *accepted)
             left = _show(args, rows_of_both, session, ours, left, table)

@@ -112,10 +112,12 @@ class PackedTable:
 
     `closed`: how many transactions. `ids`: the least and the greatest of theirs. `rows_closed`: the last row that they
     name. `begin`: of the first row, ns; `begins`: of the first and the last in time. `placed_ids`: least and greatest
-    of the transactions that its rows belong to.
+    of the transactions that its rows belong to. `remembered`: what whoever keeps it has found out of its rows, and
+    from which tables.
     """
 
     def __init__(self, table: Table) -> None:
+        self.remembered: dict[str, tuple[list[Any], Values]] = {}
         frames, placed, closed = table.frames, table.placed, table.transactions
         self.protocol, self.first, self.odd = table.protocol, table.first, table.odd
         self.octets: Octets = table.octets if table.octets.base is None else table.octets.copy()

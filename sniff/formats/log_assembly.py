@@ -12,6 +12,7 @@ from sniff.formats.log_clock import DAY, Stamp
 from sniff.formats.log_lines import Kind, Line, head_of
 from sniff.formats.log_plan import WINDOW, Plan
 from sniff.formats.log_shapes import Role
+from sniff.formats.octet_table import MOST
 
 LINE_END = 10 * MS
 """Silence that stands for the end of a line where nobody says how long it was: longer than the gap between frames at
@@ -244,11 +245,11 @@ class Assembly:
         follows = self._last + length + (silence if self._any else 0)
         time = follows
         if self._samples is not None and self._plan.bit_samples:
-            time = max(
-                self._last, int((self._samples[1] + self._plan.bit_samples) / self._plan.bit_samples * self._bit)
-            )
+            ended = (self._samples[1] + self._plan.bit_samples) / self._plan.bit_samples * self._bit
+            time = max(self._last, int(ended)) if ended < MOST else follows
         elif self._stamp is not None:
             told = self._told(self._stamp) + self._shift
+            told = told if told < MOST else follows  # steps that add up to no time
             is_coarse = self._stamp.tick >= COARSE or (told == self._last and self._any)
             time = told
             if is_coarse and self._any and told > self._last - _BACKWARDS:

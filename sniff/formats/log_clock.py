@@ -10,7 +10,7 @@ from decimal import Decimal
 
 from dissectors.line import MS, NS_PER_S
 from sniff.formats.log_times import AS_WRITTEN, BARE, EPOCH, Order, Times, day_of
-from sniff.formats.octet_table import UNITS, seconds
+from sniff.formats.octet_table import MOST, UNITS, seconds
 
 _TIME = (
     r"(?P<clock>\d{1,2}:\d{2}:\d{2}(?:[.,]\d{1,9}|:\d{3}(?![\d:]))?)(?!\d|:[0-9A-Za-z])(?: ?(?P<half>[AaPp][Mm])\b)?"
@@ -162,7 +162,8 @@ def stamp_of(line: str, times: Times = AS_WRITTEN) -> Stamp | None:
     if times.unit and (bare := BARE.match(head)) is not None:
         text = bare["number"].replace(",", ".")
         tick = max(1, times.unit // 10 ** len(text.partition(".")[2]))
-        return Stamp(int(Decimal(text) * times.unit), tick, *bare.span("number"), times.since_1970)
+        time = int(Decimal(text) * times.unit)
+        return Stamp(time, tick, *bare.span("number"), times.since_1970) if abs(time) < MOST else None
     for clock in CLOCKS:
         match = clock.pattern.search(head)
         if (
@@ -174,6 +175,8 @@ def stamp_of(line: str, times: Times = AS_WRITTEN) -> Stamp | None:
         try:
             time = clock.value(match, times.order)
         except ValueError:
+            continue
+        if abs(time) >= MOST:
             continue
         dated = clock.dated or ("number" in match.groupdict() and time >= EPOCH[0] * NS_PER_S)
         groups = match.groupdict()

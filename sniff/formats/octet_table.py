@@ -57,6 +57,9 @@ TIME_WORDS = re.compile(
 )
 """Words of which a time is named."""
 
+MOST = 1 << 62
+"""ns: a number beyond it is no time."""
+
 UNITS = {"s": 1_000_000_000, "ms": 1_000_000, "us": 1000, "µs": 1000, "μs": 1000, "ns": 1}
 _UNIT = re.compile(
     r"(?P<name>[^\[(]*)[\[(](?P<unit>s|ms|us|µs|μs|ns)[\])]"
@@ -124,7 +127,10 @@ class Table:
             octets = self.read(_cell(row, self.octet))
         if not octets:
             raise ValueError("no octets")
-        return Chunk(self._end(row, len(octets) * char), octets, self._marks(row))
+        time = self._end(row, len(octets) * char)
+        if abs(time) >= MOST:
+            raise ValueError("no time")
+        return Chunk(time, octets, self._marks(row))
 
     def _end(self, row: Sequence[str], length: int) -> int:
         if self.end is not None:

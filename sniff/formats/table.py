@@ -10,9 +10,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
-from importlib.metadata import entry_points
 from typing import Any
 
+from dissectors.installed import entry_points
 from sniff.engine.capture import CaptureError
 
 GROUP = "sniff485.formats"
@@ -137,9 +137,12 @@ def told(start: bytes, name: str) -> Format | None:
 
     A raw dump does not take a file away from the format that its name says: it is such a file, and damaged.
     """
+    for one in BUILT_IN:  # the first of all: nobody else is asked, who would have to be looked for or imported
+        if one.reader and not one.last and one.named(name) and one.recognises(start):
+            return one
     named = [one for one in formats() if one.reader and one.named(name)]
     certain = next((one for one in named if not one.last and one.recognises(start)), None)
-    if certain is not None:  # nobody else is asked, who would have to be imported first
+    if certain is not None:
         return certain
     recognised = [one for one in formats() if one.reader and one.recognises(start)]
     best = next((one for one in recognised if not one.last), None)

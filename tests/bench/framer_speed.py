@@ -63,6 +63,7 @@ PATTERNS: dict[str, bytes] = {
     "RTU of four octets, glued": _sealed("01 07"),
     "RTU long answer, spoilt": _sealed("01 03 F0" + "01 03" * 120)[:-1] + b"\x55",
     "RTU vendor function, glued": _sealed("01 41 02 E9 00 03"),
+    "RTU vendor function, four octets, glued": _sealed("01 41"),
     "good ASCII, glued": b":010300000002FA\r\n",
 }
 _FRAMERS = ("modbus-rtu", "modbus-ascii", "n2", "mstp")

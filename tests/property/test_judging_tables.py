@@ -5,8 +5,6 @@ from __future__ import annotations
 import random
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from itertools import chain, islice
-from pathlib import Path
 
 import pytest
 
@@ -16,32 +14,17 @@ from dissectors.line import Timing
 from dissectors.profiles import Devices
 from dissectors.token_ring import WatchesColumns
 from sniff.analysis.judging import Judging
-from sniff.bus.offline import outputs
-from sniff.devices import noted_devices
 from sniff.engine.blocks import Block, blocks_of
 from sniff.engine.bulk import tables
-from sniff.engine.capture import CaptureError
 from sniff.engine.engine import Row
 from sniff.engine.follow_settings import dissector_for
-from sniff.engine.observer import observe
 from sniff.engine.session import Adapter, LineEvent, LineEventKind, Session
 from sniff.engine.table import Table
-from sniff.formats import read
 from tests.bench import bulk_mstp, bulk_rtu
 from tests.property import mstp_buses
-from tests.seeds import IS_SEARCH, MOST_READS, seeds, some
+from tests.seeds import seeds
 
 Bus = Callable[[float], tuple[Session, Reads]]
-
-CAPTURES = Path(__file__).parents[2] / "captures"
-SHARED = Path(__file__).parents[3] / "shared"
-FOLDERS = (CAPTURES, SHARED / "captures", SHARED / "cases")
-NAMES = sorted(
-    path
-    for path in chain.from_iterable(folder.rglob("*") for folder in FOLDERS if folder.exists())
-    if path.suffix in {".txt", ".pcap", ".pcapng", ".mcap"} and not path.name.endswith(".expect.txt")
-)
-
 
 MIXED = 0
 """Parts of some rows and parts of many, in turn."""
@@ -95,23 +78,6 @@ def same(one: Judging, other: Judging) -> None:
 def short_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     """Even the shortest stretch is taken by columns: else only long captures would try them."""
     monkeypatch.setattr(bulk_ring_observer, "RUN_LEAST", 1)
-
-
-@pytest.mark.parametrize("path", some(NAMES, 2), ids=lambda path: path.name)
-def test_a_capture_is_judged_from_tables_as_row_by_row(path: Path) -> None:
-    try:
-        capture = read(path)
-        given = list(islice(capture.items(), MOST_READS))
-    except CaptureError as error:
-        pytest.skip(str(error))
-    session = capture.session
-    reference = judged(session, noted_devices(session))
-    observe(outputs(given, session), reference)
-    items = list(tables(blocks_of(given), session))
-    dice = random.Random(path.name)
-    for most in (1 << 30, 30) if IS_SEARCH else (MIXED,):
-        from_tables = judged(session, noted_devices(session))
-        same(by_tables(items, from_tables, dice, most), reference)
 
 
 def _mstp(damaged: float, answered: float = 1.0, many: int = 2000) -> tuple[Session, Reads]:

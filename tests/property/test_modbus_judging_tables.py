@@ -49,6 +49,16 @@ def test_each_trouble_alone_leaves_the_same(trouble: str) -> None:
     assert by_columns.findings() == by_rows.findings()
 
 
+def test_a_second_answer_is_compared_with_a_first_that_went_by_columns() -> None:
+    session, reads = bus(7, exchanges=600, troubles=("twice",))
+    judge = BulkModbusFindings(session.timing)
+    for table in tables([Block(reads)], session):
+        if isinstance(table, Table):
+            judge.take(table)
+    stations = [one for one in judge.seen.stations.values() if one.twice.count]
+    assert [(one.twice.count, one.same_twice) for one in stations] == [(1, 0)]  # two that say different things
+
+
 def test_of_a_quiet_bus_no_row_becomes_an_object_but_the_last(monkeypatch: pytest.MonkeyPatch) -> None:
     session, reads = bus(3, exchanges=400, troubles=())
     looked_at: list[int] = []

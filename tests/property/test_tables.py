@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
@@ -11,11 +12,13 @@ from types import ModuleType
 
 import pytest
 
+from dissectors.bacnet import bulk_ring_observer
 from dissectors.columns import Reads
 from dissectors.line import Timing
 from dissectors.tracker import Transaction
 from sniff.analysis.summary import Summary
 from sniff.bus.offline import outputs, settled, settled_in_bulk
+from sniff.devices import noted_devices
 from sniff.engine.blocks import Block, blocks_of
 from sniff.engine.bulk import tables
 from sniff.engine.capture import CaptureError
@@ -29,15 +32,17 @@ from sniff.filter import compile_filter
 from sniff.filter.errors import FilterError
 from sniff.formats import read
 from tests.bench import bulk_ascii, bulk_mstp, bulk_n2, bulk_profibus, bulk_rtu
-from tests.seeds import MOST_READS, some
+from tests.property.test_judging_tables import MIXED, by_tables, judged, same
+from tests.seeds import IS_SEARCH, MOST_READS, some
 
 Bus = Callable[[float], tuple[Session, Reads]]
 
 CAPTURES = Path(__file__).parents[2] / "captures"
-SHARED = Path(__file__).parents[3] / "shared" / "captures"
+SHARED = Path(__file__).parents[3] / "shared"
+FOLDERS = (CAPTURES, SHARED / "captures", SHARED / "cases")
 NAMES = sorted(
     path
-    for path in chain(CAPTURES.rglob("*"), SHARED.rglob("*") if SHARED.exists() else ())
+    for path in chain.from_iterable(folder.rglob("*") for folder in FOLDERS if folder.exists())
     if path.suffix in {".txt", ".pcap", ".pcapng", ".mcap"} and not path.name.endswith(".expect.txt")
 )
 
@@ -89,6 +94,15 @@ def test_a_capture_gives_the_same_rows_as_tables(given: Given) -> None:
     assert [by for table in made for by in _closers(table)] == list(_closers(by_outputs))
     events = [one for one in given.by_tables if isinstance(one, LineEvent)]
     assert events == [one for one in given.by_reference if isinstance(one, LineEvent)]
+
+
+def test_a_capture_is_judged_from_tables_as_row_by_row(given: Given, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bulk_ring_observer, "RUN_LEAST", 1)  # else only long captures would try its columns
+    reference = judged(given.session, noted_devices(given.session))
+    observe(given.by_reference, reference)
+    dice = random.Random(len(given.by_tables) + len(given.by_reference))
+    for most in (1 << 30, 30) if IS_SEARCH else (MIXED,):
+        same(by_tables(given.by_tables, judged(given.session, noted_devices(given.session)), dice, most), reference)
 
 
 def _closers(table: Table) -> Iterator[int]:

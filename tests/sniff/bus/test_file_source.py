@@ -8,13 +8,14 @@ from pathlib import Path
 import pytest
 
 from dissectors.tracker import Transaction
-from sniff.bus import file_source
+from sniff.bus import closings_ahead, file_source
 from sniff.bus.file_source import FileFeed
 from sniff.bus.model import BusModel
 from sniff.bus.offline import outputs, survey
 from sniff.engine.blocks import Block
 from sniff.engine.engine import Output, Row
 from sniff.engine.follow_settings import dissector_for
+from sniff.engine.packed_table import PackedTable
 from sniff.engine.session import LineEvent, Session
 from sniff.formats import read
 from tests.bench import bulk_files, bulk_mstp
@@ -135,3 +136,24 @@ def test_a_cut_file_says_so(path: Path) -> None:
     assert feed.status().ended
     assert len(feed.store) > 100
     feed.close()
+
+
+@pytest.mark.usefixtures("by_thread")
+def test_what_became_of_rows_is_known_before_a_filter_asks(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(file_source, "PACKED_ROWS", 100)
+    feed = feed_of(path)
+    feed.poll()
+    while feed.work():
+        pass
+    kept = feed.store.kept
+    packed = [part for part in kept.parts if isinstance(part.whole, PackedTable)]
+    assert len(packed) > 10
+    for part in packed[:-1]:
+        closing = kept.closing_parts(*part.placed_ids)
+        known = dict(part.remembered)
+        for name in ("verdict", "latency"):
+            told, values = known[name]
+            assert told == [one.whole for one in closing]  # so that nobody puts it together again
+            assert closings_ahead.became(part, closing, name) is values
+            del part.remembered[name]
+            assert closings_ahead.became(part, closing, name).tolist() == values.tolist()

@@ -75,3 +75,21 @@ def test_the_unit_of_a_bare_time_is_told_by_its_steps(step: str, unit: str, said
     first, second, *_ = (item.time for item in log.items())
     assert second - first == pytest.approx(float(step) * {"s": 1e9, "ms": 1e6, "µs": 1e3, "ns": 1}[unit], rel=1e-6)
     assert (f"times taken as {unit}" in log.completeness().text) == said
+
+
+@pytest.mark.parametrize(
+    "odd",
+    [
+        "221111111111111111111 ms TX 01 03 00 00 00 02 C4 0B",
+        "22136-222222222222222222222554 uart-1: 00",
+        "@4fffffffffffffff00000000 TX 01 03 00 00 00 02 C4 0B",
+        "134168328002500000 TX 01 03 00 00 00 02 C4 0B",
+    ],
+)
+def test_a_number_that_no_time_can_be(odd: str, tmp_path: Path) -> None:
+    path = tmp_path / "x.log"
+    usual = odd.replace("221111111111111111111", "17").replace("22222222222222222222", "").replace("13416832", "1341")
+    path.write_text("".join(f"{usual}\n{odd}\n{usual}\n" for _ in range(4)))
+    times = [item.time for item in read(path).items()]
+    assert len(times) == 12
+    assert all(0 <= time < 1 << 63 for time in times)

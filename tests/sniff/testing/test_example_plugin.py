@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import subprocess
@@ -12,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from sniff.cli import main
 from tests.sniff.testing.other_pytest import pytest_command
 
 EXAMPLE = Path(__file__).parent / "example_plugin"
@@ -43,6 +45,22 @@ from sniff.testing.crafting import craft
 print(craft("nmea", body=b"SDDBT,12.0").decode().strip())
 print(sum(len(burst.sent) for burst in bursts(scenario("nmea", faults=False), 1.99)))
 """
+
+SEVERAL = """
+import contextlib, io, json, sys
+from sniff.cli import main
+said = []
+for words in json.loads(sys.argv[1]):
+    out, err = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        try:
+            code = main(words)
+        except SystemExit as end:
+            code = end.code
+    said.append({"code": code, "out": out.getvalue(), "err": err.getvalue()})
+print(json.dumps(said))
+"""
+"""Several commands in one process: starting it is most of what one costs."""
 
 
 @pytest.fixture
@@ -91,18 +109,23 @@ def test_a_broken_framer_fails_it_and_says_why(run: Run, installed: Path) -> Non
 
 def test_commands_know_the_protocol(run: Run, installed: Path) -> None:
     (installed / "boat.cap.txt").write_text(CAPTURE)
-    shown = run("sniff", "show", "boat.cap.txt")
-    assert shown.returncode == 0, shown.stderr
-    assert shown.stdout.count("$SDDBT,12.0*74") == 2
+    (installed / "several.py").write_text(SEVERAL)
     fields = ("-T", "fields", "-e", "nmea.sentence", "-Y", 'nmea.sentence == "sddbt"')
-    named = run("sniff", "show", "boat.cap.txt", *fields)
-    assert named.stdout.split() == ["sddbt"] * 3, named.stderr
-    assert "NMEA 0183" in run("sniff", "--help").stdout
-    assert run("sniff", "check", "boat.cap.txt").returncode == 0
-    written = run("sniff", "snapshot", "boat.cap.txt")
-    assert written.returncode == 0, written.stderr
+    commands = [
+        ["show", "boat.cap.txt"], ["show", "boat.cap.txt", *fields], ["--help"], ["check", "boat.cap.txt"],
+        ["snapshot", "boat.cap.txt"], ["show", "-p", "no-such", "boat.cap.txt"],
+    ]  # fmt: skip
+    ran = run("several", json.dumps(commands))
+    assert ran.returncode == 0, ran.stderr
+    shown, named, helped, checked, written, refused = json.loads(ran.stdout)
+    assert shown["code"] == 0, shown["err"]
+    assert shown["out"].count("$SDDBT,12.0*74") == 2
+    assert named["out"].split() == ["sddbt"] * 3, named["err"]
+    assert "NMEA 0183" in helped["out"]
+    assert checked["code"] == 0, checked["err"]
+    assert written["code"] == 0, written["err"]
     assert "DAMAGED check" in (installed / "boat.expect.txt").read_text()
-    assert "nmea" in run("sniff", "show", "-p", "no-such", "boat.cap.txt").stderr
+    assert "nmea" in refused["err"]
 
 
 def test_it_is_simulated_and_crafted(run: Run, installed: Path) -> None:
@@ -112,14 +135,15 @@ def test_it_is_simulated_and_crafted(run: Run, installed: Path) -> None:
 
 
 @pytest.mark.parametrize("command", ["show", "info", "stats", "check", "points", "snapshot", "diff", "anonymise"])
-def test_a_capture_of_a_protocol_that_is_not_installed_is_one_clear_line(command: str, tmp_path: Path) -> None:
+def test_a_capture_of_a_protocol_that_is_not_installed_is_one_clear_line(
+    command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     capture = tmp_path / "boat.cap.txt"
     capture.write_text(CAPTURE)
     files = [capture, capture] if command == "diff" else [capture]
     options = {"snapshot": ["--check"], "anonymise": ["-o", tmp_path / "out.cap.txt"]}.get(command, [])
-    line = [sys.executable, "-m", "sniff", command, *map(str, (*files, *options))]
-    ran = subprocess.run(line, capture_output=True, text=True, timeout=100)
-    assert ran.returncode in (2, 3), ran
-    assert ran.stderr.count("\n") == 1, ran.stderr
-    assert "nmea" in ran.stderr
-    assert "modbus-rtu" in ran.stderr
+    assert main([command, *map(str, (*files, *options))]) in (2, 3)
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1, said
+    assert "nmea" in said
+    assert "modbus-rtu" in said
