@@ -34,8 +34,8 @@ _DOUBTFUL = frozenset(
 class LineJudging:
     """The line's part of `Judging`, which needs nothing of the rest: fed the same."""
 
-    def __init__(self, session: Session) -> None:
-        self.findings = BulkLineFindings(session)
+    def __init__(self, session: Session, dissector: Dissector | None = None) -> None:
+        self.findings = BulkLineFindings(session, dissector)
         self._searching = False
 
     def add(self, output: Output) -> None:
@@ -73,7 +73,7 @@ class Judging:
 
     def __init__(self, session: Session, dissector: Dissector, devices: Devices | None = None) -> None:
         self.judge = dissector.judge(session.timing) if dissector.judge is not None else None
-        self.of_line: LineJudging | None = LineJudging(session)
+        self.of_line: LineJudging | None = LineJudging(session, dissector)
         self._rules = rules_over(dissector)
         self.devices = ProfileFindings(session.timing, dissector, devices) if devices else None
         if devices and isinstance(self.judge, WordsExceptions):

@@ -11,6 +11,7 @@ from typing import NamedTuple
 from dissectors.findings import Finding, Severity, Tally, counted, found, times
 from dissectors.frame import Chunk, Damage, Event, Frame, LineError, Noise, Place, Reason, Role
 from dissectors.line import MS, NS_PER_S
+from dissectors.manifest import Dissector
 from dissectors.tracker import Transaction, Verdict
 from dissectors.words import milliseconds
 from sniff.analysis.judgement import Heard, Judgement
@@ -69,7 +70,8 @@ class LineFindings:
 
     _nouns = staticmethod(cache(station_word))  # asked for every frame
 
-    def __init__(self, session: Session) -> None:
+    def __init__(self, session: Session, dissector: Dissector | None = None) -> None:
+        """`dissector`: that of the session, where it is in no registry."""
         self._session = session
         self._patterns = TimePatterns(session)
         self._use = LineUse(session.line)
@@ -91,7 +93,7 @@ class LineFindings:
         self._asker: str | None = None  # who sent the newest frame, if that was a request
         self._pending: list[_Stray] = []  # noise beside frames, of which the frame to come tells
         self._begins = UnsureStrays()  # noise that may be the begin of the frame to come
-        self._pieces = TornPieces(dissector_for(session), session.timing, STRAY_MOST)
+        self._pieces = TornPieces(dissector or dissector_for(session), session.timing, STRAY_MOST)
         self._sample: list[Chunk] = []  # what came first, to ask what else it may be
         self._sampled = 0
         self._rests: list[bytes] = []  # the first stretches that are no frame

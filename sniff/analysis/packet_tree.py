@@ -45,6 +45,14 @@ class Field:
         )
 
 
+def moved(field: Field, by: int) -> Field:
+    """A field of octets that begin so many octets later; where that is negative, nobody can tell where."""
+    begin, end = field.begin, field.end
+    if begin is not None and end is not None:
+        begin, end = (None, None) if by < 0 else (begin + by, end + by)
+    return replace(field, begin=begin, end=end, children=tuple(moved(child, by) for child in field.children))
+
+
 def fields_of(dissector: Dissector, frame: Frame, role: Role) -> tuple[Field, ...]:
     """The layers of a frame; the dissector's flat fields, without spans, where its packet fails. Never raises."""
     try:

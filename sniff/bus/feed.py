@@ -24,6 +24,8 @@ class FeedStatus:
     rows the rules have seen, 0 … 1.
     `follows`: the recording that rows are read from while another process writes it; "": they are from a port.
     `searching`: with which settings a search listens at the moment, empty when there is none.
+    `second`: a second protocol on the bus, by its registry name, where the whole file was read; `foreign`: how many
+    frames of it.
     """
 
     port: str
@@ -42,6 +44,8 @@ class FeedStatus:
     read: float = 1.0
     judged: float = 1.0
     follows: str = ""
+    second: str = ""
+    foreign: int = 0
 
     @property
     def in_file(self) -> bool:

@@ -23,6 +23,7 @@ from sniff.bus.feed import FeedStatus
 from sniff.bus.prepared import Prepared, prepare
 from sniff.bus.row_source import rows_that_fit
 from sniff.bus.rows import Store
+from sniff.bus.second_protocol import ForeignFrames
 from sniff.engine.blocks import in_pieces
 from sniff.engine.bulk import tables
 from sniff.engine.capture import Capture, CaptureError
@@ -43,6 +44,8 @@ WAITING = 8
 LEAST_JUDGED = 32
 SWITCHED, SWITCHING = sys.getswitchinterval(), 0.001
 """Seconds after which the thread gives way; while a file is read, a key waits for that several times."""
+UNASKED = 0.5
+"""Seconds after which a file that was read is asked for a second protocol: the screen comes first."""
 PACKED_ROWS = 1024
 """Rows from which on a piece is packed at once."""
 
@@ -59,6 +62,9 @@ class FileFeed:
         self.capture = capture
         rows, ear = rows_that_fit(buses), SiteEar() if buses > 1 else None
         self._store = Store(session, dissector_for(session), rows, devices, judge_later=True, ear=ear)
+        self._foreign = ForeignFrames(session)
+        self._second: tuple[str, int] = "", 0
+        self._asking: threading.Timer | None = None
         self._pieces = self._read(session)
         self._thread: threading.Thread | None = None
         self._queue: queue.Queue[Piece | BaseException | None] = queue.Queue(WAITING)
@@ -120,6 +126,10 @@ class FileFeed:
         else:
             self._reading = False
             sys.setswitchinterval(SWITCHED)
+            self._asking = threading.Timer(UNASKED, self._ask_for_second) if self._store.error_total else None
+            if self._asking is not None:
+                self._asking.daemon = True
+                self._asking.start()
             self._store.version += 1
             if isinstance(piece, CaptureError):  # what was read before it stays
                 self._ended = str(piece)
@@ -160,6 +170,7 @@ class FileFeed:
                 if isinstance(item, LineEvent):
                     yield item
                     continue
+                self._foreign.add_table(item)
                 prepared = prepare(item, pack=len(item) >= PACKED_ROWS)
                 if before is not None:
                     look_ahead(before, prepared.packed)
@@ -171,6 +182,12 @@ class FileFeed:
             yield None if complete.whole else CaptureError(complete.text)
         except Exception as error:  # of the thread: whoever polls raises it
             yield error
+
+    def _ask_for_second(self) -> None:
+        """Whether there is a second protocol; of a thread, for all protocols have to be imported for it."""
+        told = self._foreign.told()
+        if told is not None:
+            self._second = told[0].name, told[1]
 
     # -- how things stand --------------------------------------------------------------------------------------
 
@@ -185,6 +202,8 @@ class FileFeed:
             file_size=self._size,
             ended=self._ended,
             reading=self._reading,
+            second=self._second[0],
+            foreign=self._second[1],
             read=min(0.99, self._progress.octets / max(1, self._size)) if self._reading else 1.0,
             judged=1.0 if store.all_judged and not self._reading else min(0.99, store.judged / max(1, store.last_no)),
         )
@@ -200,6 +219,8 @@ class FileFeed:
     def close(self) -> None:
         """Have the thread end."""
         self._stopped.set()
+        if self._asking is not None:
+            self._asking.cancel()
         sys.setswitchinterval(SWITCHED)
         if self._thread is not None:
             self._thread.join(2.0)

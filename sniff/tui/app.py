@@ -18,6 +18,7 @@ from textual.timer import Timer
 from dissectors.findings import Finding
 from sniff.analysis.sanitizing import sanitized
 from sniff.bus.feed import Feed, FeedStatus
+from sniff.bus.foreign_rows import ForeignRows
 from sniff.bus.rows import Store
 from sniff.config import ConfigError, nearest
 from sniff.config import load as load_config
@@ -253,6 +254,9 @@ class SnifferApp(Analyzer):
             self._take_what_was_found(seat)
         if before.reading and not seat.status.reading:  # there is nothing to follow any more
             seat.viewing.follow = False
+        if seat.status.second and seat.viewing.foreign is None:
+            seat.viewing.foreign = ForeignRows(seat.feed.store, seat.status.second)
+            changed = True
         self._tell(seat)
         return changed
 

@@ -7,6 +7,7 @@ from rich.cells import cell_len
 from dissectors.frame import Event, FoundBy, Frame, LineError
 from dissectors.tracker import Transaction, Verdict
 from sniff.analysis.sanitizing import sanitized
+from sniff.analysis.wording import describe
 from sniff.engine.engine import Row
 from sniff.tui.analyzer import analyzer
 from sniff.tui.columns import Cell, Column
@@ -70,7 +71,7 @@ class FrameList(StoreList):
         """Its verdict may come later; marks come and go; the partner of the cursor is marked."""
         row = self.store.by_no(number)
         transaction = None if row is None else self.store.transaction(row)
-        return transaction, self.viewing.marks.get(number), self.viewing.time_mode
+        return transaction, self.viewing.marks.get(number), self.viewing.time_mode, self.viewing.foreign
 
     def edge(self, number: int) -> Cell:
         """Cursor or partner, and the user's mark."""
@@ -89,7 +90,7 @@ class FrameList(StoreList):
         if self.viewing.colours and not style:
             style = self.viewing.colour_of(row, transaction)
         source, destination = self._addresses(row)
-        text = sanitized(self.store.text(row))
+        text = sanitized(self._text(row))
         said = self.viewing.marks.get(number, "")
         text = f"[{sanitized(said)}] {text}" if said else text
         answers = transaction is not None and (transaction.response in (number, None))
@@ -106,6 +107,14 @@ class FrameList(StoreList):
             "len": Cell(str(len(event.octets)), "dim"),
             "flags": Cell(flags(event), style or "dim"),
         }
+
+    def _text(self, row: Row) -> str:
+        """What it says, or what frames of a second protocol in it say, with its name."""
+        foreign = self.viewing.foreign
+        found = () if foreign is None else foreign.of(row.no)
+        if foreign is None or not found:
+            return self.store.text(row)
+        return f"{foreign.second.name}: " + "; ".join(describe(foreign.second, one, None) for one in found)
 
     def _verdict(self, transaction: Transaction | None, text: str) -> Cell:
         """The verdict; the usual one gives way to a text that has no room, for what a frame says matters more."""

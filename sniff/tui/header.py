@@ -94,6 +94,11 @@ def why_ended(status: FeedStatus, store: Store) -> tuple[str, str]:
     return gone_why(of_port[-1]) or said, f"{said}; {status.ended}"
 
 
+def protocols(status: FeedStatus) -> str:
+    """The protocol of the bus, and a second one that is heard between."""
+    return sanitized(f"{status.protocol}+{status.second}" if status.second else status.protocol)
+
+
 def status_line(
     status: FeedStatus, store: Store, viewing: Viewing, width: int, health: Health | None = None
 ) -> list[tuple[str, str]]:
@@ -103,7 +108,7 @@ def status_line(
     shown_state = f"{words}: {fit(reason, min(cell_len(reason), REASON))}" if reason else words
     pieces = [
         *([(f"searching {sanitized(status.searching)} …", "doubt")] if status.searching else []),
-        *([] if status.searching else [(sanitized(status.line), ""), (sanitized(status.protocol), "")]),
+        *([] if status.searching else [(sanitized(status.line), ""), (protocols(status), "")]),
         (f"load {store.load.share():.0%}", ""),
         *([] if health is None else [(f"health {health.score}", _health_style(health.score))]),
         (f"err {store.error_total}", "bad" if store.error_total else ""),

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 
 from dissectors.findings import Finding
 from dissectors.tracker import Transaction
+from sniff.bus.foreign_rows import ForeignRows
 from sniff.bus.row_masks import RowMasks
 from sniff.bus.rows import Store
 from sniff.engine.engine import Row
@@ -16,6 +17,7 @@ from sniff.engine.session import LineEvent, LineEventKind
 from sniff.filter import Filter, FilterError, Scope, compile_filter
 from sniff.filter.compiling import field_of
 from sniff.filter.completion import shown_value
+from sniff.filter.errors import OfOthers
 from sniff.filter.told import told
 from sniff.tui.times import TimeMode
 
@@ -38,6 +40,7 @@ class Viewing:
     accepts: Filter | None = None
     masks: RowMasks | None = None  # the same for many rows at once, where columns say something of it
     filter_version: int = 0  # changes with the filter, so that lists know when to begin anew
+    foreign: ForeignRows | None = None  # frames of a second protocol in what the first leaves
     columns: dict[str, tuple[str, ...]] = field(default_factory=dict)  # chosen, by list
     marks: dict[int, str] = field(default_factory=dict)  # what was written, by row number
     _events_seen: int = 0  # of the store
@@ -90,7 +93,14 @@ class Viewing:
 
     def compiled(self, text: str, others: bool = False) -> Filter:
         """A filter for these rows. `others`: what other protocols have is no mistake in it. Raises FilterError."""
-        return compile_filter(text, self.store.dissector, self._scope(text), others)
+        try:
+            return compile_filter(text, self.store.dissector, self._scope(text), others)
+        except OfOthers as error:
+            if self.foreign is None:
+                raise
+            first, second = self.store.dissector.title, self.foreign.second.title
+            said = f"filters here ask frames of {first}; `sniff485 show -Y` asks those of {second} too"
+            raise FilterError(said, error.column) from None
 
     def colour_rules(self, colours: Mapping[str, str]) -> None:
         """Take the filters by colour. Raises FilterError."""

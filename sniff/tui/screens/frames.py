@@ -13,6 +13,7 @@ from textual.widget import Widget
 
 from dissectors.frame import Frame
 from dissectors.tracker import Transaction
+from sniff.analysis.packet_tree import Field, moved
 from sniff.analysis.row_tree import tree_of
 from sniff.analysis.sanitizing import sanitized
 from sniff.engine.capture import CaptureError
@@ -177,9 +178,23 @@ class FramesScreen(ListingScreen):
             return
         row, transaction = self._detail
         octets.show(row.no, row.event.octets, row.event.marks)
-        kept = tree.show(tree_of(self.store.dissector, row, transaction, date_and_clock, self.store.meaning(row)))
+        fields = tree_of(self.store.dissector, row, transaction, date_and_clock, self.store.meaning(row))
+        kept = tree.show((*self._foreign_fields(row), *fields))
         if kept is not None:
             octets.select(kept.begin, kept.end, kept.name)
+
+    def _foreign_fields(self, row: Row) -> tuple[Field, ...]:
+        """Fields of frames of a second protocol in a row of the first, at their octets where they are whole in it."""
+        foreign = self.viewing.foreign
+        found = () if foreign is None else foreign.of(row.no)
+        made: list[Field] = []
+        after = 0
+        for one in found:
+            assert foreign is not None
+            at = row.event.octets.find(one.event.octets, after)
+            made += [moved(field, at) for field in tree_of(foreign.second, one, None, date_and_clock, None)]
+            after = max(after, at + len(one.event.octets))
+        return tuple(made)
 
     # -- keys --------------------------------------------------------------------------------------------------
 

@@ -12,6 +12,8 @@ from textual.containers import Container, VerticalScroll
 from textual.events import Resize
 from textual.widgets import Static
 
+from dissectors import registry
+from dissectors.findings import counted
 from dissectors.frame import LineError
 from dissectors.line import NS_PER_S
 from dissectors.words import milliseconds
@@ -98,7 +100,14 @@ def kept(store: Store, status: FeedStatus) -> str:
     return f"rows {store.first_no} to {store.last_no}; {store.dropped_rows} older ones had to go, {file}"
 
 
-def errors(store: Store) -> list[Part]:
+def also(store: Store, status: FeedStatus) -> str:
+    """A second protocol on the bus."""
+    frames = counted(status.foreign, "frame")
+    second, first = registry.get(status.second).title, store.dissector.title
+    return f"{frames} of {second} among what is none of {first}; in Frames {status.second!r} stands before them"
+
+
+def errors(store: Store, status: FeedStatus) -> list[Part]:
     """Counts, each said to be unknown where the adapter cannot report it."""
     total = store.load.total
     share = f" ({total.damaged / total.frames:.2%})" if total.frames else ""
@@ -110,6 +119,7 @@ def errors(store: Store) -> list[Part]:
     return [
         ("frames", Text(f"{total.frames} · damaged {total.damaged}{share}")),
         ("octets", Text(f"{total.octets} · noise {total.noise}{noise}")),
+        *([("also", Text(also(store, status)))] if status.second else []),
         ("errors", Text(" · ".join(words))),
     ]
 
@@ -229,7 +239,7 @@ class LineScreen(ViewScreen):
         store = self.store
         sections = {
             "settings": settings(store, analyzer(self).status),
-            "errors": errors(store),
+            "errors": errors(store, analyzer(self).status),
             "load": load(store),
             "gaps": gaps(store, width),
             "events": events(store.line_events),
