@@ -41,8 +41,8 @@ ENOUGH = 1 << 19
 _AHEAD = 2
 """Tables that are made and wait to be judged."""
 
-_PIPE = 1 << 20
-"""Octets that a pipe is asked to hold."""
+_UNWANTED = 1 << 20
+"""Octets read at a time of what nobody wants any more."""
 
 _PATIENCE = 0.5
 """s that a process is given to end by itself."""
@@ -187,7 +187,7 @@ def _end(process: int, stream: io.BufferedReader) -> None:
         try:
             os.kill(process, signal.SIGINT)
             while select.select([stream], [], [], _PATIENCE)[0]:
-                if not os.read(stream.fileno(), _PIPE):
+                if not os.read(stream.fileno(), _UNWANTED):
                     return
         finally:
             os.kill(process, signal.SIGKILL)
