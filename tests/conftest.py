@@ -27,6 +27,7 @@ os.environ["TEXTUAL_ANIMATIONS"] = "none"
 END_TO_END = Path(__file__).parent / "e2e"
 
 
+@pytest.hookimpl(optionalhook=True)  # there are runs without xdist
 def pytest_xdist_auto_num_workers() -> int:
     """One more than there are cores: somebody always waits for a process, a port or a disk."""
     return len(os.sched_getaffinity(0)) + 1
