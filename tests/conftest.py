@@ -27,9 +27,11 @@ os.environ["TEXTUAL_ANIMATIONS"] = "none"
 END_TO_END = Path(__file__).parent / "e2e"
 
 
+@pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers() -> int:
     """One more than there are cores: somebody always waits for a process, a port or a disk."""
-    return len(os.sched_getaffinity(0)) + 1
+    affinity = getattr(os, "sched_getaffinity", None)  # of Linux alone
+    return (len(affinity(0)) if affinity else os.cpu_count() or 1) + 1
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
