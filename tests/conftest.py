@@ -19,7 +19,7 @@ settings.register_profile("thorough", max_examples=1000, deadline=None, suppress
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "suite"))
 
 os.environ["LANGUAGE"] = "C"
-"""Else argparse looks for files of translations at each of its words: 2.6 of the 6.2 ms that its parser takes to make."""
+"""Else argparse looks for files of translations at each of its words: 2.6 of the 6.2 ms that a parser takes."""
 
 os.environ["TEXTUAL_ANIMATIONS"] = "none"
 """What is scrolled to is there at once: nothing is drawn on the way, and no test waits for it."""
