@@ -117,6 +117,8 @@ class ByteLog:
         said += [f"{counts.same} lines that repeat others passed over"] if counts.same else []
         if counts.completed:
             said.append(f"{counts.completed} messages that the tool writes without their check completed with it")
+        if counts.unwrapped:
+            said.append(f"taken out of {counts.unwrapped} packets of a network")
         said += self._times_said()
         said += [f"{counts.text} lines of other text passed over"] if counts.text else []
         return Completeness(True, f"complete ({'; '.join(said)})")
@@ -175,7 +177,7 @@ class ByteLog:
             yield from assembly.take(line, text)
             counts.add(assembly.was, line.kind, number)
         yield from assembly.close()
-        counts.completed = assembly.completed
+        counts.completed, counts.unwrapped = assembly.completed, assembly.unwrapped
 
     def _table(self) -> Iterator[Item]:
         assert self._heading is not None
@@ -210,6 +212,7 @@ class _Counts:
 
     def __init__(self) -> None:
         self.data = self.same = self.text = self.strange = self.first = self.completed = 0
+        self.unwrapped = 0
 
     def add(self, was: Kind, kind: Kind, number: int) -> None:
         """Count a line. `was`: what it turned out to be."""

@@ -10,6 +10,7 @@ from dissectors.frame import Chunk
 from dissectors.line import MS, LineSettings
 from sniff.formats.log_clock import DAY, Stamp
 from sniff.formats.log_lines import Kind, Line, head_of
+from sniff.formats.log_packets import carried
 from sniff.formats.log_plan import WINDOW, Plan
 from sniff.formats.log_shapes import Role
 from sniff.formats.octet_table import MOST
@@ -33,7 +34,7 @@ _MOST_REPEATED = 1 << 16
 
 class Assembly:
     """Lines in, reads out. `was`: what the line taken last turned out to be. `completed`: reads that the tool tells
-    without their check, which was put behind them.
+    without their check, which was put behind them; `unwrapped`: packets of a network that they were taken out of.
     """
 
     def __init__(self, plan: Plan, line: LineSettings) -> None:
@@ -64,6 +65,7 @@ class Assembly:
         self._is_repeated = False  # whether the rows below tell what others told
         self._whole: Callable[[bytes], bytes] | None = None
         self.completed = 0
+        self.unwrapped = 0
 
     def take(self, line: Line, text: str) -> Iterator[Chunk]:
         """Take a line; `text` as it is written."""
@@ -236,6 +238,12 @@ class Assembly:
             return
         octets = bytes(self._held)
         self._held.clear()
+        if self._plan.offsets is not None:
+            inside = carried(octets)
+            self.unwrapped += inside != octets
+            octets = inside
+        if not octets:
+            return
         if self._whole is not None and self._whole(octets) != octets:
             octets = self._whole(octets)
             self.completed += 1

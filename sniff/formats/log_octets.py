@@ -289,6 +289,8 @@ def _digits(line: str, base: int) -> Run | None:
 
 def _numbers(line: str, match: re.Match[str], tokens: list[str], base: int) -> Run | None:
     begin, end = match.span()
+    if _YEAR_AHEAD.search(line[max(0, begin - 5) : begin]) is not None:
+        return None
     if base == PAIRS_ONLY and len(tokens) > SURELY and len(tokens[0]) != 2:
         begin += len(tokens[0]) + len(match["between"])  # the number of the line, or of octets
         tokens = tokens[1:]
@@ -316,6 +318,7 @@ def _octet(token: str, base: int) -> int | None:
     return number if number < 256 else None
 
 
+_YEAR_AHEAD = re.compile(r"(?:19|20)\d\d[-./]$")
 _LONG_NUMBER = re.compile(r"[ \t]?\d{4,}")
 
 
@@ -406,6 +409,8 @@ def _words(line: str) -> Run | None:
             continue  # pairs, of which one was cut
         if _DATE.fullmatch(match[0]):
             continue
+        if _is_keyed(line, match.start(), match.end()):
+            return Run(match.start(), match.end(), bytes.fromhex(digits), "digits without space")
         enough = _enough(line, match.start(), match.end())
         if len(digits) >= enough and (best is None or len(digits) > 2 * len(best.octets)):
             best = Run(match.start(), match.end(), bytes.fromhex(digits), "digits without space")
@@ -414,7 +419,14 @@ def _words(line: str) -> Run | None:
 
 _CLOSING = " \t\"'`)]}>,;"
 _WAY_AHEAD = re.compile(rf"(?:{WAYS.pattern})[\s:,;=|>\]\"'-]{{1,4}}$", re.IGNORECASE)
+_KEY_AHEAD = re.compile(r"(?:raw|hex|data|payload|frame|bytes|octets)['\"]?\s*[:=]\s*['\"]$", re.IGNORECASE)
 _AS_FAR = 24
+
+
+def _is_keyed(line: str, begin: int, end: int) -> bool:
+    """Whether digits stand in quotes behind a name that says octets."""
+    quoted = line[begin - 1 : begin] in _QUOTES and line[begin - 1 : begin] == line[end : end + 1]
+    return quoted and _KEY_AHEAD.search(line[max(0, begin - _AS_FAR) : begin]) is not None
 
 
 def _enough(line: str, begin: int, end: int) -> int:

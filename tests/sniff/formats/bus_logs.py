@@ -431,3 +431,28 @@ add(
     "time;dir;n;b0;b1\n" + lines(lambda s: f"{s.at:.6f};{tx(s)};{len(s.octets)};{hx(s.octets, ';')}"),
     1e-5,
 )
+
+
+# -- packets ------------------------------------------------------------------------------------------------------
+
+
+def _ethernet(one: Said) -> bytes:
+    """A segment of TCP between a master and a gateway."""
+    ends = (b"\xc0\x00\x02\x05", b"\xc0\x00\x02\x09")
+    ports = (40000).to_bytes(2, "big"), (8899).to_bytes(2, "big")
+    (source, target), (own, other) = (ends, ports) if one.asks else (ends[::-1], ports[::-1])
+    segment = own + other + bytes(8) + b"\x50\x18\x20\x00\x00\x00\x00\x00" + one.octets
+    length = (20 + len(segment)).to_bytes(2, "big")
+    packet = b"\x45\x00" + length + b"\x00\x01\x00\x00\x40\x06\x00\x00" + source + target + segment
+    return b"\x02\x00\x00\x00\x00\x01\x02\x00\x00\x00\x00\x02\x08\x00" + packet
+
+
+add("tshark-x-of-a-gateway", "".join(f"{_dump(_ethernet(s), '')}\n" for s in TALK))
+add(
+    "tshark-x-of-a-gateway-with-times",
+    "".join(
+        f"{number:>5} {s.epoch / NS:.9f} {tx(s, '192.0.2.5', '192.0.2.9')} → {tx(s, '192.0.2.9', '192.0.2.5')} TCP 74 8899\n\n{_dump(_ethernet(s), '')}\n"
+        for number, s in enumerate(TALK, 1)
+    ),
+    1e-5,
+)
