@@ -10,6 +10,11 @@ def crc16_modbus(octets: bytes) -> int:
     return int(_crc16.modbus(octets))
 
 
+def ends_with_crc16(octets: bytes) -> bool:
+    """Whether the last two octets are the CRC-16 of those before, the low one first: what serial lines use most."""
+    return not crc16_modbus(octets)
+
+
 def lrc(octets: bytes) -> int:
     """Modbus ASCII LRC: two's complement of the 8-bit sum (Modbus over Serial Line V1.02, 6.2.1)."""
     return -sum(octets) & 0xFF

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
-from dissectors.checksums import crc16_modbus
+from dissectors.checksums import ends_with_crc16
 from dissectors.frame import Chunk
 from dissectors.line import MS, LineSettings
 from sniff.formats.log_clock import DAY, Stamp
@@ -157,7 +157,7 @@ class Assembly:
             return line.stamp is None and line.bare
         if line.stamp is not None and line.way and self._stamp is not None and line.stamp.tick < COARSE:
             same = (line.stamp.time, line.way, line.family) == (self._stamp.time, self._way, self._family)
-            return same and crc16_modbus(bytes(self._held)) != 0  # what one read brought in two pieces
+            return same and not ends_with_crc16(bytes(self._held))  # what one read brought in two pieces
         if self._plan.octetwise and len(line.octets) == 1:
             return line.stamp is None and line.way == self._way
         if not line.bare or line.stamp is not None:

@@ -10,7 +10,7 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from dissectors.checksums import crc16_modbus
+from dissectors.checksums import ends_with_crc16
 from sniff.formats.log_shapes import WAYS
 
 SURELY = 4
@@ -250,15 +250,20 @@ def octets_in(line: str, base: int = PAIRS_ONLY) -> Run | None:
 
 def whole_in(line: str, run: Run) -> Run:
     """The run with the pairs that stand apart from it on its line, between names or signs, where they are a message of
-    Modbus together with its check, and it alone is none: `addr:01 func:03 data:00 06 crc:39 84`.
+    a frame together with its check, and it alone is none: `addr:01 func:03 data:00 06 crc:39 84`.
     """
-    if len(run.octets) < 2 or not crc16_modbus(run.octets):
+    if len(run.octets) < 2 or ends_with_crc16(run.octets):
         return run
     begin, pairs = run.begin, list(_APART.finditer(line))
     while pairs and pairs[0].end() <= run.begin and not _NAMED_BY.search(line[: pairs[0].start()]):
         pairs.pop(0)  # of a time, a number
     octets = bytes(int(pair[0], 16) for pair in pairs)
-    if len(octets) <= len(run.octets) or len(octets) < SURELY or crc16_modbus(octets) or run.octets not in octets:
+    if (
+        len(octets) <= len(run.octets)
+        or len(octets) < SURELY
+        or not ends_with_crc16(octets)
+        or run.octets not in octets
+    ):
         return run
     begin, end = pairs[0].start(), pairs[-1].end()
     return Run(begin, end, octets, run.spelling)

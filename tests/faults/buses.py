@@ -112,22 +112,25 @@ def drives(
     extra: Sequence[bytes] = (),
     delay: int = 6 * MS,
     change: dict[int, Change] | None = None,
+    numbers: tuple[int, int] = (1, 2),
     seed: int = 0,
 ) -> Scenario:
     """A master that asks two TECO E510 drives, which are known to be such."""
-    parties = partial(_drives_parties, tuple(extra), delay, change or {})
-    devices = {1: "teco-e510", 2: "teco-e510"}
+    parties = partial(_drives_parties, tuple(extra), delay, change or {}, numbers)
+    devices = dict.fromkeys(numbers, "teco-e510")
     return Scenario("drives", "modbus-rtu", RTU_LINE, parties, tuple(faults), seed, Timing(RTU_LINE).t35, devices)
 
 
-def _drives_parties(extra: tuple[bytes, ...], delay: int, change: dict[int, Change]) -> list[Party]:
+def _drives_parties(
+    extra: tuple[bytes, ...], delay: int, change: dict[int, Change], numbers: tuple[int, int]
+) -> list[Party]:
     from dissectors.modbus.simulated_e510 import SimulatedE510
 
     status, speed, alarm = (0x2520, 4), (0x2524, 1), (0x2528, 1)
-    asked = [read_holding(unit, *block) for unit in (1, 2) for block in (status, speed, alarm)]
+    asked = [read_holding(unit, *block) for unit in numbers for block in (status, speed, alarm)]
     master = PollingMaster([*extra, *asked], RTU_LINE, interval=0, pause=25 * MS, timeout=200 * MS, retries=1)
     parties = [Party("master", master, answers=False)]
-    for unit in (1, 2):
+    for unit in numbers:
         drive: Station = SimulatedE510(unit, delay=delay)
         parties.append(Party(f"drive {unit}", change[unit](drive) if unit in change else drive))
     return parties

@@ -26,6 +26,9 @@ DRIVE_CASES: tuple[Case, ...] = (
         struck=_refused,
         also=("MB008",),
     ),
+    Case(
+        "drive, number that its manual has not", partial(drives, numbers=(1, 255)), (("PR012", "drive 255"),), seeds=1
+    ),
     Case("drive, reserved register", partial(drives, extra=(_reserved,)), (("PR002", "drive 2"),), struck=_refused),
     Case(
         "drive, read-only register",

@@ -159,9 +159,9 @@ def test_values_are_those_of_points(capsys: pytest.CaptureFixture[str]) -> None:
 @needs_polars
 def test_settings_as_on_the_command_line(shown: Shown) -> None:
     path = CAPTURES / "rtu-clean.cap.txt"
-    capture = sniff.read(path, protocol="n2", line="9600,8N1")
+    capture = sniff.read(path, protocol="modbus-rtu", line="4800,8N1")
     _rows_are_those_shown(
-        capture.frames(octets=True).to_dicts(), shown(path, "-p", "n2", "-s", "9600,8N1"), capture.started
+        capture.frames(octets=True).to_dicts(), shown(path, "-p", "modbus-rtu", "-s", "4800,8N1"), capture.started
     )
 
 
