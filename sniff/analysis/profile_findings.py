@@ -21,7 +21,7 @@ from dissectors.row_columns import RowColumns, in_turn
 from dissectors.subject import About, Subject, station
 from dissectors.tracker import Placement, Transaction
 from dissectors.words import milliseconds
-from sniff.analysis.points import ALL, WHOLE, PointReader, Sample
+from sniff.analysis.point_reader import ALL, WHOLE, PointReader, Sample
 from sniff.engine.engine import Output, Row
 
 MOST_TOLD = 2_000
@@ -155,6 +155,16 @@ class _Told:
     sure: bool = True
 
 
+@dataclass(frozen=True, slots=True)
+class _InVain:
+    """A command that the device acknowledges at most: its number and frame, what it asks, what it writes."""
+
+    no: int
+    frame: Frame
+    words: str
+    readings: tuple[Reading, ...]
+
+
 class ProfileFindings:
     """Fed every row and every closed transaction of one bus (`dissectors.findings.Judge`)."""
 
@@ -165,7 +175,8 @@ class ProfileFindings:
         self._readings = dissector.readings
         self._told: dict[Key, _Told] = {}
         self._answers: dict[Subject, int] = {}
-        self._in_vain: dict[int, tuple[int, str]] = {}  # by transaction: the frame, and what was asked in vain
+        self._asks = dissector.asks
+        self._in_vain: dict[int, _InVain] = {}  # by transaction
 
     def see(self, no: int, event: Event, header: Header | None, placement: Placement | None) -> None:
         """Take the next row."""
@@ -180,9 +191,8 @@ class ProfileFindings:
         if placement.role is not Role.RESPONSE and self._readings is not None:
             station = None if placement.role is Role.BROADCAST else placement.destination
             readings = tuple(reading for reading in self._readings(event, None) if reading.how is Origin.WRITE)
-            if readings:
+            if not self._remember_vain(no, event, header, placement, readings) and readings:
                 self._judge_writes(no, event, station, readings)
-            self._remember_vain(no, header, placement, readings)
 
     def settle(self, transaction: Transaction) -> None:
         """Take a transaction that closed."""
@@ -192,20 +202,29 @@ class ProfileFindings:
         self._judge_time(transaction)
         vain = self._in_vain.pop(transaction.id, None)
         profile = self._devices.at(transaction.station)
-        if vain is not None and profile is not None and transaction.verdict in WHOLE:
-            seen = f"{vain[1]}: acknowledged, and not executed by this device"
-            self._add("PR010", _subject(profile, transaction.station), vain[1], seen, transaction.end, vain[0])
+        if vain is None or profile is None:
+            return
+        if transaction.verdict in WHOLE:
+            seen = f"{vain.words}: acknowledged, and not executed by this device"
+            self._add("PR010", _subject(profile, transaction.station), vain.words, seen, transaction.end, vain.no)
+        elif vain.readings:
+            self._judge_writes(vain.no, vain.frame, transaction.station, vain.readings)
 
     def _remember_vain(
-        self, no: int, header: Header | None, placement: Placement, readings: tuple[Reading, ...]
-    ) -> None:
+        self, no: int, frame: Frame, header: Header | None, placement: Placement, readings: tuple[Reading, ...]
+    ) -> bool:
+        """Whether it is a command that the device is known to acknowledge only: it is judged when it is answered."""
         profile = self._devices.at(placement.destination)
         if profile is None or header is None or len(self._in_vain) >= MOST_TOLD:
-            return
-        limits, spaces = profile.limits_on(self._family), [one.space for one in readings] or [""]
-        if any(limits.ignores(header.kind, space) for space in spaces):
-            things = ", ".join(f"{one.space} {one.address}" for one in readings)
-            self._in_vain[placement.tx] = no, f"{header.kind.replace('-', ' ')} {things}".rstrip()
+            return False
+        limits = profile.limits_on(self._family)
+        about = readings or (self._asks(frame) if self._asks is not None else ())
+        if not any(limits.ignores(header.kind, space) for space in [one.space for one in about] or [""]):
+            return False
+        things = ", ".join(f"{one.space} {one.address}" for one in about)
+        words = f"{header.kind.replace('-', ' ')} {things}".rstrip()
+        self._in_vain[placement.tx] = _InVain(no, frame, words, readings)
+        return True
 
     def take(self, rows: RowColumns) -> None:
         """Take rows and what they closed (`dissectors.row_columns.JudgesColumns`)."""
