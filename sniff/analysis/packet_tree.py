@@ -28,13 +28,15 @@ HEX_PAIRS = re.compile(rb"(?:[0-9A-Fa-f]{2}){2,}")
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """One line of the tree. `begin`, `end`: octets of the frame, end exclusive; None where nobody can tell."""
+    """One line of the tree. `begin`, `end`: octets of the frame, end exclusive; None where nobody can tell. `brief`:
+    its name where there is no room for all of it, empty where there is no other."""
 
     name: str
     value: str = ""
     begin: int | None = None
     end: int | None = None
     children: tuple[Field, ...] = ()
+    brief: str = ""
 
     def __contains__(self, offset: object) -> bool:
         return (

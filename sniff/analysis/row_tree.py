@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 
 from dissectors.frame import Frame
@@ -13,6 +14,8 @@ from sniff.analysis.packet_tree import Field, fields_of
 from sniff.analysis.sanitizing import sanitized
 from sniff.analysis.wording import duration, mark_names
 from sniff.engine.engine import Row
+
+_ASIDE = re.compile(r" \([^()]*\)")
 
 
 def tree_of(
@@ -48,14 +51,19 @@ def values_of(dissector: Dissector, frame: Frame, meaning: Meaning) -> tuple[Fie
     for item, span in zip(meaning.items(dissector.place), spans, strict=False):
         begin, end = span or (None, None)
         parts = tuple(Field(sanitized(name), sanitized(text)) for name, text in item.parts)
-        lines.append(Field(sanitized(item.name), sanitized(item.text), begin, end, parts))
+        lines.append(Field(sanitized(item.name), sanitized(item.text), begin, end, parts, sanitized(item.brief)))
     if not lines and meaning.asked:
-        asked = tuple(Field(sanitized(where), sanitized(title)) for where, title in meaning.questions(dissector.place))
+        asked = tuple(_asked(sanitized(where), sanitized(title)) for where, title in meaning.questions(dissector.place))
         return (Field(sanitized(meaning.who), f"is asked for {len(asked)}", None, None, asked),)
     if not lines:
         return ()
     count = f"{len(lines)} value{'s' if len(lines) != 1 else ''}"
     return (Field(sanitized(meaning.who), count, *_cover(lines), tuple(lines)),)
+
+
+def _asked(where: str, title: str) -> Field:
+    """A place that is asked for; where there is little room without what stands in brackets."""
+    return Field(where, title, brief=_ASIDE.sub("", where))
 
 
 def _cover(lines: list[Field]) -> tuple[int | None, int | None]:

@@ -187,10 +187,10 @@ class FieldTree(ScrollView, can_focus=True, inherit_bindings=False):
             base += self.get_component_rich_style(f"field-tree--{'cursor' if self.has_focus else 'here'}", partial=True)
         name = base + self.get_component_rich_style("field-tree--name", partial=True)
         arrow = " " if not line.field.children else "▶" if line.path in self.folded else "▼"
-        segments = [Segment(f"{'  ' * line.depth}{arrow} ", base), Segment(line.field.name, name)]
-        if line.field.value:
-            segments.append(Segment(f": {line.field.value}", base))
-        strip = Strip(segments)
+        lead, value = Segment(f"{'  ' * line.depth}{arrow} ", base), f": {line.field.value}" if line.field.value else ""
+        strip = Strip([lead, Segment(line.field.name, name), Segment(value, base)])
+        if line.field.brief and not self.shifted and strip.cell_length > width:  # the value is what is looked for
+            strip = Strip([lead, Segment(line.field.brief, name), Segment(value, base)])
         if self.shifted:
             strip = strip.crop(self.shifted, max(self.shifted, strip.cell_length))
         if strip.cell_length > width > 0:  # what is cut says so: → goes on

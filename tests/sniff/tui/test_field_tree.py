@@ -101,3 +101,15 @@ def test_what_is_cut_says_so_and_can_be_scrolled_to(with_tree: Callable[..., Non
         assert tree.render_line(0).text.rstrip().endswith(" +0000")
 
     with_tree(script)
+
+
+def test_where_there_is_little_room_the_value_stays(with_tree: Callable[..., None]) -> None:
+    long = Field("Register 2524h (wire 0x2524) output frequency", "30.00 Hz", brief="output frequency")
+
+    def script(tree: FieldTree) -> None:
+        tree.show((long,))
+        assert tree.render_line(0).text.strip() == "output frequency: 30.00 Hz"
+        tree.action_right()
+        assert "(wire 0x2524)" in tree.render_line(0).text
+
+    with_tree(script)
