@@ -140,13 +140,15 @@ class Meaning:
         entry = profile.at(reading.space, reading.address) if profile is not None else None
         offset = 0 if profile is None else profile.address_offset
         kept = profile is not None and profile.is_reserved(reading.space, reading.address)
-        where = place(reading, _number(entry, reading, offset, kept), offset)
+        numbered = _number(entry, reading, offset, kept)
+        where = place(reading, numbered, offset)
         raw = number(reading.value)
         if reading.words:
             raw = reading.words + (f" ({raw})" if reading.raw is not None else "")
         if entry is None:
             value = values[0] if values else None
-            return Item(reading, where, "reserved" if kept else "", raw, value, reading.beside)
+            title, brief = ("reserved", f"reserved {numbered}") if kept else ("", "")
+            return Item(reading, where, title, raw, value, reading.beside, brief)
         if reading.part:
             due = due_property(entry, reading)
             text = raw if due is None else f"{raw}; the manual has {due}"
@@ -156,7 +158,7 @@ class Meaning:
             part = reading.part.replace(".", " ")
             return Item(reading, where, about, text, values[0] if values else None, reading.beside, part)
         if entry.reserved:
-            return Item(reading, where, "reserved", raw, None, reading.beside)
+            return Item(reading, where, "reserved", raw, None, reading.beside, f"reserved {numbered}")
         if not values:  # the first register of the number stands for all of it
             word = entry.word_of(reading.address)
             return Item(reading, where, said_title(word), raw, None, reading.beside, brief_title(word))

@@ -142,6 +142,11 @@ def n2_command(fact: Fact) -> Exchange:
     return Exchange((_sealed(b">", fact.place), b"A\r"), 0)
 
 
+def n2_answer(fact: Fact) -> Exchange:
+    """The same; the row of the answer must say it."""
+    return n2_command(fact)._replace(told=1)
+
+
 # --- BACnet ---
 
 
@@ -249,6 +254,7 @@ SHOWN: dict[str, Asked] = {
     "n2": Asked(*N2, point),
     "n2 without unit": Asked(*N2, point),
     "n2 frames": Asked(*N2, n2_command),
+    "n2 answers": Asked(*N2, n2_answer),
     "bacnet": Asked(*MSTP_LINE, present_value),
     "bacnet property": Asked(*MSTP_LINE, property_asked),
     "bacnet name": Asked(*MSTP_LINE, renamed),
