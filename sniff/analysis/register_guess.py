@@ -103,7 +103,10 @@ def guessed(blocks: Iterable[RegisterStretch], written: Collection[Span]) -> Ite
     is taken leaves over stands by itself.
     """
     held = [_Heard.of(block, written) for block in blocks]
-    found = _undisputed([guess for heard in held for guess in _of_block(heard)])
+    by_block = [(heard, _of_block(heard)) for heard in held]
+    orders = _orders_of([guess for _, some in by_block for guess in some])
+    joined = (_with_neighbours(heard, some, orders.get(heard.block.device)) for heard, some in by_block)
+    found = _undisputed([guess for some in joined for guess in some])
     taken: dict[_Place, RegisterGuess] = {}
     for guess in sorted(found, key=lambda one: (-one.sure, -one.answers, one.device, one.space, one.address)):
         if not any(place in taken for place in _places(guess)):
@@ -161,7 +164,7 @@ def _of_block(heard: _Heard) -> list[RegisterGuess]:
         best = [
             replace(one, sure=min(one.sure, GuessSureness.LIKELY)) if one.kind.registers > 1 else one for one in best
         ]
-    return _as_written(heard, _as_neighbours(heard, _may_be_wider(best)))
+    return _may_be_wider(best)
 
 
 def _in_order(heard: _Heard, order: RegisterOrder) -> list[RegisterGuess]:
@@ -196,14 +199,30 @@ def _may_be_wider(found: Sequence[RegisterGuess]) -> list[RegisterGuess]:
 # --- what neighbours and writes say ---
 
 
-def _as_neighbours(heard: _Heard, found: Sequence[RegisterGuess]) -> list[RegisterGuess]:
-    """Where the values of a block are of two registers in one order, pairs that are open are likely so too."""
-    sure = [one for one in found if one.sure is GuessSureness.SURE and one.kind.registers == 2]
-    orders = {(one.swapped, one.little) for one in sure}
-    odd = {one.address & 1 for one in sure}
-    if len(sure) < 2 or len(orders) != 1 or len(odd) != 1:
-        return list(found)
-    order, parity = RegisterOrder(*orders.pop()), odd.pop()
+def _sure_pairs(found: Iterable[RegisterGuess]) -> list[RegisterGuess]:
+    return [one for one in found if one.sure is GuessSureness.SURE and one.kind.registers == 2]
+
+
+def _orders_of(found: Sequence[RegisterGuess]) -> dict[int, RegisterOrder]:
+    """By device, the one order of its values of two registers, where at least two are sure."""
+    by_device: dict[int, list[RegisterOrder]] = {}
+    for one in _sure_pairs(found):
+        by_device.setdefault(one.device, []).append(RegisterOrder(one.swapped, one.little))
+    return {device: some[0] for device, some in by_device.items() if len(some) > 1 and len(set(some)) == 1}
+
+
+def _with_neighbours(heard: _Heard, found: list[RegisterGuess], order: RegisterOrder | None) -> list[RegisterGuess]:
+    return _as_written(heard, found if order is None else _as_neighbours(heard, found, order), order)
+
+
+def _as_neighbours(heard: _Heard, found: list[RegisterGuess], order: RegisterOrder) -> list[RegisterGuess]:
+    """Where the values of a device are of two registers in one order, pairs that are open are likely so too; such as
+    never change only beside others in the same block."""
+    sure = _sure_pairs(found)
+    odd = {one.address & 1 for one in sure} or {heard.block.first & 1}
+    if len(odd) != 1:
+        return found
+    parity = odd.pop()
 
     def pair_at(first: RegisterGuess, second: RegisterGuess) -> RegisterReading | None:
         at = first.address - heard.block.first
@@ -212,7 +231,8 @@ def _as_neighbours(heard: _Heard, found: Sequence[RegisterGuess]) -> list[Regist
             return None
         if any(map(_speaks_for_itself, (first, second))) and not register_kinds.grows_only_whole(columns, order):
             return None
-        return register_kinds.like_neighbours(columns, order)
+        reading = register_kinds.like_neighbours(columns, order)
+        return None if reading is not None and reading.use is Use.CONSTANT and len(sure) < 2 else reading
 
     return _paired(heard, found, pair_at)
 
@@ -221,12 +241,12 @@ def _speaks_for_itself(guess: RegisterGuess) -> bool:
     return guess.sure > GuessSureness.OPEN and guess.use is not Use.COUNTER
 
 
-def _as_written(heard: _Heard, found: Sequence[RegisterGuess]) -> list[RegisterGuess]:
+def _as_written(heard: _Heard, found: list[RegisterGuess], order: RegisterOrder | None) -> list[RegisterGuess]:
     """Two registers that a master writes at once, and that are open by themselves, are likely one float."""
     if not heard.together:
-        return list(found)
+        return found
     known = {RegisterOrder(one.swapped, one.little) for one in found if one.kind.registers > 1}
-    orders = [order for order in ORDERS if order in known] or ORDERS
+    orders = [order] if order is not None else [one for one in ORDERS if one in known] or ORDERS
 
     def pair_at(first: RegisterGuess, second: RegisterGuess) -> RegisterReading | None:
         at = first.address - heard.block.first
