@@ -32,6 +32,7 @@ def wrong(chosen: Sequence[Fact], folder: Path) -> Iterator[tuple[Fact, str]]:
     """The facts of one device that the program does not say, each with what it says."""
     yield from _wrongly_shown(chosen, folder)
     yield from _wrongly_judged(chosen)
+    yield from _wrongly_guessed([fact for fact in chosen if fact.how == "bacnet device"], folder)
     described = ran("profile", "show", chosen[0].device).lower().splitlines() if chosen else []
     for fact in chosen:
         if fact.how == "profile" and not any(_holds(line, fact.said.lower().split(" … ")) for line in described):
@@ -83,6 +84,18 @@ def _wrongly_shown(chosen: Sequence[Fact], folder: Path) -> Iterator[tuple[Fact,
             row = rows[begin + exchange.told]
             if not _says(fact, row):
                 yield fact, everything(row)
+
+
+def _wrongly_guessed(chosen: Sequence[Fact], folder: Path) -> Iterator[tuple[Fact, str]]:
+    """Properties of the device itself by which `profile guess` does not know it."""
+    if not chosen:
+        return
+    line, protocol, craft = SHOWN[chosen[0].how]
+    path = folder / f"{chosen[0].device}-guess.cap.txt"
+    path.write_text("\n".join(_capture(line, protocol, map(craft, chosen))) + "\n", encoding="utf-8")
+    rows = [row for row in ran("profile", "guess", str(path)).splitlines() if chosen[0].device in row]
+    why = rows[0] if rows else "no profile"
+    yield from ((fact, why) for fact in chosen if f"{fact.place} fits" not in why)
 
 
 def _capture(line: str, protocol: str, exchanges: Iterable[Exchange]) -> Iterator[str]:
