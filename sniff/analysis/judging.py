@@ -17,7 +17,8 @@ from dissectors.tracker import Transaction, Verdict
 from sniff.analysis.bulk_line_findings import BulkLineFindings
 from sniff.analysis.judgement import Judgement
 from sniff.analysis.line_rules import LINE_RULES
-from sniff.analysis.profile_findings import PROFILE_RULES, ProfileFindings
+from sniff.analysis.profile_findings import ProfileFindings
+from sniff.analysis.profile_rules import PROFILE_RULES
 from sniff.analysis.site_rules import SITE_RULES
 from sniff.engine.engine import Output
 from sniff.engine.session import LineEvent, LineEventKind, Session, settings_change
