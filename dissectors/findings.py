@@ -169,6 +169,15 @@ class KnowsResponseTimes(Protocol):
         ...
 
 
+@runtime_checkable
+class KnowsUnexecuted(Protocol):
+    """A judge that can be told what a device acknowledges and does not do, by its papers."""
+
+    def know_unexecuted(self, ignores: Callable[[int, str, str], bool]) -> None:
+        """`ignores(station, kind of exchange, kind of object)`. Use it from here on."""
+        ...
+
+
 @dataclass(slots=True)
 class Tally:
     """How often, when (ns) and in which frames one thing was seen; the first EVIDENCE_MAX frames are kept."""

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 from dissectors.frame import Frame
-from dissectors.profiles.decoding import NO_BITS, Value, brief_title, decode, number, said_title, say
+from dissectors.profiles.decoding import Value, brief_title, decode, number, said_title, say
 from dissectors.profiles.model import Entry, Profile
 from dissectors.profiles.properties import due_property
 from dissectors.readings import Reading
@@ -41,7 +41,8 @@ class Node:
 class Item:
     """One value in words. `place`: where it is; `title`: what it is, empty where nobody knows; `text`: the value with
     its unit, and its bits where they say more; `value`: None for what is only part of another one. `parts`: its named
-    bits and what came beside it, as names and texts."""
+    bits and what came beside it, as names and texts. `brief`: its name where there is little room, empty where that is
+    its place."""
 
     reading: Reading
     place: str
@@ -49,6 +50,7 @@ class Item:
     text: str
     value: Value | None = None
     parts: tuple[tuple[str, str], ...] = ()
+    brief: str = ""
 
     @property
     def name(self) -> str:
@@ -62,7 +64,7 @@ class Meaning:
 
     `station`: whose values they are, None for all stations; `request`: what it answers, None where it is no answer or
     nobody heard the question. `refused`: the maker's words for the exception code that it carries. `asked`: the places
-    that a request reads.
+    that a request speaks of without a value (`dissectors.readings.Asks`).
     """
 
     station: int | None
@@ -100,7 +102,7 @@ class Meaning:
                 title = brief_title(entry) if entry is not None else f"{one.space} {one.address}"
                 part = f" {one.part.replace('.', ' ')}" if one.part else ""
                 titles.append(title + part + (" (this device has none)" if lacks else ""))
-        return f"read {', '.join(dict.fromkeys(titles))}" if titles else ""
+        return f"{self.asked[0].words or 'read'} {', '.join(dict.fromkeys(titles))}" if titles else ""
 
     def questions(self, place: PlaceName) -> Iterator[tuple[str, str]]:
         """The places that are asked for, each with what is there."""
@@ -138,27 +140,33 @@ class Meaning:
         entry = profile.at(reading.space, reading.address) if profile is not None else None
         offset = 0 if profile is None else profile.address_offset
         kept = profile is not None and profile.is_reserved(reading.space, reading.address)
-        where = place(reading, _number(entry, reading, offset, kept), offset)
+        numbered = _number(entry, reading, offset, kept)
+        where = place(reading, numbered, offset)
         raw = number(reading.value)
         if reading.words:
             raw = reading.words + (f" ({raw})" if reading.raw is not None else "")
         if entry is None:
             value = values[0] if values else None
-            return Item(reading, where, "reserved" if kept else "", raw, value, reading.beside)
+            title, brief = ("reserved", f"reserved {numbered}") if kept else ("", "")
+            return Item(reading, where, title, raw, value, reading.beside, brief)
         if reading.part:
             due = due_property(entry, reading)
             text = raw if due is None else f"{raw}; the manual has {due}"
+            if profile is not None and profile.lacks(reading.space, reading.part):
+                text = f"{raw}; the manual has none"
             about = f"of {_titled(entry)}"
-            return Item(reading, where, about, text, values[0] if values else None, reading.beside)
+            part = reading.part.replace(".", " ")
+            return Item(reading, where, about, text, values[0] if values else None, reading.beside, part)
         if entry.reserved:
-            return Item(reading, where, "reserved", raw, None, reading.beside)
+            return Item(reading, where, "reserved", raw, None, reading.beside, f"reserved {numbered}")
         if not values:  # the first register of the number stands for all of it
             word = entry.word_of(reading.address)
-            return Item(reading, where, said_title(word), raw, None, reading.beside)
+            return Item(reading, where, said_title(word), raw, None, reading.beside, brief_title(word))
         first, *bits = values
         doubt = " (?)" if entry.doubt or not reading.sure else ""
         titled = _titled(first.entry or entry)
-        return Item(reading, where, titled, _text(first, raw) + doubt, first, (*_parts(entry, bits), *reading.beside))
+        parts, text = (*_parts(entry, bits), *reading.beside), _text(first, raw) + doubt
+        return Item(reading, where, titled, text, first, parts, brief_title(first.entry or entry))
 
 
 def _number(entry: Entry | None, reading: Reading, offset: int, kept: bool) -> str:
@@ -177,7 +185,7 @@ def _titled(entry: Entry) -> str:
 
 def _text(value: Value, raw: str) -> str:
     """The value for people, and what stood on the wire where that is not the same."""
-    text = value.text if value.words != NO_BITS else raw
+    text = raw if value.says_nothing else value.text
     held = raw if value.raw is None or isinstance(value.reading.value, float) else str(value.raw)
     return text if text in (held, f"{held} {value.unit}") else f"{text} ({held})"
 

@@ -49,7 +49,8 @@ Readings = Callable[[Frame | None, Frame | None], tuple[Reading, ...]]
 with it, what is confirmed: nothing after an exception."""
 
 Asks = Callable[[Frame], tuple[Reading, ...]]
-"""frame → the places that it asks for, as readings without a value (`Dissector.asks`); total."""
+"""frame → the places that it speaks of without a value (`Dissector.asks`); total. Their `words` are what is asked of
+them, empty where they are to be read."""
 
 Refusal = Callable[[Frame], tuple[str, int] | None]
 """frame → the family of its codes ("modbus", "n2") and the code, when it refuses a request (`Dissector.refusal`)."""

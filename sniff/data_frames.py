@@ -17,7 +17,7 @@ import numpy as np
 from dissectors.line import LineSettings
 from dissectors.profiles import Devices
 from sniff import devices as profiles
-from sniff.analysis.points import PointReader
+from sniff.analysis.point_reader import PointReader
 from sniff.analysis.told_protocol import detected
 from sniff.bus.columns import Column, ColumnForm, Columns, TableColumns
 from sniff.bus.sample_row import COLUMNS, sample_row

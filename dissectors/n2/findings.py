@@ -9,6 +9,7 @@ no status bits, no change-of-state records.
 from __future__ import annotations
 
 from collections import OrderedDict
+from collections.abc import Callable
 
 from dissectors.findings import Finding, Tally
 from dissectors.frame import Damage, Event, Frame, Header, Noise
@@ -18,6 +19,7 @@ from dissectors.n2.commands import parse_command
 from dissectors.n2.header import meant
 from dissectors.n2.late import of_late_speakers
 from dissectors.n2.masters import Masters, OpenCommand
+from dissectors.n2.objects import region_name
 from dissectors.n2.record import Damages, N2StationRecord, Override
 from dissectors.n2.torn import TornFrames
 from dissectors.n2.wording import SLOW, N2Evidence, worded
@@ -57,6 +59,11 @@ class N2Findings:
         self._answers: OrderedDict[int, bytes] = OrderedDict()  # transaction → its good answer
         self._bad: int | None = None  # the newest damaged answer
         self.turn: int | None = None  # whom the newest command was for
+        self._ignores: Callable[[int, str, str], bool] | None = None
+
+    def know_unexecuted(self, ignores: Callable[[int, str, str], bool]) -> None:
+        """See `dissectors.findings.KnowsUnexecuted`: what a device does not do changes no override."""
+        self._ignores = ignores
 
     def see(self, no: int, event: Event, header: Header | None, placement: Placement | None) -> None:
         """Take the next row: event, its header and placement (None for noise)."""
@@ -237,10 +244,13 @@ class N2Findings:
         elif kind == "warm-reset":
             station.overrides.clear()
             station.identified = False
-        elif command.region is None or command.object is None:
+        elif command.region is None or command.object is None or self._is_ignored(transaction, kind, command.region):
             return
         elif kind == "override":
             point = (command.region, command.object)
             station.overrides[point] = Override(asked.row, transaction.end, command.value)
         elif kind == "release-override":
             station.overrides.pop((command.region, command.object), None)
+
+    def _is_ignored(self, transaction: Transaction, kind: str, region: int) -> bool:
+        return self._ignores is not None and self._ignores(transaction.station or 0, kind, region_name(region))

@@ -51,7 +51,11 @@ def asks(frame: Frame) -> tuple[Reading, ...]:
     if not frame.ok or frame.octets[:1] != b">":
         return ()
     command = parse_command(frame.octets)
-    if command.type.kind != "read-attribute" or command.region is None or command.object is None:
+    if command.region is None or command.object is None:
+        return ()
+    if command.type.kind == "release-override":
+        return (Reading(region_name(command.region), command.object, None, "", Origin.WRITE, words="release"),)
+    if command.type.kind != "read-attribute":
         return ()
     part = part_of(command.region, command.attribute)
     return (Reading(region_name(command.region), command.object, None, "", Origin.READ, part),)

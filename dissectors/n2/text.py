@@ -12,7 +12,16 @@ from dissectors.n2.commands import NATIVE, UNKNOWN, Command, error_text, fields_
 from dissectors.n2.header import damage_of, error_code
 from dissectors.n2.header import meant as meant_octets
 from dissectors.n2.interpretation import Interpretation, guessed_time, interpret, printable
-from dissectors.n2.objects import BINARY, Encoding, attribute_name, guessed_bits, number, object_name, state_word
+from dissectors.n2.objects import (
+    BINARY,
+    Encoding,
+    attribute_name,
+    guessed_bits,
+    number,
+    object_name,
+    region_name,
+    state_word,
+)
 
 MOST_RAW = 40
 """Characters of an answer that follow what it means."""
@@ -48,23 +57,32 @@ def meant(frame: Frame, header: Header, role: Role, meaning: Meaning) -> str:
         return f"{station} → {plain} ({_what(asked)}){_damage(frame)}"
     raw = told.raw if len(told.raw) <= MOST_RAW else f"{told.raw[:MOST_RAW]} … +{len(told.raw) - MOST_RAW}"
     raw = f"A {raw}" if raw else "A"
-    plain = _answer(told, asked)
+    plain = _answer(told, asked, _is_ignored(asked, meaning))
     words = [said, raw] if said and told.value is None else [said, plain, raw] if said else [plain, raw]
     return f"{station} → {' — '.join(word for word in words if word)}{_damage(frame)}"
 
 
-def _answer(told: Interpretation, asked: Command) -> str:
+def _is_ignored(asked: Command, meaning: Meaning) -> bool:
+    """Whether the device acknowledges the command and does not do it, by its papers."""
+    limits = meaning.profile.limits_on("n2") if meaning.profile is not None else None
+    return limits is not None and limits.ignores(asked.type.kind, region_name(asked.region or 0))
+
+
+def _answer(told: Interpretation, asked: Command, is_ignored: bool) -> str:
     """What an answer says to its command, the object first: `AI 3 = 72.5`; of a poll what changed, one by one."""
     if told.value is not None and not told.written:
         what = [] if asked.region is None or asked.object is None else [object_name(asked.region, asked.object)]
         if told.status is not None and told.region in BINARY:
             return f"{' '.join(what)} {state_word(told.region, told.status)} (status {told.status:02X}h, tentative)"
         what += [told.name] if told.name and told.name != "current value" else []
-        doubt = f" ({'; '.join(told.tentative)}, tentative)" if told.tentative else ""
+        doubts = [one for one in told.tentative if one != told.name]
+        doubt = f" ({'; '.join(doubts)}, tentative)" if doubts else ""
         return f"{' '.join(what)} = {number(told.value)}{doubt}"
     if told.tentative:
         return f"{'; '.join(told.tentative)} (tentative)"
-    return f"done: {_what(asked)}" if told.written or asked.type.kind == "release" else ""
+    if is_ignored:
+        return f"acknowledged, not executed: {_what(asked)}"
+    return f"done: {_what(asked)}" if told.written or asked.type.kind == "release-override" else ""
 
 
 def sent_and_due(octets: bytes) -> tuple[str, str] | None:

@@ -27,8 +27,8 @@ _EXACT = 1e15
 
 _FIRST = {"coil": 0, "discrete": 1, "input": 3, "holding": 4}
 _REGISTERS = ("holding", "input")
-_OWN_PARAMETER = re.compile(r" \((?:\d\d-\d\d|[0-9A-F]{4}h)\)$")
-"""Behind a title: which parameter of the device the thing is. A line has no room for it, the tree has."""
+_ASIDE = re.compile(r" \([^()]*\)$")
+"""Behind a title: which parameter of the device the thing is, or what else. A line has no room for it, the tree has."""
 _PARAMETER = re.compile(r"[A-Za-z]+2?\.\d+|\d\d-\d\d")
 
 
@@ -63,6 +63,11 @@ class Value:
         return self.reading.how
 
     @property
+    def says_nothing(self) -> bool:
+        """Whether all its bits are 0, and there is no word for that; a state may be called "none"."""
+        return self.words == NO_BITS and self.entry is not None and bool(self.entry.bits or self.entry.parts)
+
+    @property
     def text(self) -> str:
         """For people: "60.00 Hz", "run, forward", "17"."""
         return self.words or number(self.value, self.entry, self.unit)
@@ -76,8 +81,8 @@ def decode(profile: Profile | None, readings: Sequence[Reading]) -> tuple[Value,
     values: list[Value] = []
     for reading in readings:
         entry = None if reading.part else profile.at(reading.space, reading.address)
-        is_kept = reading.how is Origin.READ or not profile.forbids(reading.space, reading.address, reading.raw)
-        if entry is not None and entry.reserved and is_kept:
+        is_along = reading.how is Origin.READ or not profile.forbids(reading.space, reading.address, reading.raw)
+        if not reading.part and is_along and profile.is_reserved(reading.space, reading.address):
             continue  # read or written along with its neighbours
         if entry is None or entry.reserved:
             values.append(_attribute(profile, reading) if reading.part else _plain(reading))
@@ -97,8 +102,14 @@ def decode(profile: Profile | None, readings: Sequence[Reading]) -> tuple[Value,
 
 def say(profile: Profile | None, readings: Sequence[Reading]) -> str:
     """What an exchange says: "run, reverse", "frequency command 60.00 Hz"; empty when the profile knows nothing."""
-    known = [value for value in decode(profile, readings) if value.entry is not None and not value.bit]
-    return _joined([phrase(value) for value in known if value.words != NO_BITS])
+    said: list[str] = []
+    for value in decode(profile, readings):
+        if value.entry is not None and not value.bit and not value.says_nothing:
+            said.append(phrase(value))
+        elif value.reading.part and profile is not None:
+            about = profile.at(value.reading.space, value.reading.address)
+            said += [_attribute_phrase(value, about)] if about is not None and not about.reserved else []
+    return _joined(said)
 
 
 def phrase(value: Value) -> str:
@@ -110,7 +121,17 @@ def phrase(value: Value) -> str:
         return value.text
     if value.words == f"no {entry.title}":
         return value.words  # which says what of
-    return f"{brief_title(entry)} {value.text}" + (" (?)" if _is_doubtful(value, entry) else "")
+    return _told(brief_title(entry), value.text) + (" (?)" if _is_doubtful(value, entry) else "")
+
+
+def _told(title: str, text: str) -> str:
+    """ "output frequency 30.00 Hz"; of two numbers it must be plain which is the value: "analog output 1: 5.00 V"."""
+    return f"{title}: {text}" if title[-1:].isdigit() and text[:1] in "-0123456789" else f"{title} {text}"
+
+
+def _attribute_phrase(value: Value, about: Entry) -> str:
+    """An attribute or property of a known object with its name: "output frequency units degrees-celsius"."""
+    return f"{brief_title(about)} {value.reading.part.replace('.', ' ')} {value.text}"
 
 
 def _is_doubtful(value: Value, entry: Entry) -> bool:
@@ -121,8 +142,8 @@ def _is_doubtful(value: Value, entry: Entry) -> bool:
 
 
 def brief_title(entry: Entry) -> str:
-    """The same for a line: without the parameter that stands behind it in brackets."""
-    return _OWN_PARAMETER.sub("", said_title(entry))
+    """The same for a line: without what stands behind it in brackets."""
+    return _ASIDE.sub("", said_title(entry))
 
 
 def said_title(entry: Entry) -> str:
@@ -137,6 +158,8 @@ def number(value: int | float | str, entry: Entry | None = None, unit: str = "")
     if isinstance(value, str):
         return '"' + "".join(c if c.isprintable() else f"\\x{ord(c):02x}" for c in value) + '"'
     scaled = entry is not None and entry.scale != 1 and isinstance(value, float) and math.isfinite(value)
+    if entry is not None and entry.hexadecimal and isinstance(value, int):
+        return f"{value:04X}h"
     digits = f"{value:.{min(entry.decimals, 4)}f}" if scaled and entry is not None else _digits(value)
     return f"{digits} {unit}".rstrip()
 
@@ -159,6 +182,14 @@ def plain_name(space: str, address: int) -> str:
 def state_words(entry: Entry, value: int) -> str:
     """The state or code in the maker's words, empty when it has none."""
     return entry.states.get(value, "")
+
+
+def _code_words(entry: Entry, value: int) -> str:
+    """The same; of a list of faults or alarms a code without a word, too."""
+    words = state_words(entry, value)
+    if words or not entry.states or not (entry.role in (EntryRole.FAULT, EntryRole.ALARM) or entry.states_from):
+        return words
+    return f"code {value}" + (", reserved" if value in entry.reserved_codes else "")
 
 
 def bit_words(entry: Entry, raw: int) -> str:
@@ -194,9 +225,9 @@ def _values(entry: Entry, reading: Reading, raws: Sequence[int | None]) -> Itera
     quality = _quality(reading, value, entry)
     words = ""
     if isinstance(value, int) or (isinstance(value, float) and value.is_integer()):
-        words = state_words(entry, int(value))
-        if not words and entry.states and reading.how is Origin.READ:  # a password may be written where a state is read
-            words = f"code {int(value)}" + (", reserved" if int(value) in entry.reserved_codes else "")
+        words = _code_words(entry, int(value))
+        if entry.written and reading.how is Origin.WRITE:
+            words = f"{entry.written} {number(value, entry)}"
     if raw is not None and (entry.bits or entry.parts):
         words = bit_words(entry, raw)
     if raw is not None and entry.version:

@@ -100,10 +100,10 @@ class Entry:
     manual writes it. `name`: of the point, the same for the same thing in every protocol of the device; `title`: for
     people; `label`: what the device itself calls it (BACnet's Object_Name). value = raw · `scale` + `offset`, in
     `unit`, within `low` … `high` (None: not said). `states_from`: the entry whose states these are; `like`: the entry
-    that says the same thing at another place. `reserved_codes`: codes that the manual lists without a meaning;
-    `reserved_bits`: bits that are to be written as 0. `version`: the
-    digits are a version, 0100h is 1.00. `default`: as the device leaves the maker, scaled. `doubt`: why its meaning is
-    not certain, in words.
+    that says the same thing at another place. `written`: what a master writes there, in words, where that is no state
+    ("password"). `reserved_codes`: codes that the manual lists without a meaning; `reserved_bits`: bits that are to be
+    written as 0. `version`: the digits are a version, 0100h is 1.00; `hexadecimal`: people write it so, 0310h.
+    `default`: as the device leaves the maker, scaled. `doubt`: why its meaning is not certain, in words.
     """
 
     space: str
@@ -128,7 +128,9 @@ class Entry:
     like: str = ""
     reserved_codes: frozenset[int] = frozenset()
     reserved_bits: tuple[int, ...] = ()
+    written: str = ""
     version: bool = False
+    hexadecimal: bool = False
     default: float | None = None
     bits: tuple[Bit, ...] = ()
     parts: tuple[BitField, ...] = ()
@@ -297,6 +299,11 @@ class Devices:
         """Whether the papers of the device there say which numbers it can be given."""
         profile = self.at(address)
         return profile is not None and profile.limits_on(family).stations is not None
+
+    def ignores(self, address: int, family: str, kind: str, space: str) -> bool:
+        """Whether the device there acknowledges an exchange of that kind and does not do it (`Limits.ignores`)."""
+        profile = self.at(address)
+        return profile is not None and profile.limits_on(family).ignores(kind, space)
 
     def response_at(self, address: int, family: str, baud: int) -> int | None:
         """ns that a station may take to answer at a rate, by its papers; None where they do not say."""

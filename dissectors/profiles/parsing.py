@@ -205,7 +205,9 @@ def _entry(
         states=states,
         reserved_codes=frozenset(empty),
         reserved_bits=table.numbers("reserved-bits"),
+        written=table.text("written", ""),
         version=table.flag("version"),
+        hexadecimal=table.flag("hex"),
         default=table.number("default") if "default" in table else None,
         bits=_bits(table),
         parts=tuple(_part(part) for part in table.tables("part")),
@@ -264,10 +266,10 @@ def _with_shared_meaning(origin: str, entries: tuple[Entry, ...]) -> tuple[Entry
     for entry in entries:
         if entry.like and entry.like not in first:
             raise ProfileError(f"{origin}: {entry.number}: like: no entry {entry.like!r}")
-    by_name: dict[str, Mapping[int, str]] = {}
+    by_name: dict[str, Entry] = {}
     for entry in entries:  # of those that have the same name, the first
         if entry.states:
-            by_name.setdefault(entry.name, entry.states)
+            by_name.setdefault(entry.name, entry)
     for entry in entries:
         if entry.states_from and entry.states_from not in by_name:
             raise ProfileError(f"{origin}: {entry.number}: states-from: no entry {entry.states_from!r} with states")
@@ -275,8 +277,9 @@ def _with_shared_meaning(origin: str, entries: tuple[Entry, ...]) -> tuple[Entry
     return tuple(_like(e, first[e.like]) if e.like else _with_states(e, by_name) for e in entries)
 
 
-def _with_states(entry: Entry, by_name: Mapping[str, Mapping[int, str]]) -> Entry:
-    return replace(entry, states=by_name[entry.states_from]) if entry.states_from else entry
+def _with_states(entry: Entry, by_name: Mapping[str, Entry]) -> Entry:
+    other = by_name.get(entry.states_from)
+    return entry if other is None else replace(entry, states=other.states, reserved_codes=other.reserved_codes)
 
 
 def _like(entry: Entry, other: Entry) -> Entry:
@@ -284,7 +287,14 @@ def _like(entry: Entry, other: Entry) -> Entry:
     ranged = entry.low is not None or entry.high is not None
     low, high = (entry.low, entry.high) if ranged else (other.low, other.high)
     return replace(
-        entry, unit=entry.unit or other.unit, low=low, high=high, states=entry.states or other.states, label=other.label
+        entry,
+        unit=entry.unit or other.unit,
+        low=low,
+        high=high,
+        states=entry.states or other.states,
+        states_from=other.states_from,
+        reserved_codes=entry.reserved_codes or other.reserved_codes,
+        label=other.label,
     )
 
 

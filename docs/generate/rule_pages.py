@@ -33,7 +33,7 @@ def families() -> list[Family]:
     from dissectors import registry
     from sniff.analysis.judging import all_rules
     from sniff.analysis.line_rules import LINE_RULES
-    from sniff.analysis.profile_findings import PROFILE_RULES
+    from sniff.analysis.profile_rules import PROFILE_RULES
     from sniff.analysis.site_rules import SITE_RULES
 
     titles: dict[str, list[str]] = {}

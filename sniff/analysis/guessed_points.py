@@ -12,9 +12,12 @@ from dissectors.manifest import Dissector
 from dissectors.profiles import Devices
 from dissectors.profiles.decoding import plain_name
 from dissectors.profiles.model import Kind
-from sniff.analysis.points import Key, Point, PointTable, station_name
-from sniff.analysis.register_guess import GuessSureness, RegisterGuess, Use, guessed, read_as
+from sniff.analysis.point_reader import station_name
+from sniff.analysis.points import Key, Point, PointTable
+from sniff.analysis.register_guess import RegisterGuess, guessed
+from sniff.analysis.register_kinds import GuessSureness, Use
 from sniff.analysis.register_series import WORD_SPACES, RegisterSeries, RegisterStretch, covering
+from sniff.analysis.register_words import read_as
 
 if TYPE_CHECKING:
     from sniff.analysis.point_columns import TableSamples

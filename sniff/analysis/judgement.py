@@ -86,9 +86,9 @@ class Judgement:
 
     def merge(self, later: Judgement) -> Judgement:
         """Both together, as a new value."""
-        if not self.heard.rows:
+        if not self.heard.rows and later.heard.rows:
             return replace(later, heard=self.heard.merge(later.heard), host=_beside(self.host, later.host))
-        if not later.heard.rows:
+        if not later.heard.rows and self.heard.rows:
             return replace(self, heard=self.heard.merge(later.heard), host=_beside(later.host, self.host))
         return Judgement(
             self.heard.merge(later.heard),

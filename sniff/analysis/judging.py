@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from dissectors import registry
-from dissectors.findings import Finding, KnowsResponseTimes, KnowsStations, Rule, WordsExceptions
+from dissectors.findings import Finding, KnowsResponseTimes, KnowsStations, KnowsUnexecuted, Rule, WordsExceptions
 from dissectors.frame import Noise, Place, Reason
 from dissectors.manifest import Dissector
 from dissectors.profiles import Devices
@@ -17,7 +17,8 @@ from dissectors.tracker import Transaction, Verdict
 from sniff.analysis.bulk_line_findings import BulkLineFindings
 from sniff.analysis.judgement import Judgement
 from sniff.analysis.line_rules import LINE_RULES
-from sniff.analysis.profile_findings import PROFILE_RULES, ProfileFindings
+from sniff.analysis.profile_findings import ProfileFindings
+from sniff.analysis.profile_rules import PROFILE_RULES
 from sniff.analysis.site_rules import SITE_RULES
 from sniff.engine.engine import Output
 from sniff.engine.session import LineEvent, LineEventKind, Session, settings_change
@@ -85,6 +86,9 @@ class Judging:
         if devices and isinstance(self.judge, KnowsResponseTimes):
             family, baud = dissector.profile_family, session.timing.line.baud
             self.judge.know_response_times(lambda station: devices.response_at(station, family, baud))
+        if devices and isinstance(self.judge, KnowsUnexecuted):
+            family = dissector.profile_family
+            self.judge.know_unexecuted(lambda station, kind, space: devices.ignores(station, family, kind, space))
         self._hole: int | None = None  # when octets were lost, by the newest line event that says so
         self._first_after: int | None = None  # number of the first row that ends after it
 

@@ -28,13 +28,17 @@ HEX_PAIRS = re.compile(rb"(?:[0-9A-Fa-f]{2}){2,}")
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """One line of the tree. `begin`, `end`: octets of the frame, end exclusive; None where nobody can tell."""
+    """One line of the tree. `begin`, `end`: octets of the frame, end exclusive; None where nobody can tell. `brief`:
+    its name where there is no room for all of it, empty where there is no other. `folded`: whether what it holds is
+    hidden at first, for it says the most itself."""
 
     name: str
     value: str = ""
     begin: int | None = None
     end: int | None = None
     children: tuple[Field, ...] = ()
+    brief: str = ""
+    folded: bool = False
 
     def __contains__(self, offset: object) -> bool:
         return (

@@ -12,7 +12,8 @@ from dissectors.histogram import Histogram
 from dissectors.profiles.decoding import Quality, Value, plain_name
 from dissectors.reading_columns import HOWS
 from dissectors.readings import Origin, Reading
-from sniff.analysis.points import HISTORY, Key, PointTable, Sample, SampleRun, station_name
+from sniff.analysis.point_reader import Sample, station_name
+from sniff.analysis.points import HISTORY, Key, PointTable, SampleRun
 
 _WRITE = HOWS.index(Origin.WRITE)
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Sequence
 
-from dissectors.profiles.decoding import plain_name
+from dissectors.profiles.decoding import number, plain_name
 from dissectors.profiles.model import Kind
-from sniff.analysis.register_guess import GuessSureness, RegisterGuess, Use
+from sniff.analysis.register_guess import RegisterGuess
+from sniff.analysis.register_kinds import GuessSureness, Use
 
 _HOW = {
     GuessSureness.SURE: "sure",
@@ -50,9 +51,9 @@ def drafted(name: str, family: str, protocols: Sequence[str], guesses: Iterable[
 def told(guess: RegisterGuess) -> str:
     """What was seen of a register, in a line."""
     if guess.low == guess.high:
-        span = f"always {guess.low:.7g}"
+        span = f"always {number(guess.low)}"
     else:
-        span = f"{guess.low:.7g} … {guess.high:.7g}, {guess.changes} changes, {guess.rate:.3g} a second"
+        span = f"{number(guess.low)} … {number(guess.high)}, {guess.changes} changes, {guess.rate:.3g} a second"
     return f"{_HOW[guess.sure]}; {_USES[guess.use]}; {span} in {guess.answers} answers"
 
 

@@ -1,4 +1,4 @@
-"""Findings about a device by its own profile: the rules PR…, and the class that finds them row by row. Pure.
+"""Findings about a device by its own profile, row by row; `profile_rules.py` has the rules PR…. Pure.
 
 Only what is certain is judged: no value whose layout is a guess (a fault told that way is a note), no response time
 beyond what the adapter allows.
@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from dissectors.findings import Finding, Rule, Severity, Tally
+from dissectors.findings import Finding, Severity, Tally
 from dissectors.frame import Event, Frame, Header, Role
 from dissectors.line import Timing
 from dissectors.manifest import Dissector
@@ -21,120 +21,12 @@ from dissectors.row_columns import RowColumns, in_turn
 from dissectors.subject import About, Subject, station
 from dissectors.tracker import Placement, Transaction
 from dissectors.words import milliseconds
-from sniff.analysis.points import ALL, WHOLE, PointReader, Sample
+from sniff.analysis.point_reader import ALL, WHOLE, PointReader, Sample
+from sniff.analysis.profile_rules import PROFILE_RULES
 from sniff.engine.engine import Output, Row
 
 MOST_TOLD = 2_000
 """Different things that are told of at most: rubbish that passes a check must not fill the memory."""
-
-PROFILE_RULES: dict[str, Rule] = {
-    rule.code: rule
-    for rule in (
-        Rule(
-            "PR001",
-            Severity.WARNING,
-            "value out of range",
-            "A value that a station answered, or that was written to it, lies outside the range that its profile gives "
-            "(from the manual of the device).",
-            "the wrong profile, a setting beyond the device, or a failed sensor",
-            "compare the device with its profile (`profile guess`), then look at the setting",
-        ),
-        Rule(
-            "PR002",
-            Severity.WARNING,
-            "write to a reserved register",
-            "A master writes to a register that the maker keeps for itself. The TECO manuals say not to (1.0.2).",
-            "the master's register list does not fit this device, or counts from 1 where it should count from 0",
-            "compare the master's register numbers with the device's table",
-        ),
-        Rule(
-            "PR003",
-            Severity.WARNING,
-            "write to what is read only",
-            "A master writes to a register or object that can only be read.",
-            "the master's list does not fit this device, or the wrong station is asked",
-            "compare the master's list with the device's table",
-        ),
-        Rule(
-            "PR004",
-            Severity.ERROR,
-            "device reports a fault",
-            "A station answered a fault code or a trip bit other than none, worded as in its manual, or the bit or "
-            "state of a status word that stands for any fault.",
-            "the device has stopped, or will not start, because of it",
-            "look the fault up in the device's manual; reset it when its cause is gone",
-        ),
-        Rule(
-            "PR005",
-            Severity.WARNING,
-            "device reports an alarm",
-            "A station answered an alarm code or warning bit other than none, worded as in its manual, or the bit or "
-            "state of a status word that stands for any warning.",
-            "the device runs on, but not as it should",
-            "look the alarm up in the device's manual",
-        ),
-        Rule(
-            "PR006",
-            Severity.WARNING,
-            "frame longer than the device takes",
-            "A frame to or from a station has more octets on the line than its manual allows (TECO E510 and F510 over "
-            "registers: 80, manual 1.0.1).",
-            "a master that reads or writes too much at once",
-            "have the master read fewer registers in one request",
-        ),
-        Rule(
-            "PR007",
-            Severity.NOTE,
-            "slower than the device promises",
-            "Answers came later than the response time that the manual gives (TECO E510 and F510 over registers: "
-            "10 ms, 1.0.1), even when all that the adapter may have added is taken off.",
-            "a response delay that is set in the device, a device busy with other work, or a gateway in between",
-            "allow for it in the master's timeout; look at the device's response delay setting",
-        ),
-        Rule(
-            "PR008",
-            Severity.WARNING,
-            "write to reserved bits",
-            "A master writes 1 into bits of a command that the maker keeps for itself. The TECO manuals ask for 0 "
-            "there (1.0.2).",
-            "the master's bits do not fit this device",
-            "compare the master's command word with the device's table",
-        ),
-        Rule(
-            "PR009",
-            Severity.NOTE,
-            "function that the device does not have",
-            "A master asks with a function code that the device's manual does not list.",
-            "the wrong profile, or a master that tries what the device refuses",
-            "have the master use a function of the device",
-        ),
-        Rule(
-            "PR010",
-            Severity.WARNING,
-            "acknowledged and not executed",
-            "A station acknowledged a command that its manual says it answers without doing anything.",
-            "the master believes that it was obeyed: what it released still stands, what it commanded never came",
-            "have the master command what the device executes; release by overriding with the value that is wanted",
-            explains=("N2006",),
-        ),
-        Rule(
-            "PR011",
-            Severity.NOTE,
-            "property other than in the manual",
-            "A station answered a name or unit of an object that its manual gives otherwise.",
-            "another software version of the device, the wrong profile, or somebody renamed the object",
-            "compare the device with its profile (`profile guess`)",
-        ),
-        Rule(
-            "PR012",
-            Severity.NOTE,
-            "number that the device cannot be given",
-            "A station answered under a number outside the range that the manual of its device gives.",
-            "the wrong profile, or another device than the plan says",
-            "compare the device with its profile (`profile guess`)",
-        ),
-    )
-}
 
 CODES = {EntryRole.FAULT: "PR004", EntryRole.ALARM: "PR005"}
 
@@ -155,6 +47,16 @@ class _Told:
     sure: bool = True
 
 
+@dataclass(frozen=True, slots=True)
+class _InVain:
+    """A command that the device acknowledges at most: its number and frame, what it asks, what it writes."""
+
+    no: int
+    frame: Frame
+    words: str
+    readings: tuple[Reading, ...]
+
+
 class ProfileFindings:
     """Fed every row and every closed transaction of one bus (`dissectors.findings.Judge`)."""
 
@@ -165,7 +67,8 @@ class ProfileFindings:
         self._readings = dissector.readings
         self._told: dict[Key, _Told] = {}
         self._answers: dict[Subject, int] = {}
-        self._in_vain: dict[int, tuple[int, str]] = {}  # by transaction: the frame, and what was asked in vain
+        self._asks = dissector.asks
+        self._in_vain: dict[int, _InVain] = {}  # by transaction
 
     def see(self, no: int, event: Event, header: Header | None, placement: Placement | None) -> None:
         """Take the next row."""
@@ -180,9 +83,8 @@ class ProfileFindings:
         if placement.role is not Role.RESPONSE and self._readings is not None:
             station = None if placement.role is Role.BROADCAST else placement.destination
             readings = tuple(reading for reading in self._readings(event, None) if reading.how is Origin.WRITE)
-            if readings:
+            if not self._remember_vain(no, event, header, placement, readings) and readings:
                 self._judge_writes(no, event, station, readings)
-            self._remember_vain(no, header, placement, readings)
 
     def settle(self, transaction: Transaction) -> None:
         """Take a transaction that closed."""
@@ -192,20 +94,29 @@ class ProfileFindings:
         self._judge_time(transaction)
         vain = self._in_vain.pop(transaction.id, None)
         profile = self._devices.at(transaction.station)
-        if vain is not None and profile is not None and transaction.verdict in WHOLE:
-            seen = f"{vain[1]}: acknowledged, and not executed by this device"
-            self._add("PR010", _subject(profile, transaction.station), vain[1], seen, transaction.end, vain[0])
+        if vain is None or profile is None:
+            return
+        if transaction.verdict in WHOLE:
+            seen = f"{vain.words}: acknowledged, and not executed by this device"
+            self._add("PR010", _subject(profile, transaction.station), vain.words, seen, transaction.end, vain.no)
+        elif vain.readings:
+            self._judge_writes(vain.no, vain.frame, transaction.station, vain.readings)
 
     def _remember_vain(
-        self, no: int, header: Header | None, placement: Placement, readings: tuple[Reading, ...]
-    ) -> None:
+        self, no: int, frame: Frame, header: Header | None, placement: Placement, readings: tuple[Reading, ...]
+    ) -> bool:
+        """Whether it is a command that the device is known to acknowledge only: it is judged when it is answered."""
         profile = self._devices.at(placement.destination)
         if profile is None or header is None or len(self._in_vain) >= MOST_TOLD:
-            return
-        limits, spaces = profile.limits_on(self._family), [one.space for one in readings] or [""]
-        if any(limits.ignores(header.kind, space) for space in spaces):
-            things = ", ".join(f"{one.space} {one.address}" for one in readings)
-            self._in_vain[placement.tx] = no, f"{header.kind.replace('-', ' ')} {things}".rstrip()
+            return False
+        limits = profile.limits_on(self._family)
+        about = readings or (self._asks(frame) if self._asks is not None else ())
+        if not any(limits.ignores(header.kind, space) for space in [one.space for one in about] or [""]):
+            return False
+        things = ", ".join(f"{one.space} {one.address}" for one in about)
+        words = f"{header.kind.replace('-', ' ')} {things}".rstrip()
+        self._in_vain[placement.tx] = _InVain(no, frame, words, readings)
+        return True
 
     def take(self, rows: RowColumns) -> None:
         """Take rows and what they closed (`dissectors.row_columns.JudgesColumns`)."""

@@ -10,7 +10,7 @@ from dissectors.profiles import Profile, Sign
 from dissectors.profiles.decoding import decode, in_range
 from dissectors.readings import Reading
 from dissectors.tracker import Verdict
-from sniff.analysis.points import PointReader
+from sniff.analysis.point_reader import PointReader
 from sniff.engine.engine import Output
 from sniff.engine.session import LineEvent
 

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from dissectors.columns import NONE, Times, counted
 from dissectors.reading_columns import HOWS
 from dissectors.readings import Origin
-from sniff.analysis.points import PointReader, Sample
+from sniff.analysis.point_reader import PointReader, Sample
 
 if TYPE_CHECKING:
     from dissectors.manifest import Dissector
@@ -33,6 +33,8 @@ WORD_SPACES = ("holding", "input")
 _WRITE = HOWS.index(Origin.WRITE)
 
 Words = npt.NDArray[np.uint16]
+Span = tuple[int, str, int, int]
+"""Device, table, first register, and how many."""
 
 
 @dataclass(slots=True)
@@ -82,14 +84,14 @@ class RegisterStretch:
 
 
 class RegisterSeries:
-    """Fed the samples of one bus or more; gives blocks. `written`: device, space, register of what a master wrote.
+    """Fed the samples of one bus or more; gives blocks. `written`: what a master wrote, together as it wrote it.
 
     `objects`: by device, what it told that is no register: its kinds of objects.
     """
 
     def __init__(self) -> None:
-        self._blocks: dict[tuple[int, str, int, int], RegisterStretch] = {}
-        self.written: set[tuple[int, str, int]] = set()
+        self._blocks: dict[Span, RegisterStretch] = {}
+        self.written: set[Span] = set()
         self.objects: dict[int, set[str]] = {}
 
     def of(self, dissector: Dissector) -> SeriesReader:
@@ -106,9 +108,6 @@ class RegisterSeries:
             if reading.space not in WORD_SPACES:
                 self.objects.setdefault(sample.device, set()).add(reading.space)
             if reading.space not in WORD_SPACES or reading.raw is None or sample.value.bit:
-                continue
-            if reading.how is Origin.WRITE:
-                self.written.add((sample.device, reading.space, reading.address))
                 continue
             if run and not _follows(run[-1], sample):
                 self._keep(run)
@@ -134,21 +133,19 @@ class RegisterSeries:
             self.objects.setdefault(device, set()).add(plain.spaces[space])
         words = plain.take(of_station & spaces[plain.space])
         writes = words.how == _WRITE
-        for (device, space, address), _ in counted(words.device[writes], words.space[writes], words.address[writes]):
-            self.written.add((device, words.spaces[space], address))
+        written = words.take(writes)
+        begins, widths = _pieces(written)
+        spans = counted(written.device[begins], written.space[begins], written.address[begins], widths)
+        self.written |= {
+            (device, written.spaces[space], address, width) for (device, space, address, width), _ in spans
+        }
         self._keep_columns(words.take(~writes))
 
     def _keep_columns(self, words: PlainSamples) -> None:
         """Cut the columns where a sample is not the next register of the same answer, and keep the pieces by block."""
         if not len(words):
             return
-        follows = np.zeros(len(words), bool)
-        follows[1:] = words.address[1:] == words.address[:-1] + 1
-        for name in ("order", "frame", "device", "space"):
-            column = getattr(words, name)
-            follows[1:] &= column[1:] == column[:-1]
-        begins = np.flatnonzero(~follows)
-        widths = np.diff(np.append(begins, len(words)))
+        begins, widths = _pieces(words)
         keys = np.stack([words.device[begins], words.space[begins], words.address[begins], widths], axis=1)
         distinct, first, which = np.unique(keys, axis=0, return_index=True, return_inverse=True)
         which = which.reshape(-1)
@@ -169,12 +166,15 @@ class RegisterSeries:
         first = run[0]
         assert first.device is not None
         key = first.device, first.value.reading.space, first.value.reading.address, len(run)
+        if first.value.how is Origin.WRITE:
+            self.written.add(key)
+            return
         block = self._block(key)
         if block is None:
             return
         block.add(first.time, tuple((sample.value.reading.raw or 0) & 0xFFFF for sample in run))
 
-    def _block(self, key: tuple[int, str, int, int]) -> RegisterStretch | None:
+    def _block(self, key: Span) -> RegisterStretch | None:
         block = self._blocks.get(key)
         if block is None and len(self._blocks) < MOST_BLOCKS:
             block = self._blocks[key] = RegisterStretch(*key)
@@ -200,6 +200,17 @@ class SeriesReader:
 
     def add_line_event(self, event: LineEvent) -> None:
         """It says nothing of a register."""
+
+
+def _pieces(words: PlainSamples) -> tuple[Times, Times]:
+    """Where a sample is not the next register of the same answer: the places, and how many samples each begins."""
+    follows = np.zeros(len(words), bool)
+    follows[1:] = words.address[1:] == words.address[:-1] + 1
+    for name in ("order", "frame", "device", "space"):
+        column = getattr(words, name)
+        follows[1:] &= column[1:] == column[:-1]
+    begins = np.flatnonzero(~follows)
+    return begins, np.diff(np.append(begins, len(words)))
 
 
 def _is_word(sample: Sample) -> bool:
@@ -244,4 +255,4 @@ def _follows(before: Sample, sample: Sample) -> bool:
     """Whether a sample is the next register of the same answer."""
     one, other = before.value.reading, sample.value.reading
     same = before.frame == sample.frame and before.device == sample.device and one.space == other.space
-    return same and other.address == one.address + 1
+    return same and one.how is other.how and other.address == one.address + 1

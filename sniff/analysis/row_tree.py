@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 
 from dissectors.frame import Frame
@@ -13,6 +14,8 @@ from sniff.analysis.packet_tree import Field, fields_of
 from sniff.analysis.sanitizing import sanitized
 from sniff.analysis.wording import duration, mark_names
 from sniff.engine.engine import Row
+
+_ASIDE = re.compile(r" \([^()]*\)")
 
 
 def tree_of(
@@ -45,17 +48,24 @@ def values_of(dissector: Dissector, frame: Frame, meaning: Meaning) -> tuple[Fie
         return (Field(sanitized(meaning.who), sanitized(meaning.refused)),)
     spans = meaning.spans_in(frame, dissector.spans)
     lines = []
-    for item, span in zip(meaning.items(dissector.place), spans, strict=False):
+    items = list(zip(meaning.items(dissector.place), spans, strict=False))
+    for item, span in items:
         begin, end = span or (None, None)
         parts = tuple(Field(sanitized(name), sanitized(text)) for name, text in item.parts)
-        lines.append(Field(sanitized(item.name), sanitized(item.text), begin, end, parts))
+        brief, text = sanitized(item.brief), sanitized(item.text)
+        lines.append(Field(sanitized(item.name), text, begin, end, parts, brief, folded=len(items) > 1))
     if not lines and meaning.asked:
-        asked = tuple(Field(sanitized(where), sanitized(title)) for where, title in meaning.questions(dissector.place))
+        asked = tuple(_asked(sanitized(where), sanitized(title)) for where, title in meaning.questions(dissector.place))
         return (Field(sanitized(meaning.who), f"is asked for {len(asked)}", None, None, asked),)
     if not lines:
         return ()
     count = f"{len(lines)} value{'s' if len(lines) != 1 else ''}"
     return (Field(sanitized(meaning.who), count, *_cover(lines), tuple(lines)),)
+
+
+def _asked(where: str, title: str) -> Field:
+    """A place that is asked for; where there is little room without what stands in brackets."""
+    return Field(where, title, brief=_ASIDE.sub("", where))
 
 
 def _cover(lines: list[Field]) -> tuple[int | None, int | None]:
@@ -93,7 +103,7 @@ def _event(row: Row, time_text: Callable[[int], str]) -> Field:
         about.append(Field("odd", sanitized(", ".join(event.flags))))
     if row.header is not None and row.header.error:
         about.append(Field("error", sanitized(row.header.error)))
-    return Field("frame", f"{row.no}: {_octets(count)}", None, None, (*about, *times, *errors))
+    return Field("frame", f"{row.no}: {_octets(count)}", None, None, (*about, *times, *errors), folded=True)
 
 
 def _transaction(transaction: Transaction, no: int) -> Field:
@@ -110,7 +120,8 @@ def _transaction(transaction: Transaction, no: int) -> Field:
         parts.append(Field("attempt", f"{transaction.attempt}{of}"))
     if transaction.error:
         parts.append(Field("error", sanitized(transaction.error)))
-    return Field("transaction", f"{transaction.id}: {transaction.verdict.words}", None, None, tuple(parts))
+    told = f"{transaction.id}: {transaction.verdict.words}"
+    return Field("transaction", told, None, None, tuple(parts), folded=True)
 
 
 def _frame(number: int, here: int) -> str:

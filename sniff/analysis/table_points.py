@@ -18,11 +18,11 @@ from dissectors.reading_columns import HOWS, ReadingColumns
 from dissectors.readings import Origin
 from dissectors.tracker import Verdict
 from sniff.analysis.point_columns import PlainSamples, TableSamples, no_samples
-from sniff.analysis.points import ALONE, MOST_ASKED, MOST_OPEN, WHOLE, Remembered, Sample, ValuedExchange
+from sniff.analysis.point_reader import ALONE, MOST_ASKED, MOST_OPEN, WHOLE, Remembered, Sample, ValuedExchange
 from sniff.engine.table import Table, rows_at
 
 if TYPE_CHECKING:
-    from sniff.analysis.points import PointReader
+    from sniff.analysis.point_reader import PointReader
 
 _WHOLE = np.array([verdict in WHOLE for verdict in VERDICTS])
 _ALONE = np.array([verdict in ALONE for verdict in VERDICTS])

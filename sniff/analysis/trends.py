@@ -14,8 +14,10 @@ from dissectors.manifest import Dissector
 from dissectors.profiles import Devices
 from dissectors.profiles.decoding import plain_name
 from sniff.analysis.guessed_points import history, told
-from sniff.analysis.points import Key, PointReader, Sample, station_name
-from sniff.analysis.register_guess import GuessSureness, Use, guessed
+from sniff.analysis.point_reader import PointReader, Sample, station_name
+from sniff.analysis.points import Key
+from sniff.analysis.register_guess import guessed
+from sniff.analysis.register_kinds import GuessSureness, Use
 from sniff.analysis.register_series import WORD_SPACES, RegisterSeries, covering
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from dissectors.frame import Frame
 from dissectors.manifest import Dissector
 from dissectors.meaning import Meaning
 from dissectors.profiles import Devices
-from sniff.analysis.points import MOST_OPEN, PointReader
+from sniff.analysis.point_reader import MOST_OPEN, PointReader
 from sniff.analysis.table_points import samples_of
 from sniff.analysis.wording import describe
 from sniff.bus.offline import ReadSource, survey

@@ -19,7 +19,7 @@ from dissectors.line import NS_PER_S
 from dissectors.manifest import Dissector
 from dissectors.profiles import Devices
 from sniff.analysis.autodetect import Detecting
-from sniff.analysis.points import PointReader, Sample
+from sniff.analysis.point_reader import PointReader, Sample
 from sniff.analysis.site_ear import SiteEar
 from sniff.bus.autodetect import Search, SearchProgress
 from sniff.bus.derived_topics import NODES_A_SECOND, NODES_AT_ONCE, BusChannels, DerivedMessage

@@ -10,7 +10,8 @@ from dissectors.profiles import Devices
 from sniff.analysis.health import HealthReport, health_of
 from sniff.analysis.judging import Judging, LineJudging
 from sniff.analysis.load import KEPT_SECONDS
-from sniff.analysis.points import PointReader, PointTable, Sample
+from sniff.analysis.point_reader import PointReader, Sample
+from sniff.analysis.points import PointTable
 from sniff.analysis.polls import Polls
 from sniff.analysis.register_series import RegisterSeries
 from sniff.analysis.summary import Summary

@@ -7,7 +7,7 @@ from contextlib import closing
 from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from dissectors.profiles import Devices
-from sniff.analysis.points import PointReader
+from sniff.analysis.point_reader import PointReader
 from sniff.engine.capture import CaptureError
 from sniff.engine.engine import Output
 from sniff.engine.follow_settings import SessionEngine, dissector_for

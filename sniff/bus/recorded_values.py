@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 from dissectors.columns import NONE
 from dissectors.manifest import Dissector
 from dissectors.profiles import Devices
-from sniff.analysis.points import PointReader, Sample
+from sniff.analysis.point_reader import PointReader, Sample
 from sniff.bus.telling_rows import telling_rows, telling_transactions
 from sniff.bus.thinning import Budget, Room
 from sniff.bus.value_topics import ValueChannels, ValueMessage

@@ -65,6 +65,7 @@ def to_json(item: JudgedRow, dissector: Dissector, session: Session, with_fields
     if with_fields:
         result["fields"] = fields_of(item, dissector)
         result["values"] = values_of(item, dissector)
+        result["asks"] = asks_of(item, dissector)
     return result
 
 
@@ -136,6 +137,24 @@ def values_of(item: JudgedRow, dissector: Dissector) -> list[dict[str, Any]]:
             "bits": dict(one.parts),
         }
         for one in item.meaning.items(dissector.place)
+    ]
+
+
+def asks_of(item: JudgedRow, dissector: Dissector) -> list[dict[str, Any]]:
+    """Every register, object and property that a row asks for, in the order of the wire; "title" is null where nobody
+    knows what it is."""
+    if item.meaning is None:
+        return []
+    asked = zip(item.meaning.asked, item.meaning.questions(dissector.place), strict=True)
+    return [
+        {
+            "place": place,
+            "space": one.space,
+            "address": one.address,
+            "part": one.part or None,
+            "title": title or None,
+        }
+        for one, (place, title) in asked
     ]
 
 

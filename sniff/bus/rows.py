@@ -25,7 +25,8 @@ from dissectors.profiles.decoding import Value, decode
 from dissectors.tracker import Passing, Transaction, Verdict
 from sniff.analysis.load import Load
 from sniff.analysis.nodes import NodeTable
-from sniff.analysis.points import TELLING, PointTable, meaning_of
+from sniff.analysis.point_reader import TELLING, meaning_of
+from sniff.analysis.points import PointTable
 from sniff.analysis.polls import Polls
 from sniff.analysis.site_ear import SiteEar
 from sniff.analysis.summary import Summary

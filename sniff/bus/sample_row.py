@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sniff.analysis.points import Sample
+from sniff.analysis.point_reader import Sample
 from sniff.formats.parquet import Kind
 
 COLUMNS = {

@@ -14,7 +14,7 @@ from dissectors.findings import Finding
 from dissectors.line import NS_PER_S
 from dissectors.manifest import Dissector
 from sniff.analysis.judging import rules_over
-from sniff.analysis.points import PointReader
+from sniff.analysis.point_reader import PointReader
 from sniff.bus.asked_rows import Fields, Meant, PointsTold, answers_told
 from sniff.engine.column_join import ColumnJoin
 from sniff.engine.engine import Output

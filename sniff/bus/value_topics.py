@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from dissectors.profiles import Devices, Entry
-from sniff.analysis.points import Sample
+from sniff.analysis.point_reader import Sample
 from sniff.recording.topics import topic_part
 
 MOST_CHANNELS = 4096

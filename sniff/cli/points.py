@@ -17,7 +17,8 @@ from typing import TYPE_CHECKING
 from dissectors.line import MS, NS_PER_S
 from dissectors.profiles import Devices
 from dissectors.profiles.decoding import Quality, number
-from sniff.analysis.points import Point, PointReader, PointTable, Sample
+from sniff.analysis.point_reader import PointReader, Sample
+from sniff.analysis.points import Point, PointTable
 from sniff.bus.offline import outputs
 from sniff.bus.row_words import iso
 from sniff.bus.sample_row import COLUMNS, sample_row, shown_value
@@ -258,7 +259,7 @@ def _latest(point: Point, end: int, style: str, guess: GuessedPoint | None) -> t
     if guess is not None:
         means = f"{means}; {guess.words}".removeprefix("; ")
         quality, low, high, rate = int(Quality.UNCERTAIN), guess.low, guess.high, guess.rate
-        shown = guess.value if style != "text" or guess.value is None else f"{guess.value:.7g}"
+        shown = guess.value if style != "text" or guess.value is None else number(guess.value)
     age = round((end - sample.time) / NS_PER_S, 3)
     changed = round((end - point.changed) / NS_PER_S, 3) if point.changed else None
     often = (_ms(point.interval), _ms(point.jitter))
@@ -276,7 +277,10 @@ def _ms(time: int | None) -> Cell:
 
 
 def _brief(value: float | None, style: str) -> Cell:
-    return value if value is None or style != "text" else f"{value:.5g}"
+    """Whole numbers with all their digits, others with five."""
+    if value is None or style != "text":
+        return value
+    return number(value) if value.is_integer() else f"{value:.5g}"
 
 
 def _by_device(point: Point) -> tuple[float, ...]:

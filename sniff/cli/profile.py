@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from dissectors.line import MS
 from dissectors.profiles import Entry, Profile, ProfileError
-from dissectors.profiles.decoding import number, plain_name
+from dissectors.profiles.decoding import number, plain_name, state_words
 from dissectors.profiles.parsing import is_name
 from sniff.analysis.sanitizing import sanitized
 from sniff.bus.offline import survey
@@ -121,6 +121,10 @@ def _show(args: argparse.Namespace) -> int:
             print(f"{family} station numbers: {limits.stations[0]} … {limits.stations[1]}")
         if limits.functions is not None:
             print(f"{family} functions: {' '.join(f'{code:02X}' for code in sorted(limits.functions))} (hex)")
+        if limits.unexecuted:
+            print(f"{family} acknowledges and does not do: {_told(limits.unexecuted)}")
+        if limits.read_only:
+            print(f"{family} attributes that are read only: {_told(limits.read_only)}")
     for family, codes in profile.exceptions.items():
         for code, words in codes.items():
             print(f"{family} error {code:02d} ({code:02X}h): {words}")
@@ -130,6 +134,8 @@ def _show(args: argparse.Namespace) -> int:
         offset = profile.address_offset
         wire = f" = wire 0x{first:04X} … 0x{last:04X}" if offset else ""
         print(f"reserved: {first - offset:04X}h … {last - offset:04X}h{wire}")
+    if profile.absent:
+        print(f"parameters without a register: {' '.join(profile.absent)}")
     if profile.address_offset:
         print(f"on the wire a register is the manual's number {profile.address_offset:+d}; both are in the table")
     print()
@@ -139,15 +145,26 @@ def _show(args: argparse.Namespace) -> int:
     return 0
 
 
+def _told(kinds: frozenset[str]) -> str:
+    """ "override AI, override BI, release override"."""
+    return ", ".join(sorted(kind.replace(":", " ").replace("-", " ") for kind in kinds))
+
+
 def _row(entry: Entry) -> tuple[str, ...]:
     low = "" if entry.low is None else f"{entry.low:g}"
     high = "" if entry.high is None else f"{entry.high:g}"
     span = f"{low} … {high}" if low or high else ""
     remarks = [f"in the device: {entry.label}"] if entry.label else []
-    remarks += [f"usually {number(entry.default, entry, entry.unit)}"] if entry.default is not None else []
+    remarks += [f"usually {_usual(entry, entry.default)}"] if entry.default is not None else []
     remarks += [f"doubtful: {entry.doubt}"] if entry.doubt else []
     title = f"{entry.title} ({'; '.join(remarks)})" if remarks else entry.title
-    return _place(entry), entry.name, entry.unit, span, entry.access.value, title
+    unit = entry.unit if entry.scale == 1 else f"{entry.scale:.12g} {entry.unit}".rstrip()
+    return _place(entry), entry.name, unit, span, entry.access.value, title
+
+
+def _usual(entry: Entry, default: float) -> str:
+    words = state_words(entry, int(default)) if default.is_integer() else ""
+    return f"{number(default, entry)}, {words}" if words else number(default, entry, entry.unit)
 
 
 def _place(entry: Entry) -> str:
@@ -254,7 +271,8 @@ def _guess(args: argparse.Namespace) -> int:
 
 def _draft(args: argparse.Namespace) -> int:
     from sniff.analysis.profile_draft import drafted
-    from sniff.analysis.register_guess import GuessSureness, guessed
+    from sniff.analysis.register_guess import guessed
+    from sniff.analysis.register_kinds import GuessSureness
     from sniff.analysis.register_series import RegisterSeries
 
     if args.write is not None:

@@ -16,7 +16,7 @@ from sniff.cli import arguments
 from sniff.formats.table import suffixes
 
 if TYPE_CHECKING:
-    from sniff.analysis.points import Sample
+    from sniff.analysis.point_reader import Sample
     from sniff.bus.derived_topics import DerivedMessage
     from sniff.bus.live import LiveBus, LiveItem, LiveTables
     from sniff.engine.session import LineEvent

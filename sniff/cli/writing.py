@@ -27,7 +27,7 @@ from sniff.formats import cut_capture, parquet
 from sniff.formats.parquet import Kind, ParquetWriter
 
 if TYPE_CHECKING:
-    from sniff.analysis.points import Sample
+    from sniff.analysis.point_reader import Sample
     from sniff.bus.derived_topics import DerivedMessage
     from sniff.engine.blocks import Block
     from sniff.engine.table import Table
@@ -286,7 +286,7 @@ class _Values:
     """Writes the values of known devices to /values."""
 
     def __init__(self, writer: object, session: Session, devices: Devices) -> None:
-        from sniff.analysis.points import PointReader
+        from sniff.analysis.point_reader import PointReader
         from sniff.bus.value_topics import ValueChannels
         from sniff.recording.mcap_writer import McapWriter
 

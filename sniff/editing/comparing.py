@@ -10,7 +10,8 @@ from dissectors.profiles.decoding import number
 from dissectors.tracker import Verdict
 from dissectors.words import milliseconds
 from sniff.analysis.nodes import Node
-from sniff.analysis.points import ALL, Point
+from sniff.analysis.point_reader import ALL
+from sniff.analysis.points import Point
 from sniff.analysis.summary import Summary
 
 NOTICEABLE = 0.02

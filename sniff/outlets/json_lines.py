@@ -9,7 +9,7 @@ import math
 from typing import Any
 
 from sniff.analysis.json_text import dumps, iso
-from sniff.analysis.points import Sample
+from sniff.analysis.point_reader import Sample
 from sniff.outlets.told import FindingTold, NumbersTold, StateTold, Told, ToldBus, ValueTold
 
 

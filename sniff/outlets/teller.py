@@ -12,7 +12,8 @@ from typing import Protocol
 
 from dissectors.findings import Severity
 from dissectors.line import NS_PER_S
-from sniff.analysis.points import MOST_POINTS, Sample
+from sniff.analysis.point_reader import Sample
+from sniff.analysis.points import MOST_POINTS
 from sniff.analysis.sanitizing import sanitized
 from sniff.bus.derived_topics import NODE, DerivedMessage
 from sniff.bus.live import LiveBus

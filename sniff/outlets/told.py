@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 from dissectors.profiles import Devices
-from sniff.analysis.points import Sample
+from sniff.analysis.point_reader import Sample
 from sniff.bus.derived_topics import DerivedMessage
 from sniff.outlets.news import News
 

@@ -18,9 +18,6 @@ from textual.strip import Strip
 from sniff.analysis.packet_tree import Field
 from sniff.tui.key_names import named
 
-FOLDED = ((("frame", 0),), (("transaction", 0),))
-"""What is known besides the packet begins folded: its first line says the most."""
-
 SHIFT = 16
 """Cells by which long lines scroll at once."""
 
@@ -66,7 +63,7 @@ class FieldTree(ScrollView, can_focus=True, inherit_bindings=False):
     def __init__(self, *, id: str | None = None) -> None:
         super().__init__(id=id)
         self.fields: tuple[Field, ...] = ()
-        self.folded: set[Path] = set(FOLDED)
+        self.turned: set[Path] = set()  # parts that are folded and were not at first, or the other way round
         self.cursor = 0
         self.shifted = 0  # cells by which all lines are scrolled to the left
         self._lines: list[_Line] = []
@@ -91,7 +88,7 @@ class FieldTree(ScrollView, can_focus=True, inherit_bindings=False):
         found = _smallest(self.fields, offset, ())
         if found is None:
             return None
-        self.folded -= {found.path[:depth] for depth in range(1, len(found.path))}
+        self.turned ^= {line.path for line in _above(self.fields, found.path) if self._is_folded(line)}
         self._flatten()
         self._wanted = found.path
         self.cursor = self._line_of(found.path) or 0
@@ -108,8 +105,11 @@ class FieldTree(ScrollView, can_focus=True, inherit_bindings=False):
     def _unfold(self, fields: tuple[Field, ...], above: Path) -> None:
         for line in _placed(fields, above):
             self._lines.append(line)
-            if line.field.children and line.path not in self.folded:
+            if line.field.children and not self._is_folded(line):
                 self._unfold(line.field.children, line.path)
+
+    def _is_folded(self, line: _Line) -> bool:
+        return line.field.folded != (line.path in self.turned)
 
     def _line_of(self, path: Path) -> int | None:
         return next((number for number, line in enumerate(self._lines) if line.path == path), None) if path else None
@@ -133,7 +133,7 @@ class FieldTree(ScrollView, can_focus=True, inherit_bindings=False):
     def action_fold(self) -> None:
         """Fold or unfold the part under the cursor."""
         if self._lines and self._lines[self.cursor].field.children:
-            self.folded ^= {self._lines[self.cursor].path}
+            self.turned ^= {self._lines[self.cursor].path}
             self._flatten()
 
     def action_right(self) -> None:
@@ -186,11 +186,11 @@ class FieldTree(ScrollView, can_focus=True, inherit_bindings=False):
         if number == self.cursor:
             base += self.get_component_rich_style(f"field-tree--{'cursor' if self.has_focus else 'here'}", partial=True)
         name = base + self.get_component_rich_style("field-tree--name", partial=True)
-        arrow = " " if not line.field.children else "▶" if line.path in self.folded else "▼"
-        segments = [Segment(f"{'  ' * line.depth}{arrow} ", base), Segment(line.field.name, name)]
-        if line.field.value:
-            segments.append(Segment(f": {line.field.value}", base))
-        strip = Strip(segments)
+        arrow = " " if not line.field.children else "▶" if self._is_folded(line) else "▼"
+        lead, value = Segment(f"{'  ' * line.depth}{arrow} ", base), f": {line.field.value}" if line.field.value else ""
+        strip = Strip([lead, Segment(line.field.name, name), Segment(value, base)])
+        if line.field.brief and not self.shifted and strip.cell_length > width:  # the value is what is looked for
+            strip = Strip([lead, Segment(line.field.brief, name), Segment(value, base)])
         if self.shifted:
             strip = strip.crop(self.shifted, max(self.shifted, strip.cell_length))
         if strip.cell_length > width > 0:  # what is cut says so: → goes on
@@ -203,6 +203,14 @@ def _placed(fields: tuple[Field, ...], above: Path) -> Iterator[_Line]:
     for field in fields:
         yield _Line(field, (*above, (field.name, seen[field.name])))
         seen[field.name] += 1
+
+
+def _above(fields: tuple[Field, ...], path: Path) -> Iterator[_Line]:
+    """The parts that hold a field, the outermost first."""
+    for depth in range(1, len(path)):
+        line = next(line for line in _placed(fields, path[: depth - 1]) if line.path == path[:depth])
+        yield line
+        fields = line.field.children
 
 
 def _smallest(fields: tuple[Field, ...], offset: int, above: Path) -> _Line | None:

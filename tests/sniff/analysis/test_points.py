@@ -11,7 +11,8 @@ import pytest
 from dissectors.profiles import Devices, packaged
 from dissectors.profiles.decoding import Quality
 from dissectors.readings import Origin
-from sniff.analysis.points import Point, PointReader, PointTable, Sample
+from sniff.analysis.point_reader import PointReader, Sample
+from sniff.analysis.points import Point, PointTable
 from sniff.bus.offline import settled
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import Session

@@ -16,8 +16,9 @@ from dissectors.profiles.decoding import decode
 from dissectors.readings import Origin, Reading
 from sniff.analysis.health import health_of
 from sniff.analysis.judging import Judging
-from sniff.analysis.points import Sample
-from sniff.analysis.profile_findings import PROFILE_RULES, ProfileFindings
+from sniff.analysis.point_reader import Sample
+from sniff.analysis.profile_findings import ProfileFindings
+from sniff.analysis.profile_rules import PROFILE_RULES
 from sniff.analysis.summary import Summary
 from sniff.bus.offline import outputs
 from sniff.engine.engine import Output

@@ -13,7 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dissectors.profiles.model import Kind
-from sniff.analysis.register_guess import GuessSureness, RegisterGuess, Use, guessed
+from sniff.analysis.register_guess import RegisterGuess, guessed
+from sniff.analysis.register_kinds import GuessSureness, Use
 from sniff.analysis.register_series import RegisterSeries, RegisterStretch, covering
 from sniff.bus.offline import survey
 from sniff.engine.follow_settings import dissector_for
@@ -106,7 +107,7 @@ def judged(found: list[RegisterGuess], layout: list[tuple[Kind, Series]], order:
 @pytest.mark.parametrize("order", [(False, False), (True, False), (True, True)])
 def test_most_registers_of_a_meter_are_read_rightly_and_none_surely_wrong(order: tuple[bool, bool]) -> None:
     right = total = 0
-    for seed in range(20):
+    for seed in range(7):
         dice = random.Random(seed)
         layout = METER[:]
         dice.shuffle(layout)
@@ -132,7 +133,7 @@ def test_what_a_master_writes_is_a_setting() -> None:
     block = RegisterStretch(3, "holding", 9, 1)
     for at in range(50):
         block.add(at * SECOND, (3000 + at % 4,))
-    (guess,) = guessed([block], {(3, "holding", 9)})
+    (guess,) = guessed([block], {(3, "holding", 9, 1)})
     assert guess.use is Use.SETTING
 
 
@@ -223,3 +224,55 @@ def test_blocks_that_cover_all_registers_are_few() -> None:
     kept = covering(blocks)
     assert {block.first + step for block in kept for step in range(block.width)} == set(range(47))
     assert len(kept) <= 47 < len(blocks)
+
+
+def guesses_of(*columns: list[int]) -> list[tuple[int, Kind, GuessSureness, Use]]:
+    block = RegisterStretch(1, "holding", 0, len(columns))
+    for at, row in enumerate(zip(*columns, strict=True)):
+        block.add(at * SECOND, tuple(word & 0xFFFF for word in row))
+    return [(one.address, one.kind, one.sure, one.use) for one in guessed([block], set())]
+
+
+def test_a_counter_that_begins_anew_is_no_sign() -> None:
+    (found,) = guesses_of([65_000 + 97 * turn for turn in range(120)])
+    assert found == (0, Kind.U16, GuessSureness.LIKELY, Use.COUNTER)
+
+
+def test_a_value_that_rises_through_zero_once_is_not_surely_signed() -> None:
+    (found,) = guesses_of(list(range(-30, 30)))
+    assert found == (0, Kind.S16, GuessSureness.LIKELY, Use.SENSOR)
+
+
+def test_whole_numbers_as_large_as_exponents_are_no_floats() -> None:
+    dice = random.Random(6)
+    middles = (16_800, 17_200, 16_500, 19_000)
+    columns = [[round(value) for value in sensor(dice, 200, middle, middle / 300)] for middle in middles]
+    assert [kind for _, kind, _, _ in guesses_of(*columns)] == [Kind.U16] * 4
+
+
+def test_a_number_of_64_bits_is_told_by_its_carry() -> None:
+    dice = random.Random(7)
+    values = [int(value) for value in counter(dice, 200, 5 << 32, 1 << 29)]
+    columns = [[value >> shift for value in values] for shift in (48, 32, 16, 0)]
+    assert guesses_of(*columns) == [(0, Kind.U64, GuessSureness.LIKELY, Use.COUNTER)]
+
+
+@pytest.mark.parametrize(("middle", "kind"), [(70_000, Kind.U32), (-70_000, Kind.S32), (0, Kind.S32)])
+def test_a_number_of_32_bits_is_signed_where_it_was_below_zero(middle: int, kind: Kind) -> None:
+    """One that was not may be: it is not sure."""
+    dice = random.Random(8)
+    values = [round(value) for value in sensor(dice, 300, middle, 6_000)]
+    columns = [[value >> 16 for value in values], values]
+    (found,) = guesses_of(*columns)
+    assert found[1] is kind
+    assert (found[2] is GuessSureness.SURE) == (middle == 0)
+
+
+def test_two_registers_written_at_once_are_likely_one_float() -> None:
+    dice = random.Random(9)
+    block = RegisterStretch(1, "holding", 4, 2)
+    for at in range(60):
+        block.add(at * SECOND, words_of(Kind.F32, dice.choice((21.5, 20.0, 22.5)), True, False))
+    (found,) = guessed([block], {(1, "holding", 4, 2)})
+    assert (found.kind, found.swapped, found.sure, found.use) == (Kind.F32, True, GuessSureness.LIKELY, Use.SETTING)
+    assert len(list(guessed([block], {(1, "holding", 4, 1), (1, "holding", 5, 1)}))) == 2

@@ -8,7 +8,8 @@ import pytest
 
 from dissectors.line import LineSettings, Timing
 from dissectors.profiles import Devices, packaged
-from sniff.analysis.points import PointReader, PointTable
+from sniff.analysis.point_reader import PointReader
+from sniff.analysis.points import PointTable
 from sniff.bus.offline import outputs
 from sniff.engine.engine import Output
 from sniff.engine.follow_settings import dissector_for

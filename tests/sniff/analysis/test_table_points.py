@@ -15,7 +15,8 @@ from dissectors.modbus.reading_columns import reading_columns
 from dissectors.modbus.readings import readings
 from dissectors.reading_columns import HOWS
 from sniff.analysis.point_columns import TableSamples, add_to
-from sniff.analysis.points import PointReader, PointTable, Sample
+from sniff.analysis.point_reader import PointReader, Sample
+from sniff.analysis.points import PointTable
 from sniff.analysis.table_points import samples_of
 from sniff.bus.offline import outputs
 from sniff.engine.blocks import blocks_of

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import pytest
 
 from dissectors.profiles.model import Kind
-from sniff.analysis.register_guess import GuessSureness, RegisterGuess, guessed
+from sniff.analysis.register_guess import RegisterGuess, guessed
+from sniff.analysis.register_kinds import GuessSureness
 from sniff.analysis.register_series import RegisterStretch
 
 FORMS = {

@@ -13,7 +13,7 @@ import pytest
 from dissectors.profiles import Devices, packaged
 from dissectors.profiles.decoding import decode
 from dissectors.readings import Origin, Reading
-from sniff.analysis.points import Sample
+from sniff.analysis.point_reader import Sample
 from sniff.bus import value_topics as value_channels
 from sniff.bus.value_topics import ValueChannels, ValueMessage
 from sniff.recording.topics import SCHEMAS

@@ -234,3 +234,13 @@ def test_a_count_is_a_whole_number(sniff485: Callable, count: str) -> None:
 def test_a_count_of_none_shows_none(sniff485: Callable) -> None:
     ran = sniff485("show", "captures/rtu-clean.cap.txt", "-c", 0)
     assert (ran.code, ran.out) == (0, "")
+
+
+@pytest.mark.parametrize("name", ["sixteen-registers", "twenty-parameters", "acn-common-area", "bacnet-three-objects"])
+def test_a_question_names_what_its_answer_tells(name: str, sniff485: Callable) -> None:
+    ran = sniff485("show", f"captures/devices/{name}.cap.txt", "--json", "--fields")
+    asked, told = (json.loads(line) for line in ran.out.splitlines()[:2])
+    assert {one["place"] for one in told["values"]} <= {one["place"] for one in asked["asks"]}
+    assert all(one["title"] for one in asked["asks"])
+    assert (asked["values"], told["asks"]) == ([], [])
+    assert len(told["values"]) in (len(asked["asks"]), len(asked["asks"]) - 1)  # one property the drive does not have

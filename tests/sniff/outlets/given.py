@@ -9,7 +9,7 @@ from typing import Any
 from dissectors.findings import Finding, Severity
 from dissectors.profiles.decoding import Quality, Value
 from dissectors.readings import Origin, Reading
-from sniff.analysis.points import Sample
+from sniff.analysis.point_reader import Sample
 from sniff.bus.derived_topics import DerivedMessage
 from sniff.outlets.news import News, NewsKind
 from sniff.outlets.outlet import Outlet

@@ -41,7 +41,7 @@ SECONDS = {"mstp": 30, "profibus": 15}
 """How long a demo runs: they bring as many frames then as the others do in five minutes."""
 ADAPTER = TapModel("FT232R", timer=1_000_000, packet=62, usb_frame=1_000_000, reports=("parity", "framing", "break"))
 PROTOCOLS = ("modbus-rtu", "modbus-ascii", "n2", "mstp", "profibus")
-SIZES = ((80, 24), (200, 60))
+SIZES = ((80, 24), (120, 40), (200, 60))
 CELL = (8, 16)
 
 

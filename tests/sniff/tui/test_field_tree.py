@@ -15,7 +15,7 @@ TAG = tuple(Field("Tag", "", begin, begin + 2, (Field("number", str(begin), begi
 FIELDS = (
     Field("head", "x", 0, 2),
     Field("tags", "3", 2, 8, TAG),
-    Field("frame", "1", None, None, (Field("check", "good"),)),
+    Field("frame", "1", None, None, (Field("check", "good"),), folded=True),
 )
 
 
@@ -99,5 +99,33 @@ def test_what_is_cut_says_so_and_can_be_scrolled_to(with_tree: Callable[..., Non
         assert [tree.render_line(y).text.rstrip()[-6:] for y in (0, 1)] == ["4 +00…", "xxxxxx"]
         tree.action_right()
         assert tree.render_line(0).text.rstrip().endswith(" +0000")
+
+    with_tree(script)
+
+
+def test_what_begins_folded_unfolds_for_an_octet(with_tree: Callable[..., None]) -> None:
+    status = Field("status", "running", 0, 2, (Field("bit 0", "1", 1, 2),), folded=True)
+
+    def script(tree: FieldTree) -> None:
+        tree.show((status,))
+        assert names(tree) == ["status"]
+        tree.pick_octet(1)
+        assert names(tree) == ["status", "bit 0"]
+        tree.action_parent()
+        tree.action_fold()
+        tree.show((status,))
+        assert names(tree) == ["status"]
+
+    with_tree(script)
+
+
+def test_where_there_is_little_room_the_value_stays(with_tree: Callable[..., None]) -> None:
+    long = Field("Register 2524h (wire 0x2524) output frequency", "30.00 Hz", brief="output frequency")
+
+    def script(tree: FieldTree) -> None:
+        tree.show((long,))
+        assert tree.render_line(0).text.strip() == "output frequency: 30.00 Hz"
+        tree.action_right()
+        assert "(wire 0x2524)" in tree.render_line(0).text
 
     with_tree(script)

@@ -133,7 +133,7 @@ def test_no_values_yet_and_no_profile(look: Any, make_bus: Any) -> None:
 def test_names_and_values_from_the_wire_are_harmless(look: Any) -> None:
     from dissectors.profiles.decoding import decode
     from dissectors.readings import Origin, Reading
-    from sniff.analysis.points import Sample
+    from sniff.analysis.point_reader import Sample
 
     store = store_of.__wrapped__("mstp", 3)
     evil = Reading("device", 5, None, "[red]x[/red]\x1b[2J\u202e", Origin.READ, "object-name\x1b")
