@@ -21,6 +21,8 @@ from sniff.analysis.point_reader import PointReader
 from sniff.analysis.told_protocol import detected
 from sniff.bus.columns import Column, ColumnForm, Columns, TableColumns
 from sniff.bus.sample_row import COLUMNS, sample_row
+from sniff.bus.second_proof import SecondProof, proving
+from sniff.bus.second_protocol import with_foreign
 from sniff.engine.bulk import tables
 from sniff.engine.capture import Capture, CaptureError
 from sniff.engine.follow_settings import dissector_for
@@ -73,7 +75,8 @@ class DataCapture:
         return self.session.started
 
     def frames(self, octets: bool = False) -> Any:
-        """A row for every frame and every stretch of noise, under the names of `show --json`.
+        """A row for every frame and every stretch of noise, under the names of `show --json`; frames of a second
+        protocol on the bus as such.
 
         `t` is an instant of UTC, `start_ns` and `end_ns` are ns since the epoch, `latency_ms` is the response time of
         the transaction that the frame belongs to. `octets`: with those on the wire, which makes an object of each row.
@@ -109,15 +112,15 @@ class DataCapture:
         return self._columns
 
     def _read_anew(self, octets: bool = False) -> TableColumns:
-        columns = TableColumns(octets)
-        for table in self._tables():
-            columns.add(table)
+        columns, proof = TableColumns(octets), SecondProof(self.session)
+        for table, foreign in with_foreign(self._tables(proof), self.session, proof):
+            columns.add(table, foreign)
         return columns
 
-    def _tables(self) -> Iterator[Table]:
-        """All that can be read; a warning where that is not all."""
+    def _tables(self, proof: SecondProof | None = None) -> Iterator[Table]:
+        """All that can be read; a warning where that is not all. `proof`: sees each before it is given."""
         try:
-            for item in tables(self._capture.blocks(), self.session):
+            for item in proving(tables(self._capture.blocks(), self.session), proof):
                 if isinstance(item, Table):
                     yield item
         except CaptureError as error:

@@ -15,9 +15,11 @@ SECOND_BITS = 40.0
 """Evidence from which on octets that are no frames of the first protocol are taken for frames of a second one."""
 
 
-def second_in(rest: Sequence[Chunk], session: Session, others: Sequence[str]) -> tuple[str, int] | None:
+def second_in(
+    rest: Sequence[Chunk], session: Session, others: Sequence[str], enough: float = SECOND_BITS
+) -> tuple[str, int] | None:
     """The protocol among `others` that makes good frames of these stretches, each at its end, and how many; None where
-    none has evidence enough."""
+    none has evidence enough (bits)."""
     found: list[tuple[float, str, int]] = []
     for name in others if rest else ():
         line = LineSettings.parse(registry.get(name).default_line) if session.line_is_assumed else session.line
@@ -26,6 +28,6 @@ def second_in(rest: Sequence[Chunk], session: Session, others: Sequence[str]) ->
             evidence.feed(chunk)
         evidence.advance(rest[-1].time + 10 * NS_PER_S)
         tally = evidence.tallies[name]
-        if tally.frames >= SECOND_FRAMES and tally.bits >= SECOND_BITS:
+        if tally.frames >= SECOND_FRAMES and tally.bits >= enough:
             found.append((tally.bits, name, tally.frames))
     return max(found)[1:] if found else None

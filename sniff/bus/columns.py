@@ -21,6 +21,7 @@ from sniff.engine.table import Table
 
 Values = npt.NDArray[Any]
 SEARCHING, NOISE = "searching", "noise"
+NOTHING: Mapping[int, Sequence[Row]] = {}
 
 
 class ColumnForm(Enum):
@@ -130,14 +131,19 @@ class TableColumns:
         self._transactions = {name: _Growing(form) for name, form in TRANSACTIONS.items()}
         self._octets: list[bytes] | None = [] if octets else None
 
-    def add(self, table: Table) -> None:
-        """Take what follows."""
+    def add(self, table: Table, replaced: Mapping[int, Sequence[Row]] = NOTHING) -> None:
+        """Take what follows. `replaced`: what stands in place of some of its rows, by place in the table."""
         self._add_frames(table)
         self._add_transactions(table)
         if self._octets is not None:
             held, ends = table.octets.tobytes(), table.frames.offset + table.frames.length
             spans = zip(table.frames.offset.tolist(), ends.tolist(), strict=True)
-            self._octets.extend(held[begin:end] for begin, end in spans)
+            found = [held[begin:end] for begin, end in spans]
+            for place, rows in sorted(replaced.items(), reverse=True):
+                found[place : place + 1] = [row.event.octets for row in rows]
+            self._octets.extend(found)
+        if replaced:
+            self._replace(len(table), replaced)
 
     def frames(self) -> Columns:
         """A row for every frame, for noise and for what a search heard, with the verdicts of the transactions."""
@@ -190,12 +196,25 @@ class TableColumns:
             _add(into[name], values, values == NONE)
         for name, values in whole.items():
             _add(into[name], values, np.zeros(count, bool))
-        for place, row in table.odd.items():
-            self._put(place, row)
+        for place, row in table.odd.items():  # of which the columns of its table do not say all
+            self._put(place, _odd(row))
 
-    def _put(self, place: int, row: Row) -> None:
-        """A row of which the columns of its table do not say all, into the part that was added last."""
-        for name, value in _odd(row).items():
+    def _replace(self, count: int, replaced: Mapping[int, Sequence[Row]]) -> None:
+        """Other rows in place of some of those that were added last."""
+        many: Times = np.ones(count, np.int64)
+        many[list(replaced)] = [len(rows) for rows in replaced.values()]
+        begins = np.cumsum(many) - many
+        for column in self._frames.values():
+            if column.parts:  # the others are joined when all is there
+                column.parts[-1] = np.repeat(column.parts[-1], many)
+                column.holes[-1] = np.repeat(column.holes[-1], many)
+        for place, rows in replaced.items():
+            for at, row in enumerate(rows, int(begins[place])):
+                self._put(at, {**_odd(row), **_placed_by_itself(row)})
+
+    def _put(self, place: int, said: Mapping[str, int | str | None]) -> None:
+        """What a row says, into the part that was added last."""
+        for name, value in said.items():
             into = self._frames[name]
             if isinstance(value, str):
                 value = int(into.text_numbers([value])[0])
@@ -271,6 +290,15 @@ def _odd(row: Row) -> dict[str, int | str | None]:
         "found": frame.found.value if frame is not None else None,
         "damage": frame.damage.value if frame is not None and frame.damage is not None else None,
         "noise_before": frame.skipped if frame is not None else 0,
+    }
+
+
+def _placed_by_itself(row: Row) -> dict[str, int | None]:
+    """What the columns of a table say of each of its rows, of a row that stands in place of one."""
+    event = row.event
+    return {"no": row.no, "t": event.start, "start_ns": event.start, "end_ns": event.end} | {
+        "len": len(event.octets),
+        "tx": row.placement.tx if row.placement else None,
     }
 
 

@@ -25,7 +25,7 @@ class FeedStatus:
     `follows`: the recording that rows are read from while another process writes it; "": they are from a port.
     `searching`: with which settings a search listens at the moment, empty when there is none.
     `second`: a second protocol on the bus, by its registry name, where the whole file was read; `foreign`: how many
-    frames of it.
+    frames of it, in rows from `since` on.
     """
 
     port: str
@@ -46,6 +46,7 @@ class FeedStatus:
     follows: str = ""
     second: str = ""
     foreign: int = 0
+    since: int = 0
 
     @property
     def in_file(self) -> bool:

@@ -30,6 +30,7 @@ from sniff.engine.capture import Capture, CaptureError
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.packed_table import PackedTable
 from sniff.engine.session import LineEvent, Session
+from sniff.engine.table import Table
 from sniff.formats.files import watched
 from sniff.formats.mark_file import MarksBeside, mark_event, mark_file, place_of
 
@@ -64,6 +65,8 @@ class FileFeed:
         self._store = Store(session, dissector_for(session), rows, devices, judge_later=True, ear=ear)
         self._foreign = ForeignFrames(session)
         self._second: tuple[str, int] = "", 0
+        self._unasked: list[Table] = []  # for a second protocol
+        self._reads_at_once = True
         self._asking: threading.Timer | None = None
         self._pieces = self._read(session)
         self._thread: threading.Thread | None = None
@@ -147,6 +150,7 @@ class FileFeed:
                 self._take(piece)
                 if time.perf_counter() >= until or not self._reading:
                     break
+        self._reads_at_once = False
         if self._reading:
             sys.setswitchinterval(SWITCHING)
             self._thread = threading.Thread(target=self._go_on, name="reading", daemon=True)
@@ -170,7 +174,9 @@ class FileFeed:
                 if isinstance(item, LineEvent):
                     yield item
                     continue
-                self._foreign.add_table(item)
+                self._unasked.append(item)
+                if not self._reads_at_once:
+                    self._see()
                 prepared = prepare(item, pack=len(item) >= PACKED_ROWS)
                 if before is not None:
                     look_ahead(before, prepared.packed)
@@ -183,8 +189,15 @@ class FileFeed:
         except Exception as error:  # of the thread: whoever polls raises it
             yield error
 
+    def _see(self) -> None:
+        """Look for a second protocol; of a thread, for all protocols have to be imported when it is asked for."""
+        unasked, self._unasked = self._unasked, []
+        for table in unasked:
+            self._foreign.add_table(table)
+
     def _ask_for_second(self) -> None:
-        """Whether there is a second protocol; of a thread, for all protocols have to be imported for it."""
+        """Whether there is a second protocol."""
+        self._see()
         told = self._foreign.told()
         if told is not None:
             self._second = told[0].name, told[1]
@@ -204,6 +217,7 @@ class FileFeed:
             reading=self._reading,
             second=self._second[0],
             foreign=self._second[1],
+            since=self._foreign.since,
             read=min(0.99, self._progress.octets / max(1, self._size)) if self._reading else 1.0,
             judged=1.0 if store.all_judged and not self._reading else min(0.99, store.judged / max(1, store.last_no)),
         )

@@ -19,10 +19,10 @@ HELD = 16
 
 
 class ForeignRows:
-    """`second`: the protocol whose frames are looked for in what the first leaves."""
+    """`second`: the protocol whose frames are looked for in what the first leaves, from row `since` on."""
 
-    def __init__(self, store: Store, second: str) -> None:
-        self._store = store
+    def __init__(self, store: Store, second: str, since: int = 0) -> None:
+        self._store, self._since = store, since
         self.second: Dissector = registry.get(second)
         self._held: OrderedDict[int, tuple[int, dict[int, list[Row]]]] = OrderedDict()  # with the last row it was of
 
@@ -42,7 +42,9 @@ class ForeignRows:
         rows = (store.by_no(no) for no in range(max(first, store.first_no), last + 1))
         judged = (JudgedRow(row, None) for row in rows if row is not None)
         found: dict[int, list[Row]] = {}
-        both = of_both(judged, store.session, self.second.name, lambda row, tx: False, lambda row, tx: True)
+        both = of_both(
+            judged, store.session, self.second.name, lambda row, tx: False, lambda row, tx: True, self._since
+        )
         for item, _ in both:
             found.setdefault(item.row.no, []).append(item.row)
         return found

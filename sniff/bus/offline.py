@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from dissectors.profiles import Devices
 from sniff.analysis.point_reader import PointReader
+from sniff.bus.second_proof import SecondProof, proving
 from sniff.engine.capture import CaptureError
 from sniff.engine.engine import Output
 from sniff.engine.follow_settings import SessionEngine, dissector_for
@@ -71,16 +72,21 @@ def survey(capture: ReadSource, session: Session, *observers: Observer, referenc
 
 
 def settled(
-    items: Iterable[Item], session: Session, devices: Devices | None = None, wanted: Wanted | None = None
+    items: Iterable[Item],
+    session: Session,
+    devices: Devices | None = None,
+    wanted: Wanted | None = None,
+    proof: SecondProof | None = None,
 ) -> Iterator[JudgedRow]:
     """Run items through a new engine; give the rows that are `wanted` (by default all) with their verdicts.
 
-    With `devices`, also what they mean to them. Raises CaptureError as `outputs` does.
+    With `devices`, also what they mean to them; with `proof`, each when it is known whether it may be a second
+    protocol's. Raises CaptureError as `outputs` does.
     """
     points = PointReader(dissector_for(session), devices) if devices is not None else None
     settling = VerdictJoin(points, wanted)
     try:
-        for output in outputs(items, session):
+        for output in proving(outputs(items, session), proof):
             if isinstance(output, Output):
                 if points is not None:
                     points.remember(output)
@@ -92,15 +98,19 @@ def settled(
 
 
 def settled_in_bulk(
-    capture: ReadSource, session: Session, devices: Devices | None = None, wanted: Wanted | None = None
+    capture: ReadSource,
+    session: Session,
+    devices: Devices | None = None,
+    wanted: Wanted | None = None,
+    proof: SecondProof | None = None,
 ) -> Iterator[JudgedRow]:
     """The same as `settled`, by way of tables: rows that a filter leaves out never become objects, unless something
     is to be said of devices."""
     from sniff.engine.table_join import TableJoin
 
     if devices is None:
-        return _joined(capture, session, TableJoin(wanted))
-    return _joined(capture, session, _Spoken(PointReader(dissector_for(session), devices), wanted))
+        return _joined(capture, session, TableJoin(wanted), proof)
+    return _joined(capture, session, _Spoken(PointReader(dissector_for(session), devices), wanted), proof)
 
 
 class _Joining(Protocol[Given]):
@@ -133,19 +143,21 @@ class _Spoken:
         yield from self._settling.flush()
 
 
-def settled_columns(capture: ReadSource, session: Session) -> Iterator[SettledRows]:
+def settled_columns(capture: ReadSource, session: Session, proof: SecondProof | None = None) -> Iterator[SettledRows]:
     """All rows of `settled`, as columns. Raises CaptureError as `settled` does."""
     from sniff.engine.column_join import ColumnJoin
 
-    return _joined(capture, session, ColumnJoin())
+    return _joined(capture, session, ColumnJoin(), proof)
 
 
-def _joined(capture: ReadSource, session: Session, joining: _Joining[Given]) -> Iterator[Given]:
+def _joined(
+    capture: ReadSource, session: Session, joining: _Joining[Given], proof: SecondProof | None
+) -> Iterator[Given]:
     """What a join gives of all tables of a capture; raises what the capture does, when all before it was given."""
     from sniff.engine.bulk import tables
 
     try:
-        for item in tables(capture.blocks(), session):
+        for item in proving(tables(capture.blocks(), session), proof):
             if not isinstance(item, LineEvent):
                 yield from joining.add(item)
     except CaptureError:

@@ -21,19 +21,20 @@ FORMULA = ("=", "+", "-", "@", "\t", "\r")
 """How a cell begins that a spreadsheet runs."""
 
 
-def save(path: Path, items: Iterable[JudgedRow], dissector: Dissector, session: Session) -> int:
-    """Write rows, what `show` gives of them; how many they are. Raises CaptureError."""
+def save(path: Path, items: Iterable[tuple[JudgedRow, Dissector]], session: Session) -> int:
+    """Write rows, what `show` gives of them, each with the dissector of its protocol; how many they are. Raises
+    CaptureError."""
     suffix = path.suffix.lower()
     if suffix == ".parquet":
         with parquet.ParquetWriter(path, row_words.COLUMNS) as columns:
-            return _add_all(columns, (row_words.typed(item, dissector, session) for item in items))
+            return _add_all(columns, (row_words.typed(*item, session) for item in items))
     if suffix == ".csv":
         with CsvFile(path, row_words.JSON_KEYS) as table:
-            given = (row_words.to_json(item, dissector, session).values() for item in items)
+            given = (row_words.to_json(*item, session).values() for item in items)
             return _add_all(table, ([text_cell(value) for value in values] for values in given))
     write = row_words.json_line if suffix in (".json", ".jsonl") else row_words.text_line
     with TextFile(path) as text:
-        return _add_all(text, ((write(item, dissector, session),) for item in items))
+        return _add_all(text, ((write(*item, session),) for item in items))
 
 
 def _add_all(table: parquet.ParquetWriter | TextFile, rows: Iterable[Sequence[Any]]) -> int:

@@ -4,100 +4,115 @@ A stretch of such octets, between two good frames of the first protocol, is read
 of it spans one of the first, and each octet stays in one row. Frames of the second take the numbers of the rows in
 which they begin. They belong to no exchange: who asked whom cannot be told where others spoke between.
 
-That there is a second protocol is told by the first octets that are left (`with_second`), whoever named the first: the
-octets, the file or the user. On a bus with one protocol nothing that is left makes good frames of another.
+That there is a second protocol, and from which row on, is told by what is left (`second_proof.py`), whoever named the
+first: the octets, the file or the user. On a bus with one protocol nothing that is left makes good frames of another.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections import deque
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from itertools import accumulate
-
-import numpy as np
 
 from dissectors import registry
 from dissectors.frame import Chunk, Frame, Noise, Place, Reason
 from dissectors.line import NS_PER_S, Timing
 from dissectors.manifest import Dissector
-from sniff.analysis.rest_evidence import second_in
 from sniff.bus.offline import ReadSource, outputs
+from sniff.bus.second_proof import Proving, SecondProof, is_left, left_places
+from sniff.engine.bulk import tables
 from sniff.engine.capture import CaptureError
 from sniff.engine.engine import Engine, Output, Row
 from sniff.engine.follow_settings import dissector_for
-from sniff.engine.session import SECOND_NOTE, LineEvent, Session
+from sniff.engine.session import LineEvent, Session
 from sniff.engine.table import Table, rows_at
 from sniff.engine.verdict_join import JudgedRow, Wanted
 
 MOST = 1 << 16
 """Octets of a stretch that are held."""
 
-SAMPLE = 6000
-"""Octets which the first protocol leaves that are asked for a second one."""
+FOREIGN, REST = -1, -2
+"""What a part of a stretch is instead of a row of it: a frame of the second protocol, a piece of a row."""
 
-LOOKED_AT = 1 << 20
-"""Octets of a capture, at least, among which they are looked for before any row is shown."""
+Part = tuple[Row, int]
+"""A row in place of those of a stretch, and the number of the row of the stretch that it is; FOREIGN, REST."""
 
 Judged = tuple[JudgedRow, Dissector]
 
 
-# -- whether there is one ----------------------------------------------------------------------------------------
+# -- stretches of what the first protocol leaves -------------------------------------------------------------------
 
 
-def with_second(capture: ReadSource, session: Session, reference: bool = False) -> Session:
-    """The session with the second protocol of a bus by name (SECOND_NOTE), where octets that the first leaves prove
-    one. Reads the begin of the capture; `reference`: row by row, for comparison."""
-    if SECOND_NOTE in session.notes:
-        return session
-    name = _second_in(_left_at_first(capture, session, reference), session)
-    return session if name is None else replace(session, notes={**session.notes, SECOND_NOTE: name})
+class Stretch:
+    """Rows that follow one another, of which the first protocol makes nothing good."""
+
+    def __init__(self, session: Session, second: str) -> None:
+        self.rows: list[Row] = []
+        self._second = registry.get(second)
+        self._timing = Timing(session.line, session.adapter.latency)
+        self._octets = 0
+
+    def add(self, row: Row) -> list[Part]:
+        """Take the row that follows; of a stretch that grows too long give what is before its last frame's end."""
+        self.rows.append(row)
+        self._octets += len(row.event.octets)
+        return self._given(False) if self._octets >= MOST else []
+
+    def end(self) -> list[Part]:
+        """Give all that is left; what follows is another stretch."""
+        return self._given(True) if self.rows else []
+
+    def _given(self, whole: bool) -> list[Part]:
+        frames = self._frames()
+        many = len(self.rows)
+        if frames and not whole:
+            ended = frames[-1][0] + len(frames[-1][1].event.octets)
+            many = 1 + sum(end < ended for end in accumulate(len(row.event.octets) for row in self.rows))
+            many = many if 2 * many > len(self.rows) else len(self.rows)
+        given = list(_parts(self.rows[:many], frames))
+        self.rows = self.rows[many:]
+        self._octets = sum(len(row.event.octets) for row in self.rows)
+        return given
+
+    def _frames(self) -> list[tuple[int, Row]]:
+        """Good frames of the second protocol, and where in the stretch each begins."""
+        engine = Engine(self._second, self._timing, pairing=False)
+        made = [engine.feed(Chunk(row.event.end, row.event.octets)) for row in self.rows]
+        made.append(engine.advance(self.rows[-1].event.end + 10 * NS_PER_S))
+        made.append(engine.close())
+        rows = [row for output in made for row in output.rows]
+        begins = accumulate((len(row.event.octets) for row in rows), initial=0)
+        return [
+            (begin, row)
+            for begin, row in zip(begins, rows, strict=False)
+            if isinstance(row.event, Frame) and row.event.ok
+        ]
 
 
-def _second_in(left: Sequence[Row], session: Session) -> str | None:
-    """The protocol that makes good frames of rows which the first one leaves."""
-    if session.unknown or session.protocol not in registry.names():  # a relative on networks has streams
-        return None
-    others = [one.name for one in registry.usable() if one.name != session.protocol]
-    found = second_in([Chunk(row.event.end, row.event.octets[:SAMPLE]) for row in left], session, others)
-    return None if found is None else found[0]
+def _parts(rows: list[Row], frames: list[tuple[int, Row]]) -> Iterator[Part]:
+    """The rows of a stretch, good frames of the second protocol in place of what they cover."""
+    waiting = deque(frames)
+    begin = taken = 0  # of the row; octets up to there are in a frame that was given
+    for place, row in enumerate(rows):
+        end = begin + len(row.event.octets)
+        while waiting and waiting[0][0] < end:
+            at, foreign = waiting.popleft()
+            yield from _rest(row, place, max(begin, taken) - begin, at - begin)
+            yield replace(foreign, no=row.no), FOREIGN
+            taken = at + len(foreign.event.octets)
+        yield from _rest(row, place, max(begin, taken) - begin, end - begin)
+        begin = end
 
 
-def _left_at_first(capture: ReadSource, session: Session, reference: bool) -> list[Row]:
-    """What the first protocol leaves of the begin of a capture."""
-    left: list[Row] = []
-    octets = seen = 0
-    given = _left_by_reference(capture, session) if reference else _left_of_tables(capture, session)
-    try:
-        for passed, rows in given:
-            seen += passed
-            for row in rows:
-                if octets >= SAMPLE:
-                    return left
-                left.append(row)
-                octets += len(row.event.octets)
-            if seen >= LOOKED_AT:
-                break
-    except CaptureError:
-        pass  # whoever reads on is told
-    return left
-
-
-def _left_of_tables(capture: ReadSource, session: Session) -> Iterator[tuple[int, Iterable[Row]]]:
-    from sniff.engine.bulk import tables
-
-    for table in tables(capture.blocks(), session):
-        if isinstance(table, Table):
-            yield len(table.octets), _left_rows(table)
-
-
-def _left_by_reference(capture: ReadSource, session: Session) -> Iterator[tuple[int, Iterable[Row]]]:
-    for output in outputs(capture.items(), session):
-        if isinstance(output, Output):
-            yield sum(len(row.event.octets) for row in output.rows), filter(_is_left, output.rows)
-
-
-def _left_rows(table: Table) -> list[Row]:
-    return rows_at(table, np.flatnonzero(~table.good & table.heard).tolist())
+def _rest(row: Row, place: int, low: int, high: int) -> Iterator[Part]:
+    """Octets `low` … `high` of a row: the row, or a part of it as noise."""
+    event = row.event
+    if low < high and (low, high) == (0, len(event.octets)):
+        yield row, place
+    elif low < high:
+        where, reason = (event.place, event.reason) if isinstance(event, Noise) else (Place.BETWEEN, Reason.NO_FRAME)
+        yield Row(row.no, Noise(event.octets[low:high], event.start, event.end, where, reason)), REST
 
 
 # -- how many ----------------------------------------------------------------------------------------------------
@@ -108,140 +123,173 @@ class ForeignFrames:
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        self._name = session.notes.get(SECOND_NOTE)
-        self._sample: list[Row] | None = [] if self._name is None else None  # until it is asked
-        self._sampled = 0
-        self._held: list[Row] = []
-        self._octets = self._counted = 0
+        self._proof = SecondProof(session)
+        self._proving: Proving[Output | Table] = Proving(self._proof)
+        self._stretch: Stretch | None = None
+        self._counted = 0
+
+    @property
+    def since(self) -> int:
+        """Number of the first row that may be one of them."""
+        return self._proof.since
 
     def add(self, output: Output) -> None:
         """Take what an engine gave."""
-        for row in filter(_is_left, output.rows):
-            self._see(row)
+        self._take(self._proving.add(output))
 
     def add_table(self, table: Table) -> None:
         """Take the same as columns."""
-        if self._sample is not None or self._name is not None:
-            for row in _left_rows(table):
-                self._see(row)
+        self._take(self._proving.add(table))
 
     def add_line_event(self, event: LineEvent) -> None:
         """It is no frame."""
 
     def told(self) -> tuple[Dissector, int] | None:
         """The protocol and how many frames of it, so far; None where the bus has one protocol."""
-        self._ask()
-        self._flush()
-        return None if self._name not in registry.names() else (registry.get(self._name), self._counted)
+        self._take(self._proving.close())
+        if self._stretch is not None:
+            self._count(self._stretch.end())
+        name = self._proof.name
+        return None if name not in registry.names() else (registry.get(name), self._counted)
 
-    def _see(self, row: Row) -> None:
-        if self._sample is None:
-            self._count(row)
+    def _take(self, items: Iterable[Output | Table]) -> None:
+        if self._proof.name not in registry.names():
             return
-        self._sample.append(row)
-        self._sampled += len(row.event.octets)
-        if self._sampled >= SAMPLE:
-            self._ask()
+        stretch = self._stretch = self._stretch or Stretch(self._session, self._proof.name)
+        for row in (row for item in items for row in _left_rows(item)):
+            if row.no < self._proof.since:
+                continue
+            if stretch.rows and stretch.rows[-1].no != row.no - 1:
+                self._count(stretch.end())
+            self._count(stretch.add(row))
 
-    def _ask(self) -> None:
-        sample, self._sample = self._sample, None
-        if sample is not None:
-            self._name = _second_in(sample, self._session)
-            for row in sample:
-                self._count(row)
+    def _count(self, parts: list[Part]) -> None:
+        self._counted += sum(kind == FOREIGN for _, kind in parts)
 
-    def _count(self, row: Row) -> None:
-        if self._octets >= MOST or (self._held and row.no != self._held[-1].no + 1):
-            self._flush()
-        self._held.append(row)
-        self._octets += len(row.event.octets)
 
-    def _flush(self) -> None:
-        if self._held and self._name in registry.names():
-            self._counted += len(_frames(self._held, self._session, registry.get(self._name)))
-        self._held, self._octets = [], 0
+def _left_rows(item: Output | Table) -> Iterable[Row]:
+    return filter(is_left, item.rows) if isinstance(item, Output) else rows_at(item, left_places(item).tolist())
+
+
+def proven(capture: ReadSource, session: Session, reference: bool = False) -> SecondProof:
+    """Whether a whole capture has a second protocol; for those who must know before any row is shown."""
+    proof = SecondProof(session)
+    given = outputs(capture.items(), session) if reference else tables(capture.blocks(), session)
+    try:
+        for item in given:
+            proof.see(item)
+            if proof.name:
+                return proof
+    except CaptureError:
+        pass  # whoever reads on is told
+    proof.close()
+    return proof
 
 
 # -- which they are ----------------------------------------------------------------------------------------------
 
 
 def of_both(
-    items: Iterator[JudgedRow], session: Session, second: str, wanted: Wanted, of_second: Wanted | None
+    items: Iterable[JudgedRow],
+    session: Session,
+    second: str,
+    wanted: Wanted,
+    of_second: Wanted | None,
+    since: int = 0,
 ) -> Iterator[Judged]:
-    """All rows with the dissector of each, as far as they are wanted; `of_second` None: none of the second protocol."""
+    """All rows with the dissector of each, as far as they are wanted; `of_second` None: none of the second protocol.
+    `since`: the first row that may be one of its frames; none before is given."""
     first, other = dissector_for(session), registry.get(second)
-    for item, dissector in _rows(items, session, first, other):
+    for item, dissector in _rows(items, session, first, other, since):
         accepts = wanted if dissector is first else of_second
-        if accepts is not None and accepts(item.row, item.transaction):
+        if accepts is not None and accepts(item.row, item.transaction) and item.row.no >= since:
             yield item, dissector
 
 
-def _rows(items: Iterator[JudgedRow], session: Session, first: Dissector, second: Dissector) -> Iterator[Judged]:
-    held: list[JudgedRow] = []
-    octets = 0
+def _rows(
+    items: Iterable[JudgedRow], session: Session, first: Dissector, second: Dissector, since: int
+) -> Iterator[Judged]:
+    stretch, held = Stretch(session, second.name), list[JudgedRow]()
+
+    def judged(parts: list[Part]) -> Iterator[Judged]:
+        for row, kind in parts:
+            yield held[kind] if kind >= 0 else JudgedRow(row, None), second if kind == FOREIGN else first
+        del held[: len(held) - len(stretch.rows)]
+
     for item in items:
-        if _is_left(item.row):
+        if is_left(item.row) and item.row.no >= since:
             held.append(item)
-            octets += len(item.row.event.octets)
-            if octets < MOST:
-                continue
-            item_after = None
+            yield from judged(stretch.add(item.row))
         else:
-            item_after = item
-        yield from _told(held, session, first, second)
-        held, octets = [], 0
-        if item_after is not None:
-            yield item_after, first
-    yield from _told(held, session, first, second)
+            yield from judged(stretch.end())
+            yield item, first
+    yield from judged(stretch.end())
 
 
-def _is_left(row: Row) -> bool:
-    """Whether the first protocol makes nothing good of a row."""
-    return row.searched is None and (isinstance(row.event, Noise) or not row.event.ok)
+def with_foreign(
+    items: Iterable[Table | LineEvent], session: Session, proof: SecondProof
+) -> Iterator[tuple[Table, Mapping[int, list[Row]]]]:
+    """Tables, each with what stands in place of some of its rows: place in the table → rows of that number. `items` as
+    `proving` gives them; raises what they raise, when all before it was given."""
+    placing = _Placing(session)
+    try:
+        for item in items:
+            if not isinstance(item, LineEvent):
+                yield from placing.add(item, proof)
+    except CaptureError:
+        yield from placing.close()
+        raise
+    yield from placing.close()
 
 
-def _told(held: list[JudgedRow], session: Session, first: Dissector, second: Dissector) -> Iterator[Judged]:
-    """The rows of a stretch, good frames of the second protocol in place of what they cover."""
-    frames = _frames([item.row for item in held], session, second) if held else []
-    at = 0
-    for begin, row in frames:
-        yield from ((item, first) for item in _between(held, at, begin))
-        number = next(item.row.no for item, end in zip(held, _ends(held), strict=True) if begin < end)
-        yield JudgedRow(replace(row, no=number), None), second
-        at = begin + len(row.event.octets)
-    yield from ((item, first) for item in _between(held, at, 1 << 62))
+class _Placing:
+    """Tables that wait for the end of a stretch that is in several of them."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self._stretch: Stretch | None = None
+        self._last = 0  # number of the row that the stretch took last
+        self._waiting: deque[tuple[Table, dict[int, list[Row]]]] = deque()
+
+    def add(self, table: Table, proof: SecondProof) -> Iterator[tuple[Table, Mapping[int, list[Row]]]]:
+        """Take the table that follows; give those that are known."""
+        if proof.name not in registry.names():
+            yield table, {}
+            return
+        stretch = self._stretch = self._stretch or Stretch(self._session, proof.name)
+        self._waiting.append((table, {}))
+        for row in _left_rows(table):
+            if row.no < proof.since:
+                continue
+            if stretch.rows and self._last != row.no - 1:
+                self._put(stretch.end())
+            self._last = row.no
+            self._put(stretch.add(row))
+        if self._last != table.first + len(table) - 1:
+            self._put(stretch.end())
+        while self._waiting and not (stretch.rows and stretch.rows[0].no < _end(self._waiting[0][0])):
+            yield self._waiting.popleft()
+
+    def close(self) -> Iterator[tuple[Table, Mapping[int, list[Row]]]]:
+        """Give all that is left."""
+        if self._stretch is not None:
+            self._put(self._stretch.end())
+        yield from self._waiting
+        self._waiting.clear()
+
+    def _put(self, parts: list[Part]) -> None:
+        """Note what stands in place of the rows that a stretch gave."""
+        if not parts or all(kind >= 0 for _, kind in parts):
+            return
+        rows = self._stretch.rows if self._stretch is not None else []
+        placed: dict[int, list[Row]] = {no: [] for no in range(parts[0][0].no, rows[0].no if rows else self._last + 1)}
+        for row, _ in parts:
+            placed[row.no].append(row)
+        changed = {row.no for row, kind in parts if kind < 0} | {no for no, given in placed.items() if not given}
+        for table, replaced in self._waiting:
+            replaced |= {no - table.first: placed[no] for no in changed if table.first <= no < _end(table)}
 
 
-def _frames(held: list[Row], session: Session, second: Dissector) -> list[tuple[int, Row]]:
-    """Good frames of the second protocol, and where in the stretch each begins."""
-    engine = Engine(second, Timing(session.line, session.adapter.latency), pairing=False)
-    outputs = [engine.feed(Chunk(row.event.end, row.event.octets)) for row in held]
-    outputs.append(engine.advance(held[-1].event.end + 10 * NS_PER_S))
-    outputs.append(engine.close())
-    rows = [row for output in outputs for row in output.rows]
-    begins = accumulate((len(row.event.octets) for row in rows), initial=0)
-    return [
-        (begin, row) for begin, row in zip(begins, rows, strict=False) if isinstance(row.event, Frame) and row.event.ok
-    ]
-
-
-def _ends(held: list[JudgedRow]) -> Iterator[int]:
-    """Where in the stretch each row ends."""
-    return accumulate(len(item.row.event.octets) for item in held)
-
-
-def _between(held: list[JudgedRow], begin: int, end: int) -> Iterator[JudgedRow]:
-    """The rows of a part of the stretch; of one that is only partly in it what is left, as noise."""
-    for item, upto in zip(held, _ends(held), strict=True):
-        event = item.row.event
-        since = upto - len(event.octets)
-        low, high = max(begin, since), min(end, upto)
-        if low >= high:
-            continue
-        if (low, high) == (since, upto):
-            yield item
-            continue
-        octets = event.octets[low - since : high - since]
-        place, reason = (event.place, event.reason) if isinstance(event, Noise) else (Place.BETWEEN, Reason.NO_FRAME)
-        rest = Noise(octets, event.start, event.end, place, reason)
-        yield JudgedRow(Row(item.row.no, rest), None)
+def _end(table: Table) -> int:
+    """The number of the row behind a table."""
+    return table.first + len(table)

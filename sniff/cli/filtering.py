@@ -18,6 +18,7 @@ from dissectors.profiles import Devices
 from dissectors.tracker import Transaction
 from sniff.analysis.sanitizing import sanitized
 from sniff.bus.offline import ReadSource, survey
+from sniff.bus.second_proof import SecondProof
 from sniff.cli import USAGE, Failure, arguments
 from sniff.cli.progress import Watched
 from sniff.cli.tables import safe_cell
@@ -51,6 +52,25 @@ def add_help_fields(parser: argparse.ArgumentParser) -> None:
         metavar="PROTOCOL",
         help="list every field with its type and its words, and end",
     )
+
+
+def filter_of_both(
+    args: argparse.Namespace, capture: ReadSource, session: Session, devices: Devices | None = None
+) -> tuple[SecondProof, Filter]:
+    """What -Y says, for those who list frames of a second protocol too, and what is known of one. Where it asks for
+    what frames of the first cannot have, the whole capture is looked at for a second one first."""
+    proof = SecondProof(session)
+    try:
+        compile_filter(args.filter, dissector_for(session), Scope(session.started, devices or Devices()))
+    except OfOthers:
+        from sniff.bus.second_protocol import proven
+
+        proof = proven(capture, session, args.reference)
+        if proof.name:
+            session = replace(session, notes={**session.notes, SECOND_NOTE: proof.name})
+    except FilterError:
+        pass  # said below
+    return proof, filter_of(args, capture, session, devices)
 
 
 def filter_of(

@@ -10,14 +10,12 @@ from pathlib import Path
 from dissectors.findings import counted
 from dissectors.profiles import Devices
 from sniff.analysis.sanitizing import sanitized
-from sniff.bus.offline import settled, settled_in_bulk
 from sniff.bus.row_files import save
+from sniff.bus.second_protocol import Judged
 from sniff.cli import UNREADABLE, USAGE, Failure, filtering, writing
-from sniff.cli.progress import Watched
+from sniff.cli.listed_rows import ListedRows
 from sniff.engine.capture import Capture, CaptureError
-from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import Session
-from sniff.engine.verdict_join import JudgedRow
 from sniff.formats import parquet
 
 
@@ -31,15 +29,12 @@ def write(args: argparse.Namespace, capture: Capture, session: Session, devices:
     if is_parquet and not parquet.available():
         raise Failure(f"{target}: needs polars: pip install 'sniff485[parquet]'", USAGE)
     try:
-        count = save(target, _rows(args, capture, session, devices), dissector_for(session), session)
+        count = save(target, _rows(args, capture, session, devices), session)
     except CaptureError as error:
         raise Failure(str(error), UNREADABLE) from None
     print(f"{sanitized(target)}: {counted(count, 'row')}, frames and what was between them", file=sys.stderr)
 
 
-def _rows(args: argparse.Namespace, capture: Capture, session: Session, devices: Devices) -> Iterator[JudgedRow]:
-    watched, known = Watched(capture), devices or None
-    wanted = filtering.filter_of(args, capture, session, devices) if args.filter else None
-    if args.reference:
-        return settled(watched.items(), session, known, wanted)
-    return settled_in_bulk(watched, session, known, wanted)
+def _rows(args: argparse.Namespace, capture: Capture, session: Session, devices: Devices) -> Iterator[Judged]:
+    proof, wanted = filtering.filter_of_both(args, capture, session, devices)
+    return ListedRows(args, capture, session, proof, wanted).all(devices or None)

@@ -10,21 +10,20 @@ import sys
 from collections.abc import Callable, Iterable, Iterator
 from typing import TYPE_CHECKING
 
-from dissectors import registry
 from dissectors.manifest import Dissector
-from dissectors.profiles import Devices
 from sniff.analysis.packet_tree import Field
 from sniff.analysis.row_tree import tree_of
 from sniff.bus import row_words as rows
-from sniff.bus.offline import settled, settled_columns, settled_in_bulk
-from sniff.bus.second_protocol import of_both, with_second
+from sniff.bus.offline import settled_columns
+from sniff.bus.second_proof import SecondProof
 from sniff.cli import USAGE, Failure, arguments, filtering, standard_streams, writing
+from sniff.cli.listed_rows import ListedRows
 from sniff.cli.progress import Watched
 from sniff.cli.tables import Cell, plain_cell
 from sniff.engine.capture import Capture
 from sniff.engine.follow_settings import dissector_for
-from sniff.engine.session import SECOND_NOTE, Session
-from sniff.engine.verdict_join import JudgedRow, Wanted
+from sniff.engine.session import Session
+from sniff.engine.verdict_join import JudgedRow
 from sniff.filter import Filter
 from sniff.filter.fields import types_of
 from sniff.formats.parquet import ParquetWriter
@@ -76,9 +75,8 @@ def _show_all(args: argparse.Namespace, table: ParquetWriter | None) -> int:
     left = args.count
     for path, capture in arguments.open_captures(args.files):
         session = arguments.settings_of(args, capture.session, path)
-        session = with_second(capture, session, args.reference)
         devices = arguments.noted_devices(args, session)
-        wanted = filtering.filter_of(args, capture, session, devices)
+        proof, wanted = filtering.filter_of_both(args, capture, session, devices)
         if args.explain:
             print(wanted.explain())
             continue
@@ -87,17 +85,13 @@ def _show_all(args: argparse.Namespace, table: ParquetWriter | None) -> int:
         )  # then every register is named, with a profile or without
         spoken = devices if named or (devices and (not args.table or "text" in args.names)) else None
         ours = filtering.FieldCells(args.names, session, devices)
-        second = session.notes.get(SECOND_NOTE, "")
-        if second and second in registry.names():
-            accepted = ours.noting(wanted), filtering.of_second(args, session, second)
-            rows_of_both = of_both(_settled(args, capture, session, spoken, None), session, second, *accepted)
-            left = _show(args, rows_of_both, session, ours, left, table)
-        elif args.reference or spoken or named or ours or args.hex:
-            items = _settled(args, capture, session, spoken, ours.noting(wanted))
-            dissector = dissector_for(session)
-            left = _show(args, ((item, dissector) for item in items), session, ours, left, table)
+        listed = ListedRows(args, capture, session, proof, wanted, ours.noting)
+        if args.reference or spoken or named or ours or args.hex or proof.name:
+            left = _show(args, listed.all(spoken), session, ours, left, table)
         else:
-            left = _show_in_bulk(args, capture, session, wanted, left, table)
+            left = _show_in_bulk(args, capture, session, proof, wanted, left, table)
+            if proof.name and left != 0:
+                left = _show(args, listed.of_both(spoken), session, ours, left, table)
         writing.say_incomplete(path, capture)
         if left == 0:
             break
@@ -108,15 +102,6 @@ def _by_request(names: list[str], session: Session) -> bool:
     """Whether answers have any of these fields by their request."""
     types = types_of(dissector_for(session))
     return any(types[name].by_request for name in names if name in types)
-
-
-def _settled(
-    args: argparse.Namespace, capture: Capture, session: Session, devices: Devices | None, wanted: Wanted | None
-) -> Iterator[JudgedRow]:
-    watched = Watched(capture, prints=True)
-    if args.reference:
-        return settled(watched.items(), session, devices, wanted)
-    return settled_in_bulk(watched, session, devices, wanted)
 
 
 def _show(
@@ -156,21 +141,25 @@ def _show_in_bulk(
     args: argparse.Namespace,
     capture: Capture,
     session: Session,
+    proof: SecondProof,
     wanted: Filter,
     left: int | None,
     table: ParquetWriter | None,
 ) -> int | None:
+    """The rows before the first that may be one of a second protocol."""
     from sniff.filter.choosing import chosen
 
     listed = _listed(args, dissector_for(session), session, table)
-    for settled_rows in settled_columns(Watched(capture, prints=True), session) if left != 0 else ():
-        places = chosen(settled_rows, wanted)
+    for settled_rows in settled_columns(Watched(capture, prints=True), session, proof) if left != 0 else ():
+        places, first = chosen(settled_rows, wanted), settled_rows.table.first
+        if proof.name:
+            places = places[places + first < proof.since]
         if left is not None:
             places = places[:left]
             left -= len(places)
         if len(places):
             listed(settled_rows, places)
-        if left == 0:
+        if left == 0 or (proof.name and first + settled_rows.end > proof.since):
             break
     return left
 

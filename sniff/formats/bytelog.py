@@ -1,9 +1,9 @@
 """Byte logs of other tools, read line by line: what a person finds on his disk from before he had this program.
 
 A line is taken apart into a time, a direction and octets, wherever they stand and however they are written
-(`log_clock.py`, `log_octets.py`, `log_shapes.py` list how; `log_lines.py` does it). What the lines of one log mean, of
-which some repeat others, is told by its first lines together (`log_plan.py`). Tables (CSV) are read by their headings
-(`octet_table.py`).
+(`log_clock.py`, `log_spellings.py`, `log_shapes.py` list how; `log_lines.py` does it). What the lines of one log mean,
+of which some repeat others, is told by its first lines together (`log_plan.py`). Tables (CSV) are read by their
+headings (`octet_table.py`).
 
 Neither line settings nor protocol are in such a file. Times of logs are those of another program, taken as the end of
 the last octet of a line; `FOREIGN_LATENCY` is assumed, or what the clock of the log leaves open if that is more. Where
@@ -34,7 +34,7 @@ from sniff.formats.log_assembly import Assembly
 from sniff.formats.log_lines import Kind, pieces
 from sniff.formats.log_margin import plain_signs
 from sniff.formats.log_plan import LOOKED_AT, LOOKED_AT_CHARACTERS, Plan, plan_of
-from sniff.formats.log_shapes import REMARK
+from sniff.formats.log_shapes import DECODED, REMARK
 from sniff.formats.octet_table import TableLayout, delimiter_of, heading_of
 from sniff.formats.records import FOREIGN_LATENCY, foreign_session
 
@@ -47,6 +47,9 @@ MOST_ROWS = 5_000_000
 
 MOST_STRANGE = 0.2
 """Share of lines that are not understood, of those that tell octets, from which on a log is not read."""
+
+_SAYS = 30
+"""Lines by which such a text is told."""
 
 _RULED = re.compile(r"[\s+|:=-]*")
 """What stands between the rows of a table that is drawn."""
@@ -72,6 +75,10 @@ class ByteLog:
         self.path = path
         self._counts = _Counts()
         lines = list(_first(self._lines()))
+        start = "\n".join(lines[:_SAYS])
+        for written, what in DECODED:
+            if written.search(start) is not None:
+                raise CaptureError(f"{path}: {what}; give this program the capture itself, or `tshark -x` of it")
         self._heading = _heading(lines)
         self._plan: Plan | None = None
         if self._heading is None:
@@ -195,7 +202,7 @@ class ByteLog:
                     self._counts.text += 1
                     continue
                 try:
-                    found.append(table.chunk(row, self.session.line.char))
+                    found += table.chunks(row, self.session.line.char)
                     self._counts.data += 1
                 except ValueError:
                     self._counts.pass_over(at + rows.line_num)

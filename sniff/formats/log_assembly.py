@@ -8,12 +8,13 @@ from dataclasses import replace
 from dissectors.checksums import ends_with_crc16
 from dissectors.frame import Chunk
 from dissectors.line import MS, LineSettings
+from sniff.formats.dump_rows import FILLED_UP
 from sniff.formats.log_clock import DAY, Stamp
 from sniff.formats.log_lines import Kind, Line, head_of
 from sniff.formats.log_packets import carried
 from sniff.formats.log_plan import WINDOW, Plan
 from sniff.formats.log_shapes import Role
-from sniff.formats.octet_table import MOST
+from sniff.formats.table_cells import MOST
 
 LINE_END = 10 * MS
 """Silence that stands for the end of a line where nobody says how long it was: longer than the gap between frames at
@@ -52,6 +53,7 @@ class Assembly:
         self._held = bytearray()
         self._stamp: Stamp | None = None
         self._samples: tuple[int, int] | None = None
+        self._annotated: tuple[tuple[int, int] | None, bytes] = (None, b"")
         self._way = ""
         self._glued = False  # whether what is held follows what was given without a silence
         self._heading: Line | None = None
@@ -112,6 +114,10 @@ class Assembly:
 
     def _take_octets(self, line: Line) -> Iterator[Chunk]:
         role = self._plan.role(line, self._recent)
+        is_annotation = line.samples is not None and line.samples[1] > line.samples[0]
+        if is_annotation and (line.samples, line.octets) == self._annotated:
+            role = Role.SAME  # one line that was decoded as two
+        self._annotated = line.samples, line.octets
         if line.spelling == "one octet" and not line.tool and not self._plan.octetwise and role is not Role.SAME:
             role = role if not line.bare or self._plan.width or self._goes_on or self._held else Role.NOTHING
         if role is Role.SAME:
@@ -188,8 +194,9 @@ class Assembly:
             self._expected = offset
         self._squeezed = False
         if not line.octets:  # the offset at the end
-            if 0 < self._expected - offset < 2 and self._held:
-                del self._held[-1:]  # an odd octet was filled up to a word
+            most = len(self._row) if self._plan.margin.writing.cells in FILLED_UP else 2
+            if 0 < self._expected - offset < most and self._held:
+                del self._held[offset - self._expected :]  # what filled the last word or row up
             return
         goes_on = offset == self._expected and offset > 0 and self._is_at_once(line.stamp)
         if not goes_on and (offset != self._expected or (offset == 0 and self._held) or line.stamp is not None):

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from decimal import Decimal
 
 from dissectors.line import MS, NS_PER_S
 from sniff.formats.log_times import AS_WRITTEN, BARE, EPOCH, Order, Times, day_of
-from sniff.formats.octet_table import MOST, UNITS, seconds
+from sniff.formats.table_cells import MOST, UNITS, seconds
 
 _TIME = (
     r"(?P<clock>\d{1,2}:\d{2}:\d{2}(?:[.,]\d{1,9}|:\d{3}(?![\d:]))?)(?!\d|:[0-9A-Za-z])(?: ?(?P<half>[AaPp][Mm])\b)?"
@@ -49,6 +49,8 @@ class Clock:
     dated: bool = False
     daily: bool = False
     first: bool = False
+    unit: int = 0
+    """ns that its number counts, where nothing that stands beside it says so."""
 
 
 def _dated(match: re.Match[str], order: Order | None) -> int:
@@ -90,7 +92,7 @@ def _minutes(match: re.Match[str], _order: Order | None) -> int:
 
 
 def _dashed(match: re.Match[str], _order: Order | None) -> int:
-    hours, minutes, rest = match["dashed"].split("-")
+    hours, minutes, rest = re.split("[-.]", match["dashed"], maxsplit=2)
     return (int(hours) * 60 + int(minutes)) * 60 * NS_PER_S + seconds(rest)
 
 
@@ -123,7 +125,7 @@ CLOCKS: tuple[Clock, ...] = (
     Clock("date and time", _clock(rf"(?P<date>\d{{1,4}}[-./]\d{{1,2}}[-./]\d{{1,4}})(?:[ T_]|, ?| +){_TIME}"
                                   r"(?P<zone>Z|[+-]\d\d:?\d\d(?!\d))?"), _dated, dated=True),
     Clock("day, month by name, year and time", _clock(rf"(?P<day>\d{{1,2}})[- ]{_MONTH}[- ]"
-                                                               rf"(?P<year>\d{{4}})[ ,T]+{_TIME}"),
+                                                               rf"(?P<year>\d{{4}})[ ,T:]+{_TIME}"),
           _named_month, dated=True),
     Clock("month by name, day, time and year", _clock(rf"{_MONTH} +(?P<day>\d{{1,2}}),? {_TIME}"
                                                             r"(?: (?P<year>\d{4}))?"),
@@ -135,24 +137,32 @@ CLOCKS: tuple[Clock, ...] = (
     Clock("TAI64N", _clock(r"@(?P<tai>4[0-9a-f]{15})(?P<nano>[0-3][0-9a-f]{7})(?![0-9a-f])"), _tai, dated=True,
           first=True),
     Clock("ms since the epoch", _clock(r"(?P<number>1\d{12})(?=[\s:;,\])|])"), _scaled(MS), dated=True, first=True),
+    Clock("ns since the epoch, behind", re.compile(r"(?<=\s)(?P<number>1\d{18})$"), _scaled(1), dated=True, unit=1),
     Clock("minutes and seconds", _clock(r"(?P<clock>(?P<m>\d{1,3}):(?P<s>\d{2}\.\d{1,6}))(?![\d:])"),
           _minutes, first=True),
-    Clock("time of day with dashes", _clock(r"(?P<dashed>[0-2]?\d-[0-5]\d-[0-5]\d[.,]\d{1,6})(?!\d)"), _dashed,
+    Clock("time of day with dashes",
+          _clock(r"(?P<dashed>[0-2]?\d(?:-[0-5]\d-|\.[0-5]\d\.)[0-5]\d[.,]\d{1,6})(?![\d.])"), _dashed,
           daily=True, first=True),
     Clock("ms", _clock(r"[+]?(?P<number>-?\d{1,12}(?:\.\d{1,6})?) ?ms\b"), _scaled(MS), first=True),
     Clock("µs", _clock(r"[+]?(?P<number>-?\d{1,15}(?:\.\d{1,6})?) ?[uµμ]s\b"), _scaled(MS // 1000), first=True),
     Clock("seconds", _clock(r"[+]?(?P<number>-?\d{1,10}\.\d{1,9})(?P<said> ?s(?:ec)?\b)?(?=[\s:;,\])|])"),
           _scaled(NS_PER_S), first=True),
+    Clock("µs of trace events", re.compile(r"(?<=\"ph\": \"B\", \"ts\": )(?P<number>\d{1,15}\.\d{1,6})"),
+          _scaled(MS // 1000), unit=MS // 1000),
     Clock("a named number", re.compile(
               r"(?<![0-9A-Za-z])(?:ts|t|time|timestamp|zeit|uptime|elapsed|millis)(?:[_ ]?(?P<unit>ms|us|ns|s))?\"?"
               r"\s*[:=]\s*\"?(?P<number>-?\d{1,19}(?:\.\d{1,9})?)(?:\s?(?P<unit_behind>ms|us|µs|ns|s))?(?![0-9A-Za-z:.-])",
               re.IGNORECASE), _named),
-    Clock("ms before a bar", _clock(r"(?P<number>\d{3,10})\|"), _scaled(MS), first=True),
+    Clock("µs of usbmon", re.compile(
+              r"(?:(?<=^[0-9a-f]{16} )|(?<=^[0-9a-f]{8} ))(?P<number>\d{1,12})(?= [SCE] [BCIZ][io]:)"),
+          _scaled(MS // 1000), unit=MS // 1000),
+    Clock("ms before a bar", _clock(r"(?P<number>(?!00)\d{3,10})\|"), _scaled(MS), first=True),
 )  # fmt: skip
 """The most telling first."""
 
 _HEAD = 160
 """Characters at the begin of a line in which a time is looked for."""
+_TAIL = 80
 _ONLY_BRACKETS = re.compile(r"(?:\s*\d{1,7}\s+|[A-Z][a-z]{2}\(\d+\):)?[\s\[({<#*|+]*(?:\[?[A-Z]\]?[ ]?)?")
 
 
@@ -183,13 +193,24 @@ def stamp_of(line: str, times: Times = AS_WRITTEN) -> Stamp | None:
         assumed = not dated and (
             groups.get("said", "") is None or (groups.get("unit", "") or groups.get("unit_behind", "")) is None
         )
-        return Stamp(time, _tick(match), match.start(), match.end(), dated, clock.daily, assumed)
-    return None
+        return Stamp(time, _tick(match, clock.unit), match.start(), match.end(), dated, clock.daily, assumed)
+    return _behind(line, times) if len(line) > _HEAD and not times.unit else None
 
 
-def _tick(match: re.Match[str]) -> int:
-    """ns: the place of the last digit."""
+def _behind(line: str, times: Times) -> Stamp | None:
+    """A date and time at the end of a long line."""
+    begin = max(_HEAD, len(line) - _TAIL)
+    found = stamp_of(line[begin:], times)
+    if found is None or not found.dated:
+        return None
+    return replace(found, begin=found.begin + begin, end=found.end + begin)
+
+
+def _tick(match: re.Match[str], counted: int = 0) -> int:
+    """ns: the place of the last digit. `counted`: ns of the number."""
     found = match.groupdict()
+    if counted:
+        return max(1, counted // int(10 ** len(match["number"].partition(".")[2])))
     if "nano" in found:
         return 1
     text = found.get("clock") or found.get("dashed") or found.get("number") or ""

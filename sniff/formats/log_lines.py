@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from enum import Enum
 
+from dissectors.checksums import ends_with_crc16
 from sniff.formats.log_clock import Stamp, stamp_of
 from sniff.formats.log_octets import PAIRS_ONLY, Run, number_in, numbers_in, octets_in, whole_in
 from sniff.formats.log_shapes import COLOURS, REMARK, STAMP, WAYS, Role, shape_of
@@ -15,7 +16,7 @@ from sniff.formats.log_times import AS_WRITTEN, Times
 LONGEST = 1 << 13
 """Characters of a line that are looked at; a frame of a field bus is far shorter."""
 
-MOST_MORE = 8
+MOST_MORE = 512
 """Reads that one line tells."""
 _BETWEEN = 60
 
@@ -37,9 +38,10 @@ _ROW = re.compile(
     r"(?:[ \t]*[|:]?[ \t]+(?P<rest>[0-9A-Fa-f]{2}.*)|\s*)"
 )
 _OCTET = re.compile(r"[0-9A-Fa-f]{1,2}")
-_COLUMN = re.compile(r"\s{2,}|\t|\s*[|>]")
+_COLUMN = re.compile(r"\s-(?=\s|$)\s*|\s{2,}|\t|\s*[|>]")
 _LAST_DIGITS = re.compile(r"(?<![0-9A-Fa-f])[0-9A-Fa-f]+\Z")
 _PAIRS = re.compile(r"[0-9A-Fa-f]{2}(?:[ -][0-9A-Fa-f]{2})*")
+_SIXTEEN = re.compile(r"([0-9A-Fa-f]{2}(?: [0-9A-Fa-f]{2}){15}) (?![0-9A-Fa-f]{2}(?: |$)).{1,16}")
 _WORDS_OF_16 = re.compile(r"(?:[0-9A-Fa-f]{4} )*(?:[0-9A-Fa-f]{4}|[0-9A-Fa-f]{2})")
 
 
@@ -90,9 +92,9 @@ class Line:
 EMPTY, REMARKED = Line(Kind.EMPTY), Line(Kind.REMARK)
 
 
-def line_of(text: str, base: int = PAIRS_ONLY, rows: bool = True, times: Times = AS_WRITTEN) -> Line:
-    """A line taken apart. `base`: of numbers (`octets_in`); `rows`: whether an offset may stand before octets;
-    `times`: how its times are read.
+def line_of(text: str, base: int = PAIRS_ONLY, rows: bool = True, times: Times = AS_WRITTEN, least: int = 0) -> Line:
+    """A line taken apart. `base`, `least`: of numbers, of digits (`octets_in`); `rows`: whether an offset may stand
+    before octets; `times`: how its times are read.
     """
     text = _SPACES.sub("   ", COLOURS.sub("", text))[:LONGEST].rstrip()
     if not text.strip():
@@ -106,7 +108,7 @@ def line_of(text: str, base: int = PAIRS_ONLY, rows: bool = True, times: Times =
         if row is not None:
             return row
     if known is None:
-        return _general(text, stamp, base)
+        return _general(text, stamp, base, least)
     shape, match = known
     groups = match.groupdict()
     way = groups.get("way") or ""
@@ -124,15 +126,20 @@ def line_of(text: str, base: int = PAIRS_ONLY, rows: bool = True, times: Times =
     samples = (int(begin[:18]), int(end[:18])) if begin and end else None
     if not way and told is None:
         way = _way(text[: run.begin])
+    is_cut = bool(groups.get("cut")) or int(groups.get("count") or 0) > len(run.octets)
     return Line(
         Kind.OCTETS, stamp, way, run.octets, shape.tool, False, Role.DATA, shape.tool, run.spelling,
-        samples=samples, cut=bool(groups.get("cut")), broken=run.broken,
+        samples=samples, cut=is_cut, broken=run.broken,
         more=_more(text, run, base) if told is None else (),
     )  # fmt: skip
 
 
 def pieces(text: str) -> Iterator[str]:
     """A line, in pieces that go on in one another where it is longer than is looked at (a whole capture on one)."""
+    if text.count("},") >= _OBJECTS and _OBJECT_BEGINS.match(text) is not None:
+        for part in _BETWEEN_OBJECTS.split(text):
+            yield from pieces(part)
+        return
     text = text if len(text) < LONGEST else _SPACES.sub("   ", text)
     while len(text) > LONGEST - 2:
         cut = max(text.rfind(" ", LONGEST // 2, LONGEST - 2), text.rfind(",", LONGEST // 2, LONGEST - 2) + 1)
@@ -143,6 +150,12 @@ def pieces(text: str) -> Iterator[str]:
         yield f"{text[:cut]} \\"
         text = text[cut:]
     yield text
+
+
+_OBJECTS = 3
+_OBJECT_BEGINS = re.compile(r"[^{}]{0,200}\[\s*\{")
+_BETWEEN_OBJECTS = re.compile(r"(?<=\}),\s*(?=\{)")
+"""Between objects of a list that is all on one line."""
 
 
 def numbers_of(text: str) -> tuple[str, ...]:
@@ -163,8 +176,8 @@ def head_of(text: str) -> str:
 _NUMERAL = re.compile(r"[0-9A-Fa-f]*\d[0-9A-Fa-f]*")
 
 
-def _general(text: str, stamp: Stamp | None, base: int) -> Line:
-    run = octets_in(text, base)
+def _general(text: str, stamp: Stamp | None, base: int, least: int) -> Line:
+    run = octets_in(text, base, least)
     if run is not None and base == PAIRS_ONLY:
         run = whole_in(text, run)
     if run is None:
@@ -188,16 +201,17 @@ def _general(text: str, stamp: Stamp | None, base: int) -> Line:
 _LOST = re.compile(r"(?:(?<![0-9A-Za-z])[\[<(]?(?:0x)?[0-9A-Za-z?*]{2}[\]>)]?[ ,:.-]{1,2}){1,256}$")
 """What stands ahead of octets and was meant as some of them."""
 
-_LEFT_OUT = re.compile(r" ?(?:\.\.\.|…)\s*(?:[\[(<]?\d+ more.*)?")
+_LEFT_OUT = re.compile(r" ?[\[(]?(?:\.\.\.|…)[\])]?\s*(?:[\[(<]?\d+ more.*)?")
 """What stands behind octets of which a tool left out the rest."""
 
 
 def _more(text: str, run: Run, base: int) -> tuple[tuple[str, bytes], ...]:
-    """What stands behind the octets of a line, written as they are, after a direction of its own."""
-    found: list[tuple[str, bytes]] = []
+    """What stands behind the octets of a line, written as they are, after a direction of its own; or another message
+    with its check beside the first, in a column of its own."""
     rest = text[run.end :]
+    found = _beside(rest, run, base)
     while len(found) < MOST_MORE:
-        way = WAYS.search(rest[:_BETWEEN])
+        way = WAYS.search(rest[:_BETWEEN]) if not found or found[0][0] else None
         after = octets_in(rest[way.end() :], base) if way is not None else None
         if way is None or after is None or after.spelling != run.spelling or len(after.octets) < 3:
             break
@@ -206,6 +220,19 @@ def _more(text: str, run: Run, base: int) -> tuple[tuple[str, bytes], ...]:
         found.append((way[0].lower(), after.octets))
         rest = rest[way.end() + after.end :]
     return tuple(found)
+
+
+def _beside(rest: str, run: Run, base: int) -> list[tuple[str, bytes]]:
+    """A message with its check in the next column, where the first is one too; the same octets once more are none,
+    unless the columns are drawn."""
+    column = _COLUMN_BESIDE.match(rest) if ends_with_crc16(run.octets) else None
+    after = octets_in(rest[column.end() :], base) if column is not None else None
+    if column is None or after is None or after.begin or not ends_with_crc16(after.octets):
+        return []
+    return [("", after.octets)] if after.octets != run.octets or "|" in column[0] else []
+
+
+_COLUMN_BESIDE = re.compile(r"[ \t]*[|;]?[ \t]+(?=[0-9A-Fa-f(\[<{])")
 
 
 def _way(lead: str) -> str:
@@ -283,7 +310,10 @@ def _of_row(rest: str, marked: bool) -> bytes | None:
     """
     found = bytearray()
     for number, field in enumerate(_COLUMN.split(rest)):
-        if number and (len(found) % 8 or not found or _are_characters(field, found)):
+        if number and (len(found) % 4 or not found or _are_characters(field, found)):
+            break
+        if (full := _SIXTEEN.fullmatch(field)) is not None:  # and their characters
+            found += bytes.fromhex(full[1])
             break
         if _PAIRS.fullmatch(field):
             found += bytes.fromhex(field.replace("-", " "))

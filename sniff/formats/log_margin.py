@@ -12,6 +12,7 @@ from decimal import Decimal
 from itertools import pairwise
 
 from sniff.formats.log_times import LEAST, is_count
+from sniff.formats.log_writing import USUAL, Writing, joined_lists, writing_of
 
 _MOST = 0.8
 _SPACES = str.maketrans(
@@ -25,7 +26,7 @@ _ENTITIES = {"&gt;": ">", "&lt;": "<", "&amp;": "&", "&nbsp;": " ", "&quot;": '"
 _QUOTE = re.compile(r"(?:> ?){1,8}(?=\S|$)")
 _NUMBER = re.compile(r"\s*[\[(#|]?\s*(?P<number>\d{1,9})(?P<behind>\s*[\])}:.|,;]+\s*|\t|\s+)(?=\S)")
 _NAMES = re.compile(
-    r"(?:(?<![0-9A-Za-z.:-])(?:\d{1,3}\.){3}\d{1,3}(?::\d{1,5})?(?![0-9.])"
+    r"(?:(?<![0-9A-Za-z.:-])(?:(?!0\d)\d{1,3}\.){3}(?!0\d)\d{1,3}(?::\d{1,5})?(?![0-9.])"
     r"|(?<![0-9A-Za-z.:-])[0-9A-Fa-f]{2}(?P<sign>[:-])(?:[0-9A-Fa-f]{2}(?P=sign)){4}[0-9A-Fa-f]{2}(?![0-9A-Za-z:-])"
     r"|(?<![0-9A-Za-z-])[0-9A-Fa-f]{8}-(?:[0-9A-Fa-f]{4}-){3}[0-9A-Fa-f]{12}(?![0-9A-Za-z-]))"
     r"(?=.*(?:[0-9A-Fa-f]{2}[\s,;:-]?){3})"
@@ -42,7 +43,7 @@ _RUN = re.compile(
 class Margin:
     """What is taken away from each line. `quotes`: `> ` of an answer to a letter; `numbers`: the number of the line;
     `ahead`, `behind`: the number of its octets, before and behind them. `width`: characters after which lines were
-    broken off, within octets too; 0: they were not.
+    broken off, within octets too; 0: they were not. `writing`: how octets are written in other forms.
     """
 
     quotes: bool = False
@@ -50,11 +51,13 @@ class Margin:
     ahead: bool = False
     behind: bool = False
     width: int = 0
+    writing: Writing = USUAL
 
     def joined(self, texts: Iterable[str]) -> Iterator[str]:
-        """Lines, those put together that a terminal or a letter broke off where they were full; "" for each that went
-        into the one before, so that lines keep their numbers.
+        """Lines, those put together that a terminal or a letter broke off where they were full, or that are one list;
+        "" for each that went into the one before, so that lines keep their numbers.
         """
+        texts = joined_lists(texts)
         if not self.width:
             yield from texts
             return
@@ -73,7 +76,7 @@ class Margin:
 
     def without(self, text: str) -> str:
         """A line without it."""
-        text = _NAMES.sub(_blank, plain_signs(text))
+        text = _NAMES.sub(_blank, self.writing.rewritten(plain_signs(text)))
         if self.quotes:
             text = _QUOTE.sub("", text, count=1) if _QUOTE.match(text) else text
         if self.numbers and (match := _NUMBER.match(text)) is not None:
@@ -102,13 +105,14 @@ def plain_signs(text: str) -> str:
 
 def margin_of(texts: Sequence[str]) -> Margin:
     """What stands around the lines of a log that begins so."""
-    lines = [text for text in map(plain_signs, texts) if text.strip()]
+    writing = writing_of(list(joined_lists(texts)))
+    lines = [text for text in map(plain_signs, joined_lists(texts)) if text.strip()]
     quotes = _are_quoted(lines)
     lines = [Margin(quotes).without(text) for text in lines]
     numbers = _are_numbered(lines)
     lines = [Margin(False, numbers).without(text) for text in lines]
     ahead, behind = (_have_counts(lines, before) for before in (True, False))
-    return Margin(quotes, numbers, ahead, behind, _width(texts))
+    return Margin(quotes, numbers, ahead, behind, _width(texts), writing)
 
 
 def _width(texts: Sequence[str]) -> int:

@@ -1,86 +1,19 @@
-"""How tools write octets into a line of text: the spellings, and the octets found in a line. Pure.
-
-A new spelling is a line of SPELLINGS: what an octet looks like, what may stand between two, how it becomes a number.
-"""
+"""The octets found in a line of text, however it spells them (`log_spellings.py`). Pure."""
 
 from __future__ import annotations
 
-import ast
 import re
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from dissectors.checksums import ends_with_crc16
 from sniff.formats.log_shapes import WAYS
-
-SURELY = 4
-"""Octets in a run that are no number of the line, no time and no length."""
+from sniff.formats.log_spellings import H2, SPELLINGS, SURELY
 
 PAIRS_ONLY = 0
 """No base: numbers are no octets."""
 
 _MOSTLY = 0.7
 """Share of a run's tokens that are octets, from which on the others are meant as octets."""
-
-_SEPARATOR = r"(?:[ ]?[,;][ ]?|[:._-]|[ \t]{1,2})"
-CONTROLS = [
-    "NUL",
-    "SOH",
-    "STX",
-    "ETX",
-    "EOT",
-    "ENQ",
-    "ACK",
-    "BEL",
-    "BS",
-    "HT",
-    "LF",
-    "VT",
-    "FF",
-    "CR",
-    "SO",
-    "SI",
-    "DLE",
-    "DC1",
-    "DC2",
-    "DC3",
-    "DC4",
-    "NAK",
-    "SYN",
-    "ETB",
-    "CAN",
-    "EM",
-    "SUB",
-    "ESC",
-    "FS",
-    "GS",
-    "RS",
-    "US",
-]
-_NAMED = {name: code for code, name in enumerate(CONTROLS)} | {"TAB": 9, "SP": 0x20, "DEL": 0x7F, "NULL": 0}
-
-
-@dataclass(frozen=True, slots=True)
-class Spelling:
-    """One way to write octets. `token`: an octet; `between`: what may stand between two, None where the token is all of
-    them; `least`: how many there must be before it is believed; `decode`: the matched text → octets, ValueError when it
-    is none after all.
-    """
-
-    name: str
-    token: str
-    between: str | None
-    decode: Callable[[str], bytes]
-    least: int = 2
-    before: str = r"(?<![0-9A-Za-z_#.])"
-    after: str = r"(?![0-9A-Za-z_])"
-
-    def pattern(self) -> re.Pattern[str]:
-        """A run of such octets in a line."""
-        run = self.token
-        if self.between is not None:
-            run += rf"(?:{self.between}{self.token}){{{self.least - 1},}}"
-        return re.compile(f"{self.before}(?:{run}){self.after}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,117 +30,6 @@ class Run:
     wordy: bool = False
 
 
-def _by(pattern: str, base: int) -> Callable[[str], bytes]:
-    compiled = re.compile(pattern)
-    return lambda text: bytes(int(found, base) for found in compiled.findall(text))
-
-
-def _escaped(text: str) -> bytes:
-    """A string with escapes, as Python, C and strace write it; only characters of one octet."""
-    inner = text[text.index(text[-1]) + 1 : -1] if text[-1] in "'\"" else text
-    inner = re.sub(r"\\(.)", lambda found: "\\x1b" if found[1] == "e" else found[0], inner)
-    inner = re.sub(r"[\x80-\xff]", lambda found: f"\\x{ord(found[0]):02x}", inner)  # of a text, not of octets
-    quote = '"' if "'" in inner else "'"
-    if quote in inner.replace("\\" + quote, ""):
-        raise ValueError("a quote within")
-    found: object = ast.literal_eval(f"b{quote}{inner}{quote}")
-    assert isinstance(found, bytes)
-    if found.startswith(b"\x7fELF"):
-        raise ValueError("a program that was read")
-    return found
-
-
-def _frame_of_characters(text: str) -> bytes:
-    """A frame written as its characters, with or without names for its end; its sum must fit."""
-    body = re.sub(r"(?:<CR>|<LF>|\\r|\\n|\r|\n)+$", "", text)
-    sums = bytes.fromhex(body[1:]) if body[0] == ":" else b""
-    if body[0] == ":" and sum(sums) % 256 == 0:
-        return body.encode() + b"\r\n"
-    if body[0] == ">" and sum(body[1:-2].encode()) % 256 == int(body[-2:], 16):
-        return body.encode() + b"\r"
-    raise ValueError("no frame")
-
-
-def _signed(text: str) -> bytes:
-    """Numbers of −128 to 127, as Java has octets; up to 255 where others have them."""
-    numbers = [int(number) for number in re.findall(r"-?\d+", text)]
-    if not all(-128 <= number <= 255 for number in numbers):
-        raise ValueError("no octets")
-    return bytes(number & 0xFF for number in numbers)
-
-
-def _explained(text: str) -> bytes:
-    """Octets in hexadecimal, each with its number in decimal or binary, or its character, beside it."""
-    found = bytearray()
-    for digits, number in re.findall(
-        r"(?:0[xX])?([0-9A-Fa-f]{1,2})[hH]? ?(?:[(\[/]((?:0b)?[0-9]+)[)\]]?|\(?'.'\)?)", text
-    ):
-        octet = int(digits, 16)
-        bits = number.removeprefix("0b")
-        said = [int(bits, 2)] if len(bits) == 8 and not bits.strip("01") else [int(bits)] if number else [octet]
-        if octet not in said:
-            raise ValueError("two numbers")
-        found.append(octet)
-    return bytes(found)
-
-
-def _codes(text: str) -> bytes:
-    """Numbers of characters, as Pascal writes them: `#1#3#123`; two digits in each are hexadecimal."""
-    tokens = text.split("#")[1:]
-    if all(len(token) == 2 for token in tokens):
-        raise ValueError("pairs")
-    return bytes(int(token) for token in tokens)
-
-
-def _controls(text: str) -> bytes:
-    """Characters, and names in angle brackets for those that are none: `<SOH><ETX>A`."""
-    found = bytearray()
-    for name, character in re.findall(r"<([A-Z0-9]{2,4})>|(.)", text):
-        if name and name not in _NAMED:
-            if not re.fullmatch(r"[0-9A-F]{2}", name):
-                raise ValueError(name)
-            found.append(int(name, 16))
-        elif name:
-            found.append(_NAMED[name])
-        else:
-            found += character.encode("latin-1")  # UnicodeEncodeError is a ValueError
-    return bytes(found)
-
-
-_H2 = r"[0-9A-Fa-f]{2}"
-_BESIDE = r"(?:\((?:0b)?[0-9]{1,8}\)|\[(?:0b)?[0-9]{1,8}\]|/[0-9]{1,3}|\('.'\)|'.')"
-_CONTROL = rf"<(?:{'|'.join(_NAMED)})>"
-_HEX = _by(_H2, 16)
-
-SPELLINGS: tuple[Spelling, ...] = (
-    Spelling("frames as characters", r"(?::(?:[0-9A-F]{2}){3,260}|>[0-9A-F]{4,260})(?:<CR>|<LF>|\\r|\\n)*", None,
-             _frame_of_characters, 1, before=r"(?<![0-9A-Za-z_#.>])"),
-    Spelling("byte strings", r"(?:b|bytearray\(b)?(?P<q>['\"])(?:[^'\"\\]|\\.)*(?P=q)", None, _escaped, 1,
-             before=r"(?<![0-9A-Za-z_])(?=[^'\"\\]{0,14}['\"][^'\"]*\\[x0-7abtnvfr])", after=""),
-    Spelling("escapes", rf"(?:\\x{_H2}|\\[abtnvfr0\\])", r"[ ,]?", _escaped, 2, before=""),
-    Spelling("pairs in brackets", rf"(?:\[{_H2}\]|<{_H2}>|\({_H2}\)|\{{{_H2}\}})", r"[ ,]?", _HEX, 2, before="",
-             after=""),
-    Spelling("names of controls", rf"[!-;=?-~]*{_CONTROL}", r"", _controls, 2, after="[!-;=?-~]*",
-             before=r"(?:(?<=\s)|^)"),
-    Spelling("bits", r"[01]{8}", r"[ ,;]{1,2}", _by(r"[01]{8}", 2), 3),
-    Spelling("signed numbers", r"[\[{(](?=[^\]})]{0,4000}-\d)-?\d{1,3}(?:, ?-?\d{1,3}){1,4096}[\]})]", None,
-             _signed, 1, before="", after=""),
-    Spelling("octets, each with the same beside it", rf"(?:0[xX][0-9A-Fa-f]{{1,2}}|{_H2}[hH]?) ?{_BESIDE}", _SEPARATOR,
-             _explained, 2, after=""),
-    Spelling("binary", r"0b[01]{8}(?: ?\(0[xX][0-9A-Fa-f]{1,2}\))?", _SEPARATOR, _by(r"0b([01]{8})", 2), 1),
-    Spelling("0x and digits", r"0[xX][0-9A-Fa-f]{1,2}(?![0-9A-Za-z])", r"['\"]?[ ]?[,;:/|]?[ \t]{0,2}['\"]?",
-             _by(r"0[xX]([0-9A-Fa-f]{1,2})", 16), 2),
-    Spelling("pairs joined by _", _H2, "_", _HEX, 3),
-    Spelling("decimals in brackets", r"[^\s()\[\]]{0,4}\(\d{3}\)", r"[ \t]{0,2}", _by(r"\((\d{3})\)", 10), 2,
-             before=r"(?:(?<=\s)|^)", after=""),
-    Spelling("three decimals in brackets", r"\[\d{3}\]", r"[ ,]?", _by(r"\[(\d{3})\]", 10), 3, before="", after=""),
-    Spelling("digits behind 16#", r"16#[0-9A-Fa-f]{1,2}", r"[ ]?[,;]?[ ]?", _by(r"16#([0-9A-Fa-f]{1,2})", 16), 2),
-    Spelling("digits and h", rf"{_H2}[hH]", _SEPARATOR, _by(rf"({_H2})[hH]", 16), 2),
-    Spelling("character codes", r"#\d{1,3}", "", _codes, SURELY, before=r"(?<![0-9A-Za-z_])"),
-    Spelling("digits after a sign", rf"[$%&#]{_H2}", r"[ ,;]{0,2}", _HEX, 2, before=r"(?<![0-9A-Za-z_])"),
-)  # fmt: skip
-"""Those whose digits need no guess, the most special first."""
-
 _PATTERNS = [(one, one.pattern()) for one in SPELLINGS]
 
 _DIGITS = re.compile(
@@ -223,9 +45,9 @@ _WORDS = re.compile(
 _TOKEN = re.compile(r"[0-9A-Fa-f]{1,3}")
 
 
-def octets_in(line: str, base: int = PAIRS_ONLY) -> Run | None:
+def octets_in(line: str, base: int = PAIRS_ONLY, least: int = 0) -> Run | None:
     """The octets that a line tells, None when it tells none. `base`: of runs of numbers; PAIRS_ONLY where only pairs of
-    hexadecimal digits count.
+    hexadecimal digits count. `least`: digits without space that are believed, 0: as many as where they stand asks for.
     """
     for spelling, pattern in _PATTERNS:
         for match in pattern.finditer(line):
@@ -238,7 +60,7 @@ def octets_in(line: str, base: int = PAIRS_ONLY) -> Run | None:
                 return Run(match.start(), match.end(), octets, spelling.name, broken)
     run = _digits(line, base)
     if run is None or len(run.octets) < SURELY:
-        words = _words(line)
+        words = _words(line, least)
         run = words if run is None or (words is not None and len(words.octets) > len(run.octets)) else run
     run = run or _single(line, base)
     if run is None or base == 10:
@@ -257,7 +79,7 @@ def whole_in(line: str, run: Run) -> Run:
     begin, pairs = run.begin, list(_APART.finditer(line))
     while pairs and pairs[0].end() <= run.begin and not _NAMED_BY.search(line[: pairs[0].start()]):
         pairs.pop(0)  # of a time, a number
-    octets = bytes(int(pair[0], 16) for pair in pairs)
+    octets = bytes.fromhex("".join(pair[0] for pair in pairs))
     if (
         len(octets) <= len(run.octets)
         or len(octets) < SURELY
@@ -269,7 +91,7 @@ def whole_in(line: str, run: Run) -> Run:
     return Run(begin, end, octets, run.spelling)
 
 
-_APART = re.compile(r"(?<![0-9A-Za-z_.])[0-9A-Fa-f]{2}(?![0-9A-Za-z_.])")
+_APART = re.compile(r"(?<![0-9A-Za-z_.])(?:[0-9A-Fa-f]{2})+(?![0-9A-Za-z_.]|[ ]?[:=])")
 _NAMED_BY = re.compile(r"[A-Za-z]\w*[ ]?[:=][ ]?$")
 
 
@@ -299,6 +121,8 @@ def _numbers(line: str, match: re.Match[str], tokens: list[str], base: int) -> R
     if base == PAIRS_ONLY and len(tokens) > SURELY and len(tokens[0]) != 2:
         begin += len(tokens[0]) + len(match["between"])  # the number of the line, or of octets
         tokens = tokens[1:]
+    if match["between"] == "." and len(tokens) == 4 and all(_DECIMAL.fullmatch(token) for token in tokens):
+        return None  # an address of a host, a version
     numbers = [_octet(token, base) for token in tokens]
     octets = bytes(number for number in numbers if number is not None)
     sign = (match["between"] or "").strip()
@@ -323,6 +147,7 @@ def _octet(token: str, base: int) -> int | None:
     return number if number < 256 else None
 
 
+_DECIMAL = re.compile(r"0|[1-9]\d{0,2}")
 _YEAR_AHEAD = re.compile(r"(?:19|20)\d\d[-./]$")
 _LONG_NUMBER = re.compile(r"[ \t]?\d{4,}")
 
@@ -406,7 +231,7 @@ _QUOTES = ("'", '"')
 _DATE = re.compile(r"[0-3]\d [01]\d (?:19|20)\d\d")
 
 
-def _words(line: str) -> Run | None:
+def _words(line: str, least: int = 0) -> Run | None:
     best: Run | None = None
     for match in _WORDS.finditer(line):
         digits = match[0].replace(" ", "")
@@ -416,7 +241,7 @@ def _words(line: str) -> Run | None:
             continue
         if _is_keyed(line, match.start(), match.end()):
             return Run(match.start(), match.end(), bytes.fromhex(digits), "digits without space")
-        enough = _enough(line, match.start(), match.end())
+        enough = least or _enough(line, match.start(), match.end())
         if len(digits) >= enough and (best is None or len(digits) > 2 * len(best.octets)):
             best = Run(match.start(), match.end(), bytes.fromhex(digits), "digits without space")
     return best
@@ -450,8 +275,8 @@ def _enough(line: str, begin: int, end: int) -> int:
     return 8 if before in (" ", "\t", "|", ";") else 4 if before in "#:=" else 12
 
 
-_BEHIND_ONE = r"\s*(?:\(\S{1,6}\)|'.'|\".\"|[|;].*)?\s*"
-_ALONE = re.compile(rf"(?:^|.*[\s:>\]|#,-])(?P<octet>(?:0[xX])?{_H2}){_BEHIND_ONE}")
+_BEHIND_ONE = r"\s*(?:\(\S{1,6}\)|\([A-Za-z][\w .,:/-]{0,40}\)|'.'|\".\"|[|;].*)?\s*"
+_ALONE = re.compile(rf"(?:^|.*[\s:>\]|#,-])(?P<octet>(?:0[xX])?{H2}){_BEHIND_ONE}")
 _ALONE_UNPADDED = re.compile(rf"(?:^|.*[\s:>\]|#,=-])(?P<octet>[0-9A-Fa-f]{{1,3}}){_BEHIND_ONE}")
 
 

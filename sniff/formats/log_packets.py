@@ -22,6 +22,8 @@ def carried(octets: bytes) -> bytes:
     exported = LINK_TYPES[EXPORTED].read(octets) if octets[:1] == b"\0" else None
     if exported is not None:
         return exported.octets
+    if _is_of_ip(octets):
+        return _of_transport(octets[9], octets[4 * (octets[0] & 0x0F) :], octets)
     for heading in (_ETHERNET, _COOKED):
         kind, packet = octets[heading - 2 : heading], octets[heading:]
         if len(packet) < _LEAST:
@@ -35,6 +37,14 @@ def carried(octets: bytes) -> bytes:
             if _fits(length, packet, heading):
                 return _of_transport(packet[6], packet[40:length], octets)
     return octets
+
+
+def _is_of_ip(octets: bytes) -> bool:
+    """Whether octets are a packet of IP without any heading before, as `tcpdump -X` shows it."""
+    is_whole = (
+        len(octets) > _LEAST and octets[0] in range(0x45, 0x50) and int.from_bytes(octets[2:4], "big") == len(octets)
+    )
+    return is_whole and octets[9] in (_TCP, _UDP)
 
 
 def _fits(length: int, packet: bytes, heading: int) -> bool:

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
+from dissectors.line import MS
 from sniff.formats.log_lines import Kind, Line, head_of, line_of, numbers_of
 from sniff.formats.log_margin import NO_MARGIN, Margin, margin_of
 from sniff.formats.log_octets import PAIRS_ONLY
@@ -27,6 +28,9 @@ LOOKED_AT_CHARACTERS = 200_000
 
 WINDOW = 2048
 """Octets within which a line that repeats others is looked for."""
+
+_JOINED, _SHORT = "digits without space", 6
+"""Digits of the shortest frame, on lines of which longer ones are known."""
 
 _REPEATS = 0.6
 _ROWS_LEAST = 0.7
@@ -70,7 +74,14 @@ class Plan:
 
     def line(self, text: str) -> Line:
         """A line taken apart as this log writes it."""
-        return line_of(self.margin.without(text), self.base, self.offsets is not None, self.times)
+        text = self.margin.without(text)
+        line = line_of(text, self.base, self.offsets is not None, self.times)
+        is_other = line.kind in (Kind.TEXT, Kind.STRANGE) or line.spelling == "one octet"
+        if is_other and _JOINED in self.spellings and self.offsets is None:
+            short = line_of(text, self.base, False, self.times, _SHORT)
+            if short.family and self.roles.get(short.family) is Role.DATA:
+                return short
+        return line
 
     def role(self, line: Line, recent: bytes) -> Role | None:
         """What a line with octets is; None: nobody knows. `recent`: the octets told last."""
@@ -192,7 +203,7 @@ def _of_labels(lines: Sequence[Line], base: int) -> Plan | None:
     best = max((name for name in amounts if name in directed), key=lambda name: amounts[name], default=None)
     if best is not None and 4 * amounts[best] >= amounts[main]:
         main = best
-    roles = _roles(with_octets, main, directed)
+    roles = _roles(with_octets, main, directed) | dict.fromkeys(_echoing(with_octets, main), Role.SAME)
     data = [line for line in with_octets if line.tool or line.bare or roles.get(line.family) is Role.DATA]
     told = sum(len(line.octets) for line in data)
     if not data or (told < 3 and not known and written > len(data)):
@@ -265,6 +276,29 @@ def _roles(lines: Sequence[Line], main: str, directed: set[str]) -> dict[str, Ro
         else:
             roles[family] = None
     return roles
+
+
+def _echoing(lines: Sequence[Line], main: str) -> set[str]:
+    """Labels whose lines nearly all repeat the line of another label before, at the same time: no answer comes as
+    soon."""
+    many, again = Counter[str](), Counter[str]()
+    for before, line in pairwise(lines):
+        many[line.family] += 1
+        is_other = before.family != line.family and line.spelling == before.spelling
+        again[line.family] += is_other and line.octets == before.octets and _are_at_once(before, line)
+    return {
+        name
+        for name, count in again.items()
+        if name not in (main, "") and count >= _FIXED_LEAST and count >= _MOSTLY * many[name]
+    }
+
+
+def _are_at_once(before: Line, line: Line) -> bool:
+    """Whether a line has the time of the one before, by a clock that would tell an answer from its request."""
+    told, stamp = before.stamp, line.stamp
+    if told is None or stamp is None or stamp.tick > MS:
+        return False
+    return abs(stamp.time - told.time) < FASTEST * len(line.octets)
 
 
 def _base(numbers: Sequence[Sequence[str]]) -> int:

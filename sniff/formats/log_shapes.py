@@ -1,7 +1,7 @@
 """Lines of known tools whose octets or meaning no general rule finds: one shape, one line of SHAPES. Pure.
 
 Most tools need no line here: a time, a direction and octets are found wherever they stand (`log_clock.py`,
-`log_octets.py`), and what a label means is told by the whole log (`log_plan.py`).
+`log_spellings.py`), and what a label means is told by the whole log (`log_plan.py`).
 """
 
 from __future__ import annotations
@@ -37,6 +37,7 @@ class Shape:
     | `way` | the direction; without it it is looked for in the line |
     | `begin`, `end` | numbers of samples, of a logic analyser |
     | `cut` | there when the tool left octets out |
+    | `count` | how many octets there were, where the tool may tell less |
     """
 
     tool: str
@@ -65,17 +66,27 @@ SHAPES: tuple[Shape, ...] = (
     _shape("esphome", rf"\b(?P<way>Read|Wrote|Write):?\s+(?:0b[01]{{8}}\s+)?\(?0x(?P<octets>{_H})\)?(?:\s|$)"),
     _shape("esphome", r"\[uart_debug:\d+\]"),
     _shape("candump", rf"^\s*\({_S}\)\s+\w+\s+(?:[0-9A-Fa-f]+(?:#|\s+\[\d+\]\s+))?(?P<octets>.+)"),
+    _shape("strace", r"<\.\.\. (?P<way>p?read(?:64|v)?|recv\w*) resumed>\s*,? ?"
+                     r"(?P<octets>\"(?:[^\"\\]|\\.)*\")(?P<cut>\.\.\.)?.*\)\s*=\s*\d+"),
+    _shape("strace", r"\b(?P<way>p?write(?:64|v)?|send\w*)\((?:[3-9]|\d{2,})(?:<[^>]*>)?, "
+                     r"(?P<octets>\"(?:[^\"\\]|\\.)*\")(?P<cut>\.\.\.)?.*<unfinished \.\.\.>"),
     _shape("strace", r"\b(?P<way>p?(?:read|write)(?:64|v)?|recv\w*|send\w*)\((?:[3-9]|\d{2,})(?:<[^>]*>)?, "
                      r"(?!\"\\(?:177ELF|x7f\\x45\\x4c\\x46))"  # a program, and what it prints
                      r"(?P<octets>\"(?:[^\"\\]|\\.)*\")(?P<cut>\.\.\.)?.*\)\s*=\s*\d+"),
+    _shape("usbmon", r"^[0-9a-f]{8,16} (?:\d+|\0) [SC] (?P<way>B[io]):\d+:\d+:\d+ -?\d+ (?P<count>\d+) = "
+                     r"(?P<octets>[0-9a-f]{2,8}(?: [0-9a-f]{2,8})*)$"),
+    _shape("usbmon", r"^[0-9a-f]{8,16} (?:\d+|\0) [SCE] [BCIZ][io]:\d+:\d+", Role.NOTHING),
     _shape("strace", r"\b(?:read|write)\([0-2], ", Role.NOTHING),
     _shape("strace", r"^(?:[\d\s\0]*\s)?(?:[a-z]\w{0,30}\(.*\)?\s*=\s*-?\d|<\.\.\. |--- SIG|\+\+\+ )", Role.NOTHING),
     _shape("interceptty", rf"^(?P<way>[<>])\s+0x(?P<octets>{_H})\s+\(.{{1,6}}\)"),
     _shape("socat", rf"^(?P<way>[<>]) {_S} +length=\d+ from=\d+ to=\d+", Role.HEADING),
     _shape("socat", r"^--$", Role.NOTHING),
+    _shape("sigrok", r"\"ph\": \"B\", .*\"pid\": \"uart-\d+\", \"tid\": \"(?P<way>[RT]X)\", "
+                     r"\"name\": \"(?P<octets>[0-9A-F]{2})\""),
+    _shape("sigrok", r"\"ph\": \"[BE]\", .*\"pid\": ", Role.NOTHING),
     _shape("sigrok", r"^(?:(?P<begin>\d+)-(?P<end>\d+)\s+[\w /.-]+?|\w+-\d+): ?"
                      r"(?:.*?\b(?P<way>[RrTt][Xx])(?:[ -]data)?: ?)?"
-                     r"(?P<octets>[0-9A-Fa-f]{2})$"),
+                     r"\"?(?P<octets>[0-9A-Fa-f]{2})\"?$"),
     _shape("sigrok", r"^(?:\d+-\d+\s+[\w /.-]+?|\w+-\d+): ?(?:.*: ?)?"
                      r"(?:[Ss]tart bit|[Ss]top bit|[Pp]arity|[01]$|Frame error|Break)",
            Role.NOTHING),
@@ -116,9 +127,20 @@ SHAPES: tuple[Shape, ...] = (
 )  # fmt: skip
 """The first that is found in a line counts."""
 
+DECODED = (
+    (re.compile(r"<pdml[ >]"), "PDML, which has decoded fields and no octets as they were sent"),
+    (re.compile(r"<psml[ >]"), "PSML, which has summaries of packets and no octets"),
+    (re.compile(r'"_index": "packets-'), "JSON of tshark, which has decoded fields and no octets as they were sent"),
+    (
+        re.compile(r"\A(?![\s\S]*\buart-\d+: )[\s\S]*\bmodbus-\d+: (?:[a-z-]+: )?\"?Slave ID: \d+"),
+        "annotations of sigrok that have decoded fields and no octets (-A uart has those)",
+    ),
+)
+"""Texts that tell what octets mean, and not which they were."""
+
 WAYS = re.compile(
     r"(?<![A-Za-z0-9_<>=-])(?:>>>|<<<|>>|<<|-->|<--|==>|<==|->|<-|=>|<=|>|<(?![A-Za-z_/]\w*>)|→|←)(?![<>=-])"
-    r"|(?<![A-Za-z])(?:tx[d]?|rx[d]?|sen[dt]|sending|recv|rcv[d]?|receiv(?:e[d]?|ing)|writ(?:e|ing|ten)|wrote|read|"
+    r"|(?<![A-Za-z])(?:tx[d]?|rx[d]?|sen(?:d|ds|t|ding)|recv|rcv[d]?|receiv(?:e[d]?|ing)|writ(?:e|ing|ten)|wrote|read|"
     r"in|out|input|output|incoming|outgoing|request|response|req|re?sp|query|answer|reply|to|from|"
     r"master|slave|host|device|dte|dce|c1|c2|poll)(?![A-Za-z])",
     re.IGNORECASE,

@@ -2,7 +2,7 @@
 
 | column | its names |
 |---|---|
-| octet | octet, byte, data, value, hex, payload …: one or more, in any spelling of `log_octets.py`, decimal, \
+| octet | octet, byte, data, value, hex, payload …: one or more, in any spelling of `log_spellings.py`, decimal, \
 binary or as characters; which one is told by the whole column |
 | begin, s | t_start_s, start, start_s, begin; start_time, time [s] (Saleae Logic: begin of the start bit) |
 | end, s | t_end_s, end, end_s, time, time_s, timestamp, t; or a duration beside the begin |
@@ -16,13 +16,14 @@ Where no name is known, the column is told by its cells: numbers or dates that r
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
 from itertools import pairwise
 
 from dissectors.frame import Chunk, LineError, Mark
 from sniff.formats.log_times import AS_WRITTEN, UNIT_NAMES, Times, is_count, order_of, unit_of
+from sniff.formats.table_cells import MOST, UNITS, fits, octets_of, spelling_of, time_of
 
 OCTET = (
     "octet",
@@ -40,7 +41,27 @@ OCTET = (
     "decoded protocol result",
     "decoded result",
     "telegram",
+    "data(hex)",
+    "data hex",
+    "rx data",
+    "tx data",
+    "rx",
+    "tx",
 )
+PAIRS = (
+    ("rx", "tx"),
+    ("rx data", "tx data"),
+    ("request", "response"),
+    ("query", "response"),
+    ("query", "answer"),
+    ("sent", "received"),
+    ("send", "receive"),
+    ("anfrage", "antwort"),
+    ("запрос", "ответ"),
+)
+"""Two columns that hold octets, one or both in a row."""
+DAYS = ("date", "datum", "дата", "fecha", "data")
+"""The day, where the time of day stands in another column."""
 ANALYSER = re.compile(r".*\b(?:uart|rs-?485|rs-?232|async serial|serial)\b.*")
 """A column that is named for its decoder, when no other holds octets."""
 BEGIN = ("t_start_s", "start", "start_s", "begin", "start_time", "start time")
@@ -57,32 +78,19 @@ TIME_WORDS = re.compile(
 )
 """Words of which a time is named."""
 
-MOST = 1 << 62
-"""ns: a number beyond it is no time."""
-
-UNITS = {"s": 1_000_000_000, "ms": 1_000_000, "us": 1000, "µs": 1000, "μs": 1000, "ns": 1}
 _UNIT = re.compile(
     r"(?P<name>[^\[(]*)[\[(](?P<unit>s|ms|us|µs|μs|ns)[\])]"
     r"|(?P<stem>.+?)[_ ,/-]+(?:in[_ ])?"
     r"(?P<last>s|secs?|seconds|ms|millis(?:econds)?|us|µs|μs|micros(?:econds)?|ns|nanos)"
 )
 _LONG = {"sec": "s", "millis": "ms", "micros": "us", "nanos": "ns"}
-_WITH_UNIT = re.compile(r"(?P<number>[+-]?\d{1,18}(?:[.,]\d{1,12})?) ?(?P<unit>s|ms|us|µs|μs|ns)")
 _DELIMITERS = (",", ";", "\t", "|")
 
-MOST_CELL = 1 << 16
+BETWEEN = 10_000_000
+"""ns from a request to its answer, where a row has one time for both."""
+
 LONGEST_HEADING = 4096
 """Characters."""
-
-LATEST = 1 << 33
-"""s; beyond it a number is no time."""
-
-_SHOWN = re.compile(r"\(0[xX]([0-9A-Fa-f]{2})\)\s*")  # behind the character, as Saleae shows "ASCII and hex"
-_PAIR = re.compile(r"[\s,;]*(?:0[xX])?([0-9A-Fa-f]{2})")
-_DECIMAL = re.compile(r"\d{1,3}")
-_BINARY = re.compile(r"(?:0b)?[01]{4}[ _]?[01]{4}")
-_QUOTED = re.compile(r"'(\d{1,3})'")
-_WORDS_OF_CHARACTERS = {"comma": ",", "' '": " ", "\\t": "\t", "\\r": "\r", "\\n": "\n", "\\\\": "\\", "\\0": "\0"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,6 +112,10 @@ class TableLayout:
     """How dates are read, and what was assumed."""
     tail: bool = False
     """Whether each cell from `octet` on holds one octet."""
+    other: int | None = None
+    """Where octets stand of the other direction, instead or too."""
+    day: int | None = None
+    """Where the day of the time stands."""
 
     @property
     def exact(self) -> bool:
@@ -116,15 +128,24 @@ class TableLayout:
             return True
         return row[self.kind].strip().lower() in TYPES_WITH_OCTETS
 
-    def chunk(self, row: Sequence[str], char: int) -> Chunk:
-        """The octets of a row, at their end; `char`: ns of a character, where only the begin is told.
+    def chunks(self, row: Sequence[str], char: int) -> Iterator[Chunk]:
+        """The octets of a row, at their end, of one direction after the other; `char`: ns of a character, where only
+        the begin is told.
 
         Raises ValueError for a row that says less than it should.
         """
+        first = self._chunk(row, char)
+        yield first
+        if self.other is not None and _cell(row, self.octet).strip() and _cell(row, self.other).strip():
+            octets = self.read(_cell(row, self.other))
+            yield Chunk(first.time + BETWEEN + len(octets) * char, octets)
+
+    def _chunk(self, row: Sequence[str], char: int) -> Chunk:
         if self.tail:
             octets = b"".join(self.read(cell) for cell in row[self.octet :] if cell.strip())
         else:
-            octets = self.read(_cell(row, self.octet))
+            cell = _cell(row, self.octet)
+            octets = self.read(cell if cell.strip() or self.other is None else _cell(row, self.other))
         if not octets:
             raise ValueError("no octets")
         time = self._end(row, len(octets) * char)
@@ -134,7 +155,8 @@ class TableLayout:
 
     def _end(self, row: Sequence[str], length: int) -> int:
         if self.end is not None:
-            return time_of(_cell(row, self.end), self.unit, self.times)
+            day = "" if self.day is None else f"{_cell(row, self.day).strip()} "
+            return time_of(day + _cell(row, self.end), self.unit, self.times)
         begin = time_of(_cell(row, self.begin), self.unit, self.times)
         if self.duration is None:
             return begin + length
@@ -191,6 +213,20 @@ def heading_of(heading: str, delimiter: str, rows: Sequence[str]) -> TableLayout
         if begin is None and end is None:
             end = _column(cells, len(written), lambda column: _are_times(column) and not _are_octets(column))
     when = begin if begin is not None else end
+    day = next((names.index(name) for name in DAYS if name in names), None)
+    if (
+        day is not None
+        and when is not None
+        and day != when
+        and octet not in (None, day)
+        and _are_of_days(cells, day, when)
+    ):
+        cells = [
+            [*row[:when], f"{row[day]} {row[when]}", *row[when + 1 :]] if max(day, when) < len(row) else row
+            for row in cells
+        ]
+    else:
+        day = None
     if octet is None or when is None or octet == when or len(names) < 2:
         return None
     errors = [(names.index(name), error) for name, error in ERRORS.items() if name in names]
@@ -203,12 +239,28 @@ def heading_of(heading: str, delimiter: str, rows: Sequence[str]) -> TableLayout
         and (kind is None or kind >= len(cell) or cell[kind].lower() in TYPES_WITH_OCTETS)
     ]
     tail = octet > when and _go_on(names, octet, data)
-    told = [[one for one in cell[octet:] if one] if tail else [cell[octet]] for cell in data]
+    partners = [two for pair in PAIRS for one, two in (pair, pair[::-1]) if names[octet] == one and two in names]
+    other = names.index(partners[0]) if partners else None
+    told = [[one for one in cell[octet:] if one] if tail else [_either(cell, octet, other)] for cell in data]
     read = spelling_of([one for cell in told for one in cell])
     unit, times = _times_of([cell[when] for cell in data], [_length(cell, read) for cell in told], units[when])
     return TableLayout(
-        octet, read, delimiter, begin, end, place(DURATION), unit, kind, (*errors, *named), times, tail
+        octet, read, delimiter, begin, end, place(DURATION), unit, kind, (*errors, *named), times, tail, other, day
     )  # fmt: skip
+
+
+def _either(row: Sequence[str], octet: int, other: int | None) -> str:
+    return row[octet] if row[octet] or other is None or other >= len(row) else row[other]
+
+
+_DAY = re.compile(r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}")
+_TIME_OF_DAY = re.compile(r"\d{1,2}:\d{2}:\d{2}.*")
+
+
+def _are_of_days(cells: Sequence[Sequence[str]], day: int, when: int) -> bool:
+    """Whether one column has dates and the other times of day."""
+    rows = [row for row in cells if max(day, when) < len(row)]
+    return bool(rows) and all(_DAY.fullmatch(row[day]) and _TIME_OF_DAY.fullmatch(row[when]) for row in rows[:50])
 
 
 _NUMBERED_NAME = re.compile(r"(?:[a-z]{1,6}[ _#]?)?\[?[0-9a-f]{1,3}\]?|")
@@ -254,7 +306,7 @@ _NAME = re.compile(r"[^\W\d][\w .#/()\[\]%°:-]{0,39}")
 
 def _is_name(text: str) -> bool:
     """Whether it may be the name of a column."""
-    return _NAME.fullmatch(text) is not None and not _fits(octets_of, text)
+    return _NAME.fullmatch(text) is not None and not fits(octets_of, text)
 
 
 def _column(cells: Sequence[Sequence[str]], many: int, wanted: Callable[[Sequence[str]], bool]) -> int | None:
@@ -314,108 +366,6 @@ def _times_of(cells: Sequence[str], lengths: Sequence[int], named: str) -> tuple
         return UNITS["s"], order_of(cells)
     unit, _, is_sure = unit_of(numbers, of_them)
     return unit, AS_WRITTEN if is_sure else Times(said=(f"times taken as {UNIT_NAMES[unit]}",))
-
-
-def spelling_of(cells: Sequence[str]) -> Callable[[str], bytes]:
-    """How a column of octets is written, told by all its cells: hexadecimal, unless only another fits.
-
-    One of `10` and `1` is decimal, since a column of hexadecimal octets has two digits in each.
-    """
-    cells = [cell for cell in cells if cell]
-    if cells and all(_BINARY.fullmatch(cell) for cell in cells):
-        return lambda text: bytes((int(re.sub("[^01]", "", text.strip().removeprefix("0b")), 2),))
-    if any(_QUOTED.fullmatch(cell) or cell.lower() in _WORDS_OF_CHARACTERS for cell in cells):
-        return _character
-    widths = {len(cell) for cell in cells}
-    if cells and all(_DECIMAL.fullmatch(cell) for cell in cells) and (widths != {2}) and widths <= {1, 2, 3}:
-        return _decimal
-    fitting = sum(_fits(octets_of, cell) for cell in cells)
-    if cells and 2 * fitting < len(cells) and all(len(cell) == 1 for cell in cells):
-        return _character
-    return octets_of
-
-
-def _fits(read: Callable[[str], bytes], cell: str) -> bool:
-    try:
-        return bool(read(cell))
-    except ValueError:
-        return False
-
-
-def _decimal(text: str) -> bytes:
-    return bytes((int(text),))
-
-
-def _character(text: str) -> bytes:
-    """A character; 'N' is the number of one that cannot be shown (Saleae Logic)."""
-    quoted = _QUOTED.fullmatch(text.strip())
-    if quoted is not None:
-        return bytes((int(quoted[1]),))
-    text = _WORDS_OF_CHARACTERS.get(text.strip().lower(), text.strip() or " ")
-    shown = _SHOWN.search(text)
-    if shown is not None:
-        return bytes.fromhex(shown[1])
-    escape = re.fullmatch(r"\\x([0-9A-Fa-f]{2})", text)
-    if escape is not None:
-        return bytes.fromhex(escape[1])
-    if len(text) != 1:
-        raise ValueError(f"{text[:20]!r}: expected one character")
-    return text.encode("latin-1")
-
-
-def octets_of(text: str) -> bytes:
-    """The octets of a text: `01 03`, `0103`, `0x01, 0x03`, `'A' (0x41)`, as in lines of logs. Raises ValueError."""
-    shown = _SHOWN.search(text)
-    if shown is not None and shown.end() == len(text):
-        return bytes.fromhex(shown[1])
-    found, at = bytearray(), 0
-    text = text.strip(" \t,;")
-    while at < len(text):
-        match = _PAIR.match(text, at)
-        if match is None:
-            return _as_in_a_line(text)
-        found.append(int(match[1], 16))
-        at = match.end()
-    return bytes(found)
-
-
-def _as_in_a_line(text: str) -> bytes:
-    from sniff.formats.log_octets import octets_in
-
-    run = octets_in(text[:MOST_CELL])
-    if run is None or run.begin or run.end < len(text.rstrip()):
-        raise ValueError(f"octets {text[:20]!r}: expected hexadecimal pairs")
-    return run.octets
-
-
-def time_of(text: str, unit: int, times: Times = AS_WRITTEN) -> int:
-    """A cell with a time → ns: a number of `unit`s (ns), or a date and time. Raises ValueError."""
-    from sniff.formats.log_clock import stamp_of
-
-    counted = _WITH_UNIT.fullmatch(text.strip())
-    try:
-        return scaled(text, unit) if counted is None else scaled(counted["number"], UNITS[counted["unit"]])
-    except ValueError:
-        stamp = stamp_of(text.strip(), times)
-        if stamp is None or stamp.begin:
-            raise
-        return stamp.time
-
-
-def seconds(text: str) -> int:
-    """Seconds as a decimal number → ns, exactly. Raises ValueError."""
-    return scaled(text, UNITS["s"])
-
-
-def scaled(text: str, unit: int) -> int:
-    """A decimal number of `unit`s (ns) → ns, exactly. Raises ValueError."""
-    try:
-        number = Decimal(text.strip().replace(",", "."))
-    except InvalidOperation:
-        raise ValueError(f"time {text[:20]!r}: expected seconds") from None
-    if not number.is_finite() or abs(number) * unit > LATEST * UNITS["s"]:
-        raise ValueError(f"time {text[:20]!r}: expected seconds, less than {LATEST}")
-    return int(number * unit)
 
 
 def _cell(row: Sequence[str], place: int | None) -> str:

@@ -21,7 +21,8 @@ from dissectors.line import NS_PER_S
 from sniff.engine.capture import CaptureError
 from sniff.engine.session import Completeness
 from sniff.formats.files import explain, open_capture
-from sniff.formats.octet_table import heading_of, seconds
+from sniff.formats.octet_table import heading_of
+from sniff.formats.table_cells import seconds
 from sniff.formats.waves import MOST_CHANNELS, Edges
 
 if TYPE_CHECKING:

@@ -255,7 +255,7 @@ class SnifferApp(Analyzer):
         if before.reading and not seat.status.reading:  # there is nothing to follow any more
             seat.viewing.follow = False
         if seat.status.second and seat.viewing.foreign is None:
-            seat.viewing.foreign = ForeignRows(seat.feed.store, seat.status.second)
+            seat.viewing.foreign = ForeignRows(seat.feed.store, seat.status.second, seat.status.since)
             changed = True
         self._tell(seat)
         return changed

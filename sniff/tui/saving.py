@@ -37,7 +37,7 @@ def why_not(path: str) -> str:
 def save(store: Store, numbers: Iterable[int], path: str) -> int:
     """Write those rows, of a capture a read each; how many they are. Raises CaptureError, OSError."""
     if not path.lower().endswith(_captures()):
-        return save_rows(Path(path), _judged(store, numbers), store.dissector, store.session)
+        return save_rows(Path(path), ((item, store.dissector) for item in _judged(store, numbers)), store.session)
     count = 0
     with create(path, store.session) as writer:
         for item in _items(store, numbers):

@@ -9,9 +9,8 @@ import pytest
 
 from sniff.analysis.told_protocol import detected
 from sniff.bus.offline import survey
-from sniff.bus.second_protocol import ForeignFrames, with_second
+from sniff.bus.second_protocol import ForeignFrames, proven
 from sniff.engine.capture import CaptureError
-from sniff.engine.session import SECOND_NOTE
 from sniff.formats import read
 from sniff.formats.several_buses import buses_in
 
@@ -49,4 +48,4 @@ def test_none_is_invented(folder: Path) -> None:
                 survey(bus, session, counting)
             told = counting.told()
             assert (told and told[0].name) == MIXED.get(path.name), path
-            assert with_second(bus, session).notes.get(SECOND_NOTE) == MIXED.get(path.name), path
+            assert (proven(bus, session).name or None) == MIXED.get(path.name), path

@@ -9,8 +9,11 @@ import pytest
 from dissectors.frame import Chunk
 from sniff.engine.capture import CaptureError
 from sniff.formats import read
+from tests.sniff.formats import program_shapes_made
 from tests.sniff.formats.shapes_made import SHAPES
 from tests.sniff.formats.written_anew import write_anew
+
+assert program_shapes_made  # adds to them
 
 
 @pytest.mark.parametrize("name", SHAPES)
