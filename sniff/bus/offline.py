@@ -99,8 +99,8 @@ def settled_in_bulk(
     from sniff.engine.table_join import TableJoin
 
     if devices is None:
-        return _joined(capture, session, TableJoin(wanted))
-    return _joined(capture, session, _Spoken(PointReader(dissector_for(session), devices), wanted))
+        return _joined(tables_of(capture, session), TableJoin(wanted))
+    return _joined(tables_of(capture, session), _Spoken(PointReader(dissector_for(session), devices), wanted))
 
 
 class _Joining(Protocol[Given]):
@@ -133,19 +133,27 @@ class _Spoken:
         yield from self._settling.flush()
 
 
-def settled_columns(capture: ReadSource, session: Session) -> Iterator[SettledRows]:
-    """All rows of `settled`, as columns. Raises CaptureError as `settled` does."""
-    from sniff.engine.column_join import ColumnJoin
-
-    return _joined(capture, session, ColumnJoin())
-
-
-def _joined(capture: ReadSource, session: Session, joining: _Joining[Given]) -> Iterator[Given]:
-    """What a join gives of all tables of a capture; raises what the capture does, when all before it was given."""
+def tables_of(capture: ReadSource, session: Session) -> Iterator[Table | LineEvent]:
+    """What a capture holds, as tables. Raises CaptureError as `outputs` does."""
     from sniff.engine.bulk import tables
 
+    return tables(capture.blocks(), session)
+
+
+def settled_columns(
+    capture: ReadSource, session: Session, made: Iterable[Table | LineEvent] | None = None
+) -> Iterator[SettledRows]:
+    """All rows of `settled`, as columns; `made`: the tables of the capture, where somebody makes them already. Raises
+    CaptureError as `settled` does."""
+    from sniff.engine.column_join import ColumnJoin
+
+    return _joined(tables_of(capture, session) if made is None else made, ColumnJoin())
+
+
+def _joined(made: Iterable[Table | LineEvent], joining: _Joining[Given]) -> Iterator[Given]:
+    """What a join gives of all tables of a capture; raises what they do, when all before it was given."""
     try:
-        for item in tables(capture.blocks(), session):
+        for item in made:
             if not isinstance(item, LineEvent):
                 yield from joining.add(item)
     except CaptureError:

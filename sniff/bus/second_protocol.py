@@ -22,6 +22,7 @@ from dissectors.line import NS_PER_S, Timing
 from dissectors.manifest import Dissector
 from sniff.analysis.rest_evidence import second_in
 from sniff.bus.offline import ReadSource, outputs
+from sniff.bus.tables_ahead import TablesAhead
 from sniff.engine.capture import CaptureError
 from sniff.engine.engine import Engine, Output, Row
 from sniff.engine.follow_settings import dissector_for
@@ -44,29 +45,29 @@ Judged = tuple[JudgedRow, Dissector]
 # -- whether there is one ----------------------------------------------------------------------------------------
 
 
-def with_second(capture: ReadSource, session: Session, reference: bool = False) -> Session:
+def with_second(capture: ReadSource, session: Session, ahead: TablesAhead | None = None) -> Session:
     """The session with the second protocol of a bus by name (SECOND_NOTE), where octets that the first leaves prove
-    one. Reads the begin of the capture; `reference`: row by row, for comparison."""
+    one. Reads the begin of the capture: `ahead`, its tables; None: row by row, for comparison."""
     if SECOND_NOTE in session.notes:
         return session
-    name = _second_in(_left_at_first(capture, session, reference), session)
+    name = _second_in(_left_at_first(capture, session, ahead), session)
     return session if name is None else replace(session, notes={**session.notes, SECOND_NOTE: name})
 
 
 def _second_in(left: Sequence[Row], session: Session) -> str | None:
     """The protocol that makes good frames of rows which the first one leaves."""
-    if session.unknown or session.protocol not in registry.names():  # a relative on networks has streams
+    if not left or session.unknown or session.protocol not in registry.names():  # a relative on networks has streams
         return None
     others = [one.name for one in registry.usable() if one.name != session.protocol]
     found = second_in([Chunk(row.event.end, row.event.octets[:SAMPLE]) for row in left], session, others)
     return None if found is None else found[0]
 
 
-def _left_at_first(capture: ReadSource, session: Session, reference: bool) -> list[Row]:
+def _left_at_first(capture: ReadSource, session: Session, ahead: TablesAhead | None) -> list[Row]:
     """What the first protocol leaves of the begin of a capture."""
     left: list[Row] = []
     octets = seen = 0
-    given = _left_by_reference(capture, session) if reference else _left_of_tables(capture, session)
+    given = _left_by_reference(capture, session) if ahead is None else _left_of_tables(ahead)
     try:
         for passed, rows in given:
             seen += passed
@@ -82,10 +83,8 @@ def _left_at_first(capture: ReadSource, session: Session, reference: bool) -> li
     return left
 
 
-def _left_of_tables(capture: ReadSource, session: Session) -> Iterator[tuple[int, Iterable[Row]]]:
-    from sniff.engine.bulk import tables
-
-    for table in tables(capture.blocks(), session):
+def _left_of_tables(ahead: TablesAhead) -> Iterator[tuple[int, Iterable[Row]]]:
+    for table in ahead.look():
         if isinstance(table, Table):
             yield len(table.octets), _left_rows(table)
 

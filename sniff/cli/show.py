@@ -16,8 +16,9 @@ from dissectors.profiles import Devices
 from sniff.analysis.packet_tree import Field
 from sniff.analysis.row_tree import tree_of
 from sniff.bus import row_words as rows
-from sniff.bus.offline import settled, settled_columns, settled_in_bulk
+from sniff.bus.offline import settled, settled_columns, settled_in_bulk, tables_of
 from sniff.bus.second_protocol import of_both, with_second
+from sniff.bus.tables_ahead import TablesAhead
 from sniff.cli import USAGE, Failure, arguments, filtering, standard_streams, writing
 from sniff.cli.progress import Watched
 from sniff.cli.tables import Cell, plain_cell
@@ -76,7 +77,8 @@ def _show_all(args: argparse.Namespace, table: ParquetWriter | None) -> int:
     left = args.count
     for path, capture in arguments.open_captures(args.files):
         session = arguments.settings_of(args, capture.session, path)
-        session = with_second(capture, session, args.reference)
+        ahead = None if args.reference else TablesAhead(tables_of(Watched(capture, prints=True), session))
+        session = with_second(capture, session, ahead)
         devices = arguments.noted_devices(args, session)
         wanted = filtering.filter_of(args, capture, session, devices)
         if args.explain:
@@ -92,12 +94,13 @@ def _show_all(args: argparse.Namespace, table: ParquetWriter | None) -> int:
             accepted = ours.noting(wanted), filtering.of_second(args, session, second)
             rows_of_both = of_both(_settled(args, capture, session, spoken, None), session, second, *accepted)
             left = _show(args, rows_of_both, session, ours, left, table)
-        elif args.reference or spoken or named or ours or args.hex:
+        elif ahead is None or spoken or named or ours or args.hex:
             items = _settled(args, capture, session, spoken, ours.noting(wanted))
             dissector = dissector_for(session)
             left = _show(args, ((item, dissector) for item in items), session, ours, left, table)
         else:
-            left = _show_in_bulk(args, capture, session, wanted, left, table)
+            rows_of_tables = settled_columns(capture, session, ahead)
+            left = _show_in_bulk(args, rows_of_tables, session, wanted, left, table)
         writing.say_incomplete(path, capture)
         if left == 0:
             break
@@ -154,7 +157,7 @@ def _show(
 
 def _show_in_bulk(
     args: argparse.Namespace,
-    capture: Capture,
+    items: Iterable[SettledRows],
     session: Session,
     wanted: Filter,
     left: int | None,
@@ -163,7 +166,7 @@ def _show_in_bulk(
     from sniff.filter.choosing import chosen
 
     listed = _listed(args, dissector_for(session), session, table)
-    for settled_rows in settled_columns(Watched(capture, prints=True), session) if left != 0 else ():
+    for settled_rows in items if left != 0 else ():
         places = chosen(settled_rows, wanted)
         if left is not None:
             places = places[:left]

@@ -10,7 +10,7 @@ import numpy as np
 from dissectors.columns import NONE, PlacementColumns, Run, TransactionColumns
 from dissectors.tracker import Transaction
 from sniff.engine.engine import Row
-from sniff.engine.table import Table, joined_columns, placement_columns, transaction_columns
+from sniff.engine.table import Table, joined_columns, placement_columns, rows_at, transaction_columns
 
 
 class Placing:
@@ -62,3 +62,29 @@ class Placing:
 
     def _is_odd(self, place: int, row: Row) -> bool:
         return place in self._table.odd or getattr(row.event, "assembly", None) is not None
+
+
+class RowsAhead:
+    """The rows of a table, asked for in order, as objects: those that the tracker is likely to be asked about, damaged
+    frames and what follows them, are made some at a time."""
+
+    def __init__(self, table: Table) -> None:
+        self._table = table
+        damaged = np.flatnonzero(~table.frames.ok)
+        likely = np.zeros(len(table) + 1, bool)
+        likely[damaged] = likely[damaged + 1] = True
+        self._likely = np.flatnonzero(likely[: len(table)])
+        self._made: dict[int, Row] = {}
+        self._beyond = 0  # all likely ones before this place are made
+
+    def at(self, place: int) -> Row:
+        """The row at a place."""
+        if place >= self._beyond:
+            begin = int(self._likely.searchsorted(place))
+            places = self._likely[begin : begin + _AHEAD].tolist()
+            self._made = dict(zip(places, rows_at(self._table, places), strict=True))
+            self._beyond = places[-1] + 1 if len(places) == _AHEAD else len(self._table)
+        return self._made.get(place) or self._table.row(place)
+
+
+_AHEAD = 1024
