@@ -35,7 +35,11 @@ class TaughtTurns:
         """Good rows [begin, end); the last four say whose turn it is. `frame`: the last."""
         if end - begin > _FEW:
             first, beyond = self._passed.searchsorted((begin, end)).tolist()
-            holder, following, heard = self._holder[first:beyond], self._following[first:beyond], self._source[begin:end]
+            holder, following, heard = (
+                self._holder[first:beyond],
+                self._following[first:beyond],
+                self._source[begin:end],
+            )
             if end - begin > _MANY:
                 last = np.full(256, NONE, np.int64)
                 last[holder] = following

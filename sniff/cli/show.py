@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from dissectors import registry
 from dissectors.manifest import Dissector
 from dissectors.profiles import Devices
+from dissectors.tracker import Transaction
 from sniff.analysis.packet_tree import Field
 from sniff.analysis.row_tree import tree_of
 from sniff.bus import row_words as rows
@@ -23,17 +24,17 @@ from sniff.cli import USAGE, Failure, arguments, filtering, standard_streams, wr
 from sniff.cli.progress import Watched
 from sniff.cli.tables import Cell, plain_cell
 from sniff.engine.capture import Capture
+from sniff.engine.engine import Row
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import SECOND_NOTE, Session
 from sniff.engine.verdict_join import JudgedRow, Wanted
-from sniff.filter import Filter
-from sniff.filter.fields import types_of
 from sniff.formats.parquet import ParquetWriter
 
 if TYPE_CHECKING:
     from dissectors.columns import Times
-    from sniff.cli.filtering import FieldCells
+    from sniff.cli.field_names import FieldCells
     from sniff.engine.column_join import SettledRows
+    from sniff.filter import Filter
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -66,7 +67,10 @@ def run(args: argparse.Namespace) -> int:
         )
     if args.names and not args.table:
         raise Failure(f"-e {args.names[0]} goes with -T fields", USAGE)
-    filtering.check_names(args.names)
+    if any(name not in rows.JSON_KEYS for name in args.names):
+        from sniff.cli.field_names import check_names
+
+        check_names(args.names)
     with writing.parquet_file(args, rows.COLUMNS) as table:
         return _show_all(args, table)
 
@@ -80,22 +84,23 @@ def _show_all(args: argparse.Namespace, table: ParquetWriter | None) -> int:
         ahead = None if args.reference else TablesAhead(tables_of(Watched(capture, prints=True), session))
         session = with_second(capture, session, ahead)
         devices = arguments.noted_devices(args, session)
-        wanted = filtering.filter_of(args, capture, session, devices)
-        if args.explain:
+        wanted = filtering.filter_of(args, capture, session, devices) if args.filter or args.explain else None
+        if wanted is not None and args.explain:
             print(wanted.explain())
             continue
         named = (
             args.tree or args.fields or _by_request(args.names, session)
         )  # then every register is named, with a profile or without
         spoken = devices if named or (devices and (not args.table or "text" in args.names)) else None
-        ours = filtering.FieldCells(args.names, session, devices)
+        ours = _cells_of_filters(args.names, session, devices)
+        noted = wanted if ours is None else ours.noting(wanted)
         second = session.notes.get(SECOND_NOTE, "")
         if second and second in registry.names():
-            accepted = ours.noting(wanted), filtering.of_second(args, session, second)
+            accepted = noted or _every_row, filtering.of_second(args, session, second)
             rows_of_both = of_both(_settled(args, capture, session, spoken, None), session, second, *accepted)
             left = _show(args, rows_of_both, session, ours, left, table)
         elif ahead is None or spoken or named or ours or args.hex:
-            items = _settled(args, capture, session, spoken, ours.noting(wanted))
+            items = _settled(args, capture, session, spoken, noted)
             dissector = dissector_for(session)
             left = _show(args, ((item, dissector) for item in items), session, ours, left, table)
         else:
@@ -107,8 +112,25 @@ def _show_all(args: argparse.Namespace, table: ParquetWriter | None) -> int:
     return 0
 
 
+def _every_row(row: Row, transaction: Transaction | None) -> bool:
+    return True
+
+
+def _cells_of_filters(names: list[str], session: Session, devices: Devices) -> FieldCells | None:
+    """Of names that only filters know; None where there are none."""
+    if all(name in rows.JSON_KEYS for name in names):
+        return None
+    from sniff.cli.field_names import FieldCells
+
+    return FieldCells(names, session, devices) or None
+
+
 def _by_request(names: list[str], session: Session) -> bool:
     """Whether answers have any of these fields by their request."""
+    if all(name in rows.JSON_KEYS for name in names):
+        return False
+    from sniff.filter.fields import types_of
+
     types = types_of(dissector_for(session))
     return any(types[name].by_request for name in names if name in types)
 
@@ -126,7 +148,7 @@ def _show(
     args: argparse.Namespace,
     items: Iterable[tuple[JudgedRow, Dissector]],
     session: Session,
-    ours: FieldCells,
+    ours: FieldCells | None,
     left: int | None,
     table: ParquetWriter | None,
 ) -> int | None:
@@ -159,15 +181,15 @@ def _show_in_bulk(
     args: argparse.Namespace,
     items: Iterable[SettledRows],
     session: Session,
-    wanted: Filter,
+    wanted: Filter | None,
     left: int | None,
     table: ParquetWriter | None,
 ) -> int | None:
-    from sniff.filter.choosing import chosen
+    import numpy as np
 
     listed = _listed(args, dissector_for(session), session, table)
     for settled_rows in items if left != 0 else ():
-        places = chosen(settled_rows, wanted)
+        places = np.arange(settled_rows.begin, settled_rows.end) if wanted is None else _chosen(settled_rows, wanted)
         if left is not None:
             places = places[:left]
             left -= len(places)
@@ -176,6 +198,12 @@ def _show_in_bulk(
         if left == 0:
             break
     return left
+
+
+def _chosen(some: SettledRows, wanted: Filter) -> Times:
+    from sniff.filter.choosing import chosen
+
+    return chosen(some, wanted)
 
 
 def _listed(
@@ -206,12 +234,15 @@ def _listed(
     return lambda some, places: standard_streams.write(made.lines(some, places))
 
 
-def _cells(item: JudgedRow, names: list[str], dissector: Dissector, session: Session, ours: FieldCells) -> list[Cell]:
+def _cells(
+    item: JudgedRow, names: list[str], dissector: Dissector, session: Session, ours: FieldCells | None
+) -> list[Cell]:
     fields = rows.fields_of(item, dissector)
     if any(name not in fields for name in names):
         fields = {**rows.to_json(item, dissector, session), **fields}
     return [
-        ours.cell(name, item.row, item.transaction) if name in ours else plain_cell(fields.get(name)) for name in names
+        ours.cell(name, item.row, item.transaction) if ours and name in ours else plain_cell(fields.get(name))
+        for name in names
     ]
 
 
