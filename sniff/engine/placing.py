@@ -48,11 +48,16 @@ class Placing:
     def table(self) -> Table:
         """The table, whole."""
         closed, closed_by = transaction_columns(self._closed), np.array(self._closed_by, np.int64)
-        if self._runs:
-            closed = joined_columns(TransactionColumns, [*self._runs, closed])
-            closed_by = np.concatenate([*self._runs_closed_by, closed_by])
-            order = np.argsort(closed_by, kind="stable")  # a row is in a run or not: none closes some of both
-            closed, closed_by = closed.take(order), closed_by[order]
+        parts = [*zip(self._runs, self._runs_closed_by, strict=True), (closed, closed_by)]
+        parts = sorted((part for part in parts if len(part[1])), key=lambda part: int(part[1][0]))
+        if len(parts) > 1:
+            closed = joined_columns(TransactionColumns, [columns for columns, _ in parts])
+            closed_by = np.concatenate([rows for _, rows in parts])
+            if (closed_by[1:] < closed_by[:-1]).any():
+                order = np.argsort(closed_by, kind="stable")  # a row is in a run or not: none closes some of both
+                closed, closed_by = closed.take(order), closed_by[order]
+        elif parts:
+            closed, closed_by = parts[0]
         single, alone = self._single, placement_columns(self._rows)
         self._tx[single], self._role[single] = alone.tx, alone.role
         self._source[single], self._destination[single] = alone.source, alone.destination

@@ -145,7 +145,7 @@ def measure(path: Path, size: tuple[int, int], last: int) -> dict[str, tuple[flo
     took: dict[str, tuple[float, float]] = {}
     with opened(path, size) as screen:
         opened_at = screen.began
-        first = screen.wait(r"10:00:00\.006")
+        first = screen.wait(r"10:00:00\.\d{3}")
         took["first screen"] = first, screen.computed()
         screen.drain(0.3)
         took["key while reading"] = screen.pressed("j", r">\s+2\s")
