@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from sniff.cli.byte_columns import Chosen, Column
 from sniff.cli.distinct import distinct_codes
 
@@ -43,7 +45,7 @@ def _combined(left: Chosen, right: Chosen) -> Chosen | None:
         (only,) = _texts(right)
         return Chosen.of([text + only for text in _texts(left)], left.codes)
     count = len(right.texts)
-    distinct, codes = distinct_codes(left.codes.astype("i8") * count + right.codes)
+    distinct, codes = distinct_codes(left.codes.astype(np.int64) * count + right.codes)
     if len(distinct) > _MOST:
         return None
     before, behind = _texts(left), _texts(right)
