@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, Self, runtime_checkable
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol, Self, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -108,8 +108,7 @@ class OctetTimes:
 
     def read_of(self, octets: Times) -> Times:
         """Index of the read that holds each octet (places in the octets of all reads)."""
-        reads: Times = np.searchsorted(self.begins, octets, side="right") - 1
-        return reads
+        return places_in(self.begins, octets, "right") - 1
 
     def end(self, octets: Times) -> Times:
         """Nominal end of octets, ns."""
@@ -268,6 +267,23 @@ class TransactionColumns:
             some(self.of[place]),
             self.names[self.error[place]] if self.error[place] else None,
         )
+
+
+def places_in(ascending: Times, values: Times, side: Literal["left", "right"] = "left") -> Times:
+    """`np.searchsorted`; at once where every value falls one place behind the one before it, as frames do among reads
+    that each hold one."""
+    first = int(ascending.searchsorted(values[0], side)) if len(values) else 0
+    end = first + len(values)
+    if first > 0 and end <= len(ascending):
+        below, above = ascending[first - 1 : end - 1], ascending[first:end]
+        if side == "left":
+            fits = (below < values) & (values <= above)
+        else:
+            fits = (below <= values) & (values < above)
+        if fits.all():
+            return np.arange(first, end)
+    places: Times = ascending.searchsorted(values, side)
+    return places
 
 
 def holds_any(begins: Times, ends: Times, places: Times) -> Masks:

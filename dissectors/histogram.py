@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cache
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -114,22 +115,35 @@ def add_grouped(
     if not len(values):
         return
     values = np.maximum(values, 0)
-    keys = groups.astype(np.int64) * _BUCKETS + np.searchsorted(_edges(), values, side="right")
-    order = np.argsort(keys, kind="stable")
-    keys, values = keys[order], values[order]
+    if int(values.max()) < 1 << _VALUE_BITS and int(groups.max()) < 1 << (63 - _VALUE_BITS):
+        both = groups.astype(np.int64) << _VALUE_BITS | values  # sorted far faster than by a key
+        both.sort()
+        groups, values = both >> _VALUE_BITS, both & ((1 << _VALUE_BITS) - 1)
+    else:
+        order = np.lexsort((values, groups))
+        groups, values = groups[order].astype(np.int64), values[order]
+    keys = groups * _BUCKETS + np.searchsorted(_edges(), values, side="right")
     begins = np.flatnonzero(np.append(True, keys[1:] != keys[:-1]))
-    counts = np.diff(np.append(begins, len(keys)))
-    columns = (keys[begins], counts, np.maximum.reduceat(values, begins), np.minimum.reduceat(values, begins))
-    sums = np.add.reduceat(values, begins)
-    for key, count, most, least, total in zip(*(column.tolist() for column in (*columns, sums)), strict=True):
-        histogram, bucket = of(key // _BUCKETS), key % _BUCKETS
-        histogram.buckets[bucket] += count
-        histogram.tops[bucket] = max(most, histogram.tops.get(bucket, 0))
-        histogram.count += count
-        histogram.total += total
+    ends = np.append(begins[1:], len(keys))
+    first = np.append(np.flatnonzero(np.append(True, np.diff(groups[begins]))), len(begins)).tolist()
+    buckets, counts = (keys[begins] % _BUCKETS).tolist(), (ends - begins).tolist()
+    tops, leasts = values[ends - 1].tolist(), values[begins].tolist()
+    sums = np.add.reduceat(values, begins).tolist()
+    for begin, end in pairwise(first):
+        histogram = of(int(groups[begins[begin]]))
+        held, largest = histogram.buckets, histogram.tops
+        for bucket, count, top in zip(buckets[begin:end], counts[begin:end], tops[begin:end], strict=True):
+            held[bucket] += count
+            largest[bucket] = max(top, largest.get(bucket, 0))
+        least, most = leasts[begin], tops[end - 1]
+        histogram.count += sum(counts[begin:end])
+        histogram.total += sum(sums[begin:end])
         histogram.least = least if histogram.least is None else min(histogram.least, least)
         histogram.most = most if histogram.most is None else max(histogram.most, most)
 
+
+_VALUE_BITS = 48
+"""Bits of a value that is sorted together with its group: 78 hours in ns."""
 
 _BUCKETS = 1 << 12
 """More than there are for any value of 64 bits."""

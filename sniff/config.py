@@ -54,16 +54,16 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Any, Literal
 
 from dissectors import registry
 from dissectors.findings import Severity
 from dissectors.line import LineSettings
 from sniff import outlet_settings
+from sniff.engine.session import AUTO as AUTO
 from sniff.outlet_settings import OutletSettings
 
 FILE = "sniff485.toml"
-AUTO: Final = "auto"
 BUS_KEYS = ("port", "line", "protocol", "record", "devices")
 ALERT_KEYS = ("command", "webhook", "at", "every")
 BOX_KEYS = ("folder", "name", "rotate", "keep", "keep_free", "metrics", "status")

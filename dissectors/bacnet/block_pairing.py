@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from dissectors.bacnet.pairing import Pairing, prepare
 from dissectors.bacnet.tracker import MstpTracker
 from dissectors.columns import FrameColumns, Octets, Run, Times
@@ -26,7 +24,7 @@ class MstpBlockPairing:
         if made is None:
             return None
         closing = self._pairing.rows.closing
-        first, beyond = np.searchsorted(closing, (made.begin, made.end)).tolist()
+        first, beyond = closing.searchsorted((made.begin, made.end)).tolist()
         return Run(made.begin, made.end, made.placements, made.transactions, closing[first:beyond])
 
 

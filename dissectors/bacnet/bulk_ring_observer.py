@@ -96,8 +96,6 @@ class BulkRingObserver(MstpRingObserver):
 
     def _move(self, columns: RingColumns, begin: int, end: int) -> None:
         """Stand behind clean rows that have been counted."""
-        from dissectors.bacnet.turn_columns import teach
-
         rows, last, told = slice(begin, end), end - 1, columns.rows
         frame = told.frames.frame(last, told.octets, told.protocol, int(told.slack[last]))
         source, destination = int(columns.source[last]), int(columns.destination[last])
@@ -117,7 +115,6 @@ class BulkRingObserver(MstpRingObserver):
         self._questions.alone_since = columns.alone_since(last)
         self._storms.see_many(columns.end[rows][columns.to_all[rows]].tolist())
         self._reads.pass_by(frame)
-        parties = columns.source[rows], columns.destination[rows]
-        teach(self._turn, columns.token[rows], columns.poll_reply[rows], *parties, columns.kind[rows], frame)
+        columns.turns.teach(self._turn, begin, end, frame)
         self._before, self._doubt = frame, False
         self._quiet_since, self._quiet_slack = frame.end, frame.slack

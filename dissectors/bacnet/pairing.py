@@ -25,7 +25,7 @@ from dissectors.bacnet.open_exchanges import POSTPONED_FOR, REMEMBERED, SEGMENTS
 from dissectors.bacnet.past_exchanges import Entry, Nets, PastExchanges
 from dissectors.bacnet.placed_rows import CODE, POLL_REPLY, REQUEST, TOKEN, WAITS, PlacedRows
 from dissectors.bacnet.tracker import LATE_WITHIN, MstpTracker
-from dissectors.bacnet.turn_columns import teach
+from dissectors.bacnet.turn_columns import TaughtTurns
 from dissectors.columns import NONE, ROLES, FrameColumns, PlacementColumns, TransactionColumns
 from dissectors.frame import Frame, Role
 from dissectors.tracker import Interval, Verdict
@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     from collections.abc import Sized
 
     from dissectors.bacnet.tracker import Standing
-    from dissectors.bacnet.turn import Turn
     from dissectors.columns import Octets, Times
     from dissectors.line import Timing
 
@@ -83,6 +82,8 @@ class Pairing:
             slack = np.full(len(frames), timing.latency, np.int64)
         self.frames, self.octets, self._slack, self._nets = frames, octets, slack, nets
         self.rows = PlacedRows(frames, octets, timing, nets, slack)
+        kinds, parties = self.rows.kinds, (self.rows.source, self.rows.destination)
+        self._turns = TaughtTurns(kinds == TOKEN, kinds == POLL_REPLY, *parties, frames.function)
 
     def run(self, tracker: MstpTracker, begin: int, no: int) -> Run | None:
         """Decide rows from `begin` on, which has the number `no`, and move the tracker behind them.
@@ -97,14 +98,14 @@ class Pairing:
         if not self._is_local(standing.waiting, begin, no):
             return None
         past = _past_of(standing)
-        end = int(rows.doubtful_rows[np.searchsorted(rows.doubtful_rows, begin)])
+        end = int(rows.doubtful_rows[rows.doubtful_rows.searchsorted(begin)])
         end = self._before_postponed(standing, begin, end)
-        first, beyond = np.searchsorted(rows.requests, (begin, end)).tolist()
+        first, beyond = rows.requests.searchsorted((begin, end)).tolist()
         end = self._before_repeats(past, begin, end, first, beyond)
         if end == begin:
             return None
         base = standing.next - 1 - int(rows.opened[begin - 1])
-        beyond = int(np.searchsorted(rows.requests, end))
+        beyond = int(rows.requests.searchsorted(end))
         attempts = self._attempts(first, beyond, base)
         stretch = _Stretch(begin, end, base, no - begin, first, beyond, standing.waiting, attempts)
         run = Run(begin, end, self._placements(stretch), self._transactions(stretch))
@@ -145,10 +146,12 @@ class Pairing:
             if len(again):
                 end = int(rows.requests[first + again[0]])
         asked = rows.requests[first + np.flatnonzero(rows.earlier[first:beyond] < first)]
-        for row, code in zip(asked.tolist(), rows.keys[asked].tolist(), strict=True):
+        codes = rows.keys[asked].tolist()
+        for place in past.known(codes):
+            row = asked[place]
             if row >= end:
                 break
-            failed_at = past.failed_at(code)
+            failed_at = past.failed_at(codes[place])
             if failed_at is not None and int(self.frames.start[row]) - failed_at < LATE_WITHIN:
                 return int(row)
         return end
@@ -157,7 +160,7 @@ class Pairing:
         """Requests that repeat one of the same stretch."""
         attempts: dict[int, tuple[int, int]] = {}
         rows = self.rows
-        begin, end = np.searchsorted(rows.repeating, (first, beyond)).tolist()
+        begin, end = rows.repeating.searchsorted((first, beyond)).tolist()
         for place in rows.repeating[begin:end].tolist():
             earlier = int(rows.earlier[place])
             row, before = int(rows.requests[place]), int(rows.requests[earlier])
@@ -174,7 +177,7 @@ class Pairing:
         return PlacementColumns(tx, role, self.frames.source[rows], self.frames.destination[rows])
 
     def _transactions(self, stretch: _Stretch) -> TransactionColumns:
-        first, beyond = np.searchsorted(self.rows.closing, (stretch.begin, stretch.end)).tolist()
+        first, beyond = self.rows.closing.searchsorted((stretch.begin, stretch.end)).tolist()
         closed, told = slice(first, beyond), self.rows.transactions
         response, of = told.response[closed], told.of[closed]
         transactions = TransactionColumns(
@@ -202,7 +205,7 @@ class Pairing:
         if waiting is not None:
             attempts = {**attempts, stretch.begin - 1: (waiting.attempt, NONE if waiting.of is None else waiting.of)}
         for row, (attempt, of) in attempts.items():
-            place = int(np.searchsorted(owners, row))
+            place = int(owners.searchsorted(row))
             if place == len(owners) or owners[place] != row:
                 continue  # still waits
             transactions.attempt[place], transactions.of[place] = attempt, of
@@ -220,7 +223,7 @@ class Pairing:
             for row in (stretch.begin + of_key).tolist():
                 standing.reassembler.add(row + stretch.to_number, self._frame(row))
         frame = self._frame(last)
-        self._teach(standing.turn, stretch.begin, stretch.end, frame)
+        self._turns.teach(standing.turn, stretch.begin, stretch.end, frame)
         standing.waiting = self.exchange(last, stretch) if WAITS[rows.kinds[last]] else None
         tx = stretch.base + int(rows.opened[last])
         standing.previous, standing.next = (frame, tx), tx + 1
@@ -238,13 +241,6 @@ class Pairing:
             _, newest = np.unique(rows.keys[requests][::-1], return_index=True)
             requests = requests[::-1][np.sort(newest)[:REMEMBERED]][::-1]
         past.add(_PairedRows(self, stretch), rows.keys[requests].tolist(), requests.tolist(), REMEMBERED)
-
-    def _teach(self, turn: Turn, begin: int, end: int, frame: Frame) -> None:
-        """Who spoke to whom, and whose turn it is. `frame`: the last."""
-        rows, some = self.rows, slice(begin, end)
-        kinds = rows.kinds[some]
-        parties = rows.source[some], rows.destination[some]
-        teach(turn, kinds == TOKEN, kinds == POLL_REPLY, *parties, self.frames.function[some], frame)
 
     # Rows as the values they stand for
 

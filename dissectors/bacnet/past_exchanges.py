@@ -92,10 +92,15 @@ class PastExchanges(OrderedDict[Key, Entry]):
             self._kept += len(rows.block)
         entries = self._entries
         for code, row in zip(codes, places, strict=True):
+            entries.pop(code, None)  # the latest last
             entries[code] = rows, row
-            entries.move_to_end(code)
-        while len(entries) > most:
+        for _ in range(len(entries) - most):
             entries.popitem(last=False)
+
+    def known(self, codes: list[int]) -> list[int]:
+        """Which of these keys, by their place, an exchange has."""
+        entries = self._entries
+        return [place for place, code in enumerate(codes) if code in entries]
 
     def failed_at(self, code: int) -> int | None:
         """When the newest exchange with that key was over, if it had no answer or a damaged one; else None."""

@@ -141,10 +141,11 @@ class PlacedRows:
         closes = np.zeros(len(frames), bool)
         closes[1:] = WAITS.take(classes[:-1])
         waited, alone = np.flatnonzero(closes), np.flatnonzero(classes == SINGLE)
-        closing = np.concatenate((waited, alone))
-        order = np.argsort(closing, kind="stable")  # what waited goes before what is over at once
-        owner = np.concatenate((waited - 1, alone))[order]
-        closing = closing[order]
+        closing, owner = waited, waited - 1
+        if len(alone):
+            closing = np.concatenate((waited, alone))
+            order = np.argsort(closing, kind="stable")  # what waited goes before what is over at once
+            closing, owner = closing[order], np.concatenate((owner, alone))[order]
         kind = classes[owner]
         answered, single = self.answered[closing] & (kind != SINGLE), kind == SINGLE
         negative = frames.error[closing] != 0

@@ -18,6 +18,7 @@ from dissectors.bacnet.frame_types import HEADER, PROPRIETARY, FrameType
 from dissectors.bacnet.limits import BROADCAST, MAX_DATA, MAX_MASTER, T_NO_TOKEN, T_REPLY_DELAY, T_USAGE_DELAY
 from dissectors.bacnet.ring_questions import T_GO_ON
 from dissectors.bacnet.storms import STORM_BROADCASTS, STORM_WITHIN
+from dissectors.bacnet.turn_columns import TaughtTurns
 from dissectors.columns import ROLES
 from dissectors.frame import Role
 
@@ -41,7 +42,7 @@ class RingColumns:
     `start`, `end`, `slack`, `length`, `kind` (frame type), `source`, `destination`: as in the rows. `token`, `poll`,
     `poll_reply`, `data`: what it is. `asks`: the next frame answers it. `answers`: it answers the frame before.
     `after`: who has the token behind it, or was sent it. `gap`: ns since the row before. `clean`: see above; the first
-    two never are.
+    two never are. `turns`: what they teach of who speaks to whom.
     """
 
     def __init__(self, rows: RowColumns, timing: Timing, least_gap: int, broadcasts: Iterable[int]) -> None:
@@ -57,6 +58,7 @@ class RingColumns:
             self._plain[place] = False
         self.token, self.poll = self.kind == _TOKEN, self.kind == _POLL
         self.poll_reply = self.kind == _POLL_REPLY
+        self.turns = TaughtTurns(self.token, self.poll_reply, self.source, self.destination, self.kind)
         self._expecting = np.isin(self.kind, _EXPECTING)
         self.data = self._expecting | np.isin(self.kind, _NOT_EXPECTING) | (self.kind >= PROPRIETARY)
         self.to_all = self.data & (self.destination == BROADCAST)

@@ -7,7 +7,8 @@ is compared with what each of those could have sent; octets may be wrong, missin
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from functools import cache
+from functools import cache, lru_cache
+from operator import getitem
 from typing import NamedTuple
 
 from dissectors.bacnet.frame_types import EXPECTING, HEADER, PREAMBLE, FrameType
@@ -103,16 +104,20 @@ class Turn:
     def speaker(self, frame: Frame) -> Speaker | None:
         """Who most likely sent a frame whose header is damaged; None where nothing is known of the bus."""
         octets = frame.octets[: HEADER + 2]
-        guesses = [(guess, _expected(guess)) for guess in self._guesses(frame)]
+        made = [(guess, _expected(*guess[1:])) for guess in self._guesses(frame)]
+        # what it costs at most: octet for octet, and the end lost, so that others need not be reckoned to their end
+        lost = max(0, HEADER - len(octets)) * _LOST
+        guesses = [(guess, header, lost + sum(map(getitem, header, octets))) for guess, header in made]
         best: _Guess | None = None
-        # what it costs where nothing is lost or too many, so that others need not be reckoned to their end
-        least = min((guess.cost + _substituted(octets, header) for guess, header in guesses), default=_FAR) + 1
-        for guess, header in guesses:
-            if guess.cost >= least:
+        least = min([guess.cost + plainly for guess, _, plainly in guesses], default=_FAR) + 1
+        for guess, header, plainly in guesses:
+            limit = least - guess.cost
+            if limit <= 0:
                 continue
-            cost = guess.cost + _distance(octets, header, least - guess.cost)
-            if cost < least:
-                least, best = cost, guess
+            if limit > _LOST:
+                plainly = _distance(octets, header, limit)
+            if plainly < limit:
+                least, best = guess.cost + plainly, guess
         if best is None:
             return None
         return Speaker(best.source, None if best.destination == _ANY else best.destination, best.frame_type)
@@ -175,23 +180,22 @@ class Turn:
         self._heard.update(heard)
 
 
-def _expected(guess: _Guess) -> tuple[int, ...]:
-    """The header of a guessed frame, octet by octet."""
-    if guess.frame_type <= _POLL_REPLY or guess.frame_type == FrameType.REPLY_POSTPONED:
-        crc = _ANY
-        if guess.destination != _ANY:
-            crc = crc8_mstp(bytes((guess.frame_type, guess.destination, guess.source, 0, 0)))
-        return (*PREAMBLE, guess.frame_type, guess.destination, guess.source, 0, 0, crc)
-    return (*PREAMBLE, guess.frame_type, guess.destination, guess.source, _ANY, _ANY, _ANY)
+Header = tuple[bytes, ...]
+"""What a guessed frame's header is, octet by octet: what it costs to take each octet for that one."""
 
 
-def _substituted(octets: bytes, header: tuple[int, ...]) -> int:
-    """What it costs at most to take the begin of `octets` for that header: octet for octet, and the end lost."""
-    lost = max(0, len(header) - len(octets)) * _LOST
-    return lost + sum([_costs(wanted)[octet] for wanted, octet in zip(header, octets, strict=False)])
+@lru_cache(1 << 14)
+def _expected(frame_type: int, destination: int, source: int) -> Header:
+    """The header of a guessed frame."""
+    crc = size = _ANY
+    if frame_type <= _POLL_REPLY or frame_type == FrameType.REPLY_POSTPONED:
+        size = 0
+        if destination != _ANY:
+            crc = crc8_mstp(bytes((frame_type, destination, source, 0, 0)))
+    return tuple(map(_costs, (*PREAMBLE, frame_type, destination, source, size, size, crc)))
 
 
-def _distance(octets: bytes, header: tuple[int, ...], limit: int) -> int:
+def _distance(octets: bytes, header: Header, limit: int) -> int:
     """What it costs to take the begin of `octets` for that header; octets after it cost nothing.
 
     `limit`, 1 or more, where it is that or more: a row never costs less than the one before it, so the rest need not be
@@ -199,8 +203,8 @@ def _distance(octets: bytes, header: tuple[int, ...], limit: int) -> int:
     """
     least, count, reach = 0, len(octets), (limit - 1) // _LOST
     row = [at * _TOO_MANY for at in range(count + 1)]
-    for number, wanted in enumerate(header, 1):
-        costs, before = _costs(wanted), row
+    for number, costs in enumerate(header, 1):
+        before = row
         first = max(1, number - reach)
         if first > count + 1:
             return limit

@@ -89,9 +89,7 @@ class Load:
         octets, is_frame, ok = table.frames.length[heard], table.is_frame[heard], table.good[heard]
         self.first = int(starts.min()) if self.first is None else min(self.first, int(starts.min()))
         self.last = int(ends.max()) if self.last is None else max(self.last, int(ends.max()))
-        busy = octets.astype(np.int64) * self.line.char
         numbers = ends // NS_PER_S
-        late = np.minimum(busy, ends - numbers * NS_PER_S)
         base = int(numbers.min()) - 1
         if int(numbers.max()) - base > MOST_AT_ONCE:  # times that jump: second by second
             for output in table.outputs():
@@ -99,24 +97,29 @@ class Load:
                     self.add(row)
             return
         places, least = numbers - base, int(numbers.max()) - base + 1
+        early = octets.astype(np.int64) * self.line.char - (ends - numbers * NS_PER_S)  # of the second before
+        begun = np.flatnonzero(early > 0)
+        noise = np.flatnonzero(~is_frame)
 
-        def summed(values: npt.NDArray[Any], at: npt.NDArray[np.int64] = places) -> list[int]:
-            whole: list[int] = np.bincount(at, values, least).astype(np.int64).tolist()
+        def summed(at: npt.NDArray[np.int64], values: npt.NDArray[Any] | None = None) -> npt.NDArray[np.int64]:
+            whole: npt.NDArray[np.int64] = np.bincount(at, values, least).astype(np.int64)
             return whole  # exact: a second has less than 2**53 ns
 
-        parts = zip(
-            (a + b for a, b in zip(summed(late), summed(busy - late, places - 1), strict=True)),
-            summed(octets),
-            summed(is_frame),
-            summed(is_frame & ~ok),
-            summed(np.where(is_frame, 0, octets)),
-            strict=True,
-        )
-        for number, (of_line, *counts) in enumerate(parts, base):
-            if of_line or any(counts):
-                more = Second(of_line, *counts)
-                self.seconds[number] = self._second(number).merge(more)
-                self.total = self.total.merge(more)
+        carried = summed(places, octets)
+        busy = carried * self.line.char
+        busy += summed(places[begun] - 1, early[begun]) - summed(places[begun], early[begun])
+        frames = summed(places[is_frame]) if len(noise) else summed(places)
+        columns = busy, carried, frames, summed(places[is_frame & ~ok]), summed(places[noise], octets[noise])
+        self.total = self.total.merge(Second(*(int(column.sum()) for column in columns)))
+        for number, counts in enumerate(zip(*(column.tolist() for column in columns), strict=True), base):
+            if not any(counts):
+                continue
+            known, more = self.seconds.get(number), Second(*counts)
+            if known is None:
+                self._second(number)  # makes room
+                self.seconds[number] = more
+            else:
+                self.seconds[number] = known.merge(more)
 
     def merge(self, other: Load) -> Load:
         """Both together, as a new value; of the seconds the newest are kept."""

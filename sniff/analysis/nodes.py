@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -13,7 +13,7 @@ from dissectors.tracker import PASSING, Passing, Transaction, Verdict
 from sniff.engine.engine import Row
 
 if TYPE_CHECKING:
-    from dissectors.columns import TransactionColumns
+    from dissectors.columns import Small, TransactionColumns
     from sniff.engine.table import Table
 
 
@@ -88,6 +88,22 @@ EXPECTING = (
 )
 
 
+_BEGIN = 4096
+"""Rows in which most stations have spoken."""
+
+
+def _first_places(held: Small, counts: Sequence[int]) -> Iterator[tuple[int, int]]:
+    """Each address, ascending, and its first place; `counts`: how often each stands there."""
+    import numpy as np
+
+    present = sum(map(bool, counts))
+    for most in (_BEGIN, len(held)):
+        addresses, places = np.unique(held[:most], return_index=True)
+        if len(addresses) == present:
+            break
+    return zip(addresses.tolist(), places.tolist(), strict=True)
+
+
 @dataclass(slots=True)
 class NodeTable:
     """All stations of one bus by address."""
@@ -149,14 +165,14 @@ class NodeTable:
             held = addresses[rows]
             damaged = ~good[rows] if sends else ~good[rows] & anonymous[rows]
             counts, bad, heard = (np.bincount(of).tolist() for of in (held, held[damaged], held[whole[rows]]))
-            for address, first in zip(*(one.tolist() for one in np.unique(held, return_index=True)), strict=True):
+            for address, first in _first_places(held, counts):
                 node = self._node(address)
                 node.sent += counts[address] * sends
                 node.received += counts[address] * (not sends)
                 node.damaged += bad[address] if address < len(bad) else 0
                 node.heard += heard[address] if sends and address < len(heard) else 0
                 seen.setdefault(address, []).append(int(rows[first]))
-            for address, last in zip(*(one.tolist() for one in np.unique(held[::-1], return_index=True)), strict=True):
+            for address, last in _first_places(held[::-1], counts):
                 seen[address].append(int(rows[len(rows) - 1 - last]))
         for address, places in seen.items():
             node = self._node(address)

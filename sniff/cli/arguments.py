@@ -14,9 +14,8 @@ from dissectors.profiles import Devices, ProfileError
 from sniff.analysis.sanitizing import sanitized
 from sniff.analysis.told_protocol import detected
 from sniff.cli import UNREADABLE, USAGE, Failure
-from sniff.config import AUTO
 from sniff.engine.capture import Capture, CaptureError
-from sniff.engine.session import ASSUMED, LINE_NOTE, OPTIONS, PROTOCOL_NOTE, Session
+from sniff.engine.session import ASSUMED, AUTO, LINE_NOTE, OPTIONS, PROTOCOL_NOTE, Session
 from sniff.formats import read
 from sniff.formats.several_buses import SeveralBuses, buses_in
 

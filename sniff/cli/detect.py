@@ -18,8 +18,7 @@ from sniff.analysis.sanitizing import sanitized
 from sniff.analysis.told_protocol import Sureness, detected, told_by
 from sniff.cli import PORT_TROUBLE, UNREADABLE, arguments, json_output, listening, targets
 from sniff.cli.searching import TIMEOUT, search, sentence
-from sniff.config import AUTO
-from sniff.engine.session import Session, with_settings
+from sniff.engine.session import AUTO, Session, with_settings
 
 
 def configure(parser: argparse.ArgumentParser) -> None:

@@ -11,21 +11,26 @@ from collections.abc import Callable, Iterator
 
 from dissectors import registry
 from dissectors.profiles import Devices
+from dissectors.tracker import Transaction
 from sniff.bus.offline import settled, settled_in_bulk
 from sniff.bus.second_proof import SecondProof
 from sniff.bus.second_protocol import Judged, of_both
 from sniff.cli import filtering
 from sniff.cli.progress import Watched
 from sniff.engine.capture import Capture
+from sniff.engine.engine import Row
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import Session
 from sniff.engine.verdict_join import JudgedRow, Wanted
-from sniff.filter import Filter
+
+
+def _every_row(row: Row, transaction: Transaction | None) -> bool:
+    return True
 
 
 class ListedRows:
-    """Rows that -Y accepts (`wanted`), each with the dissector of its protocol. `noting`: shows every row to somebody
-    who wants to know of all. Raises CaptureError as the capture does, when all before the damage was given."""
+    """Rows that -Y accepts (`wanted`; None: all), each with the dissector of its protocol. `noting`: shows every row to
+    somebody who wants to know of all. Raises CaptureError as the capture does, when all before the damage was given."""
 
     def __init__(
         self,
@@ -33,8 +38,8 @@ class ListedRows:
         capture: Capture,
         session: Session,
         proof: SecondProof,
-        wanted: Filter,
-        noting: Callable[[Filter], Wanted] = lambda wanted: wanted,
+        wanted: Wanted | None,
+        noting: Callable[[Wanted | None], Wanted | None] = lambda wanted: wanted,
     ) -> None:
         self._args, self._session = args, session
         self._watched = Watched(capture, prints=True)
@@ -49,10 +54,11 @@ class ListedRows:
         """Those from where a second protocol is proven."""
         name = self._proof.name
         if name in registry.names():
-            of_second = filtering.of_second(self._args, self._session, name)
+            filters = self._args.filter
+            of_second = filtering.of_second(self._args, self._session, name) if filters else _every_row
             asked = None if of_second is None else self._noting(of_second)
             items = self._settled(devices, None, None)
-            yield from of_both(items, self._session, name, self._wanted, asked, self._proof.since)
+            yield from of_both(items, self._session, name, self._wanted or _every_row, asked, self._proof.since)
 
     def _of_first(self, devices: Devices | None) -> Iterator[Judged]:
         """Those before."""

@@ -29,6 +29,7 @@ from sniff.cli.byte_columns import (
     where,
 )
 from sniff.cli.distinct import distinct_codes
+from sniff.cli.merged_columns import merged
 from sniff.cli.said_texts import SaidTexts
 from sniff.cli.specimens import Specimens
 from sniff.cli.tables import plain_cell
@@ -107,7 +108,7 @@ class RowCells:
                 columns.append(fields[name])
             else:
                 columns += _HELD[name](self, some, name)
-        return pieced([*columns, self._style.end], alone, lambda at: self._alone(settled, int(places[at])))
+        return pieced(merged([*columns, self._style.end]), alone, lambda at: self._alone(settled, int(places[at])))
 
     def _alone(self, settled: SettledRows, place: int) -> bytes:
         cells = map(self._style.render, self._values(settled.item(place), self._names))

@@ -14,6 +14,7 @@ from sniff.analysis.wording import duration
 from sniff.bus import row_words as rows
 from sniff.cli.byte_columns import Chosen, Codes, Column, digits, encoded, fixed_digits, pieced
 from sniff.cli.distinct import distinct_codes
+from sniff.cli.merged_columns import merged
 from sniff.cli.said_texts import SaidTexts
 from sniff.engine.column_join import SettledRows
 from sniff.engine.session import Session
@@ -51,7 +52,7 @@ class RowLines:
             texts, self._noted(notes, told, [note for _, note in noted]),
             *([Chosen.of([b"\n", b"\x1b[0m\n"], bad.view(np.uint8))] if self._colour else [b"\n"]),
         ]  # fmt: skip
-        return pieced(columns, alone, lambda at: self._alone(settled, int(places[at])))
+        return pieced(merged(columns), alone, lambda at: self._alone(settled, int(places[at])))
 
     def _alone(self, settled: SettledRows, place: int) -> bytes:
         line = rows.text_line(settled.item(place), self._dissector, self._session, self._colour)

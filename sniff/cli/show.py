@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import TYPE_CHECKING
 
 from dissectors.manifest import Dissector
+from dissectors.profiles import Devices
 from sniff.analysis.packet_tree import Field
 from sniff.analysis.row_tree import tree_of
 from sniff.bus import row_words as rows
@@ -24,14 +25,13 @@ from sniff.engine.capture import Capture
 from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import Session
 from sniff.engine.verdict_join import JudgedRow
-from sniff.filter import Filter
-from sniff.filter.fields import types_of
 from sniff.formats.parquet import ParquetWriter
 
 if TYPE_CHECKING:
     from dissectors.columns import Times
-    from sniff.cli.filtering import FieldCells
+    from sniff.cli.field_names import FieldCells
     from sniff.engine.column_join import SettledRows
+    from sniff.filter import Filter
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -64,7 +64,10 @@ def run(args: argparse.Namespace) -> int:
         )
     if args.names and not args.table:
         raise Failure(f"-e {args.names[0]} goes with -T fields", USAGE)
-    filtering.check_names(args.names)
+    if any(name not in rows.JSON_KEYS for name in args.names):
+        from sniff.cli.field_names import check_names
+
+        check_names(args.names)
     with writing.parquet_file(args, rows.COLUMNS) as table:
         return _show_all(args, table)
 
@@ -77,15 +80,15 @@ def _show_all(args: argparse.Namespace, table: ParquetWriter | None) -> int:
         session = arguments.settings_of(args, capture.session, path)
         devices = arguments.noted_devices(args, session)
         proof, wanted = filtering.filter_of_both(args, capture, session, devices)
-        if args.explain:
+        if wanted is not None and args.explain:
             print(wanted.explain())
             continue
         named = (
             args.tree or args.fields or _by_request(args.names, session)
         )  # then every register is named, with a profile or without
         spoken = devices if named or (devices and (not args.table or "text" in args.names)) else None
-        ours = filtering.FieldCells(args.names, session, devices)
-        listed = ListedRows(args, capture, session, proof, wanted, ours.noting)
+        ours = _cells_of_filters(args.names, session, devices)
+        listed = ListedRows(args, capture, session, proof, wanted, *(() if ours is None else (ours.noting,)))
         if args.reference or spoken or named or ours or args.hex or proof.name:
             left = _show(args, listed.all(spoken), session, ours, left, table)
         else:
@@ -98,8 +101,21 @@ def _show_all(args: argparse.Namespace, table: ParquetWriter | None) -> int:
     return 0
 
 
+def _cells_of_filters(names: list[str], session: Session, devices: Devices) -> FieldCells | None:
+    """Of names that only filters know; None where there are none."""
+    if all(name in rows.JSON_KEYS for name in names):
+        return None
+    from sniff.cli.field_names import FieldCells
+
+    return FieldCells(names, session, devices) or None
+
+
 def _by_request(names: list[str], session: Session) -> bool:
     """Whether answers have any of these fields by their request."""
+    if all(name in rows.JSON_KEYS for name in names):
+        return False
+    from sniff.filter.fields import types_of
+
     types = types_of(dissector_for(session))
     return any(types[name].by_request for name in names if name in types)
 
@@ -108,7 +124,7 @@ def _show(
     args: argparse.Namespace,
     items: Iterable[tuple[JudgedRow, Dissector]],
     session: Session,
-    ours: FieldCells,
+    ours: FieldCells | None,
     left: int | None,
     table: ParquetWriter | None,
 ) -> int | None:
@@ -142,16 +158,14 @@ def _show_in_bulk(
     capture: Capture,
     session: Session,
     proof: SecondProof,
-    wanted: Filter,
+    wanted: Filter | None,
     left: int | None,
     table: ParquetWriter | None,
 ) -> int | None:
     """The rows before the first that may be one of a second protocol."""
-    from sniff.filter.choosing import chosen
-
     listed = _listed(args, dissector_for(session), session, table)
     for settled_rows in settled_columns(Watched(capture, prints=True), session, proof) if left != 0 else ():
-        places, first = chosen(settled_rows, wanted), settled_rows.table.first
+        places, first = _chosen(settled_rows, wanted), settled_rows.table.first
         if proof.name:
             places = places[places + first < proof.since]
         if left is not None:
@@ -162,6 +176,16 @@ def _show_in_bulk(
         if left == 0 or (proof.name and first + settled_rows.end > proof.since):
             break
     return left
+
+
+def _chosen(some: SettledRows, wanted: Filter | None) -> Times:
+    if wanted is None:
+        import numpy as np
+
+        return np.arange(some.begin, some.end)
+    from sniff.filter.choosing import chosen
+
+    return chosen(some, wanted)
 
 
 def _listed(
@@ -192,12 +216,15 @@ def _listed(
     return lambda some, places: standard_streams.write(made.lines(some, places))
 
 
-def _cells(item: JudgedRow, names: list[str], dissector: Dissector, session: Session, ours: FieldCells) -> list[Cell]:
+def _cells(
+    item: JudgedRow, names: list[str], dissector: Dissector, session: Session, ours: FieldCells | None
+) -> list[Cell]:
     fields = rows.fields_of(item, dissector)
     if any(name not in fields for name in names):
         fields = {**rows.to_json(item, dissector, session), **fields}
     return [
-        ours.cell(name, item.row, item.transaction) if name in ours else plain_cell(fields.get(name)) for name in names
+        ours.cell(name, item.row, item.transaction) if ours and name in ours else plain_cell(fields.get(name))
+        for name in names
     ]
 
 

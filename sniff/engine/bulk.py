@@ -24,7 +24,7 @@ from sniff.engine.follow_settings import SessionEngine
 from sniff.engine.framing import BulkFraming, Clean, Stretch
 from sniff.engine.gathering import gathered
 from sniff.engine.late_columns import LateColumns
-from sniff.engine.placing import Placing
+from sniff.engine.placing import Placing, RowsAhead
 from sniff.engine.session import LineEvent, Session, settings_change
 from sniff.engine.table import Table, joined
 
@@ -226,12 +226,12 @@ class _Leg:
         if make is None:
             return self._placed(list(table.rows()))
         pairing = make(self._tracker, whole.by_kernel, table.octets, self.timing, table.slack)
-        placing, place = Placing(table), 0
+        placing, rows, place = Placing(table), RowsAhead(table), 0
         while place < len(table):
             row = given.get(place)
             run = pairing.run(place, table.first + place) if row is None else None
             if run is None:
-                placing.add(place, *self._track(row or table.row(place)))
+                placing.add(place, *self._track(row or rows.at(place)))
                 place += 1
             else:
                 placing.add_run(run, self._before_tx)

@@ -6,7 +6,7 @@ from typing import Self
 
 import numpy as np
 
-from dissectors.columns import Reads, Times
+from dissectors.columns import Reads, Times, places_in
 from dissectors.line import Timing
 from sniff.engine.late_reads import ANOTHER, KEPT, MOST, OFTEN, RARELY, TOGETHER, LateReads
 from sniff.engine.read_times import FAST, Backlog
@@ -71,7 +71,7 @@ class LateColumns:
 
     def slack(self, ends: Times) -> Times:
         """ns, of frames in their order, none of them twice, by when they ended; their reads were seen."""
-        read = np.searchsorted(self._times, ends)
+        read = places_in(self._times, ends)
         inside = read < len(self._times)
         read = np.minimum(read, len(self._times) - 1)
         within = inside & (self._starts[read] < ends)

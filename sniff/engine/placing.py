@@ -10,7 +10,7 @@ import numpy as np
 from dissectors.columns import NONE, PlacementColumns, Run, TransactionColumns
 from dissectors.tracker import Transaction
 from sniff.engine.engine import Row
-from sniff.engine.table import Table, joined_columns, placement_columns, transaction_columns
+from sniff.engine.table import Table, joined_columns, placement_columns, rows_at, transaction_columns
 
 
 class Placing:
@@ -48,11 +48,16 @@ class Placing:
     def table(self) -> Table:
         """The table, whole."""
         closed, closed_by = transaction_columns(self._closed), np.array(self._closed_by, np.int64)
-        if self._runs:
-            closed = joined_columns(TransactionColumns, [*self._runs, closed])
-            closed_by = np.concatenate([*self._runs_closed_by, closed_by])
-            order = np.argsort(closed_by, kind="stable")  # a row is in a run or not: none closes some of both
-            closed, closed_by = closed.take(order), closed_by[order]
+        parts = [*zip(self._runs, self._runs_closed_by, strict=True), (closed, closed_by)]
+        parts = sorted((part for part in parts if len(part[1])), key=lambda part: int(part[1][0]))
+        if len(parts) > 1:
+            closed = joined_columns(TransactionColumns, [columns for columns, _ in parts])
+            closed_by = np.concatenate([rows for _, rows in parts])
+            if (closed_by[1:] < closed_by[:-1]).any():
+                order = np.argsort(closed_by, kind="stable")  # a row is in a run or not: none closes some of both
+                closed, closed_by = closed.take(order), closed_by[order]
+        elif parts:
+            closed, closed_by = parts[0]
         single, alone = self._single, placement_columns(self._rows)
         self._tx[single], self._role[single] = alone.tx, alone.role
         self._source[single], self._destination[single] = alone.source, alone.destination
@@ -62,3 +67,29 @@ class Placing:
 
     def _is_odd(self, place: int, row: Row) -> bool:
         return place in self._table.odd or getattr(row.event, "assembly", None) is not None
+
+
+class RowsAhead:
+    """The rows of a table, asked for in order, as objects: those that the tracker is likely to be asked about, damaged
+    frames and what follows them, are made some at a time."""
+
+    def __init__(self, table: Table) -> None:
+        self._table = table
+        damaged = np.flatnonzero(~table.frames.ok)
+        likely = np.zeros(len(table) + 1, bool)
+        likely[damaged] = likely[damaged + 1] = True
+        self._likely = np.flatnonzero(likely[: len(table)])
+        self._made: dict[int, Row] = {}
+        self._beyond = 0  # all likely ones before this place are made
+
+    def at(self, place: int) -> Row:
+        """The row at a place."""
+        if place >= self._beyond:
+            begin = int(self._likely.searchsorted(place))
+            places = self._likely[begin : begin + _AHEAD].tolist()
+            self._made = dict(zip(places, rows_at(self._table, places), strict=True))
+            self._beyond = places[-1] + 1 if len(places) == _AHEAD else len(self._table)
+        return self._made.get(place) or self._table.row(place)
+
+
+_AHEAD = 1024

@@ -9,6 +9,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
+from typing import Final
 
 from dissectors import registry
 from dissectors.frame import Chunk
@@ -65,6 +66,9 @@ UNNAMED = ("assumed", "unknown", "")
 
 UNKNOWABLE = ("line", "protocol")
 """What of a session may be searched for."""
+
+AUTO: Final = "auto"
+"""What a user says of it for that."""
 
 OPTIONS = {"line": "-s", "protocol": "-p"}
 """How it is named on the command line."""

@@ -1,6 +1,8 @@
-"""What a screen and a key cost with a million rows: `python -m tests.bench.screen_speed`. CPU time of this process, ms.
+"""What a screen and a key cost with many rows: `python -m tests.bench.screen_speed [ROWS]` (1000000). CPU time of this
+process, ms.
 
-A switch should paint within 100 ms, a key be answered within 50 ms; each is done some times, the median is told.
+A switch should paint within 100 ms, a key be answered within 50 ms, a jump within 16 ms; each is done some times, the
+median is told.
 """
 
 from __future__ import annotations
@@ -32,9 +34,9 @@ def filled(rows: int) -> Store:
     return store
 
 
-async def measured(size: tuple[int, int] = (200, 60)) -> list[tuple[str, float, float]]:
+async def measured(rows: int, size: tuple[int, int] = (200, 60)) -> list[tuple[str, float, float]]:
     """What was done, its median and its most, ms."""
-    store = filled(ROWS)
+    store = filled(rows)
     app = SnifferApp(StoreFeed(store, FeedStatus("f.mcap", "19200,8E1", "toy")))
     found: list[tuple[str, float, float]] = []
 
@@ -68,9 +70,16 @@ async def measured(size: tuple[int, int] = (200, 60)) -> list[tuple[str, float, 
         await pilot.press("1", "home")
         for key in ("down", "pagedown", "end", "home", "t"):
             await timed(f"key {key} on Frames", lambda key=key: pilot.press(key))
+        spent = []
+        for at in range(1, TIMES + 1):
+            await pilot.press(":", *str(rows * at // (TIMES + 1)))
+            begun = time.process_time()
+            await pilot.press("enter")
+            spent.append((time.process_time() - begun) * 1e3)
+        found.append(("jump to a number on Frames", statistics.median(spent), max(spent)))
     return found
 
 
 if __name__ == "__main__":
-    for name, median, most in asyncio.run(measured()):
+    for name, median, most in asyncio.run(measured(int(sys.argv[1]) if len(sys.argv) > 1 else ROWS)):
         sys.stdout.write(f"{name:<30} {median:8.1f} {most:8.1f}\n")

@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dissectors.histogram import Histogram
+from dissectors.histogram import Histogram, add_grouped
 
 durations = st.lists(st.integers(0, 10**12), min_size=1, max_size=200)
 
@@ -47,3 +47,16 @@ def test_what_came_since_is_right_to_two_percent(before: list[int], later: list[
         assert found is not None
         assert wanted is not None
         assert abs(found - wanted) <= max(2, wanted * 0.022)
+
+
+@given(st.lists(st.tuples(st.integers(0, 3), st.integers(-5, 10**12) | st.integers(1 << 47, 1 << 55)), max_size=60))
+def test_many_in_groups_are_the_same_as_one_after_the_other(values: list[tuple[int, int]]) -> None:
+    import numpy as np
+
+    one_by_one: dict[int, Histogram] = {}
+    for group, value in values:
+        one_by_one.setdefault(group, Histogram()).add(value)
+    at_once: dict[int, Histogram] = {}
+    groups, durations = (np.array(column, np.int64) for column in (zip(*values, strict=True) if values else ((), ())))
+    add_grouped(lambda group: at_once.setdefault(group, Histogram()), groups, durations)
+    assert at_once == one_by_one
