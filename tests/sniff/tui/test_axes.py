@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -27,7 +29,7 @@ def test_the_axis_is_as_wide_as_its_columns() -> None:
     cells = widths(150, 184)
     line, _ = axis(0, 2, 149, cells)
     assert len(line) == LABEL + 184
-    assert line.endswith("▲") or line.endswith("▲─")
+    assert line.endswith(("▲", "▲─"))
 
 
 @pytest.mark.parametrize(
@@ -44,7 +46,7 @@ def test_ticks_are_few_and_evenly_apart(low: float, span: float, most: int) -> N
     made = ticks(low, low + span, most)
     assert made
     if len(made) > 2:
-        steps = [later - earlier for earlier, later in zip(made, made[1:], strict=False)]
+        steps = [later - earlier for earlier, later in pairwise(made)]
         assert max(steps) - min(steps) <= max(steps) * 1e-6 + 1e-9
         assert len(made) <= 3 * max(2, most)
 
