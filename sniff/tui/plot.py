@@ -81,7 +81,7 @@ class HistoryPlot(Vertical):
         assert isinstance(canvas, PlotWidget)
         low, high, is_steady = self._limits
         canvas.set_yticks([(low + high) / 2] if is_steady else ticks(low, high, (self.size.height - FRAME) // 2))
-        canvas.refresh()
+        canvas.refresh(layout=True)  # which is when it draws anew
 
     def show(self, title: str, history: Sequence[tuple[int, float]], least: float | None = None) -> None:
         """Draw these values, unless they are drawn already. `least`: where the axis begins, where that is not theirs to

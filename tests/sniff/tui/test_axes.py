@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import asyncio
 from itertools import pairwise
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from rich.text import Text
+from textual.app import App, ComposeResult
 
-from sniff.tui.plot import ticks
+from sniff.tui.plot import HAS_PLOT, HistoryPlot, ticks
 from sniff.tui.tables import count_cell
 from sniff.tui.timeline_picture import LABEL, WIDEST, Row, axis, draw_rows, fitting, widths
 from sniff.tui.times import interval, jitter, latency
@@ -75,3 +77,27 @@ def test_a_count_of_nothing_stands_back() -> None:
 def test_the_finest_zoom_that_holds_all() -> None:
     assert fitting(300, 184) == 1
     assert fitting(10**9, 184) == 9
+
+
+@pytest.mark.skipif(not HAS_PLOT, reason="the extra `plot` is not installed")
+def test_a_plot_that_grows_gets_more_numbers_at_its_axis() -> None:
+    class Alone(App[None]):
+        def compose(self) -> ComposeResult:
+            yield HistoryPlot()
+
+    async def script() -> list[int]:
+        app, found = Alone(), []
+        async with app.run_test(size=(100, 40)) as pilot:
+            plot = app.query_one(HistoryPlot)
+            plot.show("load", [(second * 10**9, 20 + second) for second in range(60)], least=0)
+            for height in (8, 30):
+                plot.styles.height = height
+                await pilot.pause()
+                await pilot.pause()
+                strips = app.screen._compositor.render_strips()
+                lines = ["".join(segment.text for segment in strip) for strip in strips[:height]]
+                found.append(sum(line.strip()[:1].isdigit() and "┫" in line for line in lines))
+        return found
+
+    few, many = asyncio.run(script())
+    assert few < many
