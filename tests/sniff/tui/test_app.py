@@ -293,6 +293,7 @@ def test_a_small_screen_shows_a_list_and_says_that_more_is_left_out(look, busy_b
         for key in "12345":
             await see.press(key)
             await see.poll()
+            assert "help" in see.lines()[-1]  # nothing floats
             if key in "123":
                 assert see.main.size.height >= 3
         await see.press("1")
