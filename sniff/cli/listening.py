@@ -7,6 +7,7 @@ import sys
 import time
 from collections.abc import Iterator, Sequence
 
+from dissectors.findings import counted
 from dissectors.profiles import Devices
 from dissectors.words import milliseconds
 from sniff.analysis.sanitizing import sanitized
@@ -189,7 +190,7 @@ def say_end(printers: Sequence[Printer]) -> None:
 
 def _say_counts(printer: Printer, bus: str) -> None:
     summary = printer.summary
-    noise = f", {summary.noise} octets of noise" if summary.noise else ""
+    noise = f", {counted(summary.noise, 'octet')} of noise" if summary.noise else ""
     searched = f", {summary.searched} octets heard while searching" if summary.searched else ""
     print(
         f"sniff485: {bus}{summary.frames} frames ({summary.damaged} damaged), {summary.octets} octets{noise}"

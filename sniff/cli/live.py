@@ -10,6 +10,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import replace
 
+from dissectors.findings import counted
 from sniff.analysis.sanitizing import sanitized
 from sniff.bus.live import LiveBus
 from sniff.capture.config import RecordSpec
@@ -87,7 +88,8 @@ def _on_screen(lives: Sequence[LiveBus]) -> int:
         bus = f"{sanitized(live.session.bus)}: " if len(lives) > 1 else ""
         total = feed.store.load.total
         print(
-            f"sniff485: {bus}{total.frames} frames ({total.damaged} damaged), {total.noise} octets of noise",
+            f"sniff485: {bus}{counted(total.frames, 'frame')} ({total.damaged} damaged), "
+            f"{counted(total.noise, 'octet')} of noise",
             file=sys.stderr,
         )
         if live.engine.searching:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import sys
 from collections.abc import Sequence
 
@@ -17,6 +18,7 @@ def run(feed: Feed | Sequence[Feed], start_screen: str = "frames") -> None:
     try:
         app = SnifferApp(feeds, start_screen)
         app.is_alone = True
+        gc.freeze()  # what was imported stays: looking through it again and again slows the first seconds
         app.run()
         ended = [(status.port, status.ended) for status in (each.status() for each in feeds) if status.ended]
     finally:

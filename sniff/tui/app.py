@@ -104,7 +104,8 @@ class SnifferApp(Analyzer):
     def _take_themes(self) -> None:
         for theme in THEMES:
             self.register_theme(theme)
-        self.ansi_theme_dark, self.ansi_theme_light = DARK_SIXTEEN, LIGHT_SIXTEEN
+        self.set_reactive(SnifferApp.ansi_theme_dark, DARK_SIXTEEN)  # the theme below reads all sheets anew, once
+        self.set_reactive(SnifferApp.ansi_theme_light, LIGHT_SIXTEEN)
         for one in self._filters:
             if isinstance(one, DimFilter):
                 one.dim_factor = DIM

@@ -12,7 +12,7 @@ from textual.containers import VerticalScroll
 from textual.screen import ModalScreen, Screen
 from textual.widgets import Static
 
-from sniff.tui.keybar import explanation, working_keys
+from sniff.tui.keybar import explanation, rank, working_keys
 
 LEGEND: tuple[tuple[str, str], ...] = (
     (">", "the row under the cursor"),
@@ -67,11 +67,13 @@ class HelpScreen(ModalScreen[None]):
             yield Static(_table(HEADER))
 
     def _keys(self) -> Table:
-        """What keys do first, then those that only move; those have no explanation beyond their name."""
+        """What keys do first, as in the footer; then those that only move: they have no explanation beyond their
+        name."""
         together: dict[tuple[bool, str], list[str]] = {}
         for key, active in working_keys(self.below):
             together.setdefault((not active.binding.tooltip, explanation(active)), []).append(key)
-        ordered = sorted(together.items(), key=lambda item: item[0][0])
+        wanted = {explanation(active): rank(active) for _, active in working_keys(self.below)}
+        ordered = sorted(together.items(), key=lambda item: (item[0][0], wanted[item[0][1]]))
         return _table(tuple(("  ".join(keys), words) for (_, words), keys in ordered))
 
 

@@ -12,22 +12,13 @@ from typing import Any, ClassVar
 from rich.text import Text
 from textual import events
 from textual.binding import ActiveBinding
+from textual.keys import format_key
 from textual.screen import Screen
 from textual.widget import Widget
 from textual.widgets import Input
 
-NAMES = {
-    "slash": "/",
-    "question_mark": "?",
-    "apostrophe": "'",
-    "colon": ":",
-    "escape": "esc",
-    "pageup": "page up",
-    "pagedown": "page down",
-    "ctrl+p": "^p",
-    "ctrl+q": "^q",
-    "ctrl+c": "^c",
-}
+NAMES = {"escape": "esc", "pageup": "page up", "pagedown": "page down"}
+"""Keys that are not written as the framework writes them, or not as their sign."""
 NOT_OURS = {"screen.copy_text", "help_quit", "app.focus_next", "app.focus_previous"}
 """Actions that the framework binds; they count here only where a screen explains them (a binding with a tooltip)."""
 ALWAYS = ("help", "back")
@@ -38,7 +29,9 @@ FIRST = ("bus", "filter", "", "freeze", "follow", "error", "pair", "mark", "time
 
 def key_name(key: str) -> str:
     """A key as people read it."""
-    return NAMES.get(key, key.removeprefix("upper_").replace("ctrl+", "^"))
+    plain = key.removeprefix("upper_")
+    sign = format_key(plain)
+    return NAMES.get(key) or (sign if len(sign) == 1 and sign.isascii() else plain.replace("ctrl+", "^"))
 
 
 def explanation(active: ActiveBinding) -> str:
@@ -114,7 +107,7 @@ class KeyBar(Widget):
         always = [entry for entry in entries.values() if entry.label in ALWAYS]
         room = width - sum(entry.length + 2 for entry in always) + 2
         fitting = []
-        for entry in sorted(entries.values(), key=lambda entry: _rank(entry.label)):
+        for entry in sorted(entries.values(), key=lambda entry: rank(entry.active)):
             if entry not in always and entry.length + 2 <= room:
                 fitting.append(entry)
                 room -= entry.length + 2
@@ -127,5 +120,7 @@ class KeyBar(Widget):
                 await self.app.run_action(entry.active.binding.action, entry.active.node)
 
 
-def _rank(label: str) -> int:
-    return FIRST.index(label if label in FIRST else "")
+def rank(active: ActiveBinding) -> tuple[bool, int]:
+    """How little a key is wanted: those that no footer shows come last."""
+    label = active.binding.description
+    return not active.binding.show, FIRST.index(label if label in FIRST else "")

@@ -12,6 +12,7 @@ from textual.containers import Vertical
 from textual.screen import ModalScreen
 from textual.widgets import DataTable
 
+from dissectors.findings import counted
 from sniff.analysis.sanitizing import sanitized
 from sniff.bus.rows import Store
 from sniff.tui.tables import StationTable
@@ -33,7 +34,7 @@ class MarksScreen(ModalScreen[int | None]):
     def compose(self) -> ComposeResult:
         """A table."""
         with Vertical() as page:
-            page.border_title = Text(f"{len(self._marks)} marks")
+            page.border_title = Text(counted(len(self._marks), "mark"))
             page.border_subtitle = Text("enter goes there, esc closes")
             yield StationTable(cursor_type="row", zebra_stripes=True)
 

@@ -12,6 +12,13 @@ from textual.widgets import DataTable
 from sniff.tui.key_names import named
 
 
+def count_cell(text: str, is_trouble: bool = False) -> Text:
+    """A number in a column of counts: no 0 stands out, and what is worth a look gets a "!"."""
+    if text == "0":
+        return Text(text, style="dim", justify="right")
+    return Text(f"!{text}", style="bold", justify="right") if is_trouble else Text(text, justify="right")
+
+
 class StationTable(DataTable[Text], inherit_bindings=False):
     """A table whose rows have keys; `fill` brings it to what it should be."""
 

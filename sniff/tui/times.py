@@ -6,6 +6,12 @@ from datetime import datetime
 from enum import Enum
 
 from dissectors.line import MS, NS_PER_S
+from dissectors.words import bare_milliseconds
+
+LEAST = 5_000
+"""ns; what is shorter would be written as 0.00 ms."""
+UNTOLD = 0.012
+"""Part of an interval by which two may differ and be counted as alike (`dissectors.histogram`), halved."""
 
 
 class TimeMode(Enum):
@@ -55,6 +61,24 @@ def seconds(time: int, places: int = 6) -> str:
     sign = "-" if time < 0 else "+"
     whole, rest = divmod(abs(time), NS_PER_S)
     return f"{sign}{whole}.{rest:09d}"[: len(str(whole)) + 2 + places]
+
+
+def interval(time: int | None) -> str:
+    """Milliseconds from one time to the next, with a decimal where there are few; "–" where nothing is known."""
+    return "–" if time is None else f"{time / MS:.0f}" if time >= 10 * MS else f"{time / MS:.1f}"
+
+
+def latency(time: int) -> str:
+    """Milliseconds without the unit; no answer takes no time."""
+    return "<0.01" if 0 <= time < LEAST else bare_milliseconds(time)
+
+
+def jitter(time: int | None, usual: int | None) -> str:
+    """By how much intervals differ, ms. `usual`: how long they are: smaller differences than counting them in classes
+    tells apart are no 0."""
+    if time or time is None or usual is None:
+        return interval(time)
+    return f"<{interval(max(MS // 10, int(usual * UNTOLD)))}"
 
 
 def size(octets: int) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dissectors.tracker import Interval, Transaction, Verdict
 from dissectors.words import bare_milliseconds
 from sniff.bus.rows import is_trouble
+from sniff.tui import times
 from sniff.tui.columns import Cell
 
 SHORT: dict[Verdict, str] = {
@@ -51,7 +52,7 @@ def latency_cell(latency: Interval | None, held: int) -> Cell:
     if latency is None:
         return Cell("")
     more = max(latency.nominal - latency.low, latency.high - latency.nominal) > held
-    return Cell(bare_milliseconds(latency.nominal) + ("?" if more else ""))
+    return Cell(times.latency(latency.nominal) + ("?" if more else ""))
 
 
 def latency_title(held: int, roomy: bool = False) -> str:

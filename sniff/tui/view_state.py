@@ -50,6 +50,7 @@ class Viewing:
     colours: list[tuple[str, Filter]] = field(default_factory=list)  # rows that a filter accepts have its colour
     _frozen: tuple[int, int] | None = None  # last row and last closed transaction that are shown
     _found: tuple[Finding, ...] = ()  # when it was frozen
+    is_small: bool = False  # the screen has no room for much; it was said
 
     @property
     def frozen(self) -> bool:

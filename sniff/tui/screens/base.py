@@ -18,6 +18,11 @@ from sniff.tui.keybar import KeyBar
 from sniff.tui.prompt import Prompt
 from sniff.tui.view_state import Viewing
 
+LOW = 18
+"""Height below which the list gets what there is and what is said below it the least."""
+SMALL = (60, 16)
+"""Below these columns or lines much is left out; that is said once."""
+
 
 class ViewScreen(Screen[None]):
     """A screen of the analyzer.
@@ -30,6 +35,7 @@ class ViewScreen(Screen[None]):
     TITLE: ClassVar[str] = ""
     LEGEND: ClassVar[tuple[tuple[str, str], ...]] = ()  # marks and titles of this screen, for its help page
     AUTO_FOCUS: ClassVar[str] = "#main"
+    VERTICAL_BREAKPOINTS: ClassVar[list[tuple[int, str]]] = [(0, "-low"), (LOW, "-high")]  # type: ignore[misc]
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         """Keys have names, so that a configuration can give others."""
@@ -75,6 +81,11 @@ class ViewScreen(Screen[None]):
     def on_resize(self, event: events.Resize) -> None:
         """What was laid out for another width is drawn anew, also where nothing comes any more."""
         self.call_after_refresh(analyzer(self).draw_screen)
+        is_small = event.size.width < SMALL[0] or event.size.height < SMALL[1]
+        if is_small and not self.viewing.is_small:
+            said = f"{event.size.width}×{event.size.height} is small: much is left out, 80×24 shows it"
+            self.notify(said, severity="warning", timeout=4, markup=False)
+        self.viewing.is_small = is_small
 
     def on_screen_resume(self) -> None:
         """Shown (again): catch up."""

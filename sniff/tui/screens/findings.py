@@ -26,12 +26,12 @@ from sniff.tui.tables import StationTable
 from sniff.tui.times import clock
 
 EVIDENCE = 6
-"""Frames that are named."""
+"""Frames that are named at least."""
 PERIOD = 1.0
 """Seconds between two looks at the findings while rows keep coming."""
 
 COLUMNS = ("how grave", "about", "what was seen", "times", "last", "code")
-_WORDS = {Severity.ERROR: "ERROR", Severity.WARNING: "warning", Severity.NOTE: "note", Severity.INFO: "fact"}
+_WORDS = {Severity.ERROR: "ERROR", Severity.WARNING: "warning", Severity.NOTE: "note", Severity.INFO: "info"}
 _STYLES = {Severity.ERROR: "bold red", Severity.WARNING: "yellow", Severity.NOTE: "", Severity.INFO: "dim"}
 OTHERS = 32
 """Cells that the columns take whose width does not change, those between them too; what was seen has the rest."""
@@ -40,6 +40,8 @@ ROOMY = 110
 """Width from which there is a column for when it was seen last."""
 LABEL, SIDES = 7, 3
 """Cells of a label below the table, and of what stands at both sides of its lines."""
+ABOVE_FRAMES = 12
+"""Lines of the lower half that are not theirs: what the finding says, header and keys."""
 TALL = 40
 """Height from which frames that show a finding stand below each other, with what they say."""
 
@@ -51,7 +53,7 @@ class FindingsScreen(SearchScreen):
     CSS_PATH = "findings.tcss"
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("s", "order", "order", tooltip="order by severity, or by subject"),
-        Binding("i", "infos", "facts", tooltip="show or hide facts and notes"),
+        Binding("i", "infos", "infos", tooltip="show or hide notes and infos"),
         Binding("e", "evidence(1)", "next", tooltip="next frame that shows the finding under the cursor"),
         Binding("E", "evidence(-1)", "before", tooltip="frame before that shows it", show=False),
     ]
@@ -197,16 +199,17 @@ class FindingsScreen(SearchScreen):
         return text
 
     def _frames(self, evidence: tuple[int, ...]) -> Text:
-        more = " …" if len(evidence) > EVIDENCE else ""
+        most = EVIDENCE if self.size.height < TALL else max(EVIDENCE, self.size.height // 2 - ABOVE_FRAMES)
+        more = " …" if len(evidence) > most else ""
         if self.size.height < TALL:
-            said = Text(", ".join(self._place(no) for no in evidence[:EVIDENCE]) + more)
+            said = Text(", ".join(self._place(no) for no in evidence[:most]) + more)
             return said.append("  enter, e, E go there", style="dim")
         said = Text().append("enter, e, E go there", style="dim")
-        for no in evidence[:EVIDENCE]:
+        for no in evidence[:most]:
             row = self.store.by_no(no)
             what = "" if row is None else f"  {sanitized(self.store.text(row))}"
             said.append("\n" + " " * LABEL + fit(self._place(no) + what, self._width - SIDES - LABEL).rstrip())
-        return said.append(f"\n{' ' * LABEL}and {len(evidence) - EVIDENCE} more" if more else "")
+        return said.append(f"\n{' ' * LABEL}and {len(evidence) - most} more" if more else "")
 
     def _place(self, no: int) -> str:
         row = self.store.by_no(no)
@@ -251,7 +254,7 @@ class FindingsScreen(SearchScreen):
         self._look()
 
     def action_infos(self) -> None:
-        """With facts and notes, or without."""
+        """With notes and infos, or without."""
         self._all = not self._all
         self._look()
 

@@ -47,7 +47,8 @@ class FramesScreen(ListingScreen):
     THINGS = "frames"
     CSS_PATH = "frames.tcss"
     HORIZONTAL_BREAKPOINTS: ClassVar[list[tuple[int, str]]] = [  # type: ignore[misc]  # textual's is no plain ClassVar
-        (0, "-narrow"),
+        (0, "-tiny"),
+        (60, "-narrow"),
         (124, "-wide"),
     ]
     BINDINGS: ClassVar[list[BindingType]] = [

@@ -41,6 +41,8 @@ REPORTABLE = (
     ("overrun", LineError.OVERRUN),
 )
 
+NO_EVENTS = "none: not unplugged, nothing lost on the way, no settings changed"
+"""What the list of events says that has none; line errors are counted above and are no events."""
 EITHER = LineError.PARITY | LineError.FRAMING
 
 
@@ -181,7 +183,7 @@ def events(happened: list[LineEvent]) -> list[Part]:
         lines.append(f"{clock(event.moment)}  {event.kind.value}{count}{words}")
     if len(happened) > EVENTS_SHOWN:
         lines.append(f"and {len(happened) - EVENTS_SHOWN} earlier ones")
-    return [("events", Text("\n".join(lines or ["nothing happened to the line"])))]
+    return [("events", Text("\n".join(lines or [NO_EVENTS])))]
 
 
 def _table(parts: list[Part]) -> Table:

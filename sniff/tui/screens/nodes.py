@@ -14,22 +14,27 @@ from textual.binding import Binding, BindingType
 from textual.containers import VerticalScroll
 from textual.widgets import DataTable, Static
 
-from dissectors.findings import Finding
+from dissectors.findings import Finding, counted
 from dissectors.tracker import Verdict
 from dissectors.words import milliseconds
 from sniff.analysis.health import Health, station_of
 from sniff.analysis.nodes import Node
+from sniff.analysis.poll_words import asked
 from sniff.analysis.sanitizing import sanitized
 from sniff.tui.analyzer import analyzer
 from sniff.tui.charts import spread
+from sniff.tui.columns import fit
 from sniff.tui.hanging import hanging
 from sniff.tui.screens.searching import SearchScreen
 from sniff.tui.still_judging import still_judging
-from sniff.tui.tables import StationTable
+from sniff.tui.tables import StationTable, count_cell
+from sniff.tui.times import interval, latency
 
 ANSWERS = (Verdict.ANSWERED, Verdict.RETRY, Verdict.EXCEPTION)
 FEW, SOME = 3, 8
 """Frame types in the table, and below it."""
+LEAST_ASKED = 4
+"""Lines that what a station is asked for takes at least, where it is that much."""
 
 
 def answered(node: Node) -> float | None:
@@ -45,7 +50,7 @@ def _percent(share: float | None) -> str:
 
 
 def _time(value: int | None) -> str:
-    return "–" if value is None else milliseconds(value)
+    return "–" if value is None else latency(value)
 
 
 LABEL, SIDES = 8, 3
@@ -78,25 +83,29 @@ def kinds(node: Node, most: int) -> str:
 COLUMNS: tuple[tuple[str, int, Callable[[Station], str]], ...] = (
     ("stn", 0, lambda one: str(one.node.address)),
     ("health", 0, lambda one: "–" if one.health is None else str(one.health.score)),
-    ("device", 0, lambda one: one.device),
-    ("id", 0, lambda one: "/".join(map(str, one.identity))),
+    ("device", 72, lambda one: one.device),
+    ("id", 72, lambda one: "/".join(map(str, one.identity))),
     ("asked", 0, lambda one: str(one.node.asked)),
     ("answ.", 0, lambda one: _percent(answered(one.node))),
     ("none", 0, lambda one: str(one.node.unanswered)),
-    ("exc.", 0, lambda one: str(one.node.verdicts[Verdict.EXCEPTION])),
-    ("dam.", 0, lambda one: str(one.node.damaged)),
-    ("p50", 110, lambda one: _time(one.node.latency.quantile(0.5))),
-    ("p95", 0, lambda one: _time(one.node.latency.quantile(0.95))),
-    ("max", 95, lambda one: _time(one.node.latency.most)),
+    ("exc.", 56, lambda one: str(one.node.verdicts[Verdict.EXCEPTION])),
+    ("dam.", 56, lambda one: str(one.node.damaged)),
+    ("p50 ms", 110, lambda one: _time(one.node.latency.quantile(0.5))),
+    ("p95 ms", 64, lambda one: _time(one.node.latency.quantile(0.95))),
+    ("max ms", 95, lambda one: _time(one.node.latency.most)),
     ("sent", 110, lambda one: str(one.node.sent)),
     ("recv", 110, lambda one: str(one.node.received)),
     ("passed", 110, lambda one: str(one.node.passed)),
     ("frame types", 150, lambda one: kinds(one.node, FEW)),
 )
 """Title, width of the screen from which it is shown, text."""
+ROOMY = 150
+IN_FULL = {"answ.": "answered", "none": "no answer", "exc.": "exceptions", "dam.": "damaged", "recv": "received"}
+"""Titles from that width on."""
 SELDOM = {"device", "id", "passed"}
 """Columns that are left out where no station has anything there."""
 LEFT = {"device", "id", "frame types"}
+COUNTS = {"asked", "none", "exc.", "dam.", "sent", "recv", "passed"}
 TROUBLE = {"none", "exc.", "dam."}
 """Columns where anything but 0 is worth a look: such cells get a "!"."""
 POOR = 50
@@ -129,7 +138,7 @@ class NodesScreen(SearchScreen):
         ("answ.", "share of its requests that were answered in time, exceptions too"),
         ("none", "requests without answer"),
         ("exc.  dam.", "exceptions; damaged frames"),
-        ("p50 p95 max", "time to its answers: half are shorter, 95 of 100 are, the longest"),
+        ("p50 p95 max", "ms; time to its answers: half are shorter, 95 of 100 are, the longest"),
         ("sent recv", "frames from it and to it"),
         ("passed", "tokens and polls for masters that it got"),
     )
@@ -142,6 +151,7 @@ class NodesScreen(SearchScreen):
         self._order = 0
         self._drawn: tuple[object, ...] | None = None
         self._columns: tuple[str, ...] = ()
+        self._is_roomy = False
         self._stations: dict[str, Station] = {}
 
     def compose_view(self) -> ComposeResult:
@@ -200,11 +210,13 @@ class NodesScreen(SearchScreen):
             for title, needs, text in COLUMNS
             if needs <= width and (title not in SELDOM or any(text(one) not in ("", "0") for one in stations))
         )
-        if columns != self._columns:
-            self._columns = columns
+        is_roomy = width >= ROOMY
+        if (columns, is_roomy) != (self._columns, self._is_roomy):
+            self._columns, self._is_roomy = columns, is_roomy
             table.clear(columns=True)
             for title in columns:
-                table.add_column(Text(title, justify="left" if title in LEFT else "right"), key=title)
+                said = IN_FULL.get(title, title) if is_roomy else title
+                table.add_column(Text(said, justify="left" if title in LEFT else "right"), key=title)
 
     def _cells(self, one: Station) -> list[Text]:
         return [_cell(title, text(one), one) for title, _, text in COLUMNS if title in self._columns]
@@ -234,7 +246,7 @@ class NodesScreen(SearchScreen):
             text.append("\nframes  ", style="dim").append(sanitized(kinds(node, SOME)))
         spoilt = Counter({verdict.words: count for verdict, count in node.verdicts.items()})
         if spoilt:
-            text.append("\nends    ", style="dim").append(
+            text.append("\noutcome ", style="dim").append(
                 ", ".join(f"{words} {count}" for words, count in spoilt.most_common())
             )
         if node.errors:
@@ -242,12 +254,32 @@ class NodesScreen(SearchScreen):
             text.append("\nerrors  ", style="dim").append(sanitized(", ".join(named)))
         if node.passed:
             text.append("\ntokens  ", style="dim").append(
-                f"{node.passed} tokens and polls for masters came to it, {node.unused} tokens of those it did not use"
+                f"{node.passed} tokens and polls for masters came to it"
+                + (f"; {counted(node.unused, 'token')} of those it did not use" if node.unused else "")
             )
         if node.latency.count:
             text.append("\nanswers after\n", style="dim")
             text.append("\n".join(spread(node.latency, max(10, self.size.width - 34))))
-        return hanging(text, self.size.width - SIDES, LABEL)
+        text = hanging(text, self.size.width - SIDES, LABEL)
+        return text.append_text(self._asked(node, self.query_one("#detail").size.height - text.plain.count("\n") - 3))
+
+    def _asked(self, node: Node, room: int) -> Text:
+        """What it is asked for, the most frequent first, in so many lines; nothing where they are too few."""
+        polls = [poll for poll in self.store.polls if poll.key.station == node.address]
+        if not polls or room < min(len(polls), LEAST_ASKED):
+            return Text()
+        polls.sort(key=lambda poll: -poll.asked - poll.repeats)
+        shown = polls if len(polls) <= room else polls[: room - 1]
+        text = Text().append("\nis asked for", style="dim")
+        for poll in shown:
+            often = "once" if poll.asked + poll.repeats == 1 else f"{poll.asked + poll.repeats} times"
+            every = "" if poll.interval is None else f" every {interval(poll.interval)} ms"
+            said = asked(poll, self.store.devices, self.size.width - 40) or poll.key.kind
+            bad = f", {poll.unanswered} without answer" if poll.unanswered else ""
+            line = fit(sanitized(f"{often + every:>25}  {said}{bad}"), self.size.width - SIDES)
+            text.append("\n" + line.rstrip())
+        left = len(polls) - len(shown)
+        return text.append(f"\n{'':25}  and {left} more: Polls (8)" if left else "", style="dim")
 
     # -- keys --------------------------------------------------------------------------------------------------
 
@@ -275,8 +307,8 @@ class NodesScreen(SearchScreen):
 
 
 def _cell(title: str, text: str, one: Station) -> Text:
-    justify = "left" if title in LEFT else "right"
-    poor = title == "health" and one.health is not None and one.health.score < POOR
-    if poor or (title in TROUBLE and text != "0"):
-        return Text(f"!{text}", style="bold", justify=justify)  # type: ignore[arg-type]  # a literal of two
-    return Text(sanitized(text), justify=justify)  # type: ignore[arg-type]
+    if title in COUNTS:
+        return count_cell(text, title in TROUBLE)
+    if title == "health" and one.health is not None and one.health.score < POOR:
+        return Text(f"!{text}", style="bold", justify="right")
+    return Text(sanitized(text), justify="left" if title in LEFT else "right")

@@ -11,7 +11,7 @@ from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.widgets import DataTable, Static
 
-from dissectors.line import MS, NS_PER_S
+from dissectors.line import NS_PER_S
 from dissectors.profiles.decoding import Quality, Value, number
 from sniff.analysis.guessed_points import GuessedPoint, LatestGuesses, guess_of
 from sniff.analysis.points import Point
@@ -22,6 +22,7 @@ from sniff.tui.plot import HistoryPlot
 from sniff.tui.screens.tabling import TableScreen
 from sniff.tui.still_judging import still_judging
 from sniff.tui.tables import StationTable
+from sniff.tui.times import interval, jitter
 
 SHOWN = 500
 """Points in the table at most."""
@@ -37,8 +38,8 @@ STEADY = "─"
 
 WORDS, LEAST_WORDS = 26, 16
 """Cells of a value, where there is room and where there is little."""
-OTHERS = 39
-"""Cells of all columns but names and values where the screen is narrow, those between them and the bar too."""
+BETWEEN, MARK = 2, 3
+"""Cells between two columns; of marks, and of a scrollbar."""
 MARKS = {Quality.UNCERTAIN: "?", Quality.BAD: "!"}
 
 
@@ -151,7 +152,7 @@ class PointsScreen(TableScreen):
         self._drawn = None
 
     def _lay_out(self, width: int, height: int) -> None:
-        self.query_one(HistoryPlot).display = height >= TALL if self._plotted is None else self._plotted
+        self._show_plot(height >= TALL if self._plotted is None else self._plotted)
         columns = WIDE if width >= FROM else NARROW
         if columns == self._columns:
             return
@@ -174,14 +175,30 @@ class PointsScreen(TableScreen):
         guesses = self._guesses.of(self.store.points, self.store.model.series)
         told = [(point, guesses.get(_place(point)) if point.entry is None else None) for point in self._chosen()]
         points = [(point, guess) for point, guess in told if guess is None or not guess.is_covered]
-        longest = max((len(point.sample.name) for point, _ in points[:SHOWN]), default=0)
-        room = WORDS if self._columns == WIDE else min(WORDS, max(LEAST_WORDS, self.app.size.width - OTHERS - longest))
+        room = WORDS if self._columns == WIDE else self._room([point for point, _ in points[:SHOWN]], now)
         self.query_one(StationTable).fill(
             (_key(point), _cells(point, now, self._pinned, guess, room)[: len(self._columns)])
             for point, guess in points[:SHOWN]
         )
         self._hidden = max(0, len(points) - SHOWN)
         self._draw_detail()
+
+    def _room(self, points: Sequence[Point], now: int) -> int:
+        """Cells that the other columns leave for values."""
+        texts: tuple[Callable[[Point], str], ...] = (
+            lambda point: point.sample.station,
+            lambda point: point.sample.name,
+            lambda point: age(now - point.sample.time),
+            lambda point: str(point.count),
+            lambda point: interval(point.interval),
+        )
+        titles = (title for title in NARROW if title not in ("", "value"))
+        others = [
+            max(len(title), max((len(text(point)) for point in points), default=0))
+            for title, text in zip(titles, texts, strict=True)
+        ]
+        left = self.app.size.width - sum(others) - BETWEEN * len(NARROW) - MARK
+        return min(WORDS, max(LEAST_WORDS, left - 1))  # and the mark of a change
 
     def _chosen(self) -> list[Point]:
         wanted: Callable[[Point], bool] = lambda point: (  # noqa: E731
@@ -207,6 +224,7 @@ class PointsScreen(TableScreen):
             plot.show("", ())
             return
         unit = f" in {point.sample.value.unit}" if point.sample.value.unit else ""
+        unit = " as a number" if point.sample.value.words and not unit else unit
         history, how = tuple(point.history), ""
         guess = self._guess(point)
         if guess is not None and guess.history:
@@ -287,9 +305,14 @@ class PointsScreen(TableScreen):
 
     def action_plot(self) -> None:
         """The plot or not."""
-        plot = self.query_one(HistoryPlot)
-        self._plotted = plot.display = not plot.display
+        self._plotted = not self.query_one(HistoryPlot).display
+        self._show_plot(self._plotted)
         self._draw_detail()
+
+    def _show_plot(self, shown: bool) -> None:
+        """With a plot the table is no longer than its rows, and the plot takes the rest."""
+        self.query_one(HistoryPlot).display = shown
+        self.set_class(shown, "-plotted")
 
     def action_bits(self) -> None:
         """Single bits or not."""
@@ -306,8 +329,8 @@ def _seen(point: Point, guess: GuessedPoint | None) -> list[str]:
     """How often, how it moved, who wrote it."""
     samples = f"{point.count} samples"
     if point.interval is not None:
-        samples += f" every {_ms(point.interval)} ms"
-        samples += f" ±{_ms(point.jitter)}" if point.jitter is not None else ""
+        samples += f" every {interval(point.interval)} ms"
+        samples += f" ±{jitter(point.jitter, point.interval)}" if point.jitter is not None else ""
     words = [samples]
     low, high, rate = (point.low, point.high, point.rate) if guess is None else (guess.low, guess.high, guess.rate)
     if point.sample.value.words:  # of states and flags the numbers between say nothing
@@ -319,11 +342,6 @@ def _seen(point: Point, guess: GuessedPoint | None) -> list[str]:
     if point.written:
         words.append(f"written {point.written} times" if point.written > 1 else "written once")
     return words
-
-
-def _ms(time: int | None) -> str:
-    """Milliseconds, with a decimal where there are few."""
-    return "–" if time is None else f"{time / MS:.0f}" if time >= 10 * MS else f"{time / MS:.1f}"
 
 
 def _place(point: Point) -> Key:
@@ -351,8 +369,8 @@ def _cells(point: Point, now: int, pinned: list[Key], guess: GuessedPoint | None
         Text(("*" if fresh else "") + shown, style=style, justify="right"),
         Text(age(now - sample.time), justify="right"),
         Text(str(point.count), justify="right"),
-        Text(_ms(point.interval), justify="right"),
-        Text(_ms(point.jitter), justify="right"),
+        Text(interval(point.interval), justify="right"),
+        Text(jitter(point.jitter, point.interval), justify="right"),
         Text(f"{low:.5g}" if low is not None and is_number else "–", justify="right"),
         Text(f"{high:.5g}" if high is not None and is_number else "–", justify="right"),
         Text(trend([number for _, number in point.history])),

@@ -10,7 +10,7 @@ from textual.app import ComposeResult
 from textual.widgets import DataTable, Static
 
 from dissectors.findings import counted
-from dissectors.line import MS, NS_PER_S
+from dissectors.line import NS_PER_S
 from dissectors.words import milliseconds
 from sniff.analysis.poll import Poll
 from sniff.analysis.poll_words import asked, changes, told
@@ -19,8 +19,9 @@ from sniff.tui.analyzer import analyzer
 from sniff.tui.charts import round_up, sparkline
 from sniff.tui.screens.tabling import TableScreen
 from sniff.tui.still_judging import still_judging
-from sniff.tui.tables import StationTable
-from sniff.tui.times import clock
+from sniff.tui.tables import StationTable, count_cell
+from sniff.tui.timeline_picture import LABEL, ZOOMS, Chart, axis, draw_charts, fitting, seconds_in_words, widths
+from sniff.tui.times import clock, interval, jitter, latency
 
 SHOWN = 500
 """Entries in the table at most."""
@@ -31,6 +32,10 @@ WIDE = 110
 CHART = 60
 """Characters of the chart of one entry."""
 
+TALL, HEIGHT, AXIS = 40, 7, 2
+"""Height of the screen from which on the entry under the cursor has a chart with axes, of that at least, and of its
+times."""
+
 SMALL = 40
 """Characters of the chart in a line."""
 
@@ -38,24 +43,20 @@ Cell = Callable[[Poll], str]
 
 
 def _time(value: int | None) -> str:
-    return "–" if value is None else f"{value / MS:.0f}" if value >= 10 * MS else f"{value / MS:.1f}"
-
-
-def _count(value: int) -> str:
-    return str(value) if value else "·"
+    return "–" if value is None else latency(value)
 
 
 NARROW: tuple[tuple[str, Cell], ...] = (
-    ("every ms", lambda poll: _time(poll.interval)),
-    ("±", lambda poll: _time(poll.jitter)),
+    ("every ms", lambda poll: interval(poll.interval)),
+    ("±", lambda poll: jitter(poll.jitter, poll.interval)),
     ("asked", lambda poll: str(poll.asked + poll.repeats)),
-    ("none", lambda poll: _count(poll.unanswered)),
-    ("exc.", lambda poll: _count(poll.exceptions)),
+    ("none", lambda poll: str(poll.unanswered)),
+    ("exc.", lambda poll: str(poll.exceptions)),
 )
 MORE: tuple[tuple[str, Cell], ...] = (
-    ("late", lambda poll: _count(poll.late)),
-    ("dam.", lambda poll: _count(poll.damaged)),
-    ("rep.", lambda poll: _count(poll.repeats)),
+    ("late", lambda poll: str(poll.late)),
+    ("dam.", lambda poll: str(poll.damaged)),
+    ("rep.", lambda poll: str(poll.repeats)),
     ("p95 ms", lambda poll: _time(poll.latency.quantile(0.95))),
 )
 MOST: tuple[tuple[str, Cell], ...] = (
@@ -116,8 +117,9 @@ class PollsScreen(TableScreen):
         self._charts: dict[str, tuple[tuple[int, ...], str]] = {}  # what each was drawn of, and the chart
 
     def compose_view(self) -> ComposeResult:
-        """The table, and more about the entry under the cursor."""
+        """The table, and more about the entry under the cursor: a chart too where there is room."""
         yield StationTable(id="main", cursor_type="row", zebra_stripes=True)
+        yield Static(id="chart", markup=False)
         yield Static(id="detail", markup=False)
 
     def on_mount(self) -> None:
@@ -128,6 +130,8 @@ class PollsScreen(TableScreen):
     def on_resize(self, event: events.Resize) -> None:
         """Columns that fit."""
         self._lay_out(event.size.width)
+        self.query_one("#chart").display = event.size.height >= TALL
+        self.set_class(event.size.height >= TALL, "-charted")
         self._drawn = None
 
     def _lay_out(self, width: int) -> None:
@@ -157,7 +161,7 @@ class PollsScreen(TableScreen):
         held.sort(key=ORDERS[self.order][1])
         self._hidden = max(0, len(held) - SHOWN)
         self._shown = {_key(poll): poll for poll in held[:SHOWN]}
-        span = self._span()
+        span = self._steps()
         self.query_one(StationTable).fill((key, self._cells(key, poll, span)) for key, poll in self._shown.items())
         self._describe()
 
@@ -166,9 +170,13 @@ class PollsScreen(TableScreen):
         return said or poll.key.kind
 
     def _span(self) -> tuple[int, int]:
-        """When anything was asked first, ns, and how long a character of a chart lasts."""
+        """When anything was asked first and last, ns."""
         begin = min((one.first for one in self.store.polls if one.first is not None), default=0)
-        end = max((one.last for one in self.store.polls if one.last is not None), default=0)
+        return begin, max((one.last for one in self.store.polls if one.last is not None), default=0)
+
+    def _steps(self) -> tuple[int, int]:
+        """When anything was asked first, ns, and how long a character of a chart lasts."""
+        begin, end = self._span()
         return begin, int(max(1.0, round_up((end - begin) / NS_PER_S / SMALL)) * NS_PER_S)
 
     def _cells(self, key: str, poll: Poll, span: tuple[int, int]) -> list[Text]:
@@ -179,7 +187,7 @@ class PollsScreen(TableScreen):
         cells = [
             Text(_who(poll), justify="right"),
             Text(said),
-            *(_cell(title, of(poll)) for title, of in self._columns),
+            *(count_cell(of(poll), title in TROUBLE) for title, of in self._columns),
         ]
         return [*cells, Text(self._small(key, poll, span))] if is_widest else cells
 
@@ -197,6 +205,7 @@ class PollsScreen(TableScreen):
         more = f" · {self._hidden} more are not shown" if self._hidden else ""
         summary = f"{len(self._shown)} requests, {self.said}{more}"
         self.query_one("#detail", Static).update("\n".join(part for part in (*said, summary, open_end) if part))
+        self.query_one("#chart", Static).update("" if poll is None else self._chart(poll))
 
     def _detail(self, poll: Poll) -> str:
         key = poll.key
@@ -213,12 +222,25 @@ class PollsScreen(TableScreen):
             words.append(f"answers after {milliseconds(low or 0)}, at most {milliseconds(high or 0)}")
         first, last = poll.first or 0, poll.last or 0
         words.append(f"{clock(first)} … {clock(last)}" if first != last else clock(first))
-        begin, _ = self._span()
-        end = max((one.last for one in self.store.polls if one.last is not None), default=0)
+        begin, end = self._span()
         turned = told(changes(poll, begin, end), lambda time: clock(time)[:8])
         words += [turned] if turned else []
-        chart = _chart(poll)
+        chart = "" if self.size.height >= TALL else _chart(poll)
         return sanitized(" · ".join(words)) + (f"\nhow often  {chart}" if chart else "")
+
+    def _chart(self, poll: Poll) -> Text:
+        """How often it was asked over the time of the whole programme, with axes."""
+        begin, end = (time // NS_PER_S for time in self._span())
+        room = self.size.width - LABEL - 2
+        zoom = max(ZOOMS[fitting(end - begin + 1, room)], poll.slices.width // NS_PER_S)
+        sums = [0] * ((end - begin) // zoom + 1)
+        for place, count in poll.slices.counts.items():
+            sums[min(len(sums) - 1, max(0, place * poll.slices.width // NS_PER_S - begin) // zoom)] += count
+        text, top, cells = Text(no_wrap=True), max(sums), widths(len(sums), room)
+        height = max(HEIGHT, self.query_one("#chart").size.height - AXIS)
+        asked_in = f"in {seconds_in_words(zoom)}"
+        draw_charts(text, [Chart("asked", sums, top, str(top), style="cyan", of=asked_in)], height, _plain, cells)
+        return text.append("\n".join(axis(begin, zoom, -1, cells)))
 
     def _here(self) -> Poll | None:
         key = self.query_one(StationTable).key_here()
@@ -255,10 +277,9 @@ def _bad(poll: Poll) -> str:
     return " ".join(word for word, there in (("none", poll.unanswered), ("exception", poll.exceptions)) if there)
 
 
-def _cell(title: str, text: str) -> Text:
-    if title in TROUBLE and text != "·":
-        return Text(f"!{text}", style="bold", justify="right")
-    return Text(text, justify="right")
+def _plain(place: int, style: str) -> str:
+    """Every column as it is: there is no cursor."""
+    return style
 
 
 def _over_time(poll: Poll, begin: int, step: int) -> str:

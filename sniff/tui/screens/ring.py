@@ -18,7 +18,7 @@ from sniff.tui.hanging import hanging
 from sniff.tui.ring_picture import ring_picture, share_bars
 from sniff.tui.screens.searching import SearchScreen
 from sniff.tui.still_judging import still_judging
-from sniff.tui.tables import StationTable
+from sniff.tui.tables import StationTable, count_cell
 
 PERIOD = 1.0
 """Seconds between two looks: the ring as a value is made anew each time."""
@@ -50,9 +50,12 @@ ROOMY = 280
 """Width from which all columns are shown, with their titles in full."""
 BESIDE = 160
 """Width from which the ring stands beside the table, else above it."""
+TALL = 40
+"""Height from which on the titles are explained below the sentences."""
 INDENT, SIDES = 2, 3
 """Cells by which a long sentence goes on further in, and of what stands at both sides."""
 TROUBLE = {"retries", "repeats", "lost", "claims", "damaged"}
+BARS = "bars"
 LOOPS = ("loop p50 ms", "rotation p50 ms")
 
 
@@ -61,7 +64,7 @@ class RingScreen(SearchScreen):
 
     TITLE = "Ring"
     LEGEND = (
-        ("mac  next", "a master, and the one that it passes the token to"),
+        ("next", "the master that it passes the token to"),
         ("tok.", "tokens that it passed on"),
         ("retr rep.", "tokens that it had to send again"),
         ("lost claims", "tokens that were lost at it; tokens that it made anew"),
@@ -72,7 +75,7 @@ class RingScreen(SearchScreen):
         ("poll-", "its polls for masters that nobody answered"),
         ("polls answ.", "its polls for other masters, and how many were answered"),
         ("dam.", "damaged frames"),
-        ("bars", "share of the time in which a master has the token"),
+        (BARS, "share of the time in which a master has the token"),
     )
     CSS_PATH = "ring.tcss"
 
@@ -121,8 +124,14 @@ class RingScreen(SearchScreen):
         rows = shown.rows(ring)
         self._fill(shown.headings, rows)
         self.query_one("#picture", Static).update("\n".join(self._picture(shown, ring, rows)))
-        said = (*([open_end] if open_end else []), *shown.sentences(ring), "", "?: what the titles mean")
-        words.update(hanging(Text("\n".join(said)), self.app.size.width - SIDES, INDENT))
+        said = Text("\n".join((*([open_end] if open_end else []), *shown.sentences(ring), "")))
+        if self.size.height < TALL:
+            said.append("\n?: what the titles mean")
+        else:
+            for title, means in self.LEGEND:
+                if not {BARS, *self._titles}.isdisjoint(title.split()):
+                    said.append(f"\n{title:<12}", style="bold").append(means, style="dim")
+        words.update(hanging(said, self.app.size.width - SIDES, INDENT))
 
     def _fill(self, headings: Sequence[str], rows: list[tuple[Cell, ...]]) -> None:
         roomy = self.app.size.width >= ROOMY
@@ -159,6 +168,4 @@ def _cell(name: str, value: Cell) -> Text:
     if value is None:
         return Text("–", justify="right")
     text = (f"{value:.1f}" if abs(value) < 100 else f"{value:.0f}") if isinstance(value, float) else str(value)
-    if name in TROUBLE and text != "0":
-        return Text(f"!{text}", style="bold", justify="right")
-    return Text(text, justify="right")
+    return count_cell(text, name in TROUBLE)

@@ -18,11 +18,19 @@ from sniff.tui.charts import round_up
 from sniff.tui.exchanges import Exchanges
 from sniff.tui.screens.base import ViewScreen
 from sniff.tui.themes import BENEATH, CHOSEN
-from sniff.tui.timeline_picture import LABEL, Chart, Row, axis, draw_charts, draw_rows
+from sniff.tui.timeline_picture import (
+    LABEL,
+    ZOOMS,
+    Chart,
+    Row,
+    axis,
+    draw_charts,
+    draw_rows,
+    fitting,
+    seconds_in_words,
+    widths,
+)
 from sniff.tui.times import clock
-
-ZOOMS = (1, 2, 5, 10, 30, 60, 300, 600, 1800, 3600)
-"""Seconds that one column may stand for."""
 
 LOADS = (0.02, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5, 0.75, 1.0)
 """Where the axis of the load may end."""
@@ -31,8 +39,8 @@ OTHER_LINES = 7
 LEAST_STATIONS = 3
 LEAST_TOLD = 0.01
 """ms; no adapter tells shorter times apart."""
-WIDEST = 16
-"""Cells of a column at most, where little time has to fill the screen."""
+LEAST_AXIS = 0.1
+"""ms; where the axis of times ends at least: a shorter one would make mountains of what nobody can measure."""
 
 
 class Column(NamedTuple):
@@ -73,6 +81,14 @@ class TimelineScreen(ViewScreen):
     """Charts over the same seconds and a line a station, a cursor, and a selection."""
 
     TITLE = "Timeline"
+    LEGEND = (
+        ("load", "share of the time of a column in which the bus was busy"),
+        ("frames errors", "in the time of a column; errors: rows damaged or noise, or whose exchange went wrong"),
+        ("damaged noise", "frames and octets of noise in a column; the number is the most"),
+        ("p95 p50", "time to the answers: 95 of 100 are shorter, half are shorter"),
+        ("stations", "with how much went wrong in what is shown; dots: it was asked, bars: something went wrong"),
+        ("▲", "the cursor; what it stands on is said below"),
+    )
     CSS_PATH = "timeline.tcss"
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("left,h", "move(-1)", "earlier", tooltip="cursor to an earlier time"),
@@ -101,7 +117,7 @@ class TimelineScreen(ViewScreen):
         self._cursor: int | None = None  # s since the epoch; None follows the newest
         self._anchor: int | None = None  # where the selection began
         self._begin = 0
-        self._cells = 1  # of a column
+        self._cells: list[int] = []  # of each column
         self._drawn: tuple[object, ...] = ()
         self._exchanges = Exchanges()
 
@@ -123,13 +139,12 @@ class TimelineScreen(ViewScreen):
             chart.update("nothing was heard yet" if analyzer(self).status.live else "no frames in this file")
             return
         if self._zoom is None:
-            fitting = (at for at, zoom in enumerate(ZOOMS) if (last - first + 1) <= zoom * width)
-            self._zoom = next(fitting, len(ZOOMS) - 1)
+            self._zoom = fitting(last - first + 1, width)
         zoom = ZOOMS[self._zoom]
         cursor = last if self._cursor is None else min(max(self._cursor, first), last)
         self._begin = self._scrolled(first, last, cursor, width, zoom)
         room, width = width, min(width, (last - self._begin) // zoom + 1)  # none after the end
-        self._cells = min(WIDEST, room // width)
+        self._cells = widths(width, room)
         self._exchanges.bring_up(self.store, self.viewing.last_closed)
         chart.update(self._text(columns(self.store, self._begin, width, zoom), cursor, zoom))
 
@@ -161,10 +176,10 @@ class TimelineScreen(ViewScreen):
         if stations:
             hidden = len(rows) - len(stations)
             more = f"; and {hidden} more" if hidden else ""
-            text.append(f"{'stations':<14}", style="bold").append("│", style="dim")
+            text.append(f"{'stations':<9}{'wrong':>5}", style="bold").append("│", style="dim")
             text.append(f" · asked, bars: went wrong{more}\n", style="dim")
             draw_rows(text, stations, paint, self._cells)
-        for line in axis(self._begin, len(made), zoom, at, self._cells):
+        for line in axis(self._begin, zoom, at, self._cells):
             text.append(line + "\n")
         text.append(self._words(made[at] if 0 <= at < len(made) else None, zoom, chosen))
         return text
@@ -173,10 +188,11 @@ class TimelineScreen(ViewScreen):
         peak = max((column.load for column in made), default=0.0)
         load = next((step for step in LOADS if peak <= step), 1.0)
         median, most = self._exchanges.latencies(self._begin, len(made), zoom, (0.5, 0.95))
+        each = f"in {seconds_in_words(zoom)}"
         charts = [
-            Chart("load", [column.load for column in made], load, f"{load:.0%}", 3, "blue"),
-            _counted("frames", [column.frames for column in made], 2, "magenta"),
-            _counted("errors", [column.failed for column in made], 2, "bold red"),
+            Chart("load", [column.load for column in made], load, f"{load:.0%}", 3, "blue", "of the time"),
+            _counted("frames", [column.frames for column in made], 2, "magenta", each),
+            _counted("errors", [column.failed for column in made], 2, "bold red", each),
             _counted("damaged", [column.damaged for column in made], 0, "red"),
             _counted("noise", [column.noise for column in made], 0, "yellow"),
         ]
@@ -189,17 +205,17 @@ class TimelineScreen(ViewScreen):
         found = self._exchanges.stations(self._begin, width, zoom)
         noun = self.store.dissector.noun
         ordered = sorted(found.items(), key=lambda item: (-sum(item[1][1]), item[0]))
-        return [Row(f"{noun} {at}  {sum(failed)}", asked, failed) for at, (asked, failed) in ordered]
+        return [Row(noun, at, sum(failed), asked, failed) for at, (asked, failed) in ordered]
 
     def _words(self, column: Column | None, zoom: int, chosen: tuple[int, int] | None) -> str:
         if column is None:
             return ""
         words = (
-            f"{clock(column.begin * NS_PER_S)[:8]} + {_duration(zoom)}: load {column.load:.1%}, "
+            f"{clock(column.begin * NS_PER_S)[:8]} + {seconds_in_words(zoom)}: load {column.load:.1%}, "
             f"{counted(column.frames, 'frame')}, {counted(column.failed, 'error')}, {column.damaged} damaged, "
             f"{counted(column.noise, 'octet')} of noise"
         )
-        words += self._answers(column, zoom) + f" · one column {_duration(zoom)}"
+        words += self._answers(column, zoom) + f" · one column {seconds_in_words(zoom)}"
         if self._anchor is not None and chosen is not None:
             span = f"{clock(chosen[0] * NS_PER_S)[:8]} … {clock(chosen[1] * NS_PER_S)[:8]}"
             words += f"\nselected: {span}; enter shows its frames, escape lets it go"
@@ -309,15 +325,16 @@ class TimelineScreen(ViewScreen):
         analyzer(self).show_row(min(first, self.store.last_no))
 
 
-def _counted(name: str, values: list[int], weight: int, style: str = "") -> Chart:
+def _counted(name: str, values: list[int], weight: int, style: str = "", of: str = "") -> Chart:
     top = max(values, default=0)
-    return Chart(name, values, float(top), str(top), weight, style)
+    return Chart(name, values, float(top), str(top), weight, style, of)
 
 
 def _timed(name: str, values: list[float | None], weight: int) -> Chart:
     """Times in ms; the axis ends at a round number of its own: half of the answers may be far from the slowest."""
     top = round_up(max((value for value in values if value is not None), default=0.0))
-    return Chart(name, values, top, f"{top:g} ms" if top < 1000 else f"{top / 1000:g} s", weight, "cyan")
+    top = max(top, LEAST_AXIS)
+    return Chart(name, values, top, f"{top:g} ms" if top < 1000 else f"{top / 1000:g} s", weight, "cyan", "of answers")
 
 
 class _Chart(Static, can_focus=True):
@@ -326,7 +343,3 @@ class _Chart(Static, can_focus=True):
 
 def _answered(ms: float) -> str:
     return f"{ms:.2g} ms" if ms >= LEAST_TOLD else f"under {LEAST_TOLD:g} ms"
-
-
-def _duration(seconds: int) -> str:
-    return f"{seconds} s" if seconds < 60 else f"{seconds // 60} min" if seconds < 3600 else f"{seconds // 3600} h"

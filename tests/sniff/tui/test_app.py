@@ -285,3 +285,21 @@ def test_help_explains_marks_and_titles(look: Any, busy_bus: Any, key: str, said
         assert said in see.text()
 
     look(busy_bus.store, script, (100, 80))
+
+
+def test_a_small_screen_shows_a_list_and_says_that_more_is_left_out(look, busy_bus):
+    async def script(see):
+        assert see.notices() == ["40×12 is small: much is left out, 80×24 shows it"]
+        for key in "12345":
+            await see.press(key)
+            await see.poll()
+            assert "help" in see.lines()[-1]  # nothing floats
+            if key in "123":
+                assert see.main.size.height >= 3
+        await see.press("1")
+        assert not see.app.screen.query_one("HexPane").display
+        await see.pilot.resize_terminal(80, 24)
+        await see.settle()
+        assert see.app.screen.query_one("HexPane").display
+
+    look(busy_bus.store, script, (40, 12))

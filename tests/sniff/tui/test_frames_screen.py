@@ -293,7 +293,7 @@ def test_an_empty_bus_says_so(look: Any, make_bus: Any) -> None:
     async def script(see: Any) -> None:
         assert "no frames in this file" in see.text()
         await see.press("e", "x", "m", "apostrophe", "enter", "down", "end", "y", "2", "enter", "e", "3", "enter", "9")
-        assert "nothing happened to the line" in see.text()
+        assert "none: not unplugged" in see.text()
 
     look(make_bus().store, script)
 

@@ -11,7 +11,7 @@ from sniff.config import FILE, ConfigError, View, load, save_view
 from sniff.engine.session import LineEventKind
 from sniff.tui.guest import GUEST
 from sniff.tui.key_names import KNOWN, name_of
-from sniff.tui.keybar import explanation, working_keys
+from sniff.tui.keybar import explanation, key_name, working_keys
 
 
 @pytest.fixture(autouse=True)
@@ -129,3 +129,10 @@ def test_who_looks_from_elsewhere_keeps_nothing_here(look: Any, busy_bus: Any, m
         assert not any(event.kind is LineEventKind.MARK for event in busy_bus.store.line_events)
 
     look(busy_bus.store, script)
+
+
+def test_keys_are_written_as_they_are_on_the_keyboard():
+    named = {"equals_sign": "=", "quotation_mark": '"', "slash": "/", "escape": "esc", "ctrl+q": "^q", "f8": "f8"}
+    assert {key: key_name(key) for key in named} == named
+    plain = {"e": "e", "E": "E", "space": "space", "pageup": "page up", "left": "left"}
+    assert {key: key_name(key) for key in plain} == plain
