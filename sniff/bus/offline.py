@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from dissectors.profiles import Devices
 from sniff.analysis.point_reader import PointReader
-from sniff.bus.second_proof import SecondProof, proving
 from sniff.engine.capture import CaptureError
 from sniff.engine.engine import Output
 from sniff.engine.follow_settings import SessionEngine, dissector_for
@@ -17,6 +16,7 @@ from sniff.engine.session import Item, LineEvent, Session
 from sniff.engine.verdict_join import JudgedRow, VerdictJoin, Wanted
 
 if TYPE_CHECKING:
+    from sniff.bus.second_proof import SecondProof
     from sniff.engine.blocks import Block
     from sniff.engine.column_join import SettledRows
     from sniff.engine.table import Table
@@ -83,6 +83,8 @@ def settled(
     With `devices`, also what they mean to them; with `proof`, each when it is known whether it may be a second
     protocol's. Raises CaptureError as `outputs` does.
     """
+    from sniff.bus.second_proof import proving
+
     points = PointReader(dissector_for(session), devices) if devices is not None else None
     settling = VerdictJoin(points, wanted)
     try:
@@ -154,6 +156,7 @@ def _joined(
     capture: ReadSource, session: Session, joining: _Joining[Given], proof: SecondProof | None
 ) -> Iterator[Given]:
     """What a join gives of all tables of a capture; raises what the capture does, when all before it was given."""
+    from sniff.bus.second_proof import proving
     from sniff.engine.bulk import tables
 
     try:

@@ -13,7 +13,6 @@ from dissectors.findings import Finding
 from dissectors.profiles import Devices
 from sniff.analysis.sanitizing import sanitized
 from sniff.bus.offline import ReadSource, survey
-from sniff.bus.second_proof import SecondProof
 from sniff.cli import USAGE, Failure, arguments
 from sniff.cli.progress import Watched
 from sniff.engine.capture import Capture, CaptureError
@@ -22,6 +21,7 @@ from sniff.engine.observer import Observer
 from sniff.engine.session import SECOND_NOTE, Session
 
 if TYPE_CHECKING:
+    from sniff.bus.second_proof import SecondProof
     from sniff.filter import Filter, Scope
 
 
@@ -46,6 +46,8 @@ def filter_of_both(
 ) -> tuple[SecondProof, Filter | None]:
     """What is known of a second protocol, and what -Y says, None without it, for those who list frames of one too.
     Where it asks for what frames of the first cannot have, the whole capture is looked at for a second one first."""
+    from sniff.bus.second_proof import SecondProof
+
     proof = SecondProof(session)
     if not args.filter and not getattr(args, "explain", False):
         return proof, None
