@@ -6,6 +6,7 @@ import random
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from dissectors.bacnet import bulk_ring_observer
@@ -91,6 +92,17 @@ def _held_back(damaged: float) -> tuple[Session, Reads]:
     return replace(session, adapter=Adapter(latency=16_000_000)), replace(reads, times=times)
 
 
+def _unheard(damaged: float) -> tuple[Session, Reads]:
+    """One frame in 60 is not in the capture, nor any of station 5."""
+    session, reads = _mstp(damaged)
+    heard = np.random.default_rng(5).random(len(reads)) >= 1 / 60
+    sources = reads.octets[np.concatenate(([0], np.cumsum(reads.lengths)[:-1])) + 4]
+    heard &= sources != 5
+    octets = reads.octets[np.repeat(heard, reads.lengths)]
+    kept = {"times": reads.times[heard], "lengths": reads.lengths[heard], "marked": reads.marked[heard]}
+    return session, replace(reads, octets=octets, **kept)
+
+
 def _unanswered(damaged: float) -> tuple[Session, Reads]:
     return _mstp(damaged, answered=0.9)
 
@@ -103,7 +115,7 @@ def _rtu(damaged: float, timing: Timing = bulk_rtu.TIMING) -> tuple[Session, Rea
 
 
 @pytest.mark.parametrize("damaged", [0.0, 0.002, 0.03])
-@pytest.mark.parametrize("bus", [_mstp, _held_back, _unanswered, _rtu])
+@pytest.mark.parametrize("bus", [_mstp, _held_back, _unanswered, _unheard, _rtu])
 def test_a_long_bus_is_judged_from_tables_as_row_by_row(bus: Bus, damaged: float) -> None:
     session, reads = bus(damaged)
     items = list(tables([Block(reads)], session))
