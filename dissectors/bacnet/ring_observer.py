@@ -27,7 +27,7 @@ from dissectors.bacnet.repeated_token import RepeatedToken
 from dissectors.bacnet.ring import Ring, RingEvent, RingEventKind
 from dissectors.bacnet.ring_addresses import check_addresses, see_i_am
 from dissectors.bacnet.ring_damage import count_damage, speaker_of
-from dissectors.bacnet.ring_questions import AskedInRing, RingQuestions, is_second_answer
+from dissectors.bacnet.ring_questions import AskedInRing, RingQuestions, is_proprietary_answer, is_second_answer
 from dissectors.bacnet.ring_tally import NodeTally, RingTally
 from dissectors.bacnet.searches import begin_search, end_search
 from dissectors.bacnet.second_tokens import GivenUp, SecondTokens
@@ -380,9 +380,16 @@ class MstpRingObserver:
         return False
 
     def _was_asked(self, no: int, frame: Frame, source: int, header: Header) -> bool:
-        """Whether it answers a question that was not heard, of the station that has the token or must have got it."""
+        """Whether it answers the holder of the token after all, or a question that was not heard.
+
+        Then who asked has the token, or must have got it.
+        """
         before, holder, client = self._before, self._holder, header.destination
-        if before is None or holder is None or client is None or self._doubt or header.role is not Role.RESPONSE:
+        if before is None or holder is None or client is None or self._doubt:
+            return False
+        if client == holder and is_proprietary_answer(frame, before):
+            return True
+        if header.role is not Role.RESPONSE:
             return False
         if (source, client) in self._questions.postponed or is_second_answer(frame, before):
             return False

@@ -6,7 +6,7 @@ from collections import OrderedDict, deque
 from dataclasses import dataclass
 
 from dissectors.bacnet import message as messages
-from dissectors.bacnet.frame_types import CARRIES_NPDU, FrameType
+from dissectors.bacnet.frame_types import CARRIES_NPDU, PROPRIETARY, FrameType
 from dissectors.bacnet.held_reads import HeldReads, surely_over
 from dissectors.bacnet.limits import MS, T_NO_TOKEN, T_REPLY_DELAY, T_USAGE_DELAY
 from dissectors.bacnet.message import data_of, more_follows
@@ -198,3 +198,9 @@ def is_second_answer(frame: Frame, before: Frame) -> bool:
     if first is None or second is None or first.apdu is None or second.apdu is None:
         return False
     return first.apdu.is_answer and first.apdu.invoke_id == second.apdu.invoke_id
+
+
+def is_proprietary_answer(frame: Frame, before: Frame) -> bool:
+    """Whether a proprietary frame comes back for the one before it: whether that asks for one, only its maker knows."""
+    both = frame.octets[2] >= PROPRIETARY <= before.octets[2]
+    return both and frame.octets[3] == before.octets[4] and frame.octets[4] == before.octets[3]

@@ -7,7 +7,7 @@ from random import Random
 import pytest
 
 from dissectors.bacnet.application import read_property
-from dissectors.bacnet.envelope import npdu_frame
+from dissectors.bacnet.envelope import frame, npdu_frame
 from dissectors.bacnet.ring import RingEventKind
 from dissectors.findings import Severity
 from tests.dissectors.bacnet.ring_script import Read, Step, data, found, poll, rounds, script, token
@@ -131,3 +131,10 @@ def test_the_only_other_station_is_never_heard(use: float):
     """2 seems to repeat its token without end, and looks for nobody else: 5 takes it and gives it back."""
     steps = rounds(60, 2, 5, use=use)
     assert script(without(steps, of(steps, 5))).graves() <= {("MS406", "MAC 5")}
+
+
+def test_proprietary_frames_that_are_answered_are_no_second_token():
+    steps: list[Step] = []
+    for _ in range(6):
+        steps += [*rounds(2, 2, 5, 9), (2, frame(130, 5, 2, b"\x00\x05abc")), (6, frame(131, 2, 5, b"\x00\x05defg"))]
+    assert script(steps).findings == ()
