@@ -11,6 +11,7 @@ import pytest
 
 from dissectors.bacnet import bulk_ring_observer
 from dissectors.columns import Reads
+from dissectors.frame import Chunk
 from dissectors.line import Timing
 from dissectors.profiles import Devices
 from dissectors.token_ring import WatchesColumns
@@ -22,7 +23,9 @@ from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import Adapter, LineEvent, LineEventKind, Session
 from sniff.engine.table import Table
 from tests.bench import bulk_mstp, bulk_rtu
+from tests.dissectors.bacnet.ring_script import data, rounds, token
 from tests.property import mstp_buses
+from tests.property.kernel_equality import reads_of
 from tests.seeds import seeds
 
 Bus = Callable[[float], tuple[Session, Reads]]
@@ -133,6 +136,22 @@ def test_stations_that_do_anything_are_judged_from_tables_as_row_by_row(seed: in
     dice = random.Random(seed)
     for most in (1 << 30, 100, 10):
         same(by_tables(items, judged(session), dice, most), expected)
+
+
+def test_a_token_that_was_not_heard_is_over_when_the_next_one_is() -> None:
+    """5 passed one on unheard, and much later sends without any: that is its second token, and not what was before."""
+    steps = [*rounds(20, 2, 5, 9), (2, token(2, 5)), (6, token(9, 2)), *rounds(20, 2, 5, 9)]
+    for _ in range(2):
+        steps += [(1.2, data(5, 255)), *rounds(20, 2, 5, 9)]
+    now, chunks = mstp_buses.START, []
+    for silence, octets in steps:
+        now += int(silence * 1_000_000) + len(octets) * bulk_mstp.TIMING.char
+        chunks.append(Chunk(now, octets))
+    session = Session("x", bulk_mstp.LINE, "mstp")
+    items = list(tables([Block(reads_of(chunks))], session))
+    expected = by_rows(items, judged(session))
+    assert "MAC 5 sent twice" in str([one.seen for one in expected.findings()])
+    same(by_tables(items, judged(session), random.Random(1), 1 << 30), expected)
 
 
 def test_octets_lost_on_the_way_tear_the_same_transactions() -> None:
