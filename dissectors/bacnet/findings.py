@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable
 
 from dissectors.bacnet.bulk_ring_observer import BulkRingObserver
 from dissectors.bacnet.content_findings import ContentFindings
 from dissectors.bacnet.findings_of_damage import damage, duplicates
 from dissectors.bacnet.findings_of_hearing import TRUSTED, hearing, takes_unheard, unheard_share
-from dissectors.bacnet.findings_of_refusals import refusals
+from dissectors.bacnet.findings_of_refusals import REFUSED_KEPT, Refusals
 from dissectors.bacnet.findings_of_use import polls, use
 from dissectors.bacnet.limits import MAX_MASTER, N_POLL, T_REPLY_DELAY, T_USAGE_DELAY
 from dissectors.bacnet.ring import COARSE_LIMIT, Ring, RingEventKind, RingNode, lies_between
 from dissectors.bacnet.ring_remarks import Remark, listed, measured, of, plain
 from dissectors.bacnet.rules import RULES
-from dissectors.findings import Finding, Severity, Tally, as_consequence, counted, times
+from dissectors.findings import Finding, Severity, as_consequence, counted, times
 from dissectors.frame import Event, Header
 from dissectors.line import Timing
 from dissectors.row_columns import RowColumns
@@ -44,9 +43,6 @@ ALONE_POLLS = 2 * MAX_MASTER
 
 SKIPPED_ROUNDS = 20
 """So many tokens past a station that is in the ring, and not one poll to it, are no accident."""
-
-REFUSED_KEPT = 512
-"""Most services and errors of stations that are counted apart."""
 
 _ANSWERED = frozenset((Verdict.ANSWERED, Verdict.RETRY, Verdict.EXCEPTION))
 
@@ -313,25 +309,29 @@ class MstpFindings:
     def __init__(self, timing: Timing) -> None:
         self._observer = BulkRingObserver(timing)
         self._content = ContentFindings()
-        self._asked: Counter[tuple[int, str]] = Counter()  # answered requests, by station and service
-        self._refused: dict[tuple[int, str, str], Tally] = {}  # by station, service, and class and code in words
+        self._refusals = Refusals()
+        self._newest: tuple[tuple[int, Event | None], ...] = ()  # the newest two rows, their numbers before them
 
     def see(self, no: int, event: Event, header: Header | None, placement: Placement | None = None) -> None:
         """Take the next row: event, its header and placement (None for noise)."""
         self._observer.see(no, event, header)
         self._content.see(no, event, header)
+        self._newest = (*self._newest[-1:], (no, event))
 
     def settle(self, transaction: Transaction) -> None:
         """Take a transaction that closed; the ring model has its own view of them, but for error answers."""
         station, verdict = transaction.station, transaction.verdict
         if station is None or transaction.is_passing or verdict not in _ANSWERED:
             return
-        if len(self._asked) < REFUSED_KEPT or (station, transaction.kind) in self._asked:
-            self._asked[station, transaction.kind] += 1
+        self._refusals.answer(station, transaction.kind)
         if verdict is Verdict.EXCEPTION:
-            key = station, transaction.kind, transaction.error or "error"
-            if key in self._refused or len(self._refused) < REFUSED_KEPT:
-                self._refused.setdefault(key, Tally()).add(transaction.end, transaction.request, transaction.response)
+            self._refusals.refuse(station, transaction, self._request_of(transaction))
+
+    def _request_of(self, transaction: Transaction) -> Event | None:
+        """The request, where its answer came directly behind it."""
+        if transaction.request is None or transaction.response != transaction.request + 1:
+            return None
+        return next((event for no, event in self._newest if no == transaction.request), None)
 
     def take(self, rows: RowColumns) -> None:
         """Take many rows, and the transactions that closed with them."""
@@ -349,15 +349,19 @@ class MstpFindings:
         told = (closed.station != NONE) & ~np.isin(closed.kind, passing)
         told &= np.isin(closed.verdict, [VERDICTS.index(verdict) for verdict in _ANSWERED])
         kinds = list(counted(closed.station[told], closed.kind[told]))
-        if len(self._asked) + len(kinds) > REFUSED_KEPT:
-            for place in np.flatnonzero(told).tolist():
-                self.settle(rows.transaction(place))
-            return
         refused = closed.verdict == VERDICTS.index(Verdict.EXCEPTION)
-        for place in np.flatnonzero(told & refused).tolist():
-            self.settle(rows.transaction(place))
-        for (station, kind), count in counted(closed.station[told & ~refused], closed.kind[told & ~refused]):
-            self._asked[station, closed.names[kind]] += count
+        full = len(self._refusals.asked) + len(kinds) > REFUSED_KEPT
+        before = self._newest[-1:]
+        for place in np.flatnonzero(told if full else told & refused).tolist():
+            transaction = rows.transaction(place)
+            at = NONE if transaction.request is None else transaction.request - rows.first
+            self._newest = before if at < 0 else ((rows.first + at, rows.row(at).event),)
+            self.settle(transaction)
+        if not full:
+            for (station, kind), count in counted(closed.station[told & ~refused], closed.kind[told & ~refused]):
+                self._refusals.asked[station, closed.names[kind]] += count
+        if len(rows):
+            self._newest = ((rows.first + len(rows) - 1, rows.row(len(rows) - 1).event),)
 
     def ring(self) -> Ring:
         """The ring so far."""
@@ -365,5 +369,5 @@ class MstpFindings:
 
     def findings(self) -> tuple[Finding, ...]:
         """All findings so far, the gravest first."""
-        made = (*judge(self._observer.ring()), *refusals(self._asked, self._refused), *self._content.findings())
+        made = (*judge(self._observer.ring()), *self._refusals.findings(), *self._content.findings())
         return tuple(sorted(made, key=_gravest_first))

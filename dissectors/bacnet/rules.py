@@ -199,8 +199,9 @@ _ALL = (
         Severity.WARNING,
         "error answer",
         "A station answers a request with Error, Reject or Abort (ASHRAE 135, clause 18), counted "
-        "by service, error class and code. A single one is only noted; so is, once for all, a property or service "
-        "that each of several stations says it has not: somebody looks what there is.",
+        "by service, error class and code. A single one is only noted; so is what a station says it has not where each "
+        "thing is asked for once, and, once for all, where each of several stations says so: somebody looks what there "
+        "is.",
         "the station heard the request well and refuses it; class and code say why",
         "object, property and service asked for, against what the device has; take what it has not out of the client",
     ),

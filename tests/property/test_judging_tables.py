@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 
 from dissectors.bacnet import bulk_ring_observer
+from dissectors.bacnet.envelope import npdu_frame
 from dissectors.columns import Reads
+from dissectors.findings import Severity
 from dissectors.frame import Chunk
 from dissectors.line import Timing
 from dissectors.profiles import Devices
@@ -23,7 +25,7 @@ from sniff.engine.follow_settings import dissector_for
 from sniff.engine.session import Adapter, LineEvent, LineEventKind, Session
 from sniff.engine.table import Table
 from tests.bench import bulk_mstp, bulk_rtu
-from tests.dissectors.bacnet.ring_script import data, rounds, token
+from tests.dissectors.bacnet.ring_script import Step, data, rounds, token
 from tests.property import mstp_buses
 from tests.property.kernel_equality import reads_of
 from tests.seeds import seeds
@@ -138,17 +140,39 @@ def test_stations_that_do_anything_are_judged_from_tables_as_row_by_row(seed: in
         same(by_tables(items, judged(session), dice, most), expected)
 
 
+def chunks_of(steps: list[Step]) -> list[Chunk]:
+    now, chunks = mstp_buses.START, []
+    for silence, octets in steps:
+        now += int(silence * 1_000_000) + len(octets) * bulk_mstp.TIMING.char
+        chunks.append(Chunk(now, octets))
+    return chunks
+
+
+@pytest.mark.parametrize("names", [1, 8])
+def test_what_was_asked_for_is_known_in_tables_as_row_by_row(names: int) -> None:
+    """The request may be the last row of the table before its answer's."""
+    steps = rounds(9, 2, 5, 9)
+    for no in range(8):
+        asked = bytes.fromhex(f"010402750{no % 2}0c0c000000041 9{0x1C + no % names:02x}".replace(" ", ""))
+        refused = bytes.fromhex(f"0100500{no % 2}0c91029120")
+        steps += [(2, npdu_frame(9, 2, asked, True)), (9, npdu_frame(2, 9, refused, False)), *rounds(4, 2, 5, 9)]
+    session = Session("x", bulk_mstp.LINE, "mstp")
+    items = list(tables([Block(reads_of(chunks_of(steps)))], session))
+    expected = by_rows(items, judged(session))
+    (found,) = (one for one in expected.findings() if one.code == "MS305")
+    assert (found.severity is Severity.NOTE) == (names == 8)
+    dice = random.Random(2)
+    for most in (1 << 30, 1, 3, 20):
+        same(by_tables(items, judged(session), dice, most), expected)
+
+
 def test_a_token_that_was_not_heard_is_over_when_the_next_one_is() -> None:
     """5 passed one on unheard, and much later sends without any: that is its second token, and not what was before."""
     steps = [*rounds(20, 2, 5, 9), (2, token(2, 5)), (6, token(9, 2)), *rounds(20, 2, 5, 9)]
     for _ in range(2):
         steps += [(1.2, data(5, 255)), *rounds(20, 2, 5, 9)]
-    now, chunks = mstp_buses.START, []
-    for silence, octets in steps:
-        now += int(silence * 1_000_000) + len(octets) * bulk_mstp.TIMING.char
-        chunks.append(Chunk(now, octets))
     session = Session("x", bulk_mstp.LINE, "mstp")
-    items = list(tables([Block(reads_of(chunks))], session))
+    items = list(tables([Block(reads_of(chunks_of(steps)))], session))
     expected = by_rows(items, judged(session))
     assert "MAC 5 sent twice" in str([one.seen for one in expected.findings()])
     same(by_tables(items, judged(session), random.Random(1), 1 << 30), expected)
