@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dissectors.bacnet.bulk_ring_observer import BulkRingObserver
 from dissectors.bacnet.content_findings import ContentFindings
 from dissectors.bacnet.findings_of_damage import damage, duplicates
-from dissectors.bacnet.findings_of_hearing import TRUSTED, hearing, takes_unheard, unheard_share
+from dissectors.bacnet.findings_of_hearing import TRUSTED, hasty, hearing, takes_unheard, unheard_share
 from dissectors.bacnet.findings_of_refusals import REFUSED_KEPT, Refusals
 from dissectors.bacnet.findings_of_use import polls, use
 from dissectors.bacnet.limits import MAX_MASTER, N_POLL, T_REPLY_DELAY, T_USAGE_DELAY
@@ -139,6 +139,7 @@ def _tokens(ring: Ring) -> Iterable[Remark]:
                 seen = "did not use its token, was passed over, and has been silent since"
                 yield of("MS106", mac, seen, happened)
     strays = [happened for (what, _), happened in ring.happened.items() if what is RingEventKind.TWO_TOKENS]
+    strays += hasty(ring).values()
     total = sum(happened.count for happened in strays)
     if total >= 2 and ring.shows_tokens and total > STRAYS_SHARE * unheard_share(ring) * ring.frames:
         together = strays[0]

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
 
-from dissectors.bacnet.ring import Happened, Ring, RingEventKind
+from dissectors.bacnet.ring import Happened, Ring, RingEvent, RingEventKind
 from dissectors.bacnet.ring_remarks import Remark, listed, of
+from dissectors.bacnet.unheard import HASTY
 from dissectors.findings import Severity, counted, times
 
 UNHEARD_SHARE = 0.01
@@ -13,6 +15,11 @@ UNHEARD_SHARE = 0.01
 
 MUTE_LEAST = 3
 """So often others must have gone on as after a frame of a station that was never heard."""
+
+HASTY_LEAST = 5
+HASTY_SHARE = 0.8
+"""Of what a station sends as after tokens that were not heard: where so much comes too soon after a poll of the one
+that should have passed it, it had one of its own."""
 
 TRUSTED = 4
 """What happens to a share of the tokens says something of a station where it is so many times the share of frames that
@@ -44,6 +51,24 @@ def unheard_share(ring: Ring) -> float:
     return total / max(1, ring.frames + total)
 
 
+def hasty(ring: Ring) -> dict[int, Happened]:
+    """Who sent after polls of others, again and again sooner than a token can have come: those have a second one."""
+    sent: dict[int, list[RingEvent]] = {}
+    for (what, _), happened in ring.happened.items():
+        if what is RingEventKind.UNHEARD:
+            for event in happened.events:
+                if event.other is not None:
+                    sent.setdefault(event.other, []).append(event)
+    found = {}
+    for mac, events in sorted(sent.items()):
+        soon = [event for event in events if event.value == HASTY]
+        if len(soon) >= HASTY_LEAST and len(soon) >= HASTY_SHARE * len(events):
+            found[mac] = Happened()
+            for event in {event.no: event for event in soon}.values():
+                found[mac] = found[mac].add(replace(event, mac=mac, other=event.mac))
+    return found
+
+
 def takes_unheard(ring: Ring, mac: int | None) -> bool:
     """Whether a station of which nothing is heard takes each token that seems to be repeated to it.
 
@@ -57,11 +82,22 @@ def takes_unheard(ring: Ring, mac: int | None) -> bool:
 
 def _unheard(ring: Ring) -> dict[int, Happened]:
     unheard: dict[int, Happened] = {}
+    second = hasty(ring)
     for (what, mac), happened in sorted(ring.happened.items(), key=lambda one: one[0][1] or 0):
         counts = what is RingEventKind.UNHEARD or (what is RingEventKind.RETRY and takes_unheard(ring, mac))
-        if counts and mac is not None:
+        if second and what is RingEventKind.UNHEARD:
+            happened = _without(happened, second)
+        if counts and happened.count and mac is not None:
             unheard[mac] = unheard.get(mac, Happened()).merge(happened)
     return unheard
+
+
+def _without(happened: Happened, second: Mapping[int, Happened]) -> Happened:
+    """Without what those sent that have a second token."""
+    events = tuple(event for event in happened.events if event.other not in second)
+    if len(events) == len(happened.events):
+        return happened
+    return replace(happened, count=len(events), events=events)
 
 
 def _is_mute(ring: Ring, mac: int, happened: Happened) -> bool:

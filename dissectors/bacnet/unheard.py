@@ -19,6 +19,9 @@ _POLL, _TOKEN = int(FrameType.POLL_FOR_MASTER), int(FrameType.TOKEN)
 _MOST = 8
 """Tokens in a row that may be unheard; so many too where frames came in one read, and have no times of their own."""
 
+HASTY = 1
+"""`RingEvent.value` of a token that was passed on sooner than times as they are read allow."""
+
 T_IMPATIENT = 100 * MS
 """Whoever asked a station that was never heard to answer, and goes on sooner than that, did not give up."""
 
@@ -46,15 +49,17 @@ class UnheardFrames:
     def passed_on(self, no: int, frame: Frame, before: Frame, holder: int, source: int) -> bool:
         """Whether the token of `holder` came to `source`, which sends, in frames that were not heard. Notes them."""
         fits = self._fit(frame, before, holder, source)
-        return not self._searches(frame, source) and self._pass_on(no, frame, holder, source, fits)
+        if self._searches(frame, source):
+            return False
+        return self._pass_on(no, frame, holder, source, fits, hasty=self._is_hasty(frame, before, holder))
 
-    def _pass_on(self, no: int, frame: Frame, holder: int, source: int, most: int) -> bool:
+    def _pass_on(self, no: int, frame: Frame, holder: int, source: int, most: int, *, hasty: bool = False) -> bool:
         way = self._way(holder, source, most)
         if way is None:
             return False
         nodes = self._tally.nodes
         for mac, following in zip(way, (*way[1:], source), strict=True):
-            self._tally.note(RingEventKind.UNHEARD, frame.start, no, mac, following)
+            self._tally.note(RingEventKind.UNHEARD, frame.start, no, mac, source, HASTY if hasty else None)
             self._supposed.pop(following, None)
             self._supposed[mac] = no, frame.start, source
             if following in nodes:
@@ -92,6 +97,14 @@ class UnheardFrames:
         elif before.octets[4] == holder and kind in EXPECTING:
             room -= self._least
         return min(_MOST, max(0, room) // self._least)
+
+    def _is_hasty(self, frame: Frame, before: Frame, holder: int) -> bool:
+        """Whether the holder polled, and as the times are read there was none to wait for the answer and pass a token.
+
+        One such pair of frames may have come together in a late read, but not all of them.
+        """
+        polled = before.octets[2] == _POLL and before.octets[4] == holder
+        return polled and frame.start - before.end < T_USAGE_DELAY + self._least
 
     def _searches(self, frame: Frame, source: int) -> bool:
         """Whether the frame is a poll as only one sends that has lost its neighbour, or made a token anew."""
