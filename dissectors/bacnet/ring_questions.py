@@ -185,7 +185,7 @@ class RingQuestions:
             return False
         if asked.missed:
             self._tally.take_back(RingEventKind.NO_REPLY, asked.no, source)
-        if not asked.answered:
+        if not asked.answered and took > T_REPLY_DELAY:  # sooner is in time, however soon the other one went on
             self._tally.note(RingEventKind.LATE_REPLY, frame.start, no, source, destination, took)
         return True
 
